@@ -65,6 +65,7 @@ struct ViewKey {
     /// Whether its picture is cached.
     is_cached: bool,
     is_paraboloid: bool,
+    has_oblique_near_plane: bool,
 }
 
 impl ViewKey {
@@ -74,12 +75,13 @@ impl ViewKey {
             kind: view.kind(),
             is_cached: view.is_cached,
             is_paraboloid: is_paraboloid(view),
+            has_oblique_near_plane: view.has_oblique_near_plane(),
         }
     }
 
     fn fits(&self, view: &RenderView) -> bool {
-        (self.name.as_str(), self.kind, self.is_cached, self.is_paraboloid)
-            == (view.name(), view.kind(), view.is_cached, is_paraboloid(view))
+        (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached)
+            && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
     }
 }
 
@@ -131,7 +133,11 @@ impl<B: Backend> StageGraph<B> {
             }
         }
         let tests_occlusion = key.options.occlusion_tile.is_some();
-        let control_of = |view| OcclusionControl::new(tests_occlusion, plan, draws, &passes, view);
+        let control_of = |view: (usize, &RenderView)| {
+            // What is behind a clip plane hides nothing.
+            let is_enabled = tests_occlusion && !view.1.has_oblique_near_plane();
+            OcclusionControl::new(is_enabled, plan, draws, &passes, view)
+        };
         let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();
         let mut builder = GraphBuilder::default();
         let every_frame =

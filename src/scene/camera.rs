@@ -1,9 +1,9 @@
 //! Cameras.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Quat, Vec2, Vec3};
 
-use super::SceneError;
 use super::transform::is_unit;
+use super::{ClipPlane, SceneError};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +16,12 @@ pub struct Camera {
     pub orientation: Quat,
     /// How positions are projected onto the picture.
     pub projection: Projection,
+    /// How far the picture's centre is to the right of the view direction, and above it, in halves of the picture's width and
+    /// height: the lens shift of an off-centre frustum. 0 for most cameras, and always without perspective.
+    /// [`Camera::tile`] and [`Camera::jittered`] set it.
+    pub shift: Vec2,
+    /// Only what is in front of this plane is drawn: an oblique near plane. `None` for most cameras, and always without perspective.
+    pub clip_plane: Option<ClipPlane>,
     /// The distance of the near plane, in metres, 1e-27 or more.
     pub near: f32,
     /// The distance of the far plane, in metres. In perspective it may be infinite, depth does not depend on it, and
@@ -92,11 +98,68 @@ impl Camera {
             position,
             orientation: Quat::from_mat3(&axes).normalize(),
             projection: Projection::Perspective { field_of_view: 60_f32.to_radians() },
+            shift: Vec2::ZERO,
+            clip_plane: None,
             near: 0.05,
             far: f32::INFINITY,
             size: [960, 540],
             kind: ViewKind::Main,
         }
+    }
+
+    /// The camera of one tile of this camera's picture, which is divided into `count` × `count` tiles. Tile `[0, 0]` is the upper left
+    /// one. Each has this camera's `size`, so the tiles put together are a picture with `count` times as many pixels a row (M 10.1). The
+    /// name is this camera's with the tile's column and row.
+    ///
+    /// ```
+    /// use drawloom::glam::DVec3;
+    /// use drawloom::scene::Camera;
+    ///
+    /// let camera = Camera::looking_at("main", DVec3::new(0.0, 1.0, 5.0), DVec3::ZERO);
+    /// let cameras: Vec<_> = (0..4).map(|tile| camera.tile([tile % 2, tile / 2], 2)).collect();
+    /// assert_eq!(cameras[1].name, "main, tile 1 0");
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such tile.
+    pub fn tile(&self, [column, row]: [u32; 2], count: u32) -> Self {
+        assert!(column < count && row < count, "tile {column} {row} is not one of {count} by {count}");
+        // From the whole picture's centre to the tile's, in halves of the tile.
+        let offset = Vec2::new((2 * column + 1) as f32 - count as f32, count as f32 - (2 * row + 1) as f32);
+        let mut camera = Self { name: format!("{}, tile {column} {row}", self.name), ..self.clone() };
+        match &mut camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let tangent = (f64::from(*field_of_view) * 0.5).tan() / f64::from(count);
+                *field_of_view = (2.0 * tangent.atan()) as f32;
+                camera.shift = self.shift * count as f32 + offset;
+            }
+            Projection::Orthographic { height } => {
+                *height /= count as f32;
+                let halves = offset * *height * 0.5;
+                camera.move_aside(halves * Vec2::new(self.aspect(), 1.0));
+            }
+            Projection::Paraboloid => {}
+        }
+        camera
+    }
+
+    /// This camera, looking past its picture's centre by `offset` pixels to the right and up: the sub-pixel jitter of temporal
+    /// antialiasing, and of antialiasing by the mean of several cameras (M 10.1). A paraboloid stays as it is, as it does for
+    /// [`Camera::tile`].
+    pub fn jittered(&self, offset: Vec2) -> Self {
+        let halves = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
+        let mut camera = self.clone();
+        match self.projection {
+            Projection::Perspective { .. } => camera.shift += offset / halves,
+            Projection::Orthographic { height } => camera.move_aside(offset * (0.5 * height / halves.y)),
+            Projection::Paraboloid => {}
+        }
+        camera
+    }
+
+    /// Moves the camera to the right and up, in metres.
+    fn move_aside(&mut self, metres: Vec2) {
+        self.position += (self.orientation.normalize() * metres.extend(0.0)).as_dvec3();
     }
 
     /// Width ÷ height of the picture.
@@ -120,6 +183,10 @@ impl Camera {
             "its near plane is nearer than 1e-27 m"
         } else if self.far.is_nan() || self.far <= self.near {
             "its far plane is not beyond its near plane"
+        } else if !self.shift.is_finite() || self.shift.abs().max_element() > MAX_SHIFT {
+            "its shift is not between -65536 and 65536"
+        } else if let Some(reason) = self.clip_plane.and_then(|plane| plane.problem()) {
+            reason
         } else if let Some(reason) = self.projection_problem() {
             reason
         } else {
@@ -135,6 +202,8 @@ impl Camera {
                 || field_of_view >= std::f32::consts::PI)
                 .then_some("its field of view is not between 0.0001 and 180 degrees"),
             _ if self.far.is_infinite() => Some("without perspective its far plane must be finite"),
+            _ if self.shift != Vec2::ZERO => Some("without perspective it can have no shift"),
+            _ if self.clip_plane.is_some() => Some("without perspective it can have no clip plane"),
             Projection::Orthographic { height } => {
                 (!in_range(height, MIN_HEIGHT)).then_some("its height is not a distance of 1e-6 m or more")
             }
@@ -148,6 +217,9 @@ impl Camera {
 /// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to
 /// 1.5e10 m across: with a near plane below 2e-28 m, depth would underflow in f32.
 const MIN_NEAR: f32 = 1e-27;
+
+/// The largest shift: tiles of a picture of the largest size that are a pixel wide.
+const MAX_SHIFT: f32 = 65_536.0;
 
 /// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would
 /// be larger than a pixel.

@@ -6,6 +6,7 @@
 mod assets;
 mod camera;
 mod changes;
+mod clip_plane;
 mod cuboid;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
@@ -28,6 +29,7 @@ mod vertex_attribute;
 pub use assets::{Asset, Assets};
 pub use camera::{Camera, Projection, ViewKind};
 pub use changes::Changes;
+pub use clip_plane::ClipPlane;
 pub use error::SceneError;
 pub use layer_mask::LayerMask;
 pub use light::{Light, LightKind};

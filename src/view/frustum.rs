@@ -25,7 +25,7 @@ pub struct Frustum {
     pub(super) near: f32,
     /// A point c with `far − forward · c ≥ 0` is not beyond the far plane. In metres, with tolerance.
     pub(super) far: f32,
-    /// `forward`, and the normals of the two pairs of side planes: inward, of unit length.
+    /// `forward`, and the normals of the two pairs of side planes: inward, as long as in [`SidePlanes`].
     pub(super) normals: [Vec3; 5],
     /// All planes as the tests of spheres compute them, in f64: inward normals, and offsets with tolerance.
     pub(super) planes: [([f64; 3], f64); 6],
@@ -35,10 +35,10 @@ pub struct Frustum {
 /// lies between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SidePlanes {
-    /// The part of the planes' unit normals that is perpendicular to `forward`: the normals are
-    /// `slope · forward ± across`. Its length is the cosine of half the field of view; 1 without perspective.
+    /// The normals are `slope · forward ± across`, of at most unit length: a shorter one only makes tests accept more. Without a shift
+    /// it is perpendicular to `forward`, and its length is the cosine of half the field of view; 1 without perspective.
     across: Vec3,
-    /// The sine of half the field of view; 0 without perspective.
+    /// Without a shift, the sine of half the field of view; 0 without perspective.
     slope: f32,
     /// In metres, with tolerance.
     offset: f32,
@@ -62,17 +62,25 @@ impl Frustum {
         let orientation = camera.orientation.as_dquat().normalize();
         let forward = orientation * DVec3::NEG_Z;
         let [width, height] = camera.size.map(f64::from);
-        let (sines_and_cosines, offsets) = match camera.projection {
+        // Of each pair: a point at c metres aside of the view direction and f metres along it is between the planes if
+        // slope · f + offset ≥ |scale · c − skew · f|.
+        let (slopes_scales_and_skews, offsets) = match camera.projection {
             Projection::Perspective { field_of_view } => {
                 let tangent_y = (f64::from(field_of_view) * 0.5).tan();
-                let of_tangent = |tangent: f64| [tangent, 1.0].map(|side| side / tangent.hypot(1.0));
-                ([of_tangent(tangent_y * width / height), of_tangent(tangent_y)], [0.0; 2])
+                let of_tangent = |half: f64, shift: f32| {
+                    let middle = half * f64::from(shift);
+                    // The longer normal of the two has unit length.
+                    let scale = 1.0 / (half + middle.abs()).hypot(1.0);
+                    [half * scale, scale, middle * scale]
+                };
+                let halves = [tangent_y * width / height, tangent_y];
+                (from_fn(|pair| of_tangent(halves[pair], camera.shift[pair])), [0.0; 2])
             }
             Projection::Orthographic { height: picture } => {
                 let half = f64::from(picture) * 0.5;
-                ([[0.0, 1.0]; 2], [half * width / height, half])
+                ([[0.0, 1.0, 0.0]; 2], [half * width / height, half])
             }
-            Projection::Paraboloid => ([[0.0, 1.0]; 2], [f64::from(camera.far); 2]),
+            Projection::Paraboloid => ([[0.0, 1.0, 0.0]; 2], [f64::from(camera.far); 2]),
         };
         let near = match camera.projection {
             // Objects in front of the near plane of a shadow map cast shadows too.
@@ -83,14 +91,14 @@ impl Frustum {
         };
         let axes = [DVec3::X, DVec3::Y].map(|axis| orientation * axis);
         let sides = from_fn(|pair| {
-            let [sine, cosine] = sines_and_cosines[pair];
+            let [slope, scale, skew] = slopes_scales_and_skews[pair];
             // Rounded up, so that the plane errs outwards.
             let offset = moved_outwards((offsets[pair] as f32).next_up());
-            SidePlanes { across: (axes[pair] * cosine).as_vec3(), slope: sine as f32, offset }
+            SidePlanes { across: (axes[pair] * scale - forward * skew).as_vec3(), slope: slope as f32, offset }
         });
         let normal = |pair: usize, sign: f64| {
-            let [sine, cosine] = sines_and_cosines[pair];
-            (forward * sine + axes[pair] * (cosine * sign)).as_vec3()
+            let [slope, scale, skew] = slopes_scales_and_skews[pair];
+            (forward * (slope - skew * sign) + axes[pair] * (scale * sign)).as_vec3()
         };
         let (near, far) = (moved_outwards(near), moved_outwards(camera.far));
         Self {
@@ -112,7 +120,8 @@ impl Frustum {
     /// the slope, the error is 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with
     /// the offset o add 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the
     /// error of the distance from a side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that
-    /// from the near or the far plane 6uN + u|o|. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
+    /// from the near or the far plane 6uN + u|o|. With a shift the sum is smaller, as slope and |across| are h ÷ √(1 + T²) and
+    /// √(1 + m²) ÷ √(1 + T²), where h and m are the tangents of half the picture and of its centre, and T = h + |m|. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
     /// offset, which also covers the tolerance's own rounding. Subnormal numbers lose less than the smallest normal
     /// number, which the offset includes as well. The bound consists of magnitudes from before any cancellation.
     ///
@@ -283,10 +292,15 @@ pub(super) mod tests {
         let (near, far) = (away - f64::from(camera.near), f64::from(camera.far) - away);
         let distances = match camera.projection {
             Projection::Perspective { field_of_view } => {
-                let half = f64::from(field_of_view) * 0.5;
-                let half_x = (half.tan() * aspect).atan();
-                let edge = |aside: f64, half: f64| away * half.sin() - aside.abs() * half.cos();
-                [near, far, edge(local.x, half_x), edge(local.y, half)]
+                let half = (f64::from(field_of_view) * 0.5).tan();
+                let halves = [half * aspect, half];
+                // The distance from the lines through the camera at both ends of the picture.
+                let edge = |aside: f64, pair: usize| {
+                    let [low, high] = [-1.0, 1.0].map(|end| (end + f64::from(camera.shift[pair])) * halves[pair]);
+                    let from = |slope: f64, sign: f64| sign * (aside - away * slope) / slope.hypot(1.0);
+                    from(low, 1.0).min(from(high, -1.0))
+                };
+                [near, far, edge(local.x, 0), edge(local.y, 1)]
             }
             Projection::Orthographic { height } => {
                 let half = f64::from(height) * 0.5;
@@ -297,6 +311,17 @@ pub(super) mod tests {
             Projection::Paraboloid => [away, f64::from(camera.far) - local.length(), f64::INFINITY, f64::INFINITY],
         };
         distances.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The least length of a side plane's normal: a sphere is culled if it is 1 ÷ that of its radius outside.
+    fn least_normal(camera: &Camera) -> f64 {
+        let Projection::Perspective { field_of_view } = camera.projection else { return 1.0 };
+        let half = (f64::from(field_of_view) * 0.5).tan();
+        let of_pair = |half: f64, shift: f32| {
+            let [one, other] = [-1.0, 1.0].map(|end| ((f64::from(shift) + end) * half).hypot(1.0));
+            one.min(other) / one.max(other)
+        };
+        of_pair(half * f64::from(camera.aspect()), camera.shift.x).min(of_pair(half, camera.shift.y))
     }
 
     prop_compose! {
@@ -311,6 +336,8 @@ pub(super) mod tests {
             near_exponent in -5.0..2.0_f32,
             far_exponent in 0.001..6.0_f32,
             projection in 0_usize..4,
+            shift in prop::array::uniform2(-3.0..3.0_f32),
+            is_shifted in any::<bool>(),
         ) -> Camera {
             let mut camera = Camera::looking_at("any", DVec3::from(position) * 10_f64.powf(exponent), DVec3::ZERO);
             camera.orientation = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
@@ -322,6 +349,9 @@ pub(super) mod tests {
                 2 => Projection::Orthographic { height: degrees * camera.near },
                 _ => Projection::Paraboloid,
             };
+            if projection < 2 && is_shifted {
+                camera.shift = shift.into();
+            }
             // One perspective camera in two has an infinite far plane.
             if projection != 0 {
                 camera.far = camera.near * 10_f32.powf(far_exponent);
@@ -392,8 +422,9 @@ pub(super) mod tests {
             let depth = depth_inside(&camera, center);
             let far = if camera.far.is_finite() { f64::from(camera.far) } else { 0.0 };
             let slack = 4e-6 * ((center - camera.position).length() + f64::from(camera.near) + far);
-            if depth < -slack && camera.projection != Projection::Paraboloid {
-                let radius = (-depth - slack) as f32;
+            let outside = -depth * least_normal(&camera) - slack;
+            if outside > 0.0 && camera.projection != Projection::Paraboloid {
+                let radius = outside as f32;
                 prop_assert!(!Frustum::new(&camera).intersects_sphere(center, radius), "depth {depth} radius {radius}");
             }
         }

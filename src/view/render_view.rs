@@ -1,6 +1,6 @@
 //! A camera's view within a frame.
 
-use glam::{DMat4, DVec4, Mat4, Vec3};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec2, Vec3};
 
 use super::Frustum;
 use crate::scene::{Camera, Projection, ViewKind};
@@ -54,8 +54,10 @@ impl RenderView {
         let projection = match camera.projection {
             Projection::Perspective { field_of_view } => {
                 let scale = 1.0 / (f64::from(field_of_view) * 0.5).tan();
+                let shift = camera.shift.as_dvec2();
+                let back = DVec4::new(shift.x, shift.y, 0.0, -1.0);
                 let end = DVec4::Z * f64::from(camera.near);
-                DMat4::from_cols(DVec4::X * (scale / aspect), DVec4::Y * scale, DVec4::NEG_W, end)
+                DMat4::from_cols(DVec4::X * (scale / aspect), DVec4::Y * scale, back, end)
             }
             Projection::Orthographic { height } => {
                 let scale = 2.0 / f64::from(height);
@@ -66,12 +68,51 @@ impl RenderView {
             }
             Projection::Paraboloid => DMat4::IDENTITY,
         };
-        projection * DMat4::from_quat(camera.orientation.as_dquat().normalize().inverse())
+        let matrix = projection * DMat4::from_quat(camera.orientation.as_dquat().normalize().inverse());
+        match self.oblique_depth() {
+            Some(depth) => {
+                let rows = matrix.transpose();
+                DMat4::from_cols(rows.x_axis, rows.y_axis, depth, rows.w_axis).transpose()
+            }
+            None => matrix,
+        }
+    }
+
+    /// Whether depth is measured from the camera's clip plane.
+    pub fn has_oblique_near_plane(&self) -> bool {
+        self.oblique_depth().is_some()
+    }
+
+    /// The row of the matrix that makes the clip plane the near plane, if there is one and the camera is behind it.
+    ///
+    /// For a position p relative to the camera, let w = forward · p, and π = normal · p + offset its distance in front of the plane. The
+    /// row is w − a π: it equals w, for a depth of 1, on the plane. The depth of a position at distance t along the ray r is
+    /// 1 − a normal · r − a offset ÷ t. It falls with t, as the offset is negative, towards 1 − a normal · r, which is 0 or more
+    /// everywhere in the picture if a is 1 ÷ (the largest normal · r of its corners).
+    fn oblique_depth(&self) -> Option<DVec4> {
+        let plane = self.camera.clip_plane?;
+        let Projection::Perspective { field_of_view } = self.camera.projection else { return None };
+        let offset = plane.distance(self.camera.position);
+        if offset >= 0.0 {
+            return None;
+        }
+        let half = (f64::from(field_of_view) * 0.5).tan();
+        let half = DVec2::new(half * f64::from(self.camera.size[0]) / f64::from(self.camera.size[1]), half);
+        let axis = |direction: DVec3| self.camera.orientation.as_dquat().normalize() * direction;
+        let [right, up, forward] = [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(axis);
+        let normal = plane.normal.as_dvec3().normalize();
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|corner| {
+            let DVec2 { x, y } = (DVec2::from(corner) + self.camera.shift.as_dvec2()) * half;
+            normal.dot(right * x + up * y + forward)
+        });
+        let largest = corners.into_iter().fold(MIN_OBLIQUE_SLOPE, f64::max);
+        Some((forward - normal / largest).extend(-offset / largest))
     }
 
     /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance
-    /// of 1), and forward. The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in
-    /// perspective; otherwise it starts at x·right + y·up and has the direction forward.
+    /// of 1), and forward, which in perspective is the ray of the picture's centre, a [shift](Camera::shift) from the view direction.
+    /// The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in perspective; otherwise it
+    /// starts at x·right + y·up and has the direction forward.
     pub fn picture_axes(&self) -> [Vec3; 3] {
         let half = match self.camera.projection {
             Projection::Perspective { field_of_view } => (field_of_view * 0.5).tan(),
@@ -79,15 +120,23 @@ impl RenderView {
             Projection::Paraboloid => 1.0,
         };
         let axis = |direction: Vec3| self.camera.orientation.normalize() * direction;
-        [axis(Vec3::X) * half * self.camera.aspect(), axis(Vec3::Y) * half, axis(Vec3::NEG_Z)]
+        let [right, up] = [axis(Vec3::X) * half * self.camera.aspect(), axis(Vec3::Y) * half];
+        let shift = self.camera.shift;
+        let forward = axis(Vec3::NEG_Z);
+        [right, up, if shift == Vec2::ZERO { forward } else { forward + right * shift.x + up * shift.y }]
     }
 }
 
+/// Where no ray of the picture comes closer to the clip plane's normal than this, nothing in front of the plane is visible, and the row
+/// stays finite.
+const MIN_OBLIQUE_SLOPE: f64 = 1e-6;
+
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use glam::{DVec3, Vec4, Vec4Swizzles};
+    use glam::{Vec4, Vec4Swizzles};
 
     use super::*;
+    use crate::scene::ClipPlane;
 
     #[test]
     fn depth_is_one_at_the_near_plane_and_falls_towards_zero() {
@@ -127,5 +176,39 @@ mod tests {
         let [right, up, forward] = view.picture_axes();
         let clip = view.clip_from_relative() * (right + up + forward).extend(1.0);
         assert!((clip.xy() / clip.w - glam::Vec2::ONE).length() < 1e-6);
+    }
+
+    #[test]
+    fn depth_is_one_on_the_clip_plane_and_stays_positive_beyond_it() {
+        let normal = Vec3::new(0.6, 0.0, -0.8);
+        for shift in [Vec2::ZERO, Vec2::new(2.0, -1.0)] {
+            let clip_plane = Some(ClipPlane { point: DVec3::new(0.0, 0.0, -4.0), normal });
+            let camera = Camera { shift, clip_plane, ..Camera::looking_at("mirror", DVec3::ZERO, DVec3::NEG_Z) };
+            let view = RenderView::new(&camera);
+            assert!(view.has_oblique_near_plane());
+            let [right, up, center] = view.picture_axes();
+            for (x, y) in [(0.0, 0.0), (0.9, 0.9), (-0.9, 0.4), (0.3, -0.9)] {
+                let ray = right * x + up * y + center;
+                // normal · (ray t − point) = 0.
+                let on_plane = 3.2 / normal.dot(ray);
+                let clip_at = |distance: f32| view.clip_from_relative() * (ray * distance).extend(1.0);
+                let depth_at = |distance: f32| clip_at(distance).z / clip_at(distance).w;
+                assert!(clip_at(1.0).abs_diff_eq(Vec4::new(x, y, clip_at(1.0).z, 1.0), 1e-5));
+                if on_plane <= 0.0 {
+                    assert!(depth_at(1.0) > 1.0 && depth_at(1e6) > 1.0, "nothing on this ray is in front of the plane");
+                    continue;
+                }
+                assert!((depth_at(on_plane) - 1.0).abs() < 1e-5);
+                assert!(depth_at(on_plane * 0.99) > 1.0 && depth_at(on_plane * 1.01) < 1.0);
+                assert!(depth_at(on_plane * 1e6) > -1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_clip_plane_behind_the_camera_clips_nothing() {
+        let clip_plane = Some(ClipPlane { point: DVec3::Z, normal: Vec3::NEG_Z });
+        let camera = Camera { clip_plane, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
+        assert!(!RenderView::new(&camera).has_oblique_near_plane());
     }
 }

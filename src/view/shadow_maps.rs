@@ -1,6 +1,6 @@
 //! Shadow maps: a light's view is a view like any other (M 10.4, L 4.2.2).
 
-use glam::{DQuat, DVec3, Quat, Vec3};
+use glam::{DQuat, DVec2, DVec3, Quat, Vec2, Vec3};
 
 use super::FixedPosition;
 use crate::scene::{Camera, Light, Projection, ViewKind};
@@ -79,6 +79,8 @@ impl ShadowMaps {
             position,
             orientation: looking_along(direction),
             projection,
+            shift: Vec2::ZERO,
+            clip_plane: None,
             near: near.max(f32::MIN_POSITIVE),
             far: far.max(f32::MIN_POSITIVE * 2.0),
             size: [self.side; 2],
@@ -98,7 +100,8 @@ impl ShadowMaps {
                 Projection::Perspective { field_of_view } => {
                     let up = (f64::from(field_of_view) * 0.5).tan();
                     // The sphere through the camera and the far corners, or around the far corners if it is larger.
-                    let spread = up * up * (1.0 + aspect * aspect);
+                    let corner = DVec2::new(up * aspect, up) * (1.0 + camera.shift.abs().as_dvec2());
+                    let spread = corner.length_squared();
                     let along = if spread < 1.0 { far * (1.0 + spread) * 0.5 } else { far };
                     let radius = if spread < 1.0 { along } else { far * spread.sqrt() };
                     (camera.position + forward * along, radius)

@@ -4,7 +4,8 @@ use drawloom::FrameError;
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
-    Bounds, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology, Vertex,
+    Bounds, Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology,
+    Vertex,
 };
 use drawloom::view::RejectionReason;
 use drawloom_testing::scenes::{sized, square};
@@ -223,6 +224,18 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
             }
         })],
     )?;
+    check(
+        harness,
+        &SPECIAL_POSITIONS,
+        &[(
+            "camera's clip plane's point",
+            |test, number| {
+                let point = DVec3::new(0.0, 0.0, number);
+                test.camera().clip_plane = Some(ClipPlane { point, normal: Vec3::NEG_Z });
+            },
+            |number: f64| if number.is_finite() { Expected::Drawn } else { Expected::InvalidCamera },
+        )],
+    )?;
     let small = |number: f32| if number.abs() < 0.01 { Expected::Drawn } else { Expected::InvalidCamera };
     check(
         harness,
@@ -248,6 +261,19 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
                 "camera's field of view",
                 |test, number| test.camera().projection = Projection::Perspective { field_of_view: number },
                 |_| Expected::InvalidCamera,
+            ),
+            (
+                "camera's shift",
+                |test, number| test.camera().shift.x = number,
+                |number| if number.abs() <= 65_536.0 { Expected::Drawn } else { Expected::InvalidCamera },
+            ),
+            (
+                "camera's clip plane's normal",
+                |test, number| {
+                    let normal = Vec3::new(0.0, number, -1.0);
+                    test.camera().clip_plane = Some(ClipPlane { point: DVec3::ZERO, normal });
+                },
+                small,
             ),
             (
                 "camera's height",

@@ -4,14 +4,14 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
-use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
 use drawloom::process::{
     CommandDraws, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Format, GeometryBuffer, GeometryFormats,
     LightVolumes, PlanError, ProceduralDraws, ProcessError, RenderProcess, StorageBuffer, ToneMapping, Workgroups,
 };
 use drawloom::scene::{
-    Bounds, Camera, Changes, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene, SceneError,
-    SceneRef, VertexAttribute, ViewKind,
+    Bounds, Camera, Changes, ClipPlane, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene,
+    SceneError, SceneRef, VertexAttribute, ViewKind,
 };
 use drawloom::task::Scheduler;
 use drawloom::view::RejectionReason;
@@ -75,7 +75,8 @@ fn an_invalid_camera_is_refused_by_name() {
         camera.projection = Projection::Orthographic { height };
         camera.far = 10.0;
     };
-    let bad: [&dyn Fn(&mut Camera); 16] = [
+    let plane = |normal| ClipPlane { point: DVec3::ZERO, normal };
+    let bad: [&dyn Fn(&mut Camera); 23] = [
         &|camera| camera.position.y = f64::NAN,
         &|camera| camera.position.y = f64::INFINITY,
         &|camera| camera.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0),
@@ -92,6 +93,20 @@ fn an_invalid_camera_is_refused_by_name() {
         &|camera| orthographic(camera, f32::NAN),
         // Without a far plane.
         &|camera| camera.projection = Projection::Orthographic { height: 1.0 },
+        &|camera| camera.shift.x = f32::NAN,
+        &|camera| camera.shift.y = 1e6,
+        &|camera| camera.clip_plane = Some(plane(Vec3::ZERO)),
+        &|camera| camera.clip_plane = Some(plane(Vec3::new(f32::NAN, 1.0, 0.0))),
+        &|camera| camera.clip_plane = Some(ClipPlane { point: DVec3::INFINITY, ..plane(Vec3::X) }),
+        // Only in perspective.
+        &|camera| {
+            orthographic(camera, 1.0);
+            camera.shift = Vec2::X;
+        },
+        &|camera| {
+            orthographic(camera, 1.0);
+            camera.clip_plane = Some(plane(Vec3::X));
+        },
         // Only lights have this projection.
         &|camera| (camera.projection, camera.far) = (Projection::Paraboloid, 10.0),
     ];

@@ -6,6 +6,7 @@
 
 mod attributes;
 mod buffers;
+mod cameras;
 mod changes;
 mod changing_shaders;
 mod columns;
@@ -64,6 +65,7 @@ fn main() {
     let cases = [
         (attributes::CASES, Needs::Adapter),
         (buffers::CASES, Needs::Adapter),
+        (cameras::CASES, Needs::Adapter),
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),

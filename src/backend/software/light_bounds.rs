@@ -27,14 +27,17 @@ impl LightBounds {
         }
         let double = |vector: Vector3<R>| vector.0.map(Real::as_f64);
         let (position, range) = (double(light.position), light.range.as_f64());
-        let along = |axis: Vector3<R>| {
-            let axis = double(axis);
+        let along = |axis: [f64; 3]| {
             let length = dot(axis, axis).sqrt();
             (dot(axis, position) / length, length)
         };
-        let ahead = along(view.forward).0;
-        let [columns, rows] =
-            [(view.right, view.size[0], 1.0), (view.up, view.size[1], -1.0)].map(|(axis, pixels, sign)| {
+        let (right, up, center) = (double(view.right), double(view.up), double(view.forward));
+        let shift_along = |axis: [f64; 3]| dot(axis, center) / dot(axis, axis);
+        let [shift_right, shift_up] = [right, up].map(shift_along);
+        let forward = [0, 1, 2].map(|axis| center[axis] - shift_right * right[axis] - shift_up * up[axis]);
+        let ahead = along(forward).0;
+        let [columns, rows] = [(right, shift_right, view.size[0], 1.0), (up, shift_up, view.size[1], -1.0)].map(
+            |(axis, shift, pixels, sign)| {
                 let (aside, half) = along(axis);
                 let [low, high] = match view.projection {
                     Projection::Perspective { .. } => disc_slopes(aside, ahead, range)?,
@@ -42,12 +45,13 @@ impl LightBounds {
                     Projection::Paraboloid => return None,
                 };
                 let margin = (high - low) * 1e-3;
-                let pixel_of = |value: f64| (sign * value / half * 0.5 + 0.5) * pixels as f64;
+                let pixel_of = |value: f64| (sign * (value / half - shift) * 0.5 + 0.5) * pixels as f64;
                 let [one, other] = [pixel_of(low - margin), pixel_of(high + margin)];
                 let (first, last) = (one.min(other) - 1.0, one.max(other) + 1.0);
                 // False for NaN, which an infinitely large light leads to: the bounds are the whole picture.
                 (first <= last).then(|| (first.max(0.0) as usize, (last.ceil().max(0.0) as usize).min(pixels)))
-            });
+            },
+        );
         let pixels = match (columns, rows) {
             (Some((left, right)), Some((top, bottom))) => PixelBounds { left, top, right, bottom },
             _ => whole.pixels,
@@ -62,6 +66,10 @@ impl LightBounds {
 fn depths_at<R: Real>(view: &ShaderView<R>, ends: [f64; 2]) -> Option<[f64; 2]> {
     let (near, far) = (view.near.as_f64(), view.far.as_f64());
     let depths = match view.projection {
+        // From an oblique near plane, depth does not depend on the distance alone.
+        Projection::Perspective { .. } if view.clip_from_relative[..3].iter().any(|column| column[2] != R::zero()) => {
+            return None;
+        }
         Projection::Perspective { .. } => {
             // An end behind the camera is nearer than everything visible.
             ends.map(|distance| if distance > 0.0 { near / distance } else { f64::INFINITY })
@@ -94,7 +102,7 @@ mod tests {
 
     use super::*;
     use crate::backend::software::shader_inputs::{exact_view, light_as_uploaded};
-    use crate::scene::{Assets, Camera, Light, SceneRef};
+    use crate::scene::{Assets, Camera, ClipPlane, Light, SceneRef};
     use crate::view::{GpuLight, RenderView};
 
     const SIZE: [u32; 2] = [160, 90];
@@ -127,6 +135,8 @@ mod tests {
             degrees in 1.0..170.0_f32,
             turn in 0.0..6.3_f32,
             is_orthographic in any::<bool>(),
+            shift in prop::array::uniform2(-2.0..2.0_f32),
+            clip_distance in prop::option::of(0.1..20.0_f64),
         ) {
             let mut camera = Camera::looking_at("main", DVec3::new(1e5, 2.0, 3.0), DVec3::ZERO);
             camera.orientation = Quat::from_rotation_y(turn);
@@ -134,6 +144,12 @@ mod tests {
             let perspective = Projection::Perspective { field_of_view: degrees.to_radians() };
             camera.projection = if is_orthographic { Projection::Orthographic { height: degrees } } else { perspective };
             camera.far = 1e4;
+            if !is_orthographic {
+                camera.shift = shift.into();
+                let normal = camera.orientation * Vec3::NEG_Z;
+                let plane = |distance| ClipPlane { point: camera.position + normal.as_dvec3() * distance, normal };
+                camera.clip_plane = clip_distance.map(plane);
+            }
             let position = camera.position + DVec3::from(position);
             let range = 10_f64.powf(exponent);
             let LightBounds { pixels: bounds, depths } = light_bounds(&camera, position, range as f32);

@@ -118,11 +118,13 @@ pub(super) fn exact_view(view: &RenderView, scene: &SceneRef<'_>) -> ShaderView<
     let orientation = camera.orientation.as_dquat().normalize();
     let [width, height] = camera.size.map(f64::from);
     let half = half_height(camera.projection);
+    let [right, up] = [orientation * DVec3::X * half * (width / height), orientation * DVec3::Y * half];
+    let shift = camera.shift.as_dvec2();
     ShaderView {
         clip_from_relative: view.precise_clip_from_relative().to_cols_array_2d().map(Vector),
-        right: Vector3::of(orientation * DVec3::X * half * (width / height)),
-        up: Vector3::of(orientation * DVec3::Y * half),
-        forward: Vector3::of(orientation * DVec3::NEG_Z),
+        right: Vector3::of(right),
+        up: Vector3::of(up),
+        forward: Vector3::of(orientation * DVec3::NEG_Z + right * shift.x + up * shift.y),
         near: f64::from(camera.near),
         far: f64::from(camera.far),
         size: size_of(view),

@@ -58,7 +58,11 @@ impl<R: Real> ShaderView<R> {
     pub fn position_from_depth(&self, clip: Vector2<R>, depth: R) -> Vector3<R> {
         let across = self.right * clip[0] + self.up * clip[1];
         if self.is_perspective() {
-            return (across + self.forward) * (self.near / depth);
+            let ray = across + self.forward;
+            let [right, up, back, origin] = self.clip_from_relative.map(|column| column[2]);
+            // 0 unless the near plane is oblique.
+            let depth_at_infinity = Vector([right, up, back]).dot(ray);
+            return ray * (origin / (depth - depth_at_infinity));
         }
         across + self.forward * mix(self.far, self.near, depth)
     }

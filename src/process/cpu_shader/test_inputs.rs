@@ -1,11 +1,11 @@
 //! Views, lights and targets for the tests of several CPU shaders.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::{Materials, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderView};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
-use crate::scene::{Blend, Camera, Light, MaterialValues, Projection, ViewKind};
+use crate::scene::{Blend, Camera, ClipPlane, Light, MaterialValues, Projection, ViewKind};
 use crate::view::{GpuLight, RenderView};
 
 /// The unit roundoff of f32: 2⁻²⁴.
@@ -18,8 +18,8 @@ pub(in crate::process) fn direction() -> impl Strategy<Value = DVec3> {
     vector.prop_filter("a direction", |vector| vector.length() > 1e-6).prop_map(DVec3::normalize)
 }
 
-/// A perspective view that looks along -Z, and an orthographic one.
-pub(in crate::process) fn views() -> [RenderView; 2] {
+/// A perspective view that looks along -Z, an orthographic one, an off-centre one, and one with a clip plane.
+pub(in crate::process) fn views() -> [RenderView; 4] {
     let camera = Camera { size: [16, 9], ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
     let plan = Camera {
         projection: Projection::Orthographic { height: 8.0 },
@@ -27,7 +27,10 @@ pub(in crate::process) fn views() -> [RenderView; 2] {
         far: 50.0,
         ..Camera::looking_at("plan", DVec3::ZERO, DVec3::new(-1.0, 2.0, 0.5))
     };
-    [RenderView::new(&camera), RenderView::new(&plan)]
+    let off_center = Camera { shift: Vec2::new(-1.5, 0.5), ..camera.clone() };
+    let clip_plane = ClipPlane { point: DVec3::NEG_Z * 3.0, normal: Vec3::new(0.48, 0.36, -0.8) };
+    let clipped = Camera { clip_plane: Some(clip_plane), ..off_center.clone() };
+    [&camera, &plan, &off_center, &clipped].map(RenderView::new)
 }
 
 pub(in crate::process) fn paraboloid() -> Camera {

@@ -21,7 +21,8 @@ struct View {
     light_count: u32,
     position_high: vec3<i32>,
     near: f32,
-    // Right and up are as long as half the picture's width and height at a distance of 1.
+    // Right and up are as long as half the picture's width and height at a distance of 1. In perspective, forward is the ray of the
+    // picture's centre.
     right: vec3<f32>,
     width: f32,
     up: vec3<f32>,
@@ -189,7 +190,11 @@ fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
 fn position_from_depth(clip: vec2<f32>, depth: f32) -> vec3<f32> {
     let across = clip.x * view.right + clip.y * view.up;
     if view.projection == PERSPECTIVE {
-        return (across + view.forward) * (view.near / depth);
+        let ray = across + view.forward;
+        let matrix = view.clip_from_relative;
+        // 0 unless the near plane is oblique.
+        let depth_at_infinity = dot(vec3<f32>(matrix[0].z, matrix[1].z, matrix[2].z), ray);
+        return ray * (matrix[3].z / (depth - depth_at_infinity));
     }
     return across + view.forward * mix(view.far, view.near, depth);
 }

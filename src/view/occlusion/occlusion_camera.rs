@@ -18,8 +18,11 @@ pub(super) struct OcclusionCamera {
     is_perspective: bool,
     /// Pixels per metre; in perspective, at a depth of 1 m.
     focal: f64,
-    /// The picture's centre.
+    /// Where the view direction meets the picture: its centre, unless the camera has a shift.
     center: DVec2,
+    size: DVec2,
+    /// How far the picture reaches from `center`, in pixels.
+    reach: DVec2,
     near: f64,
     far: f64,
     /// The most pixels by which a point or an edge moves in the picture if it moves by a metre, at a depth of 1 m.
@@ -52,14 +55,19 @@ impl OcclusionCamera {
             // A picture of zero size hides nothing.
             Projection::Paraboloid => (false, 0.0),
         };
-        let center = DVec2::new(width, height) / 2.0;
-        let pixels_per_metre = if is_perspective { focal + center.length() } else { focal };
+        let size = DVec2::new(width, height);
+        let shift = camera.shift.as_dvec2();
+        let center = size / 2.0 * (1.0 + shift * DVec2::new(-1.0, 1.0));
+        let reach = size / 2.0 * (1.0 + shift.abs());
+        let pixels_per_metre = if is_perspective { focal + reach.length() } else { focal };
         Self {
             position: camera.position,
             rotation: DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)) * back,
             is_perspective,
             focal,
             center,
+            size,
+            reach,
             near: f64::from(camera.near),
             far: f64::from(camera.far),
             pixels_per_metre,
@@ -142,7 +150,7 @@ impl OcclusionCamera {
 
     /// Whether a point is within the picture.
     pub(super) fn is_in_picture(&self, point: DVec2) -> bool {
-        point.cmpge(DVec2::ZERO).all() && point.cmplt(self.center * 2.0).all()
+        point.cmpge(DVec2::ZERO).all() && point.cmplt(self.size).all()
     }
 
     /// Whether the projection is perspective.
@@ -166,7 +174,7 @@ impl OcclusionCamera {
     /// pixel, and the viewport transform has an error of a few unit roundoffs of the picture's size.
     pub(super) fn pixel_error(&self, slack: f64, depth: f64) -> f64 {
         let scale = if self.is_perspective { self.pixels_per_metre / depth } else { self.pixels_per_metre };
-        SNAPPING_ERROR + self.center.max_element() * F32_ERROR + slack * scale
+        SNAPPING_ERROR + self.reach.max_element() * F32_ERROR + slack * scale
     }
 
     /// The greatest nearness that a device may compute for a depth; the tolerance, 2⁻¹⁸, is some 64 unit roundoffs.
@@ -272,12 +280,15 @@ mod tests {
             degrees in 1.0..150.0_f32,
             size in prop::array::uniform2(1_u32..4000),
             is_orthographic in prop::bool::ANY,
+            shift in prop::array::uniform2(-2.0..2.0_f32),
         ) -> Camera {
             let position = DVec3::from(position) * 10_f64.powf(exponent);
             let mut camera = Camera::looking_at("any", position, position + DVec3::from(towards));
             camera.projection = Projection::Perspective { field_of_view: degrees.to_radians() };
             if is_orthographic {
                 (camera.projection, camera.far) = (Projection::Orthographic { height: degrees }, 1e4);
+            } else if size[0] % 2 == 0 {
+                camera.shift = shift.into();
             }
             Camera { size, ..camera }
         }
