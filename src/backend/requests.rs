@@ -1,7 +1,7 @@
 //! What frames request of a backend.
 
 use crate::command::DrawList;
-use crate::process::{Draws, FramePlan, Pass};
+use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
 use crate::scene::{Light, SceneRef};
 use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
@@ -21,6 +21,8 @@ pub struct FrameRequest<'a> {
     pub light_tables: &'a [LightTable],
     /// Each render process in each of its views, in submission order.
     pub passes: &'a [Pass],
+    /// The views that passes sample.
+    pub sampled_views: &'a SampledViews,
     /// The scene.
     pub scene: &'a SceneRef<'a>,
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.

@@ -17,6 +17,8 @@ pub struct Selection {
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
     pub excluded_layers: LayerMask,
+    /// By what the view shows: objects that belong to one of these layers too. [`Camera::layers`](crate::scene::Camera::layers) sets it.
+    pub shown_layers: LayerMask,
     /// In which order they are drawn.
     pub order: DrawOrder,
 }
@@ -36,6 +38,7 @@ impl Selection {
             material_types: MaterialTypeFilter::Any,
             layers: LayerMask::ALL,
             excluded_layers: LayerMask::NONE,
+            shown_layers: LayerMask::ALL,
             order: DrawOrder::ByState,
         }
     }
@@ -58,6 +61,11 @@ impl Selection {
     /// Those of these objects that belong to none of some layers.
     pub const fn not_in_layers(self, layers: LayerMask) -> Self {
         Self { excluded_layers: LayerMask(self.excluded_layers.0 | layers.0), ..self }
+    }
+
+    /// Those of these objects that a view of some layers shows.
+    pub const fn shown_in(self, shown_layers: LayerMask) -> Self {
+        Self { shown_layers, ..self }
     }
 
     /// The same objects in another order.

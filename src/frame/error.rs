@@ -47,6 +47,10 @@ pub enum FrameError {
         /// Its kind.
         kind: ViewKind,
     },
+    /// Views that sample each other in a circle: see
+    /// [`Declare::samples_view`](crate::process::Declare::samples_view).
+    #[error("views sample each other: {0}")]
+    CircularViews(GraphProblem),
     /// Views that draw layers of one texture differ in size.
     #[error("views {:?} and {:?} share the target {target:?}, but differ in size", views[0], views[1])]
     UnequalLayers {

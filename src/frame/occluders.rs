@@ -49,7 +49,7 @@ pub(super) fn occluders(
             if !own.is_empty() {
                 colors = own;
             }
-            occluders.push(selection);
+            occluders.push(view.selection_of(selection));
         } else {
             tests_only = true;
         }

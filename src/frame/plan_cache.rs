@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
 use crate::quality::Quality;
-use crate::scene::{Assets, Light, ViewKind};
+use crate::scene::{Assets, Camera, Light, ViewKind};
 use crate::task::{JobPanic, catch};
 use crate::view::ShadowMaps;
 
@@ -66,8 +66,14 @@ impl PlanCache {
     ///
     /// # Errors
     /// If the processes make no frame.
-    pub(super) fn select(&mut self, lights: &[Light], assets: &Assets) -> Result<Arc<FramePlan>, PlanError> {
-        self.current = self.plan_for(Requirements::of(lights, assets, self.separates_shadowed_lights()))?;
+    pub(super) fn select(
+        &mut self,
+        lights: &[Light],
+        assets: &Assets,
+        cameras: &[Camera],
+    ) -> Result<Arc<FramePlan>, PlanError> {
+        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights()).with_cameras(cameras);
+        self.current = self.plan_for(requirements)?;
         Ok(Arc::clone(&self.current))
     }
 
@@ -80,8 +86,9 @@ impl PlanCache {
         &mut self,
         lights: &[Light],
         assets: &Assets,
+        cameras: &[Camera],
     ) -> Result<[Arc<FramePlan>; 2], PlanError> {
-        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights());
+        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights()).with_cameras(cameras);
         Ok([self.plan_for(requirements)?, self.plan_for(Requirements::all())?])
     }
 
@@ -129,7 +136,9 @@ fn compile(
         let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
         let own = deferred.map(|deferred| deferred.output().to_owned());
         let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
-        FramePlan::new(chain, processes.to_vec(), &outputs)
+        // Without a pipeline there is one plan for all scenes.
+        let is_present = |kind| kind != ViewKind::Reflection || deferred.is_none() || requirements.reflections();
+        FramePlan::for_views(chain, processes.to_vec(), &outputs, (&[ViewKind::Reflection], &is_present))
     })
 }
 

@@ -12,9 +12,9 @@ use super::tables::{FrameTables, PassTable};
 use crate::backend::Backend;
 use crate::command::Selection;
 use crate::graph::{FrameGraph, NodeId, Schedule};
-use crate::process::{Draws, FramePlan, Pass};
+use crate::process::{Draws, FramePasses, FramePlan, Pass, SampledViews};
 use crate::quality::{CullingVolume, DepthKey};
-use crate::scene::{Projection, SceneRef, ViewKind};
+use crate::scene::{LayerMask, Projection, SceneRef, ViewKind};
 use crate::timeline::Labels;
 use crate::view::RenderView;
 
@@ -24,6 +24,7 @@ pub(super) struct StageGraph<B: Backend> {
     pub(super) tuning: StageTuning,
     /// In submission order.
     pub(super) passes: Vec<Pass>,
+    pub(super) sampled_views: SampledViews,
     pub(super) plan: Arc<FramePlan>,
     /// What else the graph was built for.
     key: GraphKey,
@@ -66,6 +67,7 @@ struct ViewKey {
     is_cached: bool,
     is_paraboloid: bool,
     has_oblique_near_plane: bool,
+    layers: LayerMask,
 }
 
 impl ViewKey {
@@ -76,12 +78,14 @@ impl ViewKey {
             is_cached: view.is_cached,
             is_paraboloid: is_paraboloid(view),
             has_oblique_near_plane: view.has_oblique_near_plane(),
+            layers: view.camera.layers,
         }
     }
 
     fn fits(&self, view: &RenderView) -> bool {
         (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached)
             && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
+            && self.layers == view.camera.layers
     }
 }
 
@@ -119,14 +123,14 @@ impl<B: Backend> StageGraph<B> {
     /// run one after the other. Nothing else waits: the order of passes binds submission, not recording.
     ///
     /// # Errors
-    /// If no process draws in a view.
+    /// If no process draws in a view, or views sample each other in a circle.
     fn new(
         plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
         views: &[RenderView],
         key: GraphKey,
     ) -> Result<Self, FrameError> {
-        let passes = plan.passes(views);
+        let FramePasses { passes, sampled_views } = plan.passes(views).map_err(FrameError::CircularViews)?;
         for view in views {
             if !view.is_cached && !plan.draws_views(view.kind()) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
@@ -177,6 +181,7 @@ impl<B: Backend> StageGraph<B> {
             schedule: graph.compile().map_err(|error| FrameError::StageGraph(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
             passes,
+            sampled_views,
             plan: Arc::clone(plan),
             key,
         })
@@ -195,9 +200,9 @@ impl<B: Backend> StageGraph<B> {
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
-            let DrawsKey { selection, .. } = self.key.draws[pass.process_index];
-            let orders_by_bin =
-                selection.is_some_and(|selection| orders_by_bin(selection, &views[pass.view_index], opaque_order));
+            let view = &views[pass.view_index];
+            let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
+            let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
             table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
         }
         if tile.is_some() {
@@ -318,7 +323,7 @@ impl<B: Backend> StageGraphCache<B> {
     /// The graph of a frame, built if the cache does not have it.
     ///
     /// # Errors
-    /// If no process draws in a view.
+    /// If no process draws in a view, or views sample each other in a circle.
     pub(super) fn get(
         &mut self,
         plan: &Arc<FramePlan>,

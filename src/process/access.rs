@@ -31,6 +31,9 @@ pub enum Access {
     SamplePrevious,
     /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
+    /// Read by the shader: the target of another view, of this kind. Which view is
+    /// [`Declaration::sampled_views`](super::Declaration::sampled_views) at this index.
+    SampleView(ViewKind, usize),
     /// The target of a resolve: overwritten with the mean of a multisampled target's samples.
     Resolve(Format),
     /// Written by a raw pass.
@@ -42,11 +45,12 @@ pub enum Access {
 }
 
 impl Access {
-    /// Whether it depends on what other processes wrote in the same frame.
+    /// Whether it depends on what other processes wrote in the same frame and view, or in all views of a kind.
     pub fn reads(self) -> bool {
         !matches!(
             self,
             Self::SamplePrevious
+                | Self::SampleView(..)
                 | Self::ClearColor(..)
                 | Self::ClearDepth(_)
                 | Self::ClearDepthLayer(_)
@@ -65,6 +69,7 @@ impl Access {
                 | Self::Sample
                 | Self::SamplePrevious
                 | Self::SampleLayers(_)
+                | Self::SampleView(..)
                 | Self::Read
         )
     }
@@ -84,7 +89,7 @@ impl Access {
     /// The kind of view that the target belongs to, for a process that draws in views of the kind `own`.
     pub fn views(self, own: ViewKind) -> ViewKind {
         match self {
-            Self::SampleLayers(views) => views,
+            Self::SampleLayers(views) | Self::SampleView(views, _) => views,
             _ => own,
         }
     }

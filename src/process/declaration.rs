@@ -21,6 +21,12 @@ impl Declare {
         self.declaration.views = kind;
     }
 
+    /// Draws in views of this kind too, in targets of theirs, whenever a scene has such views. The pipeline's own processes draw in
+    /// [`ViewKind::Reflection`] as they do in [`ViewKind::Main`]; an engine's do so with this call.
+    pub fn also_views(&mut self, kind: ViewKind) {
+        self.declaration.also_views.push(kind);
+    }
+
     /// Draws into a colour target, cleared first. Colour targets are the shader's outputs in the order declared.
     pub fn clears_color(&mut self, target: &str, format: Format, clear: ClearColor) {
         self.access(target, Access::ClearColor(format, clear));
@@ -138,6 +144,68 @@ impl Declare {
     /// [`Declare::samples`] does.
     pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
         self.access(target, Access::SampleLayers(views));
+    }
+
+    /// Reads a target of another view in the shader, at `@group(2)` as [`Declare::samples`] does: a mirror's picture, a portal's, or that of
+    /// a camera whose picture a screen in the scene shows (M 10.1). The view has the kind `views`. In a view called `V` it is the one
+    /// called `V/view`, which [`Camera::child_name`](crate::scene::Camera::child_name) makes of the two; if the frame has none, the one
+    /// called `view`, which all views share. Of views with the same name it is the first.
+    ///
+    /// That view is submitted before. Views that read each other in a circle are an error that names them. If the frame has no such view,
+    /// or only the view itself has that name, the texture is a single pixel whose channels and depth are all 0: an alpha tells whether there
+    /// is one, and the recursion of mirrors in mirrors ends where the engine adds no further camera. The shader finds the texture's size with
+    /// `textureDimensions`.
+    ///
+    /// ```
+    /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Place, RenderProcess};
+    /// use drawloom::command::Selection;
+    /// use drawloom::scene::{LayerMask, ViewKind};
+    ///
+    /// const MIRROR: LayerMask = LayerMask::layer(5);
+    ///
+    /// /// Draws the objects of a layer as mirrors, with the picture of the view `mirror`.
+    /// struct Mirror;
+    ///
+    /// impl RenderProcess for Mirror {
+    ///     fn name(&self) -> &str {
+    ///         "mirror"
+    ///     }
+    ///
+    ///     fn declare(&self, declare: &mut Declare) {
+    ///         declare.at(Place::AfterLighting);
+    ///         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
+    ///         declare.draws_over("radiance");
+    ///         // The pipeline has drawn the mirror as an opaque object.
+    ///         declare.matches_depth("depth");
+    ///     }
+    ///
+    ///     fn draws(&self) -> Draws<'_> {
+    ///         Draws::Commands(CommandDraws {
+    ///             selection: Selection::ALL.in_layers(MIRROR),
+    ///             shader: "
+    ///                 @group(2) @binding(1) var mirrored: texture_2d<f32>;
+    ///
+    ///                 @vertex
+    ///                 fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
+    ///                     return clip_position(relative_position(drawn_object(in.instance), in.position));
+    ///                 }
+    ///
+    ///                 @fragment
+    ///                 fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    ///                     // The reflected camera sees left and right swapped.
+    ///                     let across = position.xy / vec2<f32>(view.width, view.height);
+    ///                     return textureSampleLevel(mirrored, target_sampler, vec2<f32>(1.0 - across.x, across.y), 0.0);
+    ///                 }
+    ///             ",
+    ///             ..CommandDraws::default()
+    ///         })
+    ///     }
+    /// }
+    /// ```
+    pub fn samples_view(&mut self, views: ViewKind, view: &str, target: &str) {
+        let index = self.declaration.sampled_views.len();
+        self.declaration.sampled_views.push(view.to_owned());
+        self.access(target, Access::SampleView(views, index));
     }
 
     /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the next 1, and so
@@ -322,6 +390,10 @@ impl Declare {
 pub struct Declaration {
     /// The kind of view that it draws in.
     pub views: ViewKind,
+    /// The further kinds of views that it draws in. A plan has a process for each, with `views` of its own.
+    pub also_views: Vec<ViewKind>,
+    /// The names of the views whose targets it samples: see [`Declare::samples_view`].
+    pub sampled_views: Vec<String>,
     /// The targets that it uses, and how, in the order declared.
     pub accesses: Vec<(String, Access)>,
     /// The sizes of targets that it creates, if they are not those of the pictures.
@@ -380,7 +452,7 @@ impl Declaration {
     pub fn samples(&self) -> impl Iterator<Item = (ViewKind, &str)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
             Access::Sample | Access::SamplePrevious => Some((self.views, target.as_str())),
-            Access::SampleLayers(views) => Some((*views, target.as_str())),
+            Access::SampleLayers(views) | Access::SampleView(views, _) => Some((*views, target.as_str())),
             _ => None,
         })
     }

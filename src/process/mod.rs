@@ -50,9 +50,10 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
+pub(crate) use plan::FramePasses;
 pub use plan::{
-    AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
-    ViewOrder,
+    AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, SampledViews,
+    ViewGroup, ViewOrder,
 };
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;

@@ -3,12 +3,12 @@
 use glam::{DVec3, Quat, Vec2, Vec3};
 
 use super::transform::is_unit;
-use super::{ClipPlane, SceneError};
+use super::{ClipPlane, LayerMask, SceneError};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// The name of the camera and of its view, in reports.
+    /// The name of the camera and of its view, in reports and for views that [read](crate::process::Declare::samples_view) its targets.
     pub name: String,
     /// In the world, in metres.
     pub position: DVec3,
@@ -29,6 +29,9 @@ pub struct Camera {
     pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
+    /// Only objects that belong to one of these layers are drawn, whichever process draws them: all but the mirror in its own reflection,
+    /// or all but what only another player sees.
+    pub layers: LayerMask,
     /// The purpose of the picture, which determines the render processes that draw it.
     pub kind: ViewKind,
 }
@@ -61,7 +64,8 @@ pub enum Projection {
 pub enum ViewKind {
     /// The shadow map of a light.
     Shadow,
-    /// The picture of a mirror, a portal or a screen in the scene.
+    /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred) draws in it what
+    /// it draws in a main view, as far as others [read](crate::process::Declare::samples_view) it.
     Reflection,
     /// The picture on the screen.
     #[default]
@@ -103,63 +107,15 @@ impl Camera {
             near: 0.05,
             far: f32::INFINITY,
             size: [960, 540],
+            layers: LayerMask::ALL,
             kind: ViewKind::Main,
         }
     }
 
-    /// The camera of one tile of this camera's picture, which is divided into `count` × `count` tiles. Tile `[0, 0]` is the upper left
-    /// one. Each has this camera's `size`, so the tiles put together are a picture with `count` times as many pixels a row (M 10.1). The
-    /// name is this camera's with the tile's column and row.
-    ///
-    /// ```
-    /// use drawloom::glam::DVec3;
-    /// use drawloom::scene::Camera;
-    ///
-    /// let camera = Camera::looking_at("main", DVec3::new(0.0, 1.0, 5.0), DVec3::ZERO);
-    /// let cameras: Vec<_> = (0..4).map(|tile| camera.tile([tile % 2, tile / 2], 2)).collect();
-    /// assert_eq!(cameras[1].name, "main, tile 1 0");
-    /// ```
-    ///
-    /// # Panics
-    /// If there is no such tile.
-    pub fn tile(&self, [column, row]: [u32; 2], count: u32) -> Self {
-        assert!(column < count && row < count, "tile {column} {row} is not one of {count} by {count}");
-        // From the whole picture's centre to the tile's, in halves of the tile.
-        let offset = Vec2::new((2 * column + 1) as f32 - count as f32, count as f32 - (2 * row + 1) as f32);
-        let mut camera = Self { name: format!("{}, tile {column} {row}", self.name), ..self.clone() };
-        match &mut camera.projection {
-            Projection::Perspective { field_of_view } => {
-                let tangent = (f64::from(*field_of_view) * 0.5).tan() / f64::from(count);
-                *field_of_view = (2.0 * tangent.atan()) as f32;
-                camera.shift = self.shift * count as f32 + offset;
-            }
-            Projection::Orthographic { height } => {
-                *height /= count as f32;
-                let halves = offset * *height * 0.5;
-                camera.move_aside(halves * Vec2::new(self.aspect(), 1.0));
-            }
-            Projection::Paraboloid => {}
-        }
-        camera
-    }
-
-    /// This camera, looking past its picture's centre by `offset` pixels to the right and up: the sub-pixel jitter of temporal
-    /// antialiasing, and of antialiasing by the mean of several cameras (M 10.1). A paraboloid stays as it is, as it does for
-    /// [`Camera::tile`].
-    pub fn jittered(&self, offset: Vec2) -> Self {
-        let halves = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
-        let mut camera = self.clone();
-        match self.projection {
-            Projection::Perspective { .. } => camera.shift += offset / halves,
-            Projection::Orthographic { height } => camera.move_aside(offset * (0.5 * height / halves.y)),
-            Projection::Paraboloid => {}
-        }
-        camera
-    }
-
-    /// Moves the camera to the right and up, in metres.
-    fn move_aside(&mut self, metres: Vec2) {
-        self.position += (self.orientation.normalize() * metres.extend(0.0)).as_dvec3();
+    /// The name of a view that only this camera's view reads, as [`Declare::samples_view`](crate::process::Declare::samples_view)
+    /// says: `main/mirror` for the view `mirror` of the camera `main`.
+    pub fn child_name(&self, view: &str) -> String {
+        child_name(&self.name, view)
     }
 
     /// Width ÷ height of the picture.
@@ -212,6 +168,11 @@ impl Camera {
             }
         }
     }
+}
+
+/// See [`Camera::child_name`].
+pub(crate) fn child_name(parent: &str, view: &str) -> String {
+    format!("{parent}/{view}")
 }
 
 /// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to

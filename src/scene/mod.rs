@@ -8,6 +8,7 @@ mod camera;
 mod changes;
 mod clip_plane;
 mod cuboid;
+mod derived_camera;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
 mod error;
@@ -27,6 +28,7 @@ mod transform;
 mod vertex_attribute;
 
 pub use assets::{Asset, Assets};
+pub(crate) use camera::child_name;
 pub use camera::{Camera, Projection, ViewKind};
 pub use changes::Changes;
 pub use clip_plane::ClipPlane;

@@ -3,6 +3,7 @@
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec2, Vec3};
 
 use super::Frustum;
+use crate::command::Selection;
 use crate::scene::{Camera, Projection, ViewKind};
 
 /// A camera's rendering of the scene within a frame (M listing 10.4). The backend keeps its targets and its view queue
@@ -36,6 +37,11 @@ impl RenderView {
     /// The kind of picture that it draws.
     pub fn kind(&self) -> ViewKind {
         self.camera.kind
+    }
+
+    /// Which of the objects that a process draws it draws in this view.
+    pub fn selection_of(&self, process: Selection) -> Selection {
+        process.shown_in(self.camera.layers)
     }
 
     /// From world axes relative to the camera to clip space. Depth is reversed: 1 at the near plane, and 0 at the far

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec2, DVec3, Quat, Vec2, Vec3};
 
 use super::FixedPosition;
-use crate::scene::{Camera, Light, Projection, ViewKind};
+use crate::scene::{Camera, LayerMask, Light, Projection, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct ShadowMaps {
     /// The radius of percentage-closer filtering: shadows fade over 2·`filter` + 1 pixels of the map; 0 is bilinear
     /// filtering. At most [`ShadowMaps::MAX_FILTER`].
     pub filter: u32,
+    /// Only objects that belong to one of these layers cast shadows.
+    pub layers: LayerMask,
 }
 
 impl ShadowMaps {
@@ -84,6 +86,7 @@ impl ShadowMaps {
             near: near.max(f32::MIN_POSITIVE),
             far: far.max(f32::MIN_POSITIVE * 2.0),
             size: [self.side; 2],
+            layers: self.layers,
             kind: ViewKind::Shadow,
         })
     }
@@ -129,7 +132,7 @@ impl ShadowMaps {
 
 impl Default for ShadowMaps {
     fn default() -> Self {
-        Self { side: 1024, max_distance: 60.0, bias: 1.0, filter: 1 }
+        Self { side: 1024, max_distance: 60.0, bias: 1.0, filter: 1, layers: LayerMask::ALL }
     }
 }
 

@@ -12,6 +12,7 @@ mod occlusion;
 mod order;
 mod quality;
 mod retained;
+mod sampled_views;
 mod shadow_interval;
 mod targets;
 mod timeline;

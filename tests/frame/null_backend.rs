@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest};
 use drawloom::command::{Bucket, DrawList};
-use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
+use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass, SampledViews};
 use drawloom::quality::Quality;
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
@@ -41,6 +41,7 @@ fn broken_rule(
         lights: &[],
         light_tables: &[LightTable::default()],
         passes: &[PASS],
+        sampled_views: &SampledViews::default(),
         scene: &scene.as_scene_ref(),
         objects: &objects,
         quality: &Quality::balanced(),

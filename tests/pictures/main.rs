@@ -39,6 +39,7 @@ mod references;
 mod requirements;
 mod resources;
 mod retained;
+mod sampled_views;
 mod shadow_bias;
 mod shadow_casters;
 mod shadow_interval;
@@ -92,6 +93,7 @@ fn main() {
         (requirements::CASES, Needs::Adapter),
         (resources::CASES, Needs::Adapter),
         (retained::CASES, Needs::Adapter),
+        (sampled_views::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (stencil::CASES, Needs::Adapter),

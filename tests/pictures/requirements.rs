@@ -2,7 +2,7 @@
 
 use drawloom::backend::{Picture, WgpuResources};
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
-use drawloom::scene::{Blend, Light, LightKind, Material, Scene, ViewKind};
+use drawloom::scene::{Blend, LayerMask, Light, LightKind, Material, Scene, ViewKind};
 use drawloom::view::{LightClass, ShadowMaps};
 use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use libtest_mimic::Failed;
@@ -24,7 +24,7 @@ pub const CASES: &[Case] = &[
     ("processes_change_with_the_requirements_and_are_cached", cached_plans),
 ];
 
-const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1 };
+const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1, layers: LayerMask::ALL };
 const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
 /// A list, a mirrored list, and a double-sided strip, which subdivision converts to a list.
 const OPAQUE_STATES: i64 = 3;

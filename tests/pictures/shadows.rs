@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Light, Projection};
+use drawloom::scene::{Camera, LayerMask, Light, Projection};
 use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     ("shadows_far_from_the_origin_equal_those_near_it", far_away),
 ];
 
-pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1 };
+pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1, layers: LayerMask::ALL };
 
 /// The shipped processes with these shadow maps.
 pub fn fixture_with(maps: ShadowMaps) -> Result<Fixture, Failed> {

@@ -10,7 +10,7 @@ use super::precision::Precision;
 use super::submission::ReadTargets;
 use super::tiles::{Tile, Tiling};
 use crate::backend::{BackendError, Picture};
-use crate::process::{FramePlan, PlannedTarget, SampledTexture};
+use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
@@ -45,11 +45,13 @@ pub(super) struct SoftwareTargets<R> {
     views: Vec<(String, Vec<SoftwareTarget<R>>)>,
     /// The targets that all views of a kind share.
     layered: Vec<Arc<TiledTexture<R>>>,
+    /// For passes that sample a view that the frame does not have: a pixel of zeros for each format.
+    blank: Vec<Arc<TiledTexture<R>>>,
 }
 
 impl<R> Default for SoftwareTargets<R> {
     fn default() -> Self {
-        Self { views: Vec::new(), layered: Vec::new() }
+        Self { views: Vec::new(), layered: Vec::new(), blank: Vec::new() }
     }
 }
 
@@ -79,6 +81,14 @@ impl<R> SoftwareTargets<R> {
     pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<SoftwareTarget<R>> {
         let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
         self.layered.iter().find(is_wanted).map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
+    }
+}
+
+impl<R> SoftwareTargets<R> {
+    /// A pixel of zeros in place of a target of a view that the frame does not have.
+    pub(super) fn find_blank(&self, planned: &PlannedTarget) -> Option<SoftwareTarget<R>> {
+        let found = self.blank.iter().find(|blank| blank.planned.format == planned.format);
+        found.map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 }
 
@@ -141,6 +151,14 @@ impl<R: Precision> TargetCache<R> {
                 targets.push(SoftwareTarget { texture, layer: 0 });
             }
             next.views.push((view.name().to_owned(), targets));
+        }
+        for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
+            let Access::SampleView(views, _) = *access else { continue };
+            if let Some(planned) = plan.sampled_target(views, target)
+                && next.find_blank(planned).is_none()
+            {
+                next.blank.push(Arc::new(TiledTexture::new(planned, [1, 1], 1)?));
+            }
         }
         self.current = Arc::new(next);
         Ok(Arc::clone(&self.current))

@@ -1,6 +1,6 @@
 //! Which processes a scene requires.
 
-use crate::scene::{Assets, Blend, Light, LightKind, Material};
+use crate::scene::{Assets, Blend, Camera, Light, LightKind, Material, ViewKind};
 use crate::view::LightClass;
 
 /// What a scene requires of a frame. A frame has the processes that this requires, and no others.
@@ -10,6 +10,8 @@ pub struct Requirements {
     lights: u8,
     /// Whether a material is blended.
     transparency: bool,
+    /// Whether a camera draws a reflection.
+    reflections: bool,
 }
 
 const _: () = assert!(LightClass::COUNT <= 8);
@@ -29,12 +31,22 @@ impl Requirements {
 
     /// All that a scene can require.
     pub fn all() -> Self {
-        let mut requirements = Self { lights: 0, transparency: true };
+        let mut requirements = Self { lights: 0, transparency: true, reflections: true };
         // Point lights cast no shadows.
         for class in LightClass::all().filter(|class| !class.shadowed || class.kind != LightKind::Point) {
             requirements.lights |= 1 << class.index();
         }
         requirements
+    }
+
+    /// The same for a scene with these cameras.
+    pub fn with_cameras(self, cameras: &[Camera]) -> Self {
+        Self { reflections: cameras.iter().any(|camera| camera.kind == ViewKind::Reflection), ..self }
+    }
+
+    /// Whether the scene has views of kind [`ViewKind::Reflection`].
+    pub fn reflections(&self) -> bool {
+        self.reflections
     }
 
     /// Whether the scene has lights of this class.

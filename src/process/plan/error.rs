@@ -186,6 +186,16 @@ pub enum PlanError {
         /// The buffer.
         buffer: &'static str,
     },
+    /// A process samples a target of another view that no process writes in any view.
+    #[error("process {process:?} samples {target:?} of the view {view:?}, but no process writes such a target")]
+    UnknownSampledTarget {
+        /// The process.
+        process: String,
+        /// The view.
+        view: String,
+        /// The target.
+        target: String,
+    },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]
     ShadowMaps {

@@ -9,15 +9,17 @@ use super::attributes::attributes_of;
 use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::material_types::{check_material_types, material_types_of};
-use super::order::{AddedProcess, order_constraints};
 use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
-use super::resource_names::{buffer_name, passed_on_resources, resource_name};
+use super::process_graph::{compile, is_node_of};
+use super::resource_names::passed_on_resources;
+use super::sampled_views::{check_sampled_views, sampled_target};
 use super::view_group::view_groups;
-use super::{AttachmentExtent, ChainSlot, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup};
-use crate::graph::FrameGraph;
+use super::{
+    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
+};
+use crate::graph::GraphProblem;
 use crate::process::{
-    Access, BufferAccess, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
-    previous_name,
+    Access, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
 };
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
 use crate::view::RenderView;
@@ -55,83 +57,40 @@ impl FramePlan {
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: &[String],
     ) -> Result<Self, PlanError> {
-        let (slot_names, in_chain): (Vec<_>, Vec<_>) = chain.into_iter().map(|slot| (slot.name, slot.process)).unzip();
-        let chained = in_chain.into_iter().enumerate().filter_map(|(slot, process)| Some((Some(slot), process?)));
-        let others = processes.into_iter().map(|process| (None, process));
-        let mut planned: Vec<_> = chained
-            .chain(others)
-            .map(|(slot, process)| Ok((slot, PlannedProcess::new(process)?)))
-            .collect::<Result<_, PlanError>>()?;
-        planned.sort_by_key(|(_, planned)| planned.declaration.views);
-        let mut graph = FrameGraph::new();
-        let (mut added, mut histories): (Vec<AddedProcess>, Vec<_>) = (Vec::new(), Vec::new());
-        for (chain_slot, planned) in planned {
-            let PlannedProcess { name, declaration, .. } = &planned;
-            let (name, declaration) = (name.clone(), declaration.clone());
-            let id = graph.add(name.clone(), planned);
-            for (target, access) in &declaration.accesses {
-                if *access == Access::SamplePrevious {
-                    histories.push((declaration.views, target.clone()));
-                    continue;
-                }
-                let resource = graph.resource(resource_name(access.views(declaration.views), target));
-                if access.reads() {
-                    graph.read(id, resource);
-                }
-                if access.writes() {
-                    graph.write(id, resource);
-                }
-            }
-            for (buffer, access) in &declaration.buffers {
-                let resource = graph.resource(buffer_name(buffer.name));
-                graph.read(id, resource);
-                if *access == BufferAccess::Change {
-                    // The first to change it finds what the frame before left.
-                    graph.import(resource);
-                    graph.write(id, resource);
-                }
-            }
-            if declaration.keep {
-                graph.keep(id);
-            }
-            added.push(AddedProcess { chain_slot, name, id, declaration });
+        Self::for_views(chain, processes, outputs, (&[], &|_| true))
+    }
+
+    /// The plan of frames that have the kinds of views that `is_present` tells. The processes of the chain that draw in main views draw in
+    /// those of `with_main` too.
+    ///
+    /// # Errors
+    /// See [`PlanError`].
+    pub(crate) fn for_views(
+        chain: Vec<ChainSlot>,
+        processes: Vec<Arc<dyn RenderProcess>>,
+        outputs: &[String],
+        (with_main, is_present): (&[ViewKind], &dyn Fn(ViewKind) -> bool),
+    ) -> Result<Self, PlanError> {
+        let slot_names: Vec<_> = chain.iter().map(|slot| slot.name.clone()).collect();
+        let mut added: Vec<(Option<usize>, PlannedProcess)> = Vec::new();
+        for (index, slot) in chain.into_iter().enumerate() {
+            let Some(process) = slot.process else { continue };
+            let of_kinds = PlannedProcess::of_each_kind(&process, with_main, is_present)?;
+            added.extend(of_kinds.into_iter().map(|planned| (Some(index), planned)));
         }
+        for process in &processes {
+            let of_kinds = PlannedProcess::of_each_kind(process, &[], is_present)?;
+            added.extend(of_kinds.into_iter().map(|planned| (None, planned)));
+        }
+        added.sort_by_key(|(_, planned)| planned.declaration.views);
         let placeholder = placeholder_shadow_map(&slot_names, &added);
-        if let Some(target) = &placeholder {
-            let resource = graph.resource(resource_name(target.views, &target.name));
-            graph.import(resource);
-        }
-        for (before, after) in order_constraints(&slot_names, &added)? {
-            graph.order(before, after);
-        }
-        for output in outputs {
-            let writers = added.iter().filter(|added| added.declaration.written().any(|target| target == output));
-            let mut kinds: Vec<_> = writers.map(|added| added.declaration.views).collect();
-            if kinds.is_empty() {
-                kinds.push(ViewKind::Main);
-            }
-            for kind in kinds {
-                let resource = graph.resource(resource_name(kind, output));
-                graph.output(resource);
-            }
-        }
-
-        // A target whose history is read is an output of its frame.
-        for added in &added {
-            let declaration = &added.declaration;
-            let is_read = |target: &str| histories.contains(&(declaration.views, previous_name(target)));
-            for target in declaration.written().filter(|target| is_read(target)) {
-                let resource = graph.resource(resource_name(declaration.views, target));
-                graph.output(resource);
-            }
-        }
-
-        let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
+        let schedule = compile(&slot_names, &added, placeholder.as_ref(), outputs)?;
         let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
         let dot =
             schedule.to_labelled_dot(|before, after| passed_on_resources(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
-        for process in dropped.iter().filter(|name| !slot_names.contains(name)) {
+        let is_of_chain = |name: &String| slot_names.iter().any(|slot| is_node_of(name, slot));
+        for process in dropped.iter().filter(|name| !is_of_chain(name)) {
             tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
         }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
@@ -143,6 +102,7 @@ impl FramePlan {
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes)?;
         targets.extend(placeholder);
+        check_sampled_views(&processes, &targets)?;
         let (columns, material_types) = (columns_of(&processes)?, material_types_of(&processes)?);
         let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
         let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
@@ -187,9 +147,19 @@ impl FramePlan {
     }
 
     /// The passes of a frame with these views, in submission order: each process in each view of its kind whose picture is not
-    /// cached.
-    pub(crate) fn passes(&self, views: &[RenderView]) -> Vec<Pass> {
-        self.view_groups.iter().flat_map(|group| group.passes(&self.processes, views)).collect()
+    /// cached. A view comes after those that it [samples](crate::process::Declare::samples_view).
+    ///
+    /// # Errors
+    /// If views sample each other in a circle.
+    pub(crate) fn passes(&self, views: &[RenderView]) -> Result<FramePasses, GraphProblem> {
+        let parts = self.view_groups.iter().flat_map(|group| group.parts(&self.processes, views)).collect();
+        FramePasses::new(&self.processes, views, parts)
+    }
+
+    /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such views, it is
+    /// the target of this name in views of another kind: its pixel has the same format.
+    pub fn sampled_target(&self, views: ViewKind, name: &str) -> Option<&PlannedTarget> {
+        sampled_target(&self.targets, views, name)
     }
 
     /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
@@ -269,12 +239,12 @@ static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 
 /// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
 /// texture to bind.
-fn placeholder_shadow_map(slot_names: &[String], added: &[AddedProcess]) -> Option<PlannedTarget> {
+fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, PlannedProcess)]) -> Option<PlannedTarget> {
     let is_map = |(target, access): &(String, Access)| {
         target == ShadowCasters::TARGET && *access == Access::SampleLayers(ViewKind::Shadow)
     };
-    let is_read = added.iter().any(|other| other.declaration.accesses.iter().any(is_map));
-    let is_drawn = added.iter().any(|other| {
+    let is_read = added.iter().any(|(_, other)| other.declaration.accesses.iter().any(is_map));
+    let is_drawn = added.iter().any(|(_, other)| {
         other.declaration.views == ViewKind::Shadow
             && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
     });
@@ -433,7 +403,7 @@ mod tests {
         let plan = FramePlan::new(Vec::new(), processes(), &[]).unwrap();
         let view = |kind| RenderView::new(&Camera { kind, ..Camera::looking_at("", DVec3::Z, DVec3::ZERO) });
         let views = [view(Main), view(Main), view(Reflection), view(Shadow)];
-        let order: Vec<_> = plan.passes(&views).iter().map(|pass| pass.view_index).collect();
+        let order: Vec<_> = plan.passes(&views).unwrap().passes.iter().map(|pass| pass.view_index).collect();
         assert_eq!(order, [3, 0, 1, 2]);
     }
 
@@ -455,6 +425,8 @@ mod tests {
         let views = [view(Main), view(Main), view(Reflection)];
         let names: Vec<_> = plan
             .passes(&views)
+            .unwrap()
+            .passes
             .iter()
             .map(|pass| (plan.processes()[pass.process_index].name.as_str(), pass.view_index))
             .collect();

@@ -37,11 +37,11 @@ pub(super) fn order_constraints(
     }
     for own in added {
         for before in &own.declaration.after {
-            let known = find(slot_names, added, before, |empty, filled| filled <= empty);
+            let known = find(slot_names, added, (own, before), |empty, filled| filled <= empty);
             orders.extend(known.map_err(|error| error.in_process(own, before))?.map(|before| (before, own.id)));
         }
         for after in &own.declaration.before {
-            let known = find(slot_names, added, after, |empty, filled| filled >= empty);
+            let known = find(slot_names, added, (own, after), |empty, filled| filled >= empty);
             orders.extend(known.map_err(|error| error.in_process(own, after))?.map(|after| (own.id, after)));
         }
     }
@@ -54,30 +54,38 @@ pub(super) fn order_constraints(
         let Some(before) = earlier.declaration.before.iter().filter_map(empty_slot).min() else { continue };
         let comes_after =
             |later: &&AddedProcess| later.declaration.after.iter().filter_map(empty_slot).any(|after| before <= after);
-        let later = added.iter().filter(|later| later.id != earlier.id).filter(comes_after);
+        let later = added.iter().filter(|later| later.id != earlier.id && is_for(added, earlier, later));
+        let later = later.filter(comes_after);
         orders.extend(later.map(|later| (earlier.id, later.id)));
     }
     Ok(orders)
 }
 
 /// The process of this name; if it is an empty slot of the chain, the process in the nearest filled slot for which
-/// `is_on_side(empty, filled)` holds.
+/// `is_on_side(empty, filled)` holds. Of a process that draws in several kinds of views, the one that [`is_for`] `own`.
 ///
 /// # Errors
 /// If neither a process nor a slot has this name.
 fn find(
     slot_names: &[String],
     added: &[AddedProcess],
-    name: &str,
+    (own, name): (&AddedProcess, &str),
     is_on_side: impl Fn(usize, usize) -> bool,
 ) -> Result<Option<NodeId>, UnknownName> {
-    if let Some(found) = added.iter().find(|other| other.name == name) {
+    if let Some(found) = added.iter().find(|other| other.name == name && is_for(added, own, other)) {
         return Ok(Some(found.id));
     }
     let empty = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
-    let in_chain = added.iter().filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
+    let in_chain = added.iter().filter(|other| is_for(added, own, other));
+    let in_chain = in_chain.filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
     let nearest = in_chain.filter(|(slot, _)| is_on_side(empty, *slot)).min_by_key(|(slot, _)| slot.abs_diff(empty));
     Ok(nearest.map(|(_, id)| id))
+}
+
+/// Whether `own` can refer to this process: not if the same process also draws in the views of `own`.
+fn is_for(added: &[AddedProcess], own: &AddedProcess, other: &AddedProcess) -> bool {
+    let has_same_views = |process: &AddedProcess| process.declaration.views == own.declaration.views;
+    has_same_views(other) || !added.iter().any(|twin| twin.name == other.name && has_same_views(twin))
 }
 
 /// Neither a process nor a slot has a name.

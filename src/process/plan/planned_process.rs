@@ -1,12 +1,15 @@
 //! A process and its declaration.
 
+use std::iter;
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
 use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
+use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
 
-/// A process and what it declared.
+/// A process and what it declared, for one kind of view.
+#[derive(Clone)]
 pub struct PlannedProcess {
     /// The process.
     pub process: Arc<dyn RenderProcess>,
@@ -17,11 +20,16 @@ pub struct PlannedProcess {
 }
 
 impl PlannedProcess {
-    /// Calls a process's `name` and `declare`, once.
+    /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if `is_present` says that
+    /// frames have such views; if it draws in main views, for those of `with_main` too.
     ///
     /// # Errors
     /// If one of them panics, or `declare` declares more than one depth target.
-    pub(super) fn new(process: Arc<dyn RenderProcess>) -> Result<Self, PlanError> {
+    pub(super) fn of_each_kind(
+        process: &Arc<dyn RenderProcess>,
+        with_main: &[ViewKind],
+        is_present: impl Fn(ViewKind) -> bool,
+    ) -> Result<Vec<Self>, PlanError> {
         let name =
             catch(|| process.name().to_owned()).map_err(|JobPanic { message }| PlanError::Panicked { message })?;
         let mut declare = Declare::default();
@@ -31,7 +39,18 @@ impl PlannedProcess {
         if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
             return Err(PlanError::MultipleDepthTargets { process: name });
         }
-        Ok(Self { process, name, declaration })
+        let Declaration { views, also_views, .. } = &declaration;
+        let with_main = if *views == ViewKind::Main { with_main } else { &[] };
+        let further = also_views.iter().chain(with_main).copied().filter(|kind| is_present(*kind));
+        let mut kinds: Vec<_> = iter::once(*views).chain(further).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let of_kind = |views| Self {
+            process: Arc::clone(process),
+            name: name.clone(),
+            declaration: Declaration { views, ..declaration.clone() },
+        };
+        Ok(kinds.into_iter().map(of_kind).collect())
     }
 
     /// What the process draws in this frame.

@@ -298,7 +298,8 @@ fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
         for target in planned.declaration.written() {
             let history = previous_name(target);
             let uses = |(name, access): &(String, Access)| {
-                (name == target || *name == history) && !matches!(access, Access::SampleLayers(_))
+                (name == target || *name == history)
+                    && !matches!(access, Access::SampleLayers(_) | Access::SampleView(..))
             };
             let draws_in_each = |other: &&PlannedProcess| {
                 other.declaration.views == planned.declaration.views && !other.declaration.once_a_frame

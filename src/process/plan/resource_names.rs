@@ -15,7 +15,8 @@ pub(super) fn passed_on_resources(before: &Declaration, after: &Declaration) -> 
         .iter()
         .filter_map(|(target, access)| {
             let same_views = access.views(after.views) == before.views;
-            (same_views && before.written().any(|written| written == target)).then_some(target.as_str())
+            (access.reads() && same_views && before.written().any(|written| written == target))
+                .then_some(target.as_str())
         })
         .collect();
     let changed = before.buffers.iter().filter(|(_, access)| *access == BufferAccess::Change).map(|(buffer, _)| buffer);

@@ -54,6 +54,11 @@ impl AttachmentFormats {
                 let multisampled = planned(declaration.views, target).is_some_and(|planned| planned.multisampled);
                 Some(SampledTarget { format, layered: false, multisampled })
             }
+            Access::SampleView(views, _) => {
+                let planned = plan.sampled_target(*views, target)?;
+                let (format, multisampled) = (planned.format, planned.multisampled);
+                Some(SampledTarget { format, layered: false, multisampled })
+            }
             Access::SampleLayers(views) => {
                 Some(SampledTarget { format: format_of(*views, target), layered: true, multisampled: false })
             }

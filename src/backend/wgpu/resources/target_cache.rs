@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::bind_group_layouts::texture_format;
 use super::imported_target::ResolvedImport;
 use crate::backend::BackendError;
-use crate::process::{Format, FramePlan, PlannedTarget};
+use crate::process::{Access, Format, FramePlan, PlannedTarget};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -16,6 +16,8 @@ pub(crate) struct WgpuTargets {
     views: Vec<(String, Vec<ViewTarget>)>,
     /// The targets that all views of a kind share.
     layered: Vec<LayeredTarget>,
+    /// For passes that sample a view that the frame does not have: a pixel of zeros for each format and number of samples.
+    blank: Vec<(Format, bool, wgpu::TextureView)>,
 }
 
 /// A target as one view draws into it.
@@ -54,6 +56,12 @@ impl WgpuTargets {
     pub(crate) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
         let found = self.layered.iter().find(|target| target.planned.views == kind && target.planned.name == name);
         found.map(|target| (&target.texture, &target.array))
+    }
+
+    /// A pixel of zeros in place of a target of a view that the frame does not have.
+    pub(crate) fn find_blank(&self, planned: &PlannedTarget) -> Option<&wgpu::TextureView> {
+        let is_wanted = |blank: &&(Format, bool, _)| (blank.0, blank.1) == (planned.format, planned.multisampled);
+        self.blank.iter().find(is_wanted).map(|(.., texture)| texture)
     }
 
     /// Copies what processes of later frames read of this one.
@@ -166,6 +174,7 @@ impl TargetCache {
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push((view.name().to_owned(), targets));
         }
+        next.blank = self.blank_targets(device, plan)?;
         self.current = Arc::new(next);
         self.plan = Some(plan.identity());
         self.views.clear();
@@ -197,6 +206,34 @@ impl TargetCache {
         let texture = new_texture(device, planned, extent)?;
         let (view, sampled) = new_views(&texture, planned.format, &wgpu::TextureViewDescriptor::default());
         Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 })
+    }
+
+    fn blank_targets(
+        &self,
+        device: &wgpu::Device,
+        plan: &FramePlan,
+    ) -> Result<Vec<(Format, bool, wgpu::TextureView)>, BackendError> {
+        let mut blank: Vec<(Format, bool, wgpu::TextureView)> = Vec::new();
+        let accesses = plan.processes().iter().flat_map(|planned| &planned.declaration.accesses);
+        for (target, access) in accesses {
+            let Access::SampleView(views, _) = *access else { continue };
+            let Some(planned) = plan.sampled_target(views, target) else { continue };
+            let (format, multisampled) = (planned.format, planned.multisampled);
+            if blank.iter().any(|(known, samples, _)| (*known, *samples) == (format, multisampled)) {
+                continue;
+            }
+            let sampled = match self.current.find_blank(planned) {
+                Some(cached) => cached.clone(),
+                // wgpu clears a texture before it is first read.
+                None => {
+                    let size = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
+                    let texture = new_texture(device, planned, size)?;
+                    new_views(&texture, format, &wgpu::TextureViewDescriptor::default()).1
+                }
+            };
+            blank.push((format, multisampled, sampled));
+        }
+        Ok(blank)
     }
 
     fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {

@@ -1,0 +1,141 @@
+//! From processes to the graph of what they read and write.
+
+use super::order::{AddedProcess, order_constraints};
+use super::resource_names::{buffer_name, resource_name};
+use super::{PlanError, PlannedProcess, PlannedTarget};
+use crate::graph::{FrameGraph, Schedule};
+use crate::process::{Access, BufferAccess, previous_name};
+use crate::scene::ViewKind;
+
+/// Orders the processes by what they read and write, and drops those on which no output depends. `added` are the processes in
+/// descending priority, each with its slot in the chain if it has one.
+///
+/// What a process samples of other views is an output of those: which view that is, and the order of views, depends on the scene. So
+/// targets that the remaining processes sample are added to the outputs until none is missing.
+///
+/// # Errors
+/// See [`PlanError`].
+pub(super) fn compile(
+    slot_names: &[String],
+    added: &[(Option<usize>, PlannedProcess)],
+    imported: Option<&PlannedTarget>,
+    outputs: &[String],
+) -> Result<Schedule<PlannedProcess>, PlanError> {
+    let mut sampled: Vec<(ViewKind, String)> = Vec::new();
+    loop {
+        let graph = process_graph(slot_names, added, imported, (outputs, &sampled))?;
+        let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
+        let mut missing = Vec::new();
+        for (_, planned) in schedule.nodes() {
+            for (target, access) in &planned.declaration.accesses {
+                let Access::SampleView(views, _) = *access else { continue };
+                let wanted = (views, target.clone());
+                let is_written = added.iter().any(|(_, other)| {
+                    other.declaration.views == views && other.declaration.written().any(|written| written == target)
+                });
+                if is_written && !sampled.contains(&wanted) && !missing.contains(&wanted) {
+                    missing.push(wanted);
+                }
+            }
+        }
+        if missing.is_empty() {
+            return Ok(schedule);
+        }
+        sampled.extend(missing);
+    }
+}
+
+/// Whether a node of the graph is the process of this name, in some kind of view.
+pub(super) fn is_node_of(node: &str, process: &str) -> bool {
+    node == process
+        || node.strip_prefix(process).is_some_and(|rest| rest.starts_with(" in ") && rest.ends_with(" views"))
+}
+
+fn process_graph(
+    slot_names: &[String],
+    added: &[(Option<usize>, PlannedProcess)],
+    imported: Option<&PlannedTarget>,
+    (outputs, sampled): (&[String], &[(ViewKind, String)]),
+) -> Result<FrameGraph<PlannedProcess>, PlanError> {
+    let mut graph = FrameGraph::new();
+    let (mut nodes, mut histories): (Vec<AddedProcess>, Vec<_>) = (Vec::new(), Vec::new());
+    for (chain_slot, planned) in added {
+        let PlannedProcess { name, declaration, .. } = planned;
+        let id = graph.add(node_name(added, planned), planned.clone());
+        for (target, access) in &declaration.accesses {
+            if *access == Access::SamplePrevious {
+                histories.push((declaration.views, target.clone()));
+                continue;
+            }
+            let resource = graph.resource(resource_name(access.views(declaration.views), target));
+            if access.reads() {
+                graph.read(id, resource);
+            }
+            if access.writes() {
+                graph.write(id, resource);
+            }
+        }
+        for (buffer, access) in &declaration.buffers {
+            let resource = graph.resource(buffer_name(buffer.name));
+            graph.read(id, resource);
+            if *access == BufferAccess::Change {
+                // The first to change it finds what the frame before left.
+                graph.import(resource);
+                graph.write(id, resource);
+            }
+        }
+        if declaration.keep {
+            graph.keep(id);
+        }
+        nodes.push(AddedProcess { chain_slot: *chain_slot, name: name.clone(), id, declaration: declaration.clone() });
+    }
+    if let Some(target) = imported {
+        let resource = graph.resource(resource_name(target.views, &target.name));
+        graph.import(resource);
+    }
+    for (before, after) in order_constraints(slot_names, &nodes)? {
+        graph.order(before, after);
+    }
+    for output in outputs {
+        let writers = nodes.iter().filter(|node| node.declaration.written().any(|target| target == output));
+        let mut kinds: Vec<_> = writers.map(|node| node.declaration.views).collect();
+        // The pipeline's reflections are for other views to sample.
+        if kinds.contains(&ViewKind::Main) {
+            kinds.retain(|kind| *kind != ViewKind::Reflection);
+        }
+        if kinds.is_empty() {
+            kinds.push(ViewKind::Main);
+        }
+        for kind in kinds {
+            let resource = graph.resource(resource_name(kind, output));
+            graph.output(resource);
+        }
+    }
+    for (views, target) in sampled {
+        let resource = graph.resource(resource_name(*views, target));
+        graph.output(resource);
+    }
+    // A target whose history is read is an output of its frame.
+    for node in &nodes {
+        let declaration = &node.declaration;
+        let is_read = |target: &str| histories.contains(&(declaration.views, previous_name(target)));
+        for target in declaration.written().filter(|target| is_read(target)) {
+            let resource = graph.resource(resource_name(declaration.views, target));
+            graph.output(resource);
+        }
+    }
+    Ok(graph)
+}
+
+/// The name of a process, with the kind of view if it draws in main views too. Two processes of the same name and kind keep it, so that the
+/// graph reports it.
+fn node_name(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> String {
+    let views = planned.declaration.views;
+    let count = |kind: ViewKind| {
+        added.iter().filter(|(_, other)| other.name == planned.name && other.declaration.views == kind).count()
+    };
+    if views == ViewKind::Main || count(views) > 1 || count(ViewKind::Main) == 0 {
+        return planned.name.clone();
+    }
+    format!("{} in {} views", planned.name, views.name())
+}

@@ -1,0 +1,222 @@
+//! Views that other views sample: which passes they have, and in which order they are submitted.
+
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::command::Selection;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Place, PlanError, RenderProcess};
+use drawloom::scene::{Camera, ClipPlane, LayerMask, RenderObject, Scene, ViewKind};
+use drawloom::task::Scheduler;
+use drawloom::{BuildError, FrameError, Renderer, Submitter};
+use drawloom_testing::scenes::field;
+
+const MIRROR: LayerMask = LayerMask::layer(3);
+
+/// Draws mirrors with what the view `mirror` has in a target.
+struct Mirror {
+    target: &'static str,
+    place: Place,
+}
+
+impl RenderProcess for Mirror {
+    fn name(&self) -> &str {
+        "mirror"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.also_views(ViewKind::Reflection);
+        declare.at(self.place);
+        declare.samples_view(ViewKind::Reflection, "mirror", self.target);
+        declare.draws_over("radiance");
+        declare.matches_depth("depth");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws { selection: Selection::ALL.in_layers(MIRROR), ..CommandDraws::default() })
+    }
+}
+
+const RADIANCE: Mirror = Mirror { target: "radiance", place: Place::AfterLighting };
+
+fn renderer(mirror: Mirror) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let scheduler = Arc::new(Scheduler::new(2).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(mirror);
+    builder.build(scheduler).unwrap()
+}
+
+fn scene() -> Scene {
+    let mut scene = field(60);
+    scene.lights.clear();
+    scene.cameras = vec![Camera::looking_at("main", DVec3::new(0.0, 0.0, 30.0), DVec3::ZERO)];
+    scene
+}
+
+const PLANE: ClipPlane = ClipPlane { point: DVec3::new(0.0, 0.0, -40.0), normal: Vec3::Z };
+
+/// The passes in the order in which they are submitted, without transparency.
+fn passes(mirror: Mirror, scene: &Scene) -> Vec<(String, usize)> {
+    let (mut renderer, submitter) = renderer(mirror);
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let passes = submitted.submission.passes.into_iter().map(|pass| (pass.process, pass.view));
+    passes.filter(|(process, _)| process != "transparency").collect()
+}
+
+fn named(expected: &[(&str, usize)]) -> Vec<(String, usize)> {
+    expected.iter().map(|(process, view)| ((*process).to_owned(), *view)).collect()
+}
+
+#[test]
+fn a_reflection_draws_what_is_sampled_of_it_and_comes_first() {
+    let mut scene = scene();
+    scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+    let expected = [("geometry buffer", 1), ("mirror", 1), ("geometry buffer", 0), ("mirror", 0), ("tone mapping", 0)];
+    assert_eq!(passes(RADIANCE, &scene), named(&expected));
+
+    let of_picture = Mirror { target: "picture", place: Place::AfterLighting };
+    let expected = [
+        ("geometry buffer", 1),
+        ("mirror", 1),
+        ("tone mapping", 1),
+        ("geometry buffer", 0),
+        ("mirror", 0),
+        ("tone mapping", 0),
+    ];
+    assert_eq!(passes(of_picture, &scene), named(&expected));
+
+    // Normals are there before the mirror's own process and lights.
+    let of_normals = Mirror { target: "normal", place: Place::AfterLighting };
+    let expected = [("geometry buffer", 1), ("geometry buffer", 0), ("mirror", 0), ("tone mapping", 0)];
+    assert_eq!(passes(of_normals, &scene), named(&expected));
+}
+
+#[test]
+fn without_reflections_a_frame_has_no_pass_more() {
+    let expected = [("geometry buffer", 0), ("mirror", 0), ("tone mapping", 0)];
+    assert_eq!(passes(RADIANCE, &scene()), named(&expected));
+}
+
+#[test]
+fn nested_views_are_submitted_innermost_first_in_any_order_of_cameras() {
+    let back = ClipPlane { point: DVec3::new(0.0, 0.0, 40.0), normal: Vec3::NEG_Z };
+    let main = scene().cameras.remove(0);
+    let mut nested = vec![main];
+    for depth in 0..6 {
+        let plane = if depth % 2 == 0 { PLANE } else { back };
+        nested.push(nested[depth].reflected("mirror", plane));
+    }
+    for rotation in 0..nested.len() {
+        let mut scene = scene();
+        scene.cameras = nested.clone();
+        scene.cameras.rotate_left(rotation);
+        scene.cameras[1..5].reverse();
+        let passes = passes(RADIANCE, &scene);
+        let mut views: Vec<_> = passes.iter().map(|(_, view)| scene.cameras[*view].name.len()).collect();
+        views.dedup();
+        assert_eq!(views.len(), nested.len(), "the passes of a view are not apart");
+        assert!(views.is_sorted_by(|one, next| one > next), "{views:?}");
+    }
+}
+
+#[test]
+fn many_nested_views_are_ordered_without_recursion() {
+    let (mut renderer, submitter) = renderer(RADIANCE);
+    let mut scene = scene();
+    scene.cameras[0].size = [1, 1];
+    for depth in 0..1000 {
+        let mut camera = scene.cameras[depth].clone();
+        camera.name = camera.child_name("mirror");
+        camera.kind = ViewKind::Reflection;
+        scene.cameras.push(camera);
+    }
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    assert_eq!(submitted.submission.passes.first().unwrap().view, 1000);
+    assert_eq!(submitted.submission.passes.last().unwrap().view, 0);
+}
+
+#[test]
+fn a_view_shows_only_the_layers_of_its_camera() {
+    let mut scene = scene();
+    let (mesh, material) = {
+        let object = scene.object(scene.objects().next().unwrap()).unwrap();
+        (object.mesh, object.material)
+    };
+    let mut mirror = RenderObject::new(mesh, material, DVec3::ZERO);
+    mirror.layers = MIRROR;
+    scene.add_object(mirror).unwrap();
+    let mut other = scene.cameras[0].clone();
+    other.name = "other".to_owned();
+    // Objects without layers of their own belong to all.
+    other.layers = LayerMask(!MIRROR.0);
+    scene.cameras.push(other);
+    let mut nothing = scene.cameras[0].clone();
+    (nothing.name, nothing.layers) = ("nothing".to_owned(), LayerMask::NONE);
+    scene.cameras.push(nothing);
+    let (mut renderer, submitter) = renderer(RADIANCE);
+    let count = |renderer: &mut Renderer<NullBackend>, scene: &Scene| {
+        drop(submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap());
+        [0, 1, 2].map(|view| renderer.draw_list("geometry buffer", view).unwrap().objects.len())
+    };
+    let [all, shown, none] = count(&mut renderer, &scene);
+    assert_eq!((all, none), (shown + 1, 0));
+    // A camera's layers may change from frame to frame.
+    scene.cameras[1].layers = MIRROR;
+    scene.cameras[2].layers = LayerMask::ALL;
+    let counts = count(&mut renderer, &scene);
+    assert_eq!(counts, [all, all, all], "objects in all layers are in this one too");
+}
+
+#[test]
+fn a_target_that_no_process_writes_is_an_error() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let unknown = Mirror { target: "albedo", place: Place::AfterLighting };
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(unknown);
+    let error = builder.build(scheduler).err().unwrap();
+    let named = matches!(
+        &error,
+        BuildError::Plan(PlanError::UnknownSampledTarget { process, view, target })
+            if process == "mirror" && view == "mirror" && target == "albedo"
+    );
+    assert!(named, "{error}");
+}
+
+#[test]
+fn a_reflection_that_nothing_samples_is_refused_by_name() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let (mut renderer, _) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
+    let mut scene = scene();
+    scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+    let error = renderer.record(scene.as_scene_ref()).err().unwrap();
+    assert!(matches!(&error, FrameError::NoProcess { view, .. } if view == "main/mirror"), "{error}");
+}
+
+/// Draws a colour of its own in main views and reflections, without a pipeline.
+struct Flat;
+
+impl RenderProcess for Flat {
+    fn name(&self) -> &str {
+        "flat"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.also_views(ViewKind::Reflection);
+        declare.clears_color("flat", Format::Rgba8Unorm, ClearColor::Background);
+        declare.samples_view(ViewKind::Reflection, "mirror", "flat");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn processes_without_a_pipeline_draw_in_several_kinds_of_views() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).process(Flat).output("flat");
+    let (mut renderer, submitter) = builder.build(scheduler).unwrap();
+    let mut scene = scene();
+    scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let views: Vec<_> = submitted.submission.passes.iter().map(|pass| pass.view).collect();
+    assert_eq!(views, [1, 0]);
+}

@@ -1,0 +1,13 @@
+// The picture of another view at the same pixel.
+@group(2) @binding(1) var sampled: texture_2d<f32>;
+
+@vertex
+fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
+    return clip_position(relative_position(drawn_object(in.instance), in.position));
+}
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let size = vec2<i32>(textureDimensions(sampled));
+    return textureLoad(sampled, clamp(vec2<i32>(i32(position.x), i32(position.y)), vec2<i32>(0), size - 1), 0);
+}
