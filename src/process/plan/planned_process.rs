@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
+#[cfg(feature = "wgpu")]
+use crate::process::RequestLog;
 use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
 use crate::task::{JobPanic, catch};
 
@@ -14,6 +16,9 @@ pub struct PlannedProcess {
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,
+    /// What its raw pass asks for.
+    #[cfg(feature = "wgpu")]
+    pub(crate) requests: RequestLog,
 }
 
 impl PlannedProcess {
@@ -31,7 +36,15 @@ impl PlannedProcess {
         if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
             return Err(PlanError::MultipleDepthTargets { process: name });
         }
-        Ok(Self { process, name, declaration })
+        #[cfg(feature = "wgpu")]
+        let requests = RequestLog::new(&declaration);
+        Ok(Self {
+            process,
+            name,
+            declaration,
+            #[cfg(feature = "wgpu")]
+            requests,
+        })
     }
 
     /// What the process draws in this frame.
@@ -49,8 +62,9 @@ impl PlannedProcess {
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };
-        // Both kinds read histories: raw passes by the name of the copy.
-        let fits = |access: &Access| access.is_raw() == is_raw || *access == Access::SamplePrevious;
+        // Both kinds read histories and layers, as nothing else declares these: raw passes ask for them by name.
+        let is_of_both = |access: &Access| matches!(access, Access::SamplePrevious | Access::SampleLayers(_));
+        let fits = |access: &Access| access.is_raw() == is_raw || is_of_both(access);
         if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
             return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
         }
