@@ -232,7 +232,7 @@ impl RawPass for Present {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        let picture = resources.target("picture").ok_or("there is no picture to present")?;
+        let picture = resources.target("picture")?;
         let surface = self.surface.texture.lock();
         encoder.copy_texture_to_texture(picture.as_image_copy(), surface.as_image_copy(), picture.size());
         Ok(())

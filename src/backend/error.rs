@@ -1,5 +1,7 @@
 //! Errors of backends.
 
+use crate::process::AccessError;
+
 /// An error of a backend or its device.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -110,6 +112,9 @@ pub enum BackendError {
     /// A raw pass reported an error.
     #[error("the raw pass failed: {0}")]
     RawPass(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// A raw pass asked for a resource that it may not use.
+    #[error(transparent)]
+    Access(AccessError),
     /// The view has no target of the requested name.
     #[error("view {view} has no target {target:?}")]
     UnknownTarget {

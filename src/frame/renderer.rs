@@ -105,7 +105,8 @@ impl<B: Backend> Renderer<B> {
     /// call.
     ///
     /// Objects, lights and textures that cannot be drawn are left out, counted in the statistics, and warned of through
-    /// `tracing` when their number changes.
+    /// `tracing` when their number changes. A process that declares what its [raw pass](crate::process::RawPassResources) never asks for
+    /// is warned of once.
     ///
     /// # Errors
     /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, too many
@@ -232,6 +233,8 @@ impl<B: Backend> Renderer<B> {
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times(), tuning);
         self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
+        #[cfg(feature = "wgpu")]
+        self.warnings.report_unrequested(&plan, &draws);
         let in_flight = self.shadow_cache.store(shadow_maps);
         let submission_order = graph.passes.clone();
         let backend = Arc::clone(&self.backend);

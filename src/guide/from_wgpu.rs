@@ -239,7 +239,7 @@
 //!         encoder: &mut wgpu::CommandEncoder,
 //!         resources: &RawPassResources<'_>,
 //!     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-//!         let picture = resources.target("picture").ok_or("there is no picture")?;
+//!         let picture = resources.target("picture")?;
 //!         encoder.copy_texture_to_texture(picture.as_image_copy(), self.0.as_image_copy(), self.0.size());
 //!         Ok(())
 //!     }

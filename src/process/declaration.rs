@@ -10,6 +10,9 @@ use crate::scene::{
 
 /// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
 /// of the size of its picture unless [`Declare::size`] says otherwise.
+///
+/// A process can use only what it declares. What it declares and does not use is warned of through `tracing`: a target, buffer, column or
+/// material type that its shader has no variable for, or that its [raw pass](super::RawPassResources) never asks for.
 #[derive(Debug, Default)]
 pub struct Declare {
     declaration: Declaration,
@@ -141,7 +144,7 @@ impl Declare {
     }
 
     /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
-    /// [`Declare::samples`] does.
+    /// [`Declare::samples`] does. A raw pass finds it as the [layered target](super::RawPassResources::layered_target).
     pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
         self.access(target, Access::SampleLayers(views));
     }
@@ -333,7 +336,7 @@ impl Declare {
         self.access(target, Access::Change);
     }
 
-    /// A raw pass reads a target with its own commands.
+    /// A raw pass reads a target with its own commands. Nothing checks that it does not write it.
     pub fn reads(&mut self, target: &str) {
         self.access(target, Access::Read);
     }

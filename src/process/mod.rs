@@ -9,6 +9,7 @@
 //!   post-processing.
 
 mod access;
+mod access_error;
 mod blend_equation;
 mod compute_dispatch;
 #[cfg(feature = "software")]
@@ -24,6 +25,8 @@ mod post;
 mod prelude;
 mod procedural_draws;
 #[cfg(feature = "wgpu")]
+mod raw_access;
+#[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
 mod shader_file;
@@ -33,6 +36,7 @@ mod storage_buffer;
 mod target_size;
 
 pub use access::{Access, ClearColor};
+pub use access_error::AccessError;
 pub use blend_equation::{BlendComponent, BlendEquation, BlendFactor};
 pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
@@ -71,3 +75,5 @@ pub use target_size::TargetSize;
 pub(crate) use cpu_shader::TypedCpuShader;
 #[cfg(feature = "wgpu")]
 pub(crate) use prelude::{FIRST_OWN_LOCATION, LightVolume, prelude_with};
+#[cfg(feature = "wgpu")]
+pub(crate) use raw_access::{RawAccess, RequestLog};

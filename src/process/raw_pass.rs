@@ -5,7 +5,8 @@ use std::error::Error;
 use bytemuck::Pod;
 use wgpu::util::DeviceExt;
 
-use super::{BufferLayout, StorageBuffer};
+use super::raw_access::RawAccess;
+use super::{AccessError, BufferLayout, StorageBuffer};
 use crate::scene::{ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, ViewKind};
 
 /// A pass that gets the command encoder, because compute, copies and viewports cannot be recorded into a bundle.
@@ -16,7 +17,7 @@ pub trait RawPass: Send + Sync {
     /// Encodes the pass.
     ///
     /// # Errors
-    /// Any error of the engine: the frame fails with an error that names the process.
+    /// Any error of the engine, or an [`AccessError`] of a lookup: the frame fails with an error that names the process.
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -24,7 +25,15 @@ pub trait RawPass: Send + Sync {
     ) -> Result<(), Box<dyn Error + Send + Sync>>;
 }
 
-/// The resources of a raw pass.
+/// The resources of a raw pass: those that its process declares. It gets no others, in any build: processes are ordered by what they
+/// declare, so another target may not be written yet, or not exist in the next plan.
+///
+/// A lookup that fails makes the frame fail, with an error that names the process and the resource, even if `encode` goes on without the
+/// resource. The next frame is not affected. `tracing` warns, once, of what the process declares and the pass has not asked for in the
+/// first 60 frames that encode it: a declaration orders processes, and keeps those that write the target.
+///
+/// Nothing checks how a pass uses what it gets: wgpu has no textures that can only be read, so no error tells of a pass that writes a
+/// target which its process only [reads](super::Declare::reads).
 pub struct RawPassResources<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
@@ -37,6 +46,7 @@ pub struct RawPassResources<'a> {
     /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders: the view,
     /// all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
     pub bind_groups: [&'a wgpu::BindGroup; 2],
+    pub(crate) access: RawAccess<'a>,
     pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<wgpu::BufferBinding<'a>>,
     pub(crate) materials: &'a dyn Fn(MaterialLayout) -> Option<wgpu::BufferBinding<'a>>,
     pub(crate) buffers: &'a dyn Fn(BufferLayout) -> Option<&'a wgpu::Buffer>,
@@ -51,30 +61,47 @@ impl RawPassResources<'_> {
         self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents: bytes, usage })
     }
 
-    /// The values of a column of objects; `None` if the process does not declare that it [reads](super::Declare::reads_column) it.
-    pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Option<wgpu::BufferBinding<'_>> {
-        (self.columns)(column.layout())
+    /// The values of a column of objects.
+    ///
+    /// # Errors
+    /// If the process does not declare that it [reads](super::Declare::reads_column) it.
+    pub fn column<T: Pod>(&self, column: ObjectColumn<T>) -> Result<wgpu::BufferBinding<'_>, AccessError> {
+        self.access.column(column.layout(), || (self.columns)(column.layout()))
     }
 
-    /// The values of a material type; `None` if the process does not declare that it [reads](super::Declare::reads_materials) them.
-    pub fn materials<T: Pod>(&self, material_type: MaterialType<T>) -> Option<wgpu::BufferBinding<'_>> {
-        (self.materials)(material_type.layout())
+    /// The values of a material type.
+    ///
+    /// # Errors
+    /// If the process does not declare that it [reads](super::Declare::reads_materials) them.
+    pub fn materials<T: Pod>(&self, material_type: MaterialType<T>) -> Result<wgpu::BufferBinding<'_>, AccessError> {
+        self.access.material_type(material_type.layout(), || (self.materials)(material_type.layout()))
     }
 
-    /// A buffer that processes share, with the usages `STORAGE`, `INDIRECT`, `COPY_SRC` and `COPY_DST`; `None` if the process does not
-    /// declare that it [reads](super::Declare::reads_buffer) or [changes](super::Declare::changes_buffer) it. To fill it, copy from
+    /// A buffer that processes share, with the usages `STORAGE`, `INDIRECT`, `COPY_SRC` and `COPY_DST`. To fill it, copy from
     /// [`RawPassResources::buffer_of`].
-    pub fn buffer<T: Pod>(&self, buffer: StorageBuffer<T>) -> Option<&wgpu::Buffer> {
-        (self.buffers)(buffer.layout())
+    ///
+    /// # Errors
+    /// If the process does not declare that it [reads](super::Declare::reads_buffer) or [changes](super::Declare::changes_buffer) it, or
+    /// takes [arguments](super::Declare::reads_arguments) from it.
+    pub fn buffer<T: Pod>(&self, buffer: StorageBuffer<T>) -> Result<&wgpu::Buffer, AccessError> {
+        self.access.buffer(buffer.layout(), || (self.buffers)(buffer.layout()))
     }
 
-    /// The view's target of this name; `None` if no process declares it.
-    pub fn target(&self, name: &str) -> Option<&wgpu::Texture> {
-        (self.textures)(name)
+    /// The view's target of this name; a history by its [`previous_name`](super::previous_name).
+    ///
+    /// # Errors
+    /// If the process does not declare that it [reads](super::Declare::reads), [changes](super::Declare::changes) or
+    /// [writes](super::Declare::writes) it, or [samples what it held before](super::Declare::samples_previous).
+    pub fn target(&self, name: &str) -> Result<&wgpu::Texture, AccessError> {
+        self.access.target(name, || (self.textures)(name))
     }
 
-    /// The texture array of this name that all views of a kind share; `None` if no process declares it.
-    pub fn layered_target(&self, views: ViewKind, name: &str) -> Option<&wgpu::Texture> {
-        (self.layered)(views, name)
+    /// The texture array of this name that all views of a kind share.
+    ///
+    /// # Errors
+    /// If the process does not declare that it [samples the layers](super::Declare::samples_layers), or, where the views are of its own
+    /// kind, uses the target as others; or if the views share no target of this name.
+    pub fn layered_target(&self, views: ViewKind, name: &str) -> Result<&wgpu::Texture, AccessError> {
+        self.access.layered_target(views, name, || (self.layered)(views, name))
     }
 }

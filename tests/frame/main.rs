@@ -2,6 +2,8 @@
 
 mod bad_input;
 mod changes;
+#[cfg(feature = "wgpu")]
+mod declared_resources;
 mod deferred;
 mod determinism;
 mod failing_process;
@@ -22,7 +24,7 @@ mod tuning;
 mod uploads;
 mod views;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::Deferred;
@@ -33,4 +35,31 @@ use drawloom::{Granularity, Renderer, Submitter};
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     Renderer::builder(NullBackend).deferred(Deferred::to_picture()).granularity(granularity).build(scheduler).unwrap()
+}
+
+/// What this thread reports through `tracing` during a call, as text.
+fn reported(call: impl FnOnce()) -> String {
+    let written = Arc::new(Mutex::new(Vec::new()));
+    let writer = {
+        let written = Arc::clone(&written);
+        move || Written(Arc::clone(&written))
+    };
+    let subscriber = tracing_subscriber::fmt().with_writer(writer).with_ansi(false).finish();
+    tracing::subscriber::with_default(subscriber, call);
+    let bytes = written.lock().unwrap().clone();
+    String::from_utf8(bytes).unwrap()
+}
+
+/// What a subscriber writes.
+struct Written(Arc<Mutex<Vec<u8>>>);
+
+impl std::io::Write for Written {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }

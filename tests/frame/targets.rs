@@ -1,6 +1,6 @@
 //! Sizes and histories of targets that no plan can have.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use bytemuck::Pod;
 use drawloom::backend::NullBackend;
@@ -13,6 +13,8 @@ use drawloom::scene::{Blend, Material, MaterialType, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
+
+use crate::reported;
 
 /// A process with a name, and a function that declares.
 struct Declaring(&'static str, Box<dyn Fn(&mut Declare) + Send + Sync>);
@@ -239,32 +241,11 @@ fn a_process_that_nothing_needs_is_warned_of() {
         declare.clears_color("unused", Format::Rgba8Unorm, ClearColor::Background);
     });
     let picture = Declaring::new("useful", |declare| clears(declare, "picture"));
-    let written = Arc::new(Mutex::new(Vec::new()));
-    let writer = {
-        let written = Arc::clone(&written);
-        move || Written(Arc::clone(&written))
-    };
-    let subscriber = tracing_subscriber::fmt().with_writer(writer).with_ansi(false).finish();
-    tracing::subscriber::with_default(subscriber, || {
+    let text = reported(|| {
         let builder = Renderer::builder(NullBackend).process(useless).process(picture);
         drop(builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap());
     });
-    let text = String::from_utf8(written.lock().unwrap().clone()).unwrap();
     assert!(text.contains("WARN") && text.contains("useless") && !text.contains("useful"), "{text}");
-}
-
-/// What a subscriber writes.
-struct Written(Arc<Mutex<Vec<u8>>>);
-
-impl std::io::Write for Written {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().unwrap().extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
 }
 
 #[test]

@@ -179,10 +179,7 @@ impl RawPass for Fill {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        if resources.buffer(RUNS).is_some() {
-            return Err("it does not declare this buffer".into());
-        }
-        let columns = resources.buffer(COLUMNS).ok_or("no columns")?;
+        let columns = resources.buffer(COLUMNS)?;
         let arguments = [[0; 4], [6_u32, 5, 0, 0]];
         let staged = resources.buffer_of("columns", wgpu::BufferUsages::COPY_SRC, bytemuck::bytes_of(&arguments));
         encoder.copy_buffer_to_buffer(&staged, 0, columns, 0, staged.size());

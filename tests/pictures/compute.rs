@@ -49,8 +49,8 @@ impl RawPass for Palette {
         let (pipeline, layout) = self.pipeline.get_or_init(|| new_pipeline(device, resources.bind_group_layouts));
         let factor = [self.factor.load(Ordering::Relaxed) as f32 / 255.0, 0.0, 0.0, 0.0];
         let factor = resources.buffer_of("factor", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&factor));
-        let palette = resources.target("palette").ok_or("no palette")?.create_view(&Default::default());
-        let tints = resources.column(TINT).ok_or("no tints")?;
+        let palette = resources.target("palette")?.create_view(&Default::default());
+        let tints = resources.column(TINT)?;
         let entries = [
             wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&palette) },
             wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(tints) },

@@ -212,7 +212,7 @@ impl RawPass for OwnPass {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        let target = resources.target("raw").ok_or("the target is missing")?;
+        let target = resources.target("raw")?;
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &target.create_view(&wgpu::TextureViewDescriptor::default()),

@@ -299,7 +299,7 @@ impl RawPass for Green {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        let target = resources.target("multisampled colour").ok_or("it is declared")?;
+        let target = resources.target("multisampled colour")?;
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::GREEN), store: wgpu::StoreOp::Store };
         let attachment = wgpu::RenderPassColorAttachment { view: &view, depth_slice: None, resolve_target: None, ops };

@@ -207,7 +207,7 @@ impl RawPass for RawProcess {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        let target = resources.target("raw").ok_or("the target is missing")?;
+        let target = resources.target("raw")?;
         match self.action {
             Action::ClearYellow => {
                 let view = target.create_view(&wgpu::TextureViewDescriptor::default());

@@ -328,8 +328,8 @@ pub enum ProcessError {
         /// The target.
         target: String,
     },
-    /// A raw pass declares that it draws into or samples a target, or another process that it writes, changes or reads
-    /// one by commands of its own.
+    /// A raw pass declares that it draws into or samples a target, beside histories and layers, or another process that it writes,
+    /// changes or reads one by commands of its own.
     #[error(
         "process {process:?} declares target {target:?} with an access of raw passes but draws no raw pass, or draws one with an access of drawn passes"
     )]

@@ -4,6 +4,8 @@ use std::iter;
 use std::sync::Arc;
 
 use super::{PlanError, ProcessError};
+#[cfg(feature = "wgpu")]
+use crate::process::RequestLog;
 use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
@@ -17,6 +19,9 @@ pub struct PlannedProcess {
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,
+    /// What its raw pass asks for.
+    #[cfg(feature = "wgpu")]
+    pub(crate) requests: Arc<RequestLog>,
 }
 
 impl PlannedProcess {
@@ -45,10 +50,15 @@ impl PlannedProcess {
         let mut kinds: Vec<_> = iter::once(*views).chain(further).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let of_kind = |views| Self {
-            process: Arc::clone(process),
-            name: name.clone(),
-            declaration: Declaration { views, ..declaration.clone() },
+        let of_kind = |views| {
+            let declaration = Declaration { views, ..declaration.clone() };
+            Self {
+                process: Arc::clone(process),
+                name: name.clone(),
+                #[cfg(feature = "wgpu")]
+                requests: Arc::new(RequestLog::new(&declaration)),
+                declaration,
+            }
         };
         Ok(kinds.into_iter().map(of_kind).collect())
     }
@@ -68,8 +78,9 @@ impl PlannedProcess {
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };
-        // Both kinds read histories: raw passes by the name of the copy.
-        let fits = |access: &Access| access.is_raw() == is_raw || *access == Access::SamplePrevious;
+        // Both kinds read histories and layers, as nothing else declares these: raw passes ask for them by name.
+        let is_of_both = |access: &Access| matches!(access, Access::SamplePrevious | Access::SampleLayers(_));
+        let fits = |access: &Access| access.is_raw() == is_raw || is_of_both(access);
         if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
             return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
         }

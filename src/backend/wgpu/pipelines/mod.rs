@@ -6,6 +6,7 @@ mod pipeline_cache;
 mod pipeline_key;
 mod pipeline_variant;
 mod process_pipelines;
+mod unused_bindings;
 mod vertex_buffers;
 
 pub(crate) use pipeline_cache::PipelineCache;

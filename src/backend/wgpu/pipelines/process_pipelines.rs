@@ -10,6 +10,7 @@ use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_
 use super::compile_shader::compile_shader;
 use super::pipeline_key::{PipelineKey, VertexSource};
 use super::pipeline_variant::PipelineVariant;
+use super::unused_bindings::warn_of_unused_bindings;
 use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, binding_type, engine_layout, process_layout};
@@ -79,12 +80,9 @@ impl ProcessPipelines {
         let shader = if key.vertices == VertexSource::None {
             None
         } else {
-            let module = compile_shader(
-                device,
-                name,
-                &key.prelude(attributes.iter().map(|attribute| attribute.layout)),
-                &key.own_shaders(),
-            )?;
+            let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
+            let module = compile_shader(device, name, &before, &key.own_shaders())?;
+            warn_of_unused_bindings(name, &planned.declaration, &before, &key.own_shaders());
             let own = [process_layout.as_ref(), engine_layout.as_ref()];
             let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
             let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);

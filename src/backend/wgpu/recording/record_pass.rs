@@ -11,7 +11,7 @@ use crate::backend::wgpu::pipelines::{PipelineVariant, fixed_state};
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{DrawCount, Draws, Pass, ProceduralDraws, RawPass, RawPassResources};
+use crate::process::{DrawCount, Draws, Pass, PlannedProcess, ProceduralDraws, RawAccess, RawPass, RawPassResources};
 
 /// Records the batches of a segment directly into the pass.
 ///
@@ -135,7 +135,8 @@ pub(crate) fn record_without_commands(
 /// Has a raw pass encode itself.
 ///
 /// # Errors
-/// If the raw pass reports an error, or a resource of the pass is missing. The latter is a bug in Drawloom.
+/// If the raw pass asks for what its process does not declare, or reports an error, or a resource of the pass is missing. The latter is a
+/// bug in Drawloom.
 pub(crate) fn encode_raw(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
@@ -148,14 +149,13 @@ pub(crate) fn encode_raw(
     let textures = |name: &str| frame.targets.find(pass.view_index, name).map(|target| &target.texture);
     let layered = |kind, name: &str| frame.targets.find_layered(kind, name).map(|(texture, _)| texture);
     let size = request.views[pass.view_index].camera.size;
-    let declaration = &request.plan.processes()[pass.process_index].declaration;
-    let columns = |column| frame.buffers.objects().column(column).filter(|_| declaration.columns.contains(&column));
+    let PlannedProcess { name, declaration, requests, .. } = &request.plan.processes()[pass.process_index];
+    let columns = |column| frame.buffers.objects().column(column);
     let materials = |material_type| {
         let index = declaration.material_types.iter().position(|declared| *declared == material_type)?;
         frame.buffers.resource_bytes().of_process(pass.process_index).nth(index)
     };
-    let is_declared = |buffer| declaration.buffers.iter().any(|(declared, _)| *declared == buffer);
-    let buffers = |buffer| frame.storage_buffers.find(buffer).filter(|_| is_declared(buffer));
+    let buffers = |buffer| frame.storage_buffers.find(buffer);
     let of_frame = frame.pass(index).frame_bind_group.as_ref();
     let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
     let of_materials = frame.buffers.materials_bind_group();
@@ -166,6 +166,7 @@ pub(crate) fn encode_raw(
         size,
         bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
         bind_groups: [of_frame, of_materials],
+        access: RawAccess::new(name, declaration, requests),
         columns: &columns,
         materials: &materials,
         buffers: &buffers,
@@ -176,7 +177,11 @@ pub(crate) fn encode_raw(
     if let Some((set, [begin, _])) = queries {
         encoder.write_timestamp(set, begin);
     }
-    raw.encode(encoder, &resources).map_err(BackendError::RawPass)?;
+    let encoded = raw.encode(encoder, &resources);
+    // Before the pass's own error, which may follow from it, and even if there is none: a pass that goes on without a resource draws
+    // something else than its process promises.
+    resources.access.end().map_err(BackendError::Access)?;
+    encoded.map_err(BackendError::RawPass)?;
     if let Some((set, [_, end])) = queries {
         encoder.write_timestamp(set, end);
     }
