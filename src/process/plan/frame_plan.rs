@@ -241,7 +241,8 @@ static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 /// texture to bind.
 fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, PlannedProcess)]) -> Option<PlannedTarget> {
     let is_map = |(target, access): &(String, Access)| {
-        target == ShadowCasters::TARGET && *access == Access::SampleLayers(ViewKind::Shadow)
+        target == ShadowCasters::TARGET
+            && matches!(access, Access::SampleLayers(ViewKind::Shadow) | Access::SampleView(ViewKind::Shadow, _))
     };
     let is_read = added.iter().any(|(_, other)| other.declaration.accesses.iter().any(is_map));
     let is_drawn = added.iter().any(|(_, other)| {

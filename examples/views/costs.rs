@@ -1,0 +1,127 @@
+//! What each view costs, and what leaving it out would save.
+
+use std::collections::HashMap;
+use std::error::Error;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::Backend;
+use drawloom::scene::{Camera, SceneRef};
+use drawloom::{Renderer, Submitter};
+use serde::Serialize;
+
+use crate::gallery::Gallery;
+
+/// Frames that are drawn before others are measured: targets and pipelines are made in them.
+const WARM_UP_FRAMES: u32 = 3;
+
+/// A view, and what it costs.
+#[derive(Serialize)]
+pub struct ViewCost {
+    name: String,
+    kind: &'static str,
+    /// The view that samples it; none for one that all views share.
+    parent: Option<String>,
+    objects: usize,
+    commands: usize,
+    /// The thread time of its stages a frame, in milliseconds.
+    ms: f64,
+    /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted sooner. Only of
+    /// views that may be left out.
+    saves_ms: Option<f64>,
+    /// In which of its forms it was drawn.
+    rung: &'static str,
+}
+
+/// How many frames [`measure`] draws.
+pub fn frames_to_draw(gallery: &Gallery, frames: u32) -> u64 {
+    u64::from(2 * frames + WARM_UP_FRAMES) * gallery.optional_views().count() as u64
+}
+
+/// Draws the gallery, alternately whole and without each of its views.
+///
+/// # Errors
+/// If a frame fails.
+pub fn measure<B: Backend>(
+    gallery: &Gallery,
+    renderer: &mut Renderer<B>,
+    submitter: &Submitter<B>,
+    frames: u32,
+    mut drawn: impl FnMut(),
+) -> Result<Vec<ViewCost>, Box<dyn Error>> {
+    let mut draw = |cameras: &[Camera]| -> Result<Duration, Box<dyn Error>> {
+        let scene = SceneRef { cameras, ..gallery.scene.as_scene_ref() };
+        let start = Instant::now();
+        let submitted = submitter.submit(renderer.record(scene)?)?;
+        let took = start.elapsed();
+        drop(submitted);
+        drawn();
+        Ok(took)
+    };
+    let mut saved: HashMap<String, f64> = HashMap::new();
+    for view in gallery.optional_views() {
+        let cameras = gallery.without(view);
+        let mut medians = [0.0; 2];
+        for (median, cameras) in medians.iter_mut().zip([&gallery.scene.cameras, &cameras]) {
+            for _ in 0..WARM_UP_FRAMES.min(frames) {
+                draw(cameras)?;
+            }
+            let mut times = (0..frames).map(|_| draw(cameras)).collect::<Result<Vec<_>, _>>()?;
+            times.sort_unstable();
+            *median = times[times.len() / 2].as_secs_f64() * 1e3;
+        }
+        saved.insert(view.to_owned(), medians[0] - medians[1]);
+    }
+
+    let timeline = std::sync::Arc::clone(renderer.scheduler().timeline());
+    timeline.start();
+    let mut statistics = None;
+    for _ in 0..frames {
+        statistics = Some(submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?.statistics);
+    }
+    timeline.stop();
+    let log = timeline.take();
+    let mut times: HashMap<&str, Duration> = HashMap::new();
+    for run in &log.runs {
+        for chunk in &run.chunks {
+            if let Some(view) = &run.graph.nodes[chunk.node].labels.view {
+                *times.entry(view).or_default() += chunk.ended.saturating_sub(chunk.started);
+            }
+        }
+    }
+    let views = statistics.map(|statistics| statistics.views).unwrap_or_default();
+    let names: Vec<_> = views.iter().map(|view| view.name.clone()).collect();
+    let cost_of = |view: drawloom::ViewStatistics| {
+        let parent = view.name.rsplit_once('/').map(|(parent, _)| parent.to_owned());
+        ViewCost {
+            kind: view.kind.name(),
+            parent: parent.filter(|parent| names.contains(parent)),
+            objects: view.visible,
+            commands: view.commands,
+            ms: times.get(view.name.as_str()).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
+            saves_ms: saved.get(&view.name).copied(),
+            rung: "full",
+            name: view.name,
+        }
+    };
+    Ok(views.into_iter().map(cost_of).collect())
+}
+
+/// Prints a line for each view.
+pub fn print(views: &[ViewCost]) {
+    println!("{:<28} {:<10} {:>8} {:>9} {:>8} {:>9}", "view", "kind", "objects", "commands", "ms", "saves ms");
+    for view in views {
+        let saves = view.saves_ms.map_or_else(|| "-".to_owned(), |saves| format!("{saves:.3}"));
+        let ViewCost { name, kind, objects, commands, ms, .. } = view;
+        println!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9}");
+    }
+}
+
+/// Writes what was printed as JSON.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(views: &[ViewCost], path: &Path) -> Result<(), Box<dyn Error>> {
+    let text = serde_json::to_string_pretty(&serde_json::json!({ "views": views }))?;
+    std::fs::write(path, text).map_err(|error| format!("{} could not be written: {error}", path.display()).into())
+}

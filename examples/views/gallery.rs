@@ -1,0 +1,181 @@
+//! The scene, its mirror, portals and screen, and the cameras of all views.
+
+use drawloom::demo;
+use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
+use drawloom::handle::Handle;
+use drawloom::scene::{
+    Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Topology, Vertex, ViewKind,
+};
+
+use crate::contact_sheet;
+use crate::surface::Surface;
+
+/// The pixels of a view.
+pub const SIZE: [u32; 2] = [480, 270];
+
+/// How many tiles the camera of the detail is divided into, in each direction.
+pub const TILES: u32 = 2;
+
+/// The colonnade with a pool, two portals and a screen.
+pub struct Gallery {
+    pub scene: Scene,
+}
+
+impl Gallery {
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn new() -> Result<Self, SceneError> {
+        let mut scene = demo::colonnade()?;
+        let world: Vec<_> = scene.objects().collect();
+        for handle in world {
+            let Ok(object) = scene.object(handle) else { continue };
+            scene.replace_object(handle, RenderObject { layers: Surface::WORLD, ..object })?;
+        }
+        let square = scene.add(square()?)?;
+        let surface = scene.add(Material { diffuse: Vec3::ZERO, ..Material::default() })?;
+        let frame = scene.add(Material { diffuse: Vec3::new(0.25, 0.16, 0.05), ..Material::default() })?;
+        let cuboid = scene.add(Mesh::cuboid("frame", Vec3::ONE)?)?;
+        for place in Place::all() {
+            let mut object = RenderObject::new(square, surface, place.position);
+            (object.orientation, object.scale) = (place.orientation, place.half_size.extend(1.0));
+            object.layers = place.surface.layer();
+            scene.add_object(object)?;
+            for object in place.frame(cuboid, frame) {
+                scene.add_object(object)?;
+            }
+        }
+        scene.cameras = cameras();
+        Ok(Self { scene })
+    }
+
+    /// The index of the contact sheet's view.
+    pub fn sheet_view(&self) -> usize {
+        self.scene.cameras.iter().position(|camera| camera.name == contact_sheet::TARGET).unwrap_or(0)
+    }
+
+    /// The scene without a view, and without those that only this view samples.
+    pub fn without(&self, view: &str) -> Vec<Camera> {
+        let belongs_to = |name: &str| name == view || name.strip_prefix(view).is_some_and(|rest| rest.starts_with('/'));
+        self.scene.cameras.iter().filter(|camera| !belongs_to(&camera.name)).cloned().collect()
+    }
+
+    /// The views that are drawn for another view's picture.
+    pub fn optional_views(&self) -> impl Iterator<Item = &str> {
+        self.scene
+            .cameras
+            .iter()
+            .map(|camera| camera.name.as_str())
+            .filter(|name| !["main", contact_sheet::TARGET].contains(name))
+    }
+
+    /// The light whose shadow map is on the sheet: the first that casts a shadow.
+    pub fn light_of_shadow_map(lights: &[Light]) -> Option<usize> {
+        lights.iter().position(Light::casts_shadow)
+    }
+}
+
+/// Where a surface is that shows another view.
+struct Place {
+    surface: Surface,
+    position: DVec3,
+    /// The surface faces +Z.
+    orientation: Quat,
+    half_size: Vec2,
+}
+
+impl Place {
+    fn all() -> [Self; 4] {
+        let [entry, exit] = portals();
+        [
+            Self {
+                surface: Surface::pool(),
+                position: pool().point,
+                orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2),
+                half_size: Vec2::new(2.6, 1.5),
+            },
+            Self {
+                surface: Surface::portal(),
+                position: entry.0,
+                orientation: entry.1,
+                half_size: Vec2::new(1.1, 1.5),
+            },
+            Self { surface: Surface::exit(), position: exit.0, orientation: exit.1, half_size: Vec2::new(1.1, 1.5) },
+            Self {
+                surface: Surface::screen(),
+                position: DVec3::new(3.9, 2.6, 4.4),
+                orientation: Quat::from_rotation_y(-0.75),
+                half_size: Vec2::new(1.28, 0.72),
+            },
+        ]
+    }
+
+    /// Four bars around the surface.
+    fn frame(&self, mesh: Handle<Mesh>, material: Handle<Material>) -> impl Iterator<Item = RenderObject> {
+        let half = self.half_size;
+        let bars = [
+            (half.x, 0.0, 0.06, half.y),
+            (-half.x, 0.0, 0.06, half.y),
+            (0.0, half.y, half.x, 0.06),
+            (0.0, -half.y, half.x, 0.06),
+        ];
+        bars.into_iter().map(move |(x, y, width, height)| {
+            let offset = self.orientation * Vec3::new(x, y, 0.0);
+            let mut object = RenderObject::new(mesh, material, self.position + offset.as_dvec3());
+            object.orientation = self.orientation;
+            object.scale = 2.0 * Vec3::new(width.max(0.06), height.max(0.06), 0.06);
+            object.layers = Surface::WORLD;
+            object
+        })
+    }
+}
+
+/// The water's surface.
+fn pool() -> ClipPlane {
+    ClipPlane { point: DVec3::new(-0.2, 0.06, 6.2), normal: Vec3::Y }
+}
+
+/// Two portals that face each other across the nave, so that the first shows itself.
+fn portals() -> [(DVec3, Quat); 2] {
+    let turn = std::f32::consts::FRAC_PI_2;
+    [
+        (DVec3::new(-3.9, 1.6, 3.2), Quat::from_rotation_y(turn)),
+        (DVec3::new(3.9, 1.6, 1.0), Quat::from_rotation_y(-turn)),
+    ]
+}
+
+fn camera(name: &str, position: DVec3, target: DVec3, degrees: f32) -> Camera {
+    let projection = Projection::Perspective { field_of_view: degrees.to_radians() };
+    Camera { projection, size: SIZE, ..Camera::looking_at(name, position, target) }
+}
+
+/// The cameras of all views, shadow maps aside. Their order does not matter.
+fn cameras() -> Vec<Camera> {
+    let main = camera("main", DVec3::new(1.6, 2.3, 11.6), DVec3::new(-0.9, 1.3, 2.0), 58.0);
+    let guest = camera("guest", DVec3::new(-2.2, 1.7, 10.2), DVec3::new(0.4, 1.2, 3.0), 65.0);
+    let screen = camera("screen", DVec3::new(-4.2, 5.2, -2.5), DVec3::new(0.5, 0.5, 4.0), 70.0);
+    let detail = camera("detail", DVec3::new(-1.5, 2.4, 6.5), DVec3::new(-5.6, 2.6, 1.2), 40.0);
+    let [entry, exit] = portals();
+    let portal = main.through_portal("portal", entry, exit);
+    let inner = portal.through_portal("portal", entry, exit);
+    let [width, height] = contact_sheet::SIZE;
+    let mut cameras = vec![
+        main.reflected("pool", pool()),
+        guest.reflected("pool", pool()),
+        inner,
+        portal,
+        Camera { kind: ViewKind::Reflection, ..screen },
+    ];
+    cameras.extend((0..TILES * TILES).map(|tile| detail.tile([tile % TILES, tile / TILES], TILES)));
+    cameras.extend([detail, guest, main]);
+    let sheet = camera(contact_sheet::TARGET, DVec3::ZERO, DVec3::NEG_Z, 60.0);
+    cameras.push(Camera { kind: ViewKind::Post, size: [width, height], ..sheet });
+    cameras
+}
+
+/// A square of 2 m that faces +Z.
+fn square() -> Result<Mesh, SceneError> {
+    let corner =
+        |x: f32, y: f32| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] };
+    let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    Mesh::new("square", Topology::TriangleList, corners, vec![0, 1, 2, 2, 3, 0])
+}
