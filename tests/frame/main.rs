@@ -11,6 +11,7 @@ mod object_table;
 mod occlusion;
 mod order;
 mod quality;
+mod requirements;
 mod retained;
 mod shadow_interval;
 mod targets;
