@@ -63,8 +63,10 @@ impl BlendedObjectWitness {
 struct BlendedMaterials {
     /// The identity and revision of the materials; `None` before the first update.
     version: Option<(u64, u64)>,
-    /// By slot: each material, and whether it needs transparency.
-    slots: Vec<Option<(Handle<Material>, bool)>>,
+    /// By slot: each material of the assets.
+    materials: Vec<Option<Handle<Material>>>,
+    /// By slot: whether there is a material that needs transparency. A search looks here for each object.
+    is_blended: Vec<bool>,
     /// The number of those that need it.
     count: usize,
 }
@@ -78,20 +80,22 @@ impl BlendedMaterials {
             return false;
         }
         let mut starts = false;
-        let mut slots = vec![None; assets.materials.slot_count()];
-        self.count = 0;
+        let mut materials = vec![None; assets.materials.slot_count()];
+        let mut is_blended = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
-            let needs = Requirements::needs_transparency(material);
             let slot = handle.index() as usize;
-            starts |= needs && self.slots.get(slot) == Some(&Some((handle, false)));
-            self.count += usize::from(needs);
-            slots[slot] = Some((handle, needs));
+            materials[slot] = Some(handle);
+            is_blended[slot] = Requirements::needs_transparency(material);
+            let was_opaque = self.materials.get(slot) == Some(&Some(handle)) && !self.is_blended[slot];
+            starts |= was_opaque && is_blended[slot];
         }
-        (self.version, self.slots) = (version, slots);
+        self.count = is_blended.iter().filter(|is_blended| **is_blended).count();
+        (self.version, self.materials, self.is_blended) = (version, materials, is_blended);
         starts
     }
 
     fn contains(&self, material: Handle<Material>) -> bool {
-        self.slots.get(material.index() as usize) == Some(&Some((material, true)))
+        let slot = material.index() as usize;
+        self.is_blended.get(slot) == Some(&true) && self.materials[slot] == Some(material)
     }
 }

@@ -164,7 +164,7 @@ impl<B: Backend> Renderer<B> {
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
-        self.tables.cullable_meshes.update(scene.assets);
+        self.tables.cullable_meshes.update(scene.assets, self.tables.objects.used_meshes());
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =
             !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;
