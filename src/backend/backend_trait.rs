@@ -71,7 +71,8 @@ pub trait Backend: Send + Sync + 'static {
         Ok(())
     }
 
-    /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines.
+    /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the meshes, the frame draws
+    /// none but the [used ones](crate::view::ObjectTable::used_meshes).
     ///
     /// # Errors
     /// If the device lacks room for the frame's resources, or refuses them.

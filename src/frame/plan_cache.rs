@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
 use crate::quality::Quality;
-use crate::scene::{Assets, Camera, Light, ViewKind};
+use crate::scene::{Camera, Light, ViewKind};
 use crate::task::{JobPanic, catch};
 use crate::view::ShadowMaps;
 
@@ -62,33 +62,35 @@ impl PlanCache {
         &self.current
     }
 
-    /// The plan for a scene with these valid lights and assets, compiled if the cache does not have it. It becomes the current plan.
+    /// The plan for a scene with these valid lights, and with objects that need transparency if `transparency` is true, compiled if the
+    /// cache does not have it. It becomes the current plan.
     ///
     /// # Errors
     /// If the processes make no frame.
     pub(super) fn select(
         &mut self,
         lights: &[Light],
-        assets: &Assets,
+        transparency: bool,
         cameras: &[Camera],
     ) -> Result<Arc<FramePlan>, PlanError> {
-        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights()).with_cameras(cameras);
+        let requirements =
+            Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
         self.current = self.plan_for(requirements)?;
         Ok(Arc::clone(&self.current))
     }
 
-    /// The plans for a scene with these lights and assets, and for one that requires everything, compiled if the cache does not have
-    /// them. The current plan stays.
+    /// The plans for such a scene, and for one that requires everything, compiled if the cache does not have them. The current plan stays.
     ///
     /// # Errors
     /// If the processes make no frame.
     pub(super) fn plans_to_prepare(
         &mut self,
         lights: &[Light],
-        assets: &Assets,
+        transparency: bool,
         cameras: &[Camera],
     ) -> Result<[Arc<FramePlan>; 2], PlanError> {
-        let requirements = Requirements::of(lights, assets, self.separates_shadowed_lights()).with_cameras(cameras);
+        let requirements =
+            Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
         Ok([self.plan_for(requirements)?, self.plan_for(Requirements::all())?])
     }
 

@@ -20,7 +20,7 @@ use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
 use crate::command::DrawList;
-use crate::process::{Deferred, Draws, FramePlan, Pass};
+use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
 use crate::task::Scheduler;
@@ -133,7 +133,8 @@ impl<B: Backend> Renderer<B> {
     /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
     /// frame.
     pub fn prepare_pipelines(&mut self, scene: SceneRef<'_>) -> Result<(), FrameError> {
-        for plan in self.plans.plans_to_prepare(scene.lights, scene.assets, scene.cameras)? {
+        let transparency = Requirements::any_needs_transparency(&scene);
+        for plan in self.plans.plans_to_prepare(scene.lights, transparency, scene.cameras)? {
             let draws = plan.draws()?;
             let states_of = |draws: &Draws<'_>| {
                 draws.selection().map_or_else(Vec::new, |selection| possible_draw_states(selection, scene.assets))
@@ -155,7 +156,8 @@ impl<B: Backend> Renderer<B> {
         self.tables.objects.configure(self.quality.culling);
         self.tables.objects.begin_frame(scene);
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
-        let plan = self.plans.select(&valid_lights.lights, scene.assets, scene.cameras)?;
+        let transparency = self.tables.blended_object.update(scene, &self.tables.objects);
+        let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
         let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), &plan)?;
         let (frame_views, shadow_maps) = self.shadow_cache.resolve(self.quality.shadows.interval, &plan, requested);
         let FrameViews { views, lights } = frame_views;
@@ -163,7 +165,7 @@ impl<B: Backend> Renderer<B> {
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
-        self.tables.cullable_meshes.update(scene.assets);
+        self.tables.cullable_meshes.update(scene.assets, self.tables.objects.used_meshes());
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =
             !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;

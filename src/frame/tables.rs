@@ -2,6 +2,7 @@
 
 use parking_lot::{Mutex, RwLock};
 
+use super::blended_object_witness::BlendedObjectWitness;
 use super::list_inputs::ListInputs;
 use super::triangle_culling::{CullableMeshes, PassTriangles};
 use super::view_occlusion::ViewOcclusion;
@@ -15,6 +16,8 @@ use crate::view::{LightTable, ObjectTable, OccluderMeshes, RenderView};
 #[derive(Debug, Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
+    /// Whether an object needs transparency.
+    pub(super) blended_object: BlendedObjectWitness,
     /// One for each view.
     pub(super) visibility: Vec<ViewVisibility>,
     /// One for each view.

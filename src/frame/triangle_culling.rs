@@ -6,28 +6,29 @@ use parking_lot::Mutex;
 
 use crate::command::DrawList;
 use crate::raster::CulledTriangles;
-use crate::scene::{Assets, SceneRef};
-use crate::view::RenderView;
+use crate::scene::{Assets, Mesh, SceneRef};
+use crate::view::{RenderView, UsedMeshes};
 
-/// The meshes that ask for triangle culling.
+/// The meshes that ask for triangle culling, and that objects use.
 #[derive(Debug, Default)]
 pub(super) struct CullableMeshes {
-    /// The identity and revision of the mesh collection that this was built from.
-    version: Option<(u64, u64)>,
+    /// The identity and revision of the mesh collection that this was built from, and the revision of the used meshes.
+    version: Option<(u64, u64, u64)>,
     /// For each slot, up to the last cullable one.
     is_cullable: Vec<bool>,
 }
 
 impl CullableMeshes {
-    /// Rebuilds the set if the meshes have changed.
-    pub(super) fn update(&mut self, assets: &Assets) {
-        let version = (assets.meshes.identity(), assets.meshes.revision());
+    /// Rebuilds the set if the meshes have changed, or others are used.
+    pub(super) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
+        let version = (assets.meshes.identity(), assets.meshes.revision(), used.revision());
         if self.version == Some(version) {
             return;
         }
         self.version = Some(version);
         self.is_cullable.clear();
-        for (handle, ..) in assets.meshes.iter_with_revision().filter(|(.., mesh)| mesh.culls_triangles()) {
+        let is_cullable = |(handle, mesh): &(_, &Mesh)| mesh.culls_triangles() && used.contains(*handle);
+        for (handle, _) in assets.iter::<Mesh>().filter(is_cullable) {
             self.is_cullable.resize(handle.index() as usize, false);
             self.is_cullable.push(true);
         }

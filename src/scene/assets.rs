@@ -4,7 +4,7 @@ use super::{Material, Mesh, SceneError, Texture};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// Owns meshes, materials and textures. An engine with its own storage for objects keeps its assets here too, so that a
-/// frame uploads an asset only when it is new or has changed.
+/// frame uploads an asset only when it is new or has changed; and a mesh not before the first frame in which an object has it.
 ///
 /// ```
 /// use drawloom::glam::Vec3;

@@ -29,6 +29,7 @@ mod render_view;
 mod shadow_maps;
 mod subdivision_level;
 mod triangle_culling;
+mod used_meshes;
 mod visible_set;
 
 pub(crate) use bin::{bin_visible, may_walk};
@@ -55,6 +56,7 @@ pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
 pub use shadow_maps::ShadowMaps;
+pub use used_meshes::UsedMeshes;
 #[doc(hidden)] // For this repository's tests and benchmarks.
 pub use visible_set::VisibleSet;
 pub(crate) use visible_set::set_bits;

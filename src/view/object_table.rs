@@ -11,6 +11,7 @@ use super::draw_states::DrawStates;
 use super::object_block::ObjectBlock;
 use super::object_description::{PacketDescription, rejection_reason};
 use super::packet_columns::GatheredColumns;
+use super::used_meshes::UsedMeshes;
 use super::{BoundingBoxes, GpuObject, Rejections};
 use crate::chunked_array::block_ranges;
 use crate::command::{BinnedSegment, Bins};
@@ -37,6 +38,7 @@ pub struct ObjectTable {
     boxes_volume: CullingVolume,
     changed: ChangedObjects,
     draw_states: DrawStates,
+    used_meshes: UsedMeshes,
     /// Whether the table is that of the last frame; if not, the next frame describes all objects.
     is_current: bool,
     epoch: u64,
@@ -81,7 +83,8 @@ impl ObjectTable {
         self.culling = volume;
     }
 
-    /// Makes room for a scene's objects, and finds out which of them have to be described: those that changed, or all.
+    /// Makes room for a scene's objects, and finds out which of them have to be described, those that changed or all, and which meshes
+    /// they use.
     pub fn begin_frame(&mut self, scene: &SceneRef<'_>) {
         let objects = scene.object_count();
         let assets_changed = self.draw_states.update(scene.assets);
@@ -97,6 +100,7 @@ impl ObjectTable {
         } else {
             self.changed.set_all(objects);
         }
+        self.used_meshes.update(scene, &self.changed);
         self.is_current = false;
         if self.changed.word_count() > 0 || objects != length_before {
             self.epoch += 1;
@@ -119,6 +123,11 @@ impl ObjectTable {
         for object in self.length..length_before {
             self.blocks[object / Self::BLOCK_SIZE].get_mut().remove(object % Self::BLOCK_SIZE);
         }
+    }
+
+    /// The meshes that the scene's objects use. They are known from [`ObjectTable::begin_frame`] on.
+    pub fn used_meshes(&self) -> &UsedMeshes {
+        &self.used_meshes
     }
 
     /// The type of each material, by slot; empty if none has one.

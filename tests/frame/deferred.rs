@@ -7,7 +7,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Fxaa, Place, PlanError, RenderProcess, ToneMapping,
 };
-use drawloom::scene::{Blend, Camera, Light, Material, Scene, ViewKind};
+use drawloom::scene::{Camera, Light, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
@@ -136,9 +136,6 @@ fn each_class_of_lights_has_its_own_process() {
         }
         assert_eq!(processes(&mut renderer, &scene), expected);
     }
-    let mut scene = empty();
-    scene.add(Material { blend: Blend::Additive, ..Material::default() }).unwrap();
-    assert_eq!(processes(&mut renderer, &scene), ["geometry buffer", "transparency", "tone mapping"]);
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod object_table;
 mod occlusion;
 mod order;
 mod quality;
+mod requirements;
 mod retained;
 mod sampled_views;
 mod shadow_interval;

@@ -1,8 +1,13 @@
-//! Which objects a backend has to upload.
+//! Which objects and meshes a backend has to upload.
 
-use drawloom::scene::{Changes, SceneRef};
+use std::collections::HashSet;
+
+use drawloom::handle::Handle;
+use drawloom::scene::{Assets, Changes, Mesh, SceneRef};
 use drawloom::view::ObjectTable;
+use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::scenes::field;
+use proptest::prelude::*;
 
 /// The first object of each run, and the one after its last.
 fn runs(table: &ObjectTable, epoch: u64, gap: usize) -> Vec<(usize, usize)> {
@@ -47,6 +52,57 @@ fn what_changed_before_a_frame_without_changes_is_not_lost() {
     table.update(&scene.as_scene_ref());
     draw(&mut table, &SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() });
     assert_eq!(runs(&table, 0, 1), [(0, 603)]);
+}
+
+/// The used ones among these assets' meshes.
+fn used_meshes(table: &ObjectTable, assets: &Assets) -> HashSet<Handle<Mesh>> {
+    assets.iter().map(|(mesh, _)| mesh).filter(|mesh| table.used_meshes().contains(*mesh)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_used_meshes_are_those_that_an_object_has_had(seed in any::<u64>(), count in 0_usize..300) {
+        let mut world = ChangingWorld::new(seed, count);
+        let mut table = ObjectTable::default();
+        let mut had = HashSet::new();
+        for step in 0..40 {
+            let scene = world.as_scene_ref();
+            if step % 10 == 3 {
+                // A frame that fails early does not look at the objects, and the next one is not told of their changes again.
+                table.invalidate();
+            } else {
+                let (before, revision) = (used_meshes(&table, scene.assets), table.used_meshes().revision());
+                if step % 10 == 6 {
+                    table.begin_frame(&scene);
+                    table.invalidate();
+                } else {
+                    draw(&mut table, &scene);
+                }
+                had.extend(scene.meshes.iter().copied());
+                let live: HashSet<_> = scene.assets.iter().map(|(mesh, _)| mesh).collect();
+                let found = used_meshes(&table, scene.assets);
+                prop_assert_eq!(&found, &had.intersection(&live).copied().collect(), "in step {}", step);
+                prop_assert_eq!(table.used_meshes().revision() > revision, found != before, "in step {}", step);
+                prop_assert!(!had.difference(&live).any(|mesh| table.used_meshes().contains(*mesh)), "in step {}", step);
+            }
+            world.step().unwrap();
+        }
+    }
+}
+
+#[test]
+fn scenes_of_several_assets_use_their_own_meshes() {
+    let mut table = ObjectTable::default();
+    let (two, all) = (field(2), field(20));
+    for _ in 0..2 {
+        for (scene, expected) in [(&two, 2), (&all, 3)] {
+            draw(&mut table, &scene.as_scene_ref());
+            assert_eq!(used_meshes(&table, scene.assets()).len(), expected);
+        }
+        assert!(used_meshes(&table, two.assets()).is_empty());
+    }
 }
 
 /// Describes what changed in a frame.

@@ -6,12 +6,12 @@ use drawloom::backend::NullBackend;
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, TransformPrecision};
 use drawloom::raster::CulledTriangles;
-use drawloom::scene::{Projection, Scene, Topology};
+use drawloom::scene::{Changes, Mesh, Projection, Scene, SceneRef, Topology};
 use drawloom::task::Scheduler;
 use drawloom::view::RenderView;
 use drawloom::{FrameStatistics, Granularity, Renderer};
 use drawloom_testing::scenes::everything::everything;
-use drawloom_testing::scenes::{as_list, culled, field, square, with_meshes};
+use drawloom_testing::scenes::{as_list, cube, culled, field, square, with_meshes};
 
 use crate::renderer;
 
@@ -77,6 +77,17 @@ fn meshes_that_do_not_request_it_are_not_culled() {
     let (statistics, renderer) = frame(&field(400), 2, Granularity::Adaptive);
     assert!(statistics.views.iter().all(|view| view.culled_triangles == CulledTriangles::default()));
     assert!(!renderer.stage_graph_to_dot().unwrap().contains("triangles"));
+    // No object has this one.
+    let mut unused = field(400);
+    unused.add(culled(&cube())).unwrap();
+    let (_, mut renderer) = frame(&unused, 2, Granularity::Adaptive);
+    assert!(!renderer.stage_graph_to_dot().unwrap().contains("triangles"));
+    let added = unused.assets().iter::<Mesh>().find(|(_, mesh)| mesh.culls_triangles()).unwrap().0;
+    let mut meshes = unused.as_scene_ref().meshes.to_vec();
+    meshes[3] = added;
+    let changes = Changes::Objects(&[3]);
+    drop(renderer.record(SceneRef { meshes: &meshes, changes, ..unused.as_scene_ref() }).unwrap());
+    assert!(renderer.stage_graph_to_dot().unwrap().contains("triangles"));
 
     let some = with_meshes(field(400), |mesh| if mesh.name() == "cube" { culled(mesh) } else { mesh.clone() });
     let (statistics, renderer) = frame(&some, 2, Granularity::Adaptive);

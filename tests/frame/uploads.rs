@@ -5,7 +5,8 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
-use drawloom::scene::{Changes, SceneRef};
+use drawloom::quality::{Quality, VertexFormat};
+use drawloom::scene::{Changes, Mesh, Scene, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::view::GpuObject;
 use drawloom_testing::adapter;
@@ -99,4 +100,68 @@ fn a_column_is_uploaded_where_objects_changed_and_only_if_a_process_reads_it() {
     let (with, without) = (uploads(true), uploads(false));
     let differences = [with[0] - without[0], with[1] - without[1], with[2] - without[2]];
     assert_eq!(differences, [0, 2 * 16, 600 * 16]);
+}
+
+/// A mesh whose vertices fill this many bytes.
+fn mesh_of(bytes: usize) -> Mesh {
+    let vertex = |index| Vertex { position: [index as f32 * 0.01, 0.0, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+    let vertices = (0..bytes / size_of::<Vertex>()).map(vertex).collect();
+    Mesh::new("large", Topology::TriangleList, vertices, vec![0, 1, 2]).unwrap()
+}
+
+#[test]
+fn a_mesh_is_uploaded_in_the_first_frame_in_which_an_object_has_it() {
+    let new_renderer = || {
+        let (device, queue) = adapter::noop_device().unwrap();
+        let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
+        builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap()
+    };
+    // More than everything else of the scene takes; the second even packed.
+    let (large, huge) = (1 << 20, 16 << 20);
+    let mut scene = field(600);
+    let mut meshes = scene.as_scene_ref().meshes.to_vec();
+    let (small, large_mesh, huge_mesh) =
+        (meshes[5], scene.add(mesh_of(large)).unwrap(), scene.add(mesh_of(huge)).unwrap());
+    let (mut renderer, submitter) = new_renderer();
+    let mut uploaded = |scene: &Scene, meshes: &[_], quality: Option<Quality>, changes| {
+        quality.into_iter().for_each(|quality| renderer.set_quality(quality).unwrap());
+        let lent = SceneRef { meshes, changes, ..scene.as_scene_ref() };
+        submitter.submit(renderer.record(lent).unwrap()).unwrap().statistics.uploaded as usize
+    };
+    // Both are unused.
+    let (mut plain, plain_submitter) = new_renderer();
+    let without = plain_submitter.submit(plain.record(field(600).as_scene_ref()).unwrap()).unwrap();
+    assert_eq!(uploaded(&scene, &meshes, None, Changes::Unknown), without.statistics.uploaded as usize);
+    (0..3).for_each(|_| assert!(uploaded(&scene, &meshes, None, Changes::Unknown) < large));
+    scene.replace(large_mesh, mesh_of(large)).unwrap();
+    assert!(uploaded(&scene, &meshes, None, Changes::NONE) < large);
+    // One is used.
+    meshes[5] = large_mesh;
+    let first = uploaded(&scene, &meshes, None, Changes::Objects(&[5]));
+    assert!((large..huge / 4).contains(&first), "{first}");
+    // It remains on the device when the object has another one.
+    for mesh in [small, large_mesh, small] {
+        meshes[5] = mesh;
+        assert!(uploaded(&scene, &meshes, None, Changes::Objects(&[5])) < large);
+    }
+    scene.replace(large_mesh, mesh_of(large)).unwrap();
+    let changed = uploaded(&scene, &meshes, None, Changes::NONE);
+    assert!((large..huge / 4).contains(&changed), "{changed}");
+    // Vertices of another format move to new buffers, those of the unused mesh not among them.
+    let packed = Quality { vertices: VertexFormat::Packed, ..Quality::default() };
+    let moved = uploaded(&scene, &meshes, Some(packed), Changes::NONE);
+    assert!((large / 4..huge / 4).contains(&moved), "{moved}");
+    // The other one is, in a frame that is told nothing, and in one that is.
+    let before = meshes.clone();
+    meshes[599] = huge_mesh;
+    let second = uploaded(&scene, &meshes, None, Changes::Unknown);
+    assert!(second >= huge / 4, "{second}");
+    assert!(uploaded(&scene, &before, None, Changes::Objects(&[599])) < large);
+    // A removed mesh leaves its slot to another one, which is unused.
+    scene.remove(huge_mesh).unwrap();
+    let other = scene.add(mesh_of(huge)).unwrap();
+    assert_eq!(other.index(), huge_mesh.index());
+    assert!(uploaded(&scene, &before, None, Changes::NONE) < large);
+    meshes[599] = other;
+    assert!(uploaded(&scene, &meshes, None, Changes::Ranges(&[3..4, 590..600])) >= huge / 4);
 }

@@ -2,8 +2,9 @@
 
 use drawloom::backend::{Picture, WgpuResources};
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
-use drawloom::scene::{Blend, LayerMask, Light, LightKind, Material, Scene, ViewKind};
+use drawloom::scene::{Blend, Changes, LayerMask, Light, LightKind, Material, Mesh, Scene, SceneRef, ViewKind};
 use drawloom::view::{LightClass, ShadowMaps};
+use drawloom_testing::scenes::cube;
 use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use libtest_mimic::Failed;
 
@@ -21,6 +22,7 @@ pub const CASES: &[Case] = &[
     ("without_post_processing_steps_there_is_none", no_post),
     ("without_a_depth_pre_pass_there_is_none", no_depth_pre_pass),
     ("every_process_is_needed_by_another_or_changes_the_picture", every_process_is_needed),
+    ("a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it", first_use_of_meshes),
     ("processes_change_with_the_requirements_and_are_cached", cached_plans),
 ];
 
@@ -181,6 +183,7 @@ fn no_casters() -> Result<(), Failed> {
     expect_same("no shadow maps, shadowed lights alone", &drawn(bare(), &casting)?, &drawn(deferred(), &scene)?)
 }
 
+/// The assets still have the materials.
 fn no_glass() -> Result<(), Failed> {
     let mut scene = everything();
     let glasses = glasses(&scene);
@@ -189,9 +192,6 @@ fn no_glass() -> Result<(), Failed> {
         if glasses.iter().any(|(glass, _)| *glass == material) {
             scene.remove_object(handle)?;
         }
-    }
-    for (glass, _) in glasses {
-        scene.remove(glass)?;
     }
     let saved = Cost { passes: 1, pipelines: GLASS_STATES, ..Cost::default() };
     expect_saved(&full()?, "transparency", &scene, deferred().leave_out("transparency"), saved)
@@ -334,6 +334,39 @@ fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
     for (index, (glass, material)) in glasses.collect::<Vec<_>>().into_iter().enumerate() {
         let blend = if index < count { Blend::None } else { material.blend };
         scene.replace(glass, Material { blend, ..material })?;
+    }
+    Ok(())
+}
+
+/// The objects get their meshes one after the other. Some of these are larger than the buffers of the meshes before.
+fn first_use_of_meshes() -> Result<(), Failed> {
+    let mut scene = everything();
+    let expected = drawn(deferred(), &scene)?.1;
+    let block = scene.assets().iter::<Mesh>().find(|(_, mesh)| mesh.name() == "cube").ok_or("no cube")?.0;
+    let mut last = scene.as_scene_ref().meshes.to_vec();
+    for (size, mesh) in (1..).zip(last.iter_mut().filter(|mesh| **mesh == block)) {
+        let cube = cube();
+        let vertices = cube.vertices().iter().copied().cycle().take(size * 24 * 100).collect();
+        *mesh = scene.add(Mesh::new("large cube", cube.topology(), vertices, cube.indices().to_vec())?)?;
+    }
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let mut meshes = vec![last[0]; last.len()];
+    for object in 0..last.len() {
+        meshes[object] = last[object];
+        let changed = [object as u32];
+        let changes = if object == 0 { Changes::Unknown } else { Changes::Objects(&changed) };
+        let mut new = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+        let mut pictures = Vec::new();
+        for (fixture, changes) in [(&mut fixture, changes), (&mut new, Changes::Unknown)] {
+            let recorded = fixture.renderer.record(SceneRef { meshes: &meshes, changes, ..scene.as_scene_ref() })?;
+            pictures.push(fixture.submit(recorded)?.read(0, "picture")?);
+        }
+        if pictures[0] != pictures[1] {
+            return Err(format!("object {object}: a new renderer draws another picture").into());
+        }
+        if (meshes == last) != (pictures[0] == expected) {
+            return Err(format!("object {object}: the picture is that of all meshes too early, or never").into());
+        }
     }
     Ok(())
 }

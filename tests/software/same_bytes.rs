@@ -2,7 +2,7 @@
 
 use drawloom::backend::SoftwareBackend;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::Scene;
+use drawloom::scene::{Changes, Scene, SceneRef};
 use drawloom::{Granularity, RendererBuilder};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{as_list, culled, field, with_meshes};
@@ -45,6 +45,23 @@ fn a_frame_does_not_depend_on_those_before_it() {
     let mut fixture = Fixture::with_granularity(2, Granularity::Adaptive);
     for turn in [0, 0, 1, 0, 1, 1] {
         assert!(fixture.picture([&small, &large][turn]) == expected[turn], "{turn}");
+    }
+}
+
+#[test]
+fn a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it() {
+    let scene = everything();
+    let expected = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
+    let mut fixture = Fixture::with_granularity(2, Granularity::Adaptive);
+    let last = scene.as_scene_ref().meshes;
+    let mut meshes = vec![last[0]; last.len()];
+    for object in 0..last.len() {
+        meshes[object] = last[object];
+        let changed = [object as u32];
+        let changes = if object == 0 { Changes::Unknown } else { Changes::Objects(&changed) };
+        let recorded = fixture.renderer.record(SceneRef { meshes: &meshes, changes, ..scene.as_scene_ref() }).unwrap();
+        let picture = fixture.submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap();
+        assert_eq!(picture == expected, meshes == last, "object {object}");
     }
 }
 

@@ -35,7 +35,8 @@ impl WgpuBackend {
             self.subdivisions.clear();
         }
         let (meshes, materials) = with_error_scope(&self.device, "meshes, materials and textures", || {
-            let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, vertices)?;
+            let used = request.objects.used_meshes();
+            let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, used, vertices)?;
             let types = plan.material_types();
             let mut materials = self.materials.lock();
             Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))

@@ -16,8 +16,8 @@ use crate::view::{LightClass, ShadowMaps};
 /// out. An engine adds further processes to the renderer's builder.
 ///
 /// It has only the processes that a scene requires. A class of lights without lights has no process; without a light
-/// that casts shadows there is no shadow map; without a blended material there is no transparency. When a scene's
-/// requirements change, so do the processes.
+/// that casts shadows there is no shadow map; without an object with a blended material there is no transparency, whatever
+/// materials the assets have. When a scene's requirements change, so do the processes, in the same frame.
 ///
 /// ```text
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows

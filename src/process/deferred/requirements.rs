@@ -1,14 +1,15 @@
 //! Which processes a scene requires.
 
-use crate::scene::{Assets, Blend, Camera, Light, LightKind, Material, ViewKind};
+use crate::scene::{Blend, Camera, Light, LightKind, Material, SceneRef, ViewKind};
 use crate::view::LightClass;
 
-/// What a scene requires of a frame. A frame has the processes that this requires, and no others.
+/// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what the scene
+/// draws: materials of the assets that no object has require nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Requirements {
     /// A bit for each class of lights in the scene, by [`LightClass::index`].
     lights: u8,
-    /// Whether a material is blended.
+    /// Whether an object needs transparency.
     transparency: bool,
     /// Whether a camera draws a reflection.
     reflections: bool,
@@ -17,16 +18,25 @@ pub struct Requirements {
 const _: () = assert!(LightClass::COUNT <= 8);
 
 impl Requirements {
-    /// What a scene with these valid lights and assets requires. If `shadows` is false, lights count as casting none.
-    pub fn of(lights: &[Light], assets: &Assets, shadows: bool) -> Self {
-        let mut requirements = Self::default();
+    /// What a scene with these valid lights requires, some of whose objects [need transparency](Self::needs_transparency) if
+    /// `transparency` is true. If `shadows` is false, lights count as casting none.
+    pub fn of(lights: &[Light], transparency: bool, shadows: bool) -> Self {
+        let mut requirements = Self { transparency, ..Self::default() };
         for light in lights {
             requirements.lights |= 1 << LightClass::of(light, shadows).index();
         }
-        let mut materials = assets.iter::<Material>();
-        requirements.transparency =
-            materials.any(|(_, material)| material.blend != Blend::None && material.values.is_none());
         requirements
+    }
+
+    /// Whether objects with this material need transparency: it is blended, and of no material type. Objects with a material type
+    /// are left to the process that reads it.
+    pub fn needs_transparency(material: &Material) -> bool {
+        material.blend != Blend::None && material.values.is_none()
+    }
+
+    /// Whether an object of the scene needs transparency. Looks at all objects; a renderer keeps a witness from frame to frame instead.
+    pub(crate) fn any_needs_transparency(scene: &SceneRef<'_>) -> bool {
+        scene.materials.iter().any(|material| scene.assets.get(*material).is_ok_and(Self::needs_transparency))
     }
 
     /// All that a scene can require.
@@ -59,7 +69,7 @@ impl Requirements {
         LightClass::all().any(|class| class.shadowed && self.lights(class))
     }
 
-    /// Whether a material is blended.
+    /// Whether an object needs transparency.
     pub fn transparency(&self) -> bool {
         self.transparency
     }

@@ -14,6 +14,7 @@ use crate::command::Batch;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, AttributeLayout, Mesh};
+use crate::view::UsedMeshes;
 
 /// The meshes of a frame. It stays valid while meshes change for later frames.
 pub(crate) struct MeshSnapshot {
@@ -72,7 +73,7 @@ pub(crate) struct MeshRange {
     revision: u64,
 }
 
-/// Keeps meshes on the device, and uploads those that changed since the last frame.
+/// Keeps the meshes that objects use on the device, and uploads those that changed, or became used, since the last frame.
 pub(crate) struct MeshCache {
     vertices: Arena,
     /// Of the vertices in the arena.
@@ -81,9 +82,19 @@ pub(crate) struct MeshCache {
     attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
     imported_meshes: ImportedMeshes,
-    /// Identity and revision of the snapshot's meshes.
-    current: Option<(u64, u64)>,
+    /// What the snapshot is of.
+    current: Option<MeshVersion>,
     snapshot: Option<Arc<MeshSnapshot>>,
+}
+
+/// What decides which meshes a frame has.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct MeshVersion {
+    /// Of the assets' meshes.
+    identity: u64,
+    revision: u64,
+    /// The revision of the meshes that are used.
+    used: u64,
 }
 
 impl Default for MeshCache {
@@ -126,7 +137,7 @@ impl MeshCache {
         self.attributes.of_mesh(device, uploads, mesh)
     }
 
-    /// The snapshot of these meshes, with vertices of this format: the latest one if nothing changed.
+    /// The snapshot of those of the assets' meshes that are used, with vertices of this format: the latest one if nothing changed.
     ///
     /// # Errors
     /// If the device has no room for them.
@@ -135,9 +146,11 @@ impl MeshCache {
         device: &wgpu::Device,
         uploads: &UploadQueue,
         assets: &Assets,
+        used: &UsedMeshes,
         vertices: VertexFormat,
     ) -> Result<Arc<MeshSnapshot>, BackendError> {
-        let requested = (assets.meshes.identity(), assets.meshes.revision());
+        let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
+        let requested = MeshVersion { identity, revision, used: used.revision() };
         if let Some(snapshot) = &self.snapshot
             && self.current == Some(requested)
             && self.format == vertices
@@ -149,12 +162,12 @@ impl MeshCache {
             (self.vertices, self.format) = (new_vertex_arena(), vertices);
             self.meshes.clear();
         }
-        if self.current.is_none_or(|(identity, _)| identity != requested.0) {
+        if self.current.is_none_or(|current| current.identity != identity) {
             self.meshes.clear();
         }
         // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
         self.current = None;
-        self.update_meshes(device, uploads, assets)?;
+        self.update_meshes(device, uploads, assets, used)?;
         let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
         self.imported_meshes = self.imported_meshes.updated(device, meshes)?;
         let (Some(vertices), Some(indices)) = (self.vertices.buffer(), self.indices.buffer()) else {
@@ -177,11 +190,13 @@ impl MeshCache {
         device: &wgpu::Device,
         uploads: &UploadQueue,
         assets: &Assets,
+        used: &UsedMeshes,
     ) -> Result<(), BackendError> {
+        let used = || assets.meshes.iter_with_revision().filter(|(handle, ..)| used.contains(*handle));
         self.meshes.resize(assets.meshes.slot_count(), None);
         let mut live = vec![false; self.meshes.len()];
         let mut changed = Vec::new();
-        for (handle, revision, mesh) in assets.meshes.iter_with_revision() {
+        for (handle, revision, mesh) in used() {
             let slot = handle.index() as usize;
             live[slot] = true;
             if self.meshes[slot].is_none_or(|range| range.revision != revision) {
@@ -197,17 +212,13 @@ impl MeshCache {
         let bytes = changed.iter().map(|(_, _, mesh)| bytes_of(mesh, format));
         let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
         if !self.vertices.fits(vertex_bytes) || !self.indices.fits(index_bytes) {
-            // All live meshes move to new buffers, which leaves the garbage behind.
-            let bytes = assets.iter::<Mesh>().map(|(_, mesh)| bytes_of(mesh, format));
+            // All used meshes move to new buffers, which leaves the garbage behind.
+            let bytes = used().map(|(.., mesh)| bytes_of(mesh, format));
             let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
             self.vertices.reallocate(device, vertex_bytes)?;
             self.indices.reallocate(device, index_bytes)?;
             self.attributes.reallocate(device, self.vertices.size() / vertex_stride(format))?;
-            changed = assets
-                .meshes
-                .iter_with_revision()
-                .map(|(handle, revision, mesh)| (handle.index() as usize, revision, mesh))
-                .collect();
+            changed = used().map(|(handle, revision, mesh)| (handle.index() as usize, revision, mesh)).collect();
         }
         for (slot, revision, mesh) in changed {
             let vertices = with_vertex_bytes(mesh, format, |bytes| self.vertices.append(uploads, bytes));

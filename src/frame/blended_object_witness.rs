@@ -1,0 +1,101 @@
+//! Whether an object of the scene needs transparency, known by one object that does.
+
+use crate::handle::Handle;
+use crate::process::Requirements;
+use crate::scene::{Assets, Material, SceneRef};
+use crate::view::{ObjectTable, set_bits};
+
+/// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes no difference.
+///
+/// While the witness needs transparency, a frame looks at no other object; without a witness, at those that changed. All objects
+/// are searched when the witness stops needing it, and without a witness when a material starts to need it.
+///
+/// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is visible changes
+/// with every step of a camera, and the processes of a frame should not.
+#[derive(Debug, Default)]
+pub(super) struct BlendedObjectWitness {
+    materials: BlendedMaterials,
+    witness: Option<Witness>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Witness {
+    object: usize,
+    material: Handle<Material>,
+}
+
+impl BlendedObjectWitness {
+    /// Whether an object of the scene needs transparency. The object table has begun the frame, so it knows which objects changed: after
+    /// a failed frame all of them, so nothing has to be invalidated here.
+    pub(super) fn update(&mut self, scene: &SceneRef<'_>, objects: &ObjectTable) -> bool {
+        let has_started = self.materials.update(scene.assets);
+        let materials = &self.materials;
+        let count = scene.object_count();
+        let witness_of = |object: usize| {
+            let material = scene.materials[object];
+            materials.contains(material).then_some(Witness { object, material })
+        };
+        // An object that is not reported is drawn as it was, so its material of that time counts.
+        let remains = |witness: Witness| match objects.is_reported(witness.object) {
+            true => witness_of(witness.object),
+            false => materials.contains(witness.material).then_some(witness),
+        };
+        self.witness = match self.witness {
+            _ if materials.count == 0 => None,
+            Some(witness) => {
+                let next = witness.object.min(count);
+                let kept = Some(witness).filter(|witness| witness.object < count).and_then(remains);
+                // Objects often stop one after the other, so the search goes on where the last one ended.
+                kept.or_else(|| (next..count).chain(0..next).find_map(witness_of))
+            }
+            None if has_started => (0..count).find_map(witness_of),
+            None => {
+                let words = (0..objects.changed_word_count()).map(|index| objects.changed_word(index));
+                words.flat_map(|word| set_bits(word.mask).map(move |bit| word.word * 64 + bit)).find_map(witness_of)
+            }
+        };
+        self.witness.is_some()
+    }
+}
+
+/// The materials that need transparency.
+#[derive(Debug, Default)]
+struct BlendedMaterials {
+    /// The identity and revision of the materials; `None` before the first update.
+    version: Option<(u64, u64)>,
+    /// By slot: each material of the assets.
+    materials: Vec<Option<Handle<Material>>>,
+    /// By slot: whether there is a material that needs transparency. A search looks here for each object.
+    is_blended: Vec<bool>,
+    /// The number of those that need it.
+    count: usize,
+}
+
+impl BlendedMaterials {
+    /// Updates the materials. Returns whether one that was there before starts to need transparency: objects that have it need not
+    /// be reported. No object that is not reported can have one that is new.
+    fn update(&mut self, assets: &Assets) -> bool {
+        let version = Some((assets.materials.identity(), assets.materials.revision()));
+        if self.version == version {
+            return false;
+        }
+        let mut starts = false;
+        let mut materials = vec![None; assets.materials.slot_count()];
+        let mut is_blended = vec![false; assets.materials.slot_count()];
+        for (handle, material) in assets.iter::<Material>() {
+            let slot = handle.index() as usize;
+            materials[slot] = Some(handle);
+            is_blended[slot] = Requirements::needs_transparency(material);
+            let was_opaque = self.materials.get(slot) == Some(&Some(handle)) && !self.is_blended[slot];
+            starts |= was_opaque && is_blended[slot];
+        }
+        self.count = is_blended.iter().filter(|is_blended| **is_blended).count();
+        (self.version, self.materials, self.is_blended) = (version, materials, is_blended);
+        starts
+    }
+
+    fn contains(&self, material: Handle<Material>) -> bool {
+        let slot = material.index() as usize;
+        self.is_blended.get(slot) == Some(&true) && self.materials[slot] == Some(material)
+    }
+}
