@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::error::Error;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::Backend;
@@ -35,10 +36,10 @@ pub struct ViewCost {
 
 /// How many frames [`measure`] draws.
 pub fn frames_to_draw(gallery: &Gallery, frames: u32) -> u64 {
-    u64::from(2 * frames + WARM_UP_FRAMES) * gallery.optional_views().count() as u64
+    u64::from(frames) + u64::from(2 * (frames + WARM_UP_FRAMES.min(frames))) * gallery.optional_views().count() as u64
 }
 
-/// Draws the gallery, alternately whole and without each of its views.
+/// Draws the gallery, in turn whole and without each of its views. Calls `drawn` after each frame.
 ///
 /// # Errors
 /// If a frame fails.
@@ -73,11 +74,12 @@ pub fn measure<B: Backend>(
         saved.insert(view.to_owned(), medians[0] - medians[1]);
     }
 
-    let timeline = std::sync::Arc::clone(renderer.scheduler().timeline());
+    let timeline = Arc::clone(renderer.scheduler().timeline());
     timeline.start();
     let mut statistics = None;
     for _ in 0..frames {
         statistics = Some(submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?.statistics);
+        drawn();
     }
     timeline.stop();
     let log = timeline.take();

@@ -102,8 +102,8 @@ impl Place {
             Self { surface: Surface::exit(), position: exit.0, orientation: exit.1, half_size: Vec2::new(1.1, 1.5) },
             Self {
                 surface: Surface::screen(),
-                position: DVec3::new(3.9, 2.6, 4.4),
-                orientation: Quat::from_rotation_y(-0.75),
+                position: DVec3::new(-4.4, 3.5, 2.6),
+                orientation: Quat::from_rotation_y(0.6),
                 half_size: Vec2::new(1.28, 0.72),
             },
         ]
@@ -134,13 +134,11 @@ fn pool() -> ClipPlane {
     ClipPlane { point: DVec3::new(-0.2, 0.06, 6.2), normal: Vec3::Y }
 }
 
-/// Two portals that face each other across the nave, so that the first shows itself.
+/// Two portals on both sides of the pool. The second is turned so that the main camera, through the first, sees the first again.
 fn portals() -> [(DVec3, Quat); 2] {
-    let turn = std::f32::consts::FRAC_PI_2;
-    [
-        (DVec3::new(-3.9, 1.6, 3.2), Quat::from_rotation_y(turn)),
-        (DVec3::new(3.9, 1.6, 1.0), Quat::from_rotation_y(-turn)),
-    ]
+    let [entry, exit] = [DVec3::new(-3.6, 1.6, 6.6), DVec3::new(4.4, 1.6, 4.8)];
+    let facing = |from: DVec3, to: DVec3| Quat::from_rotation_arc(Vec3::Z, (to - from).normalize().as_vec3());
+    [(entry, facing(entry, exit)), (exit, facing(exit, exit + DVec3::new(-0.3, 0.0, 0.95)))]
 }
 
 fn camera(name: &str, position: DVec3, target: DVec3, degrees: f32) -> Camera {
@@ -150,10 +148,10 @@ fn camera(name: &str, position: DVec3, target: DVec3, degrees: f32) -> Camera {
 
 /// The cameras of all views, shadow maps aside. Their order does not matter.
 fn cameras() -> Vec<Camera> {
-    let main = camera("main", DVec3::new(1.6, 2.3, 11.6), DVec3::new(-0.9, 1.3, 2.0), 58.0);
+    let main = camera("main", DVec3::new(1.4, 2.4, 11.8), DVec3::new(-0.8, 1.3, 2.0), 60.0);
     let guest = camera("guest", DVec3::new(-2.2, 1.7, 10.2), DVec3::new(0.4, 1.2, 3.0), 65.0);
-    let screen = camera("screen", DVec3::new(-4.2, 5.2, -2.5), DVec3::new(0.5, 0.5, 4.0), 70.0);
-    let detail = camera("detail", DVec3::new(-1.5, 2.4, 6.5), DVec3::new(-5.6, 2.6, 1.2), 40.0);
+    let screen = camera("screen", DVec3::new(2.5, 6.0, 10.5), DVec3::new(-0.6, 0.5, 4.0), 60.0);
+    let detail = camera("detail", DVec3::new(0.6, 1.7, 4.8), DVec3::new(-3.4, 2.3, -6.0), 40.0);
     let [entry, exit] = portals();
     let portal = main.through_portal("portal", entry, exit);
     let inner = portal.through_portal("portal", entry, exit);

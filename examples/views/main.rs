@@ -1,6 +1,6 @@
 //! Everything is a camera (M 10.1): draws a scene with a mirror, portals, a screen, two players and tiles, each as views that other views
-//! sample, and puts all of them on one contact sheet. Prints what each view costs, and what leaving it out would save. Without a graphics
-//! adapter the software backend draws it.
+//! sample, and puts all of them on one contact sheet. Prints what each view costs the processor, and what leaving it out would save. Without
+//! a graphics adapter the software backend draws it.
 //!
 //!     cargo run --release --example views
 //!     cargo run --release --example views -- --frames 100 --report views.json --out sheet.png
@@ -39,9 +39,9 @@ struct Arguments {
     #[arg(long, value_name = "JSON")]
     report: Option<PathBuf>,
 
-    /// The frames that are measured of the whole gallery, and without each view. Default: 20, or 1 in software.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    frames: Option<u32>,
+    /// The frames that are measured of the whole gallery, and without each view.
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
 
     /// Draws in software although there is an adapter.
     #[arg(long)]
@@ -60,21 +60,27 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let scheduler = Arc::new(Scheduler::builder().timeline_capacity(1 << 16).build()?);
+    let scheduler = Arc::new(Scheduler::builder().build()?);
     let device = if arguments.software { Err("it is asked for".into()) } else { adapter::device() };
     match device {
         Ok((device, queue)) => {
             let backend = WgpuBackend::new(device, queue)?;
             println!("drawn by {}", backend.adapter_name());
             let (renderer, submitter) = with_processes(Renderer::builder(backend)).build(scheduler)?;
-            draw(arguments, renderer, submitter, 20, |submission, view| submission.read(view, contact_sheet::TARGET))
+            draw(arguments, renderer, submitter, |submission, view| submission.read(view, contact_sheet::TARGET))?;
         }
         Err(reason) => {
             println!("drawn in software: {reason}");
             let backend = SoftwareBackend::new(Arc::clone(&scheduler));
             let (renderer, submitter) = with_processes(Renderer::builder(backend)).build(scheduler)?;
-            draw(arguments, renderer, submitter, 1, |submission, view| submission.read(view, contact_sheet::TARGET))
+            draw(arguments, renderer, submitter, |submission, view| submission.read(view, contact_sheet::TARGET))?;
         }
+    }
+    let views = measured_costs(arguments)?;
+    costs::print(&views);
+    match &arguments.report {
+        Some(path) => costs::write(&views, path),
+        None => Ok(()),
     }
 }
 
@@ -84,11 +90,11 @@ fn with_processes<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B>
     builder.process(ContactSheet::new()).output(contact_sheet::TARGET)
 }
 
+/// Draws the gallery once, and writes the contact sheet.
 fn draw<B: Backend>(
     arguments: &Arguments,
     mut renderer: Renderer<B>,
     submitter: Submitter<B>,
-    default_frames: u32,
     read: impl Fn(&B::Submission, usize) -> Result<Picture, BackendError>,
 ) -> Result<(), Box<dyn Error>> {
     let gallery = Gallery::new()?;
@@ -97,16 +103,20 @@ fn draw<B: Backend>(
     contact_sheet::draw_labels(&mut sheet);
     image::save_buffer(&arguments.out, &sheet.bytes, sheet.width, sheet.height, image::ColorType::Rgba8)
         .map_err(|error| format!("{} could not be written: {error}", arguments.out.display()))?;
-
-    let frames = arguments.frames.unwrap_or(default_frames);
-    let progress = ProgressBar::new(costs::frames_to_draw(&gallery, frames));
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
-    let views = costs::measure(&gallery, &mut renderer, &submitter, frames, || progress.inc(1))?;
-    progress.finish_and_clear();
-    costs::print(&views);
     println!("{} written", arguments.out.display());
-    match &arguments.report {
-        Some(path) => costs::write(&views, path),
-        None => Ok(()),
-    }
+    Ok(())
+}
+
+/// Measures on a device that draws nothing, so that only the processor's work counts.
+fn measured_costs(arguments: &Arguments) -> Result<Vec<costs::ViewCost>, Box<dyn Error>> {
+    let gallery = Gallery::new()?;
+    let (device, queue) = adapter::noop_device()?;
+    let scheduler = Arc::new(Scheduler::builder().timeline_capacity(1 << 16).build()?);
+    let builder = with_processes(Renderer::builder(WgpuBackend::new(device, queue)?));
+    let (mut renderer, submitter) = builder.build(scheduler)?;
+    let progress = ProgressBar::new(costs::frames_to_draw(&gallery, arguments.frames));
+    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
+    let views = costs::measure(&gallery, &mut renderer, &submitter, arguments.frames, || progress.inc(1))?;
+    progress.finish_and_clear();
+    Ok(views)
 }
