@@ -1,0 +1,191 @@
+//! What views cost the processor: one more, and many on several workers.
+//!
+//!     cargo bench -p drawloom-benches --bench views
+//!     cargo bench -p drawloom-benches --bench views -- --quick
+//!
+//! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is compared in a row is
+//! drawn in turn, and the table has the medians. All cameras move in every frame. `target/drawloom/views.json` has the same.
+
+use std::error::Error;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Parser;
+use drawloom::backend::WgpuBackend;
+use drawloom::command::Selection;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Place, RenderProcess};
+use drawloom::scene::{
+    Camera, Changes, ClipPlane, LayerMask, Material, Mesh, Projection, RenderObject, Scene, SceneRef, ViewKind,
+};
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, Submitter};
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::{Harness, Rounds, WARM_UP, progress_bar};
+use drawloom_benches::results;
+use drawloom_benches::statistics::median_duration;
+use drawloom_benches::stopwatch::timed_frame;
+use drawloom_benches::table::Table;
+use drawloom_testing::adapter;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+/// Two ways to draw a frame.
+#[derive(Serialize)]
+struct Row {
+    compared: &'static str,
+    /// Objects that the views see: all of the first frame's, and all of the second's.
+    seen: [usize; 2],
+    microseconds: [f64; 2],
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let quick = ExtentArguments::parse().is_quick();
+    let (rounds, side) = if quick { (3, 20) } else { (1001, 100) };
+    let progress = progress_bar("frames");
+    let rows = [mirror(side, rounds, &progress)?, many_views(side, rounds, &progress)?];
+    progress.finish_and_clear();
+
+    let mut table = Table::new(&["compared", "objects seen", "first, µs", "second, µs", "difference, µs", "ratio"]);
+    for Row { compared, seen, microseconds: [first, second] } in &rows {
+        let seen = format!("{} and {}", seen[0], seen[1]);
+        let [difference, ratio] = [format!("{:.1}", second - first), format!("{:.2}", first / second)];
+        table.row([(*compared).to_owned(), seen, format!("{first:.1}"), format!("{second:.1}"), difference, ratio]);
+    }
+    table.print();
+    if !quick {
+        results::write_json("views.json", &rows)?;
+    }
+    Ok(())
+}
+
+/// A frame without a mirror and with one, on one worker.
+fn mirror(side: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
+    let scene = grid(side)?;
+    let runners = [Runner::new(1, false)?, Runner::new(1, true)?];
+    measure("without and with a small mirror, 1 worker", scene, runners, rounds, progress)
+}
+
+/// The same 64 views on one worker and on two.
+fn many_views(side: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
+    let scene = grid(side)?;
+    let mut runners = [Runner::new(1, false)?, Runner::new(2, false)?];
+    for runner in &mut runners {
+        runner.cameras = (0..64).map(|index| overhead(&format!("view {index}"), index as f64 * 5.0, 7)).collect();
+    }
+    measure("64 views, 1 worker and 2", scene, runners, rounds, progress)
+}
+
+fn measure(
+    compared: &'static str,
+    scene: Scene,
+    mut runners: [Runner; 2],
+    rounds: usize,
+    progress: &ProgressBar,
+) -> Result<Row, Box<dyn Error>> {
+    let mut seen = Vec::new();
+    for runner in &mut runners {
+        seen.push(runner.frame(&scene)?.0);
+    }
+    let times = Harness::new(Rounds { warm_up: WARM_UP, measured: rounds }, progress)
+        .measure(&mut runners, |runner, _round| Ok::<_, Box<dyn Error>>(runner.frame(&scene)?.1))?;
+    let microseconds = |times: &Vec<Duration>| median_duration(times.iter().copied()).as_secs_f64() * 1e6;
+    Ok(Row { compared, seen: [seen[0], seen[1]], microseconds: [microseconds(&times[0]), microseconds(&times[1])] })
+}
+
+/// A square of boxes, 2 m apart, with a mirror in the middle.
+fn grid(side: usize) -> Result<Scene, Box<dyn Error>> {
+    let mut scene = Scene::new();
+    let mesh = scene.add(Mesh::cuboid("box", Vec3::ONE)?)?;
+    let material = scene.add(Material::default())?;
+    for index in 0..side * side {
+        let [x, z] = [index % side, index / side].map(|place| 2.0 * place as f64);
+        let object = RenderObject::new(mesh, material, DVec3::new(x, 0.0, z));
+        scene.add_object(RenderObject { layers: WORLD, ..object })?;
+    }
+    let mirror = RenderObject::new(mesh, material, DVec3::new(side as f64, 1.0, side as f64));
+    scene.add_object(RenderObject { layers: MIRROR, ..mirror })?;
+    Ok(scene)
+}
+
+/// A camera above the boxes that sees some `across` × `across` of them.
+fn overhead(name: &str, along: f64, across: u32) -> Camera {
+    let position = DVec3::new(30.0 + along % 140.0, 20.0, 40.0 + along / 8.0);
+    let camera = Camera::looking_at(name, position, position - DVec3::new(0.0, 20.0, 1e-3));
+    let field_of_view = 2.0 * (across as f32 / 20.0).atan();
+    Camera { projection: Projection::Perspective { field_of_view }, size: [8, 8], ..camera }
+}
+
+const WORLD: LayerMask = LayerMask::layer(0);
+const MIRROR: LayerMask = LayerMask::layer(1);
+
+/// Draws the mirror.
+struct Mirror;
+
+impl RenderProcess for Mirror {
+    fn name(&self) -> &str {
+        "mirror"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(Place::AfterLighting);
+        declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
+        declare.draws_over("radiance");
+        declare.matches_depth("depth");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @group(2) @binding(1) var mirrored: texture_2d<f32>;
+
+            @vertex
+            fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
+                return clip_position(relative_position(drawn_object(in.instance), in.position));
+            }
+
+            @fragment
+            fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+                return textureLoad(mirrored, vec2<i32>(position.xy), 0);
+            }
+        ";
+        Draws::Commands(CommandDraws { shader, selection: Selection::ALL.in_layers(MIRROR), ..CommandDraws::default() })
+    }
+}
+
+struct Runner {
+    renderer: Renderer<WgpuBackend>,
+    submitter: Submitter<WgpuBackend>,
+    cameras: Vec<Camera>,
+    frames: usize,
+}
+
+impl Runner {
+    /// With a camera above the middle of the boxes and, if `mirrors`, one for the mirror, which sees some 200 of them.
+    fn new(workers: usize, mirrors: bool) -> Result<Self, Box<dyn Error>> {
+        let (device, queue) = adapter::noop_device()?;
+        let scheduler = Arc::new(Scheduler::new(workers)?);
+        let builder =
+            Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).process(Mirror);
+        let (renderer, submitter) = builder.build(scheduler)?;
+        let main = overhead("main", 70.0, 40);
+        let mut cameras = vec![main.clone()];
+        if mirrors {
+            let plane = ClipPlane { point: DVec3::Y, normal: Vec3::Y };
+            let mirrored = Camera { name: main.child_name("mirror"), ..overhead("", 70.0, 14) };
+            cameras.push(Camera { clip_plane: Some(plane), kind: ViewKind::Reflection, layers: WORLD, ..mirrored });
+        }
+        Ok(Self { renderer, submitter, cameras, frames: 0 })
+    }
+
+    /// The number of objects that all views see, and the time.
+    fn frame(&mut self, scene: &Scene) -> Result<(usize, Duration), Box<dyn Error>> {
+        for camera in &mut self.cameras {
+            camera.position.x += if self.frames % 2 == 0 { 0.01 } else { -0.01 };
+        }
+        let changes = if self.frames == 0 { Changes::Unknown } else { Changes::NONE };
+        self.frames += 1;
+        let scene = SceneRef { cameras: &self.cameras, changes, ..scene.as_scene_ref() };
+        let (submitted, time) = timed_frame(&mut self.renderer, &self.submitter, scene, |_| Ok(()))?;
+        Ok((submitted.statistics.views.iter().map(|view| view.visible).sum(), time.cpu))
+    }
+}
