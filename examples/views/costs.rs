@@ -30,8 +30,6 @@ pub struct ViewCost {
     /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted sooner. Only of
     /// views that may be left out.
     saves_ms: Option<f64>,
-    /// In which of its forms it was drawn.
-    rung: &'static str,
 }
 
 /// How many frames [`measure`] draws.
@@ -102,7 +100,6 @@ pub fn measure<B: Backend>(
             commands: view.commands,
             ms: times.get(view.name.as_str()).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
             saves_ms: saved.get(&view.name).copied(),
-            rung: "full",
             name: view.name,
         }
     };

@@ -17,8 +17,9 @@ pub struct Selection {
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
     pub excluded_layers: LayerMask,
-    /// By what the view shows: objects that belong to one of these layers too. [`Camera::layers`](crate::scene::Camera::layers) sets it.
-    pub shown_layers: LayerMask,
+    /// By the layers that the view shows, which [`Camera::layers`](crate::scene::Camera::layers) sets: objects must belong to one of these
+    /// as well.
+    pub visible_layers: LayerMask,
     /// In which order they are drawn.
     pub order: DrawOrder,
 }
@@ -38,7 +39,7 @@ impl Selection {
             material_types: MaterialTypeFilter::Any,
             layers: LayerMask::ALL,
             excluded_layers: LayerMask::NONE,
-            shown_layers: LayerMask::ALL,
+            visible_layers: LayerMask::ALL,
             order: DrawOrder::ByState,
         }
     }
@@ -64,8 +65,8 @@ impl Selection {
     }
 
     /// Those of these objects that a view of some layers shows.
-    pub const fn shown_in(self, shown_layers: LayerMask) -> Self {
-        Self { shown_layers, ..self }
+    pub const fn visible_in(self, visible_layers: LayerMask) -> Self {
+        Self { visible_layers, ..self }
     }
 
     /// The same objects in another order.

@@ -15,5 +15,5 @@
 //! - **Ray tracing, global illumination, streaming of meshes and textures.** An engine can add passes for the first two. Meshes and
 //!   textures are uploaded within the frame that first draws them, which takes long for many at once.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how many frames it keeps.
-//! - **Cameras that see what other cameras drew.** A shadow map is read by other views; reflections and portals must be drawn
-//!   by frames or passes of the engine's.
+//! - **Recursion by itself.** A mirror in a mirror, or a portal in a portal, is as deep as the engine has cameras for it. Each has one clip
+//!   plane, and none without perspective. A directional light's shadow map covers what main cameras see, not what only mirrors show.

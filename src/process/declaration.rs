@@ -24,8 +24,9 @@ impl Declare {
         self.declaration.views = kind;
     }
 
-    /// Draws in views of this kind too, in targets of theirs, whenever a scene has such views. The pipeline's own processes draw in
-    /// [`ViewKind::Reflection`] as they do in [`ViewKind::Main`]; an engine's do so with this call.
+    /// Draws in views of this kind too, in targets of theirs, whenever a scene has such views, and draws there what others sample. The
+    /// pipeline's own processes draw in [`ViewKind::Reflection`] as they do in [`ViewKind::Main`]; an engine's do so with this call. It has no
+    /// effect on a process that draws once a frame.
     pub fn also_views(&mut self, kind: ViewKind) {
         self.declaration.also_views.push(kind);
     }
@@ -154,14 +155,16 @@ impl Declare {
     /// called `V/view`, which [`Camera::child_name`](crate::scene::Camera::child_name) makes of the two; if the frame has none, the one
     /// called `view`, which all views share. Of views with the same name it is the first.
     ///
-    /// That view is submitted before. Views that read each other in a circle are an error that names them. If the frame has no such view,
-    /// or only the view itself has that name, the texture is a single pixel whose channels and depth are all 0: an alpha tells whether there
-    /// is one, and the recursion of mirrors in mirrors ends where the engine adds no further camera. The shader finds the texture's size with
-    /// `textureDimensions`.
+    /// That view is submitted before. Views that sample each other in a circle are
+    /// [`FrameError::CircularViews`](crate::FrameError::CircularViews), and so are views that sample each other and are submitted
+    /// [process by process](super::ViewOrder::ProcessByProcess). If the frame has no such view, or only the view itself has that name, the
+    /// texture is a single pixel whose channels and depth are all 0. So a format with alpha tells whether there is one, and the recursion of
+    /// mirrors in mirrors ends where the engine adds no further camera. The shader finds the texture's size with `textureDimensions`. A raw
+    /// pass cannot sample views.
     ///
     /// ```
-    /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Place, RenderProcess};
     /// use drawloom::command::Selection;
+    /// use drawloom::process::{CommandDraws, Declare, Draws, Place, RenderProcess};
     /// use drawloom::scene::{LayerMask, ViewKind};
     ///
     /// const MIRROR: LayerMask = LayerMask::layer(5);

@@ -65,7 +65,8 @@ pub enum ViewKind {
     /// The shadow map of a light.
     Shadow,
     /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred) draws in it what
-    /// it draws in a main view, as far as others [read](crate::process::Declare::samples_view) it.
+    /// it draws in a main view, as far as others [sample](crate::process::Declare::samples_view) it. Shadow maps of directional lights cover
+    /// what main views see, so elsewhere nothing is in their shadow.
     Reflection,
     /// The picture on the screen.
     #[default]

@@ -4,12 +4,13 @@ use glam::{DVec3, Vec3};
 
 use super::transform::is_unit;
 
-/// A plane in the world, such as a mirror's: what is behind it is not drawn.
+/// A plane in the world, such as a mirror's. A camera behind it draws only what is in front of it; for a camera in front of it, it clips
+/// nothing.
 ///
-/// It becomes the near plane of the camera's frustum (Lengyel 2005, for a reversed depth without a far plane). That costs depth
-/// precision: for a camera D metres behind the plane, depth resolves D ÷ (16.8 million · t) of the distance at t metres, where an ordinary
-/// near plane resolves a 16.8 millionth of it everywhere. The plane of a camera that is itself in front of it clips nothing. Objects
-/// behind it are clipped by the device, and not culled before.
+/// It becomes the near plane of the camera's frustum (Lengyel 2005, for a reversed depth without a far plane), in place of
+/// [`Camera::near`](super::Camera::near). That costs depth precision: for a camera D metres behind the plane, depth distinguishes surfaces
+/// t metres away that are some t² ÷ (16.8 million · D) apart, where an ordinary near plane distinguishes a 16.8 millionth of t. Objects that
+/// are entirely behind the plane are clipped by the device, and not culled before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlane {
     /// A point of the plane, in the world, in metres.

@@ -19,11 +19,12 @@ impl Camera {
     /// ```
     ///
     /// # Panics
-    /// If there is no such tile.
+    /// If there is no such tile. So many tiles that the field of view is too small for a camera are an error of the frame.
     pub fn tile(&self, [column, row]: [u32; 2], count: u32) -> Self {
         assert!(column < count && row < count, "tile {column} {row} is not one of {count} by {count}");
         // From the whole picture's centre to the tile's, in halves of the tile.
-        let offset = Vec2::new((2 * column + 1) as f32 - count as f32, count as f32 - (2 * row + 1) as f32);
+        let middle = |index: u32| 2.0 * index as f32 + 1.0;
+        let offset = Vec2::new(middle(column) - count as f32, count as f32 - middle(row));
         let mut camera = Self { name: format!("{}, tile {column} {row}", self.name), ..self.clone() };
         match &mut camera.projection {
             Projection::Perspective { field_of_view } => {
@@ -42,8 +43,8 @@ impl Camera {
     }
 
     /// This camera, looking past its picture's centre by `offset` pixels to the right and up: the sub-pixel jitter of temporal
-    /// antialiasing, and of antialiasing by the mean of several cameras (M 10.1). A paraboloid stays as it is, as it does for
-    /// [`Camera::tile`].
+    /// antialiasing, and of antialiasing by the mean of several cameras (M 10.1). Neither changes a
+    /// paraboloid.
     pub fn jittered(&self, offset: Vec2) -> Self {
         let halves = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
         let mut camera = self.clone();
@@ -65,7 +66,7 @@ impl Camera {
     ///
     /// A camera cannot be mirrored, as front faces would become back faces. So this one sees left and right swapped: what this camera has at
     /// (x, y) is at (1 - x, y) in the mirror's picture, as shares of width and height. The mirror shows nothing if this camera is behind it,
-    /// so leave the view out then. What is behind the mirror is not drawn, but only in perspective. The mirror's own surface lies in the plane:
+    /// so leave the view out then. In perspective, what is behind the mirror is not drawn. The mirror's own surface lies in the plane:
     /// it must be single-sided, or in none of the camera's [layers](Camera::layers).
     ///
     /// ```
@@ -101,7 +102,8 @@ impl Camera {
     /// the same position of the picture. Who enters the portal at `entry` leaves it at `exit`: each is a point and an orientation whose
     /// +Z leads out of the portal.
     ///
-    /// For a portal that is visible through itself, derive a camera from the result again, as often as the recursion is to be seen.
+    /// For a portal that is visible through itself, derive a camera from the result again, as often as the recursion is to be seen. A camera
+    /// has one clip plane: the derived one replaces that of this camera. Leave the view out if this camera is behind the entry.
     pub fn through_portal(&self, portal: &str, entry: (DVec3, Quat), exit: (DVec3, Quat)) -> Self {
         let [entered, left] = [entry.1, exit.1].map(|orientation| orientation.as_dquat().normalize());
         // What goes into the entry comes out of the exit: half a turn between them.

@@ -87,6 +87,8 @@ impl Frustum {
             Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => f32::INFINITY,
             // Filtering at the disc's rim reads a few texels beyond it.
             Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,
+            // Its near plane is the clip plane, which may be nearer.
+            _ if camera.clip_plane.is_some() => 0.0,
             _ => -camera.near,
         };
         let axes = [DVec3::X, DVec3::Y].map(|axis| orientation * axis);
@@ -120,8 +122,9 @@ impl Frustum {
     /// the slope, the error is 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with
     /// the offset o add 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the
     /// error of the distance from a side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that
-    /// from the near or the far plane 6uN + u|o|. With a shift the sum is smaller, as slope and |across| are h ÷ √(1 + T²) and
-    /// √(1 + m²) ÷ √(1 + T²), where h and m are the tangents of half the picture and of its centre, and T = h + |m|. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
+    /// from the near or the far plane 6uN + u|o|. With a
+    /// shift, let h and m be the tangents of half the picture and of its centre. Then slope is h ÷ √(1 + (h + |m|)²) and |across| is
+    /// √(1 + m²) ÷ √(1 + (h + |m|)²), and the sum is smaller. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
     /// offset, which also covers the tolerance's own rounding. Subnormal numbers lose less than the smallest normal
     /// number, which the offset includes as well. The bound consists of magnitudes from before any cancellation.
     ///

@@ -12,7 +12,7 @@ pub(crate) struct ObjectFilter<'a> {
     layers: &'a [LayerMask],
     drawn: LayerMask,
     excluded: LayerMask,
-    shown: LayerMask,
+    visible: LayerMask,
     /// Of each object.
     materials: &'a [Handle<Material>],
     /// Of each material, by slot; empty if all have the same answer.
@@ -22,14 +22,14 @@ pub(crate) struct ObjectFilter<'a> {
 
 impl<'a> ObjectFilter<'a> {
     pub(crate) fn new(table: &'a ObjectTable, scene: &SceneRef<'a>, selection: Selection) -> Self {
-        let (drawn, excluded, shown) = (selection.layers, selection.excluded_layers, selection.shown_layers);
-        let is_of_all = (drawn, excluded, shown) == (LayerMask::ALL, LayerMask::NONE, LayerMask::ALL);
+        let (drawn, excluded, visible) = (selection.layers, selection.excluded_layers, selection.visible_layers);
+        let is_of_all = (drawn, excluded, visible) == (LayerMask::ALL, LayerMask::NONE, LayerMask::ALL);
         let drawn_types = selection.material_types;
         Self {
             layers: if is_of_all { &[] } else { scene.layers },
             drawn,
             excluded,
-            shown,
+            visible,
             materials: scene.materials,
             types: if drawn_types == MaterialTypeFilter::Any { &[] } else { table.material_type_of_slots() },
             drawn_types,
@@ -58,8 +58,8 @@ impl<'a> ObjectFilter<'a> {
             Some(layers) => {
                 let is_drawn = self.drawn == LayerMask::ALL || layers.intersects(self.drawn);
                 let is_excluded = self.excluded == LayerMask::ALL || layers.intersects(self.excluded);
-                let is_shown = self.shown == LayerMask::ALL || layers.intersects(self.shown);
-                is_drawn && is_shown && !is_excluded
+                let is_visible = self.visible == LayerMask::ALL || layers.intersects(self.visible);
+                is_drawn && is_visible && !is_excluded
             }
             None => self.passes_object_in_all_layers(),
         }
@@ -76,7 +76,7 @@ impl<'a> ObjectFilter<'a> {
 
     /// Whether it lets an object that belongs to all layers pass.
     fn passes_object_in_all_layers(&self) -> bool {
-        self.drawn != LayerMask::NONE && self.shown != LayerMask::NONE && self.excluded == LayerMask::NONE
+        self.drawn != LayerMask::NONE && self.visible != LayerMask::NONE && self.excluded == LayerMask::NONE
     }
 
     /// Those of up to 64 objects that pass: bit 0 is object `first`.

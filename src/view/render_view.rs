@@ -41,7 +41,7 @@ impl RenderView {
 
     /// Which of the objects that a process draws it draws in this view.
     pub fn selection_of(&self, process: Selection) -> Selection {
-        process.shown_in(self.camera.layers)
+        process.visible_in(self.camera.layers)
     }
 
     /// From world axes relative to the camera to clip space. Depth is reversed: 1 at the near plane, and 0 at the far

@@ -14,7 +14,7 @@ pub struct ShadowMaps {
     /// 2.3·`max_distance`/side.
     pub side: u32,
     /// The distance from the main cameras, in metres, up to which a directional light's map covers their views; at most
-    /// 1,000 km. Beyond it, nothing is in shadow. There is one map for all main cameras: the farther they are apart,
+    /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. There is one map for all main cameras: the farther they are apart,
     /// the coarser it is.
     pub max_distance: f32,
     /// The depth bias, as a multiple of what a pixel's width and the surface's slope require. Below 1, lit surfaces
@@ -103,7 +103,10 @@ impl ShadowMaps {
                 Projection::Perspective { field_of_view } => {
                     let up = (f64::from(field_of_view) * 0.5).tan();
                     // The sphere through the camera and the far corners, or around the far corners if it is larger.
-                    let corner = DVec2::new(up * aspect, up) * (1.0 + camera.shift.abs().as_dvec2());
+                    // Less a pixel, so that a jitter of less moves no shadow.
+                    let pixel = 2.0 / DVec2::from(camera.size.map(f64::from));
+                    let shift = (camera.shift.abs().as_dvec2() - pixel).max(DVec2::ZERO);
+                    let corner = DVec2::new(up * aspect, up) * (1.0 + shift);
                     let spread = corner.length_squared();
                     let along = if spread < 1.0 { far * (1.0 + spread) * 0.5 } else { far };
                     let radius = if spread < 1.0 { along } else { far * spread.sqrt() };

@@ -5,9 +5,12 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Place, PlanError, RenderProcess};
-use drawloom::scene::{Camera, ClipPlane, LayerMask, RenderObject, Scene, ViewKind};
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Place, PlanError, RenderProcess, StorageBuffer,
+};
+use drawloom::scene::{Camera, ClipPlane, LayerMask, Light, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom::{BuildError, FrameError, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
@@ -188,6 +191,171 @@ fn a_reflection_that_nothing_samples_is_refused_by_name() {
     scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
     let error = renderer.record(scene.as_scene_ref()).err().unwrap();
     assert!(matches!(&error, FrameError::NoProcess { view, .. } if view == "main/mirror"), "{error}");
+}
+
+const PARTICLES: StorageBuffer<[f32; 4]> = StorageBuffer::new("particles", 64);
+
+/// Moves particles once a frame.
+struct Simulate;
+
+impl RenderProcess for Simulate {
+    fn name(&self) -> &str {
+        "simulate"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.once_a_frame();
+        declare.also_views(ViewKind::Reflection);
+        declare.changes_buffer(PARTICLES);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+/// Draws particles in every view.
+struct DrawParticles;
+
+impl RenderProcess for DrawParticles {
+    fn name(&self) -> &str {
+        "draw particles"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.also_views(ViewKind::Reflection);
+        declare.at(Place::BeforeGeometry);
+        declare.reads_buffer(PARTICLES);
+        declare.clears_color("particles", Format::Rgba8Unorm, ClearColor::Background);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn what_is_drawn_once_a_frame_comes_before_all_views_that_use_it() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(RADIANCE);
+    let (mut renderer, submitter) = builder.process(Simulate).process(DrawParticles).build(scheduler).unwrap();
+    let mut scene = scene();
+    scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let passes: Vec<_> = submitted.submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
+    assert_eq!(passes[0], ("simulate", 0));
+    assert_eq!(passes.iter().filter(|(process, _)| *process == "simulate").count(), 1);
+    let first_of = |view: usize| passes[1..].iter().position(|pass| pass.1 == view);
+    assert!(first_of(1) < first_of(0), "{passes:?}");
+    assert!(passes.contains(&("draw particles", 0)) && passes.contains(&("draw particles", 1)));
+}
+
+/// Draws over reflections only.
+struct Tint;
+
+impl RenderProcess for Tint {
+    fn name(&self) -> &str {
+        "tint"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Reflection);
+        declare.at(Place::AfterTransparency);
+        declare.draws_over("radiance");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn a_process_of_reflections_alone_has_no_pass_without_one() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(RADIANCE).process(Tint);
+    let (mut renderer, submitter) = builder.build(scheduler).unwrap();
+    let mut scene = scene();
+    for has_mirror in [false, true, false] {
+        scene.cameras.truncate(1);
+        if has_mirror {
+            scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+        }
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        let tints: Vec<_> = submitted.submission.passes.iter().filter(|pass| pass.process == "tint").collect();
+        assert_eq!(tints.len(), usize::from(has_mirror));
+        assert!(tints.iter().all(|pass| pass.view == 1));
+    }
+}
+
+/// Writes a target that main views do not have.
+struct OnlyInReflections;
+
+impl RenderProcess for OnlyInReflections {
+    fn name(&self) -> &str {
+        "only in reflections"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Reflection);
+        declare.clears_color("own", Format::Rgba8Unorm, ClearColor::Background);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+/// Samples that target of a main view.
+struct OfMain;
+
+impl RenderProcess for OfMain {
+    fn name(&self) -> &str {
+        "of main"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples_view(ViewKind::Main, "other", "own");
+        declare.clears_color("shown", Format::Rgba8Unorm, ClearColor::Background);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn a_target_of_another_kind_of_view_is_no_target_of_this_one() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(OnlyInReflections);
+    let error = builder.process(RADIANCE).process(OfMain).build(scheduler).err().unwrap();
+    let named = matches!(&error, BuildError::Plan(PlanError::UnknownSampledTarget { target, .. }) if target == "own");
+    assert!(named, "{error}");
+}
+
+#[test]
+fn only_objects_of_the_layers_of_shadow_maps_cast_shadows() {
+    let mut scene = field(60);
+    scene.lights = vec![Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true }];
+    scene.cameras = vec![Camera::looking_at("main", DVec3::new(0.0, 0.0, 30.0), DVec3::ZERO)];
+    for (index, handle) in scene.objects().collect::<Vec<_>>().into_iter().enumerate() {
+        let object = scene.object(handle).unwrap();
+        let layers = if index % 2 == 0 { LayerMask::layer(0) } else { MIRROR };
+        scene.replace_object(handle, RenderObject { layers, ..object }).unwrap();
+    }
+    let casters = |layers: LayerMask| {
+        let maps = ShadowMaps { layers, ..ShadowMaps::default() };
+        let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+        let scheduler = Arc::new(Scheduler::new(1).unwrap());
+        let (mut renderer, _) = Renderer::builder(NullBackend).deferred(deferred).build(scheduler).unwrap();
+        drop(renderer.record(scene.as_scene_ref()).unwrap());
+        renderer.draw_list("shadow casters", 1).unwrap().objects.len()
+    };
+    let counts = [LayerMask::ALL, LayerMask::layer(0), MIRROR, LayerMask::NONE].map(casters);
+    assert_eq!((counts[0], counts[3]), (counts[1] + counts[2], 0));
+    assert!(counts[1] > 0 && counts[2] > 0, "{counts:?}");
 }
 
 /// Draws a colour of its own in main views and reflections, without a pipeline.

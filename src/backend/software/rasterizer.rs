@@ -190,8 +190,8 @@ fn attachments<R: Precision>(
         Access::Sample | Access::SamplePrevious => Some(of_view(name)),
         Access::SampleView(kind, index) => {
             let found = request.sampled_views.find(pass, *index).and_then(|view| targets.find(view, name).cloned());
-            let blank = || targets.find_blank(request.plan.sampled_target(*kind, name)?);
-            Some(found.or_else(blank).ok_or_else(|| missing(name)))
+            let placeholder = || targets.find_placeholder(request.plan.sampled_target(*kind, name)?);
+            Some(found.or_else(placeholder).ok_or_else(|| missing(name)))
         }
         Access::SampleLayers(kind) => Some(layered(*kind, name)),
         _ => None,

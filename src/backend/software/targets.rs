@@ -46,12 +46,12 @@ pub(super) struct SoftwareTargets<R> {
     /// The targets that all views of a kind share.
     layered: Vec<Arc<TiledTexture<R>>>,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format.
-    blank: Vec<Arc<TiledTexture<R>>>,
+    placeholder: Vec<Arc<TiledTexture<R>>>,
 }
 
 impl<R> Default for SoftwareTargets<R> {
     fn default() -> Self {
-        Self { views: Vec::new(), layered: Vec::new(), blank: Vec::new() }
+        Self { views: Vec::new(), layered: Vec::new(), placeholder: Vec::new() }
     }
 }
 
@@ -86,8 +86,8 @@ impl<R> SoftwareTargets<R> {
 
 impl<R> SoftwareTargets<R> {
     /// A pixel of zeros in place of a target of a view that the frame does not have.
-    pub(super) fn find_blank(&self, planned: &PlannedTarget) -> Option<SoftwareTarget<R>> {
-        let found = self.blank.iter().find(|blank| blank.planned.format == planned.format);
+    pub(super) fn find_placeholder(&self, planned: &PlannedTarget) -> Option<SoftwareTarget<R>> {
+        let found = self.placeholder.iter().find(|placeholder| placeholder.planned.format == planned.format);
         found.map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 }
@@ -155,9 +155,9 @@ impl<R: Precision> TargetCache<R> {
         for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
             let Access::SampleView(views, _) = *access else { continue };
             if let Some(planned) = plan.sampled_target(views, target)
-                && next.find_blank(planned).is_none()
+                && next.find_placeholder(planned).is_none()
             {
-                next.blank.push(Arc::new(TiledTexture::new(planned, [1, 1], 1)?));
+                next.placeholder.push(Arc::new(TiledTexture::new(planned, [1, 1], 1)?));
             }
         }
         self.current = Arc::new(next);

@@ -28,7 +28,7 @@ pub(super) fn update_bind_groups(
         Access::SampleView(kind, index) => {
             let sampled = request.sampled_views.find(pass.pass, *index);
             let target = sampled.and_then(|sampled| targets.find(sampled, name)).map(|target| &target.sampled);
-            target.or_else(|| targets.find_blank(request.plan.sampled_target(*kind, name)?))
+            target.or_else(|| targets.find_placeholder(request.plan.sampled_target(*kind, name)?))
         }
         Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
         _ => None,

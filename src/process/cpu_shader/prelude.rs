@@ -62,7 +62,7 @@ impl<R: Real> ShaderView<R> {
             let [right, up, back, origin] = self.clip_from_relative.map(|column| column[2]);
             // 0 unless the near plane is oblique.
             let depth_at_infinity = Vector([right, up, back]).dot(ray);
-            return ray * (origin / (depth - depth_at_infinity));
+            return ray * (origin / (depth - depth_at_infinity).max(R::zero()));
         }
         across + self.forward * mix(self.far, self.near, depth)
     }
@@ -183,6 +183,11 @@ mod tests {
                 let view = view_values::<f64>(&view);
                 let relative = view.position_from_depth(Vector(pixel), depth);
                 let [x, y, z, w] = view.clip_position(relative).0;
+                if !w.is_finite() {
+                    // Beyond what an oblique near plane leaves at infinity.
+                    continue;
+                }
+                prop_assert!(w > 0.0);
                 // The views' matrices are of f32.
                 let found = DVec3::new(x, y, z) / w;
                 prop_assert!(found.distance(DVec2::from(pixel).extend(depth)) < 1e-5, "{found} {pixel:?} {depth}");
@@ -234,6 +239,17 @@ mod tests {
             let back = as_double(direction_from_octahedral(there));
             let [x, y, z] = normal.to_array().map(|value| f64::from(value as f32));
             prop_assert!(back.distance(DVec3::new(x, y, z).normalize()) <= 26.0 * UNIT);
+        }
+    }
+
+    #[test]
+    fn a_depth_of_zero_is_infinitely_far_away_in_perspective() {
+        for view in views().into_iter().filter(|view| matches!(view.camera.projection, Projection::Perspective { .. }))
+        {
+            let view = view_values::<f64>(&view);
+            let relative = as_double(view.position_from_depth(Vector([0.3, -0.4]), 0.0));
+            // All of them look along -Z.
+            assert!(relative.length() > 1e30 && relative.z < 0.0, "{relative}");
         }
     }
 

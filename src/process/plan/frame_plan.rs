@@ -31,6 +31,8 @@ pub struct FramePlan {
     alive: Arc<()>,
     processes: Vec<PlannedProcess>,
     view_groups: Vec<ViewGroup>,
+    /// Pairs of processes, by index: the first comes before the second.
+    dependencies: Vec<(usize, usize)>,
     targets: Vec<PlannedTarget>,
     columns: Vec<ColumnLayout>,
     material_types: Vec<MaterialLayout>,
@@ -113,6 +115,7 @@ impl FramePlan {
             alive: Arc::default(),
             processes,
             view_groups,
+            dependencies: edges,
             targets,
             columns,
             material_types,
@@ -140,7 +143,8 @@ impl FramePlan {
         &self.processes
     }
 
-    /// The order in which views are submitted: the groups one after the other. Each view is submitted with its whole queue,
+    /// The order in which views are submitted: the groups one after the other, except where a view
+    /// [samples](crate::process::Declare::samples_view) another one. Each view is submitted with its whole queue,
     /// except in groups that are submitted [process by process](super::ViewOrder::ProcessByProcess).
     pub fn view_groups(&self) -> &[ViewGroup] {
         &self.view_groups
@@ -153,7 +157,7 @@ impl FramePlan {
     /// If views sample each other in a circle.
     pub(crate) fn passes(&self, views: &[RenderView]) -> Result<FramePasses, GraphProblem> {
         let parts = self.view_groups.iter().flat_map(|group| group.parts(&self.processes, views)).collect();
-        FramePasses::new(&self.processes, views, parts)
+        FramePasses::new(&self.processes, &self.dependencies, views, parts)
     }
 
     /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such views, it is

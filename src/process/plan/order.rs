@@ -3,6 +3,7 @@
 use super::PlanError;
 use crate::graph::NodeId;
 use crate::process::Declaration;
+use crate::scene::ViewKind;
 
 /// A process that was added to the graph.
 pub(super) struct AddedProcess {
@@ -72,8 +73,9 @@ fn find(
     (own, name): (&AddedProcess, &str),
     is_on_side: impl Fn(usize, usize) -> bool,
 ) -> Result<Option<NodeId>, UnknownName> {
-    if let Some(found) = added.iter().find(|other| other.name == name && is_for(added, own, other)) {
-        return Ok(Some(found.id));
+    if added.iter().any(|other| other.name == name) {
+        let found = added.iter().find(|other| other.name == name && is_for(added, own, other));
+        return Ok(found.map(|found| found.id));
     }
     let empty = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
     let in_chain = added.iter().filter(|other| is_for(added, own, other));
@@ -82,10 +84,13 @@ fn find(
     Ok(nearest.map(|(_, id)| id))
 }
 
-/// Whether `own` can refer to this process: not if the same process also draws in the views of `own`.
+/// Whether `own` can refer to this process: not if one of the two also draws in the other one's views.
 fn is_for(added: &[AddedProcess], own: &AddedProcess, other: &AddedProcess) -> bool {
-    let has_same_views = |process: &AddedProcess| process.declaration.views == own.declaration.views;
-    has_same_views(other) || !added.iter().any(|twin| twin.name == other.name && has_same_views(twin))
+    let draws_in_views_of = |process: &AddedProcess, views: ViewKind| {
+        added.iter().any(|same| same.name == process.name && same.declaration.views == views)
+    };
+    let (own_views, other_views) = (own.declaration.views, other.declaration.views);
+    own_views == other_views || !draws_in_views_of(other, own_views) && !draws_in_views_of(own, other_views)
 }
 
 /// Neither a process nor a slot has a name.

@@ -19,6 +19,8 @@ pub struct PlannedProcess {
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,
+    /// Whether it draws in the kind of views that it declares, and not in a further one.
+    pub(super) is_of_own_kind: bool,
     /// What its raw pass asks for.
     #[cfg(feature = "wgpu")]
     pub(crate) requests: Arc<RequestLog>,
@@ -26,7 +28,8 @@ pub struct PlannedProcess {
 
 impl PlannedProcess {
     /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if `is_present` says that
-    /// frames have such views; if it draws in main views, for those of `with_main` too.
+    /// frames have such views; if it draws in main views, for those of `with_main` too. What draws once a frame does so in the kind that it
+    /// declares.
     ///
     /// # Errors
     /// If one of them panics, or `declare` declares more than one depth target.
@@ -46,15 +49,17 @@ impl PlannedProcess {
         }
         let Declaration { views, also_views, .. } = &declaration;
         let with_main = if *views == ViewKind::Main { with_main } else { &[] };
-        let further = also_views.iter().chain(with_main).copied().filter(|kind| is_present(*kind));
-        let mut kinds: Vec<_> = iter::once(*views).chain(further).collect();
+        let further = also_views.iter().chain(with_main).copied().filter(|_| !declaration.once_a_frame);
+        let mut kinds: Vec<_> = iter::once(*views).chain(further).filter(|kind| is_present(*kind)).collect();
         kinds.sort_unstable();
         kinds.dedup();
+        let own_kind = *views;
         let of_kind = |views| {
             let declaration = Declaration { views, ..declaration.clone() };
             Self {
                 process: Arc::clone(process),
                 name: name.clone(),
+                is_of_own_kind: views == own_kind,
                 #[cfg(feature = "wgpu")]
                 requests: Arc::new(RequestLog::new(&declaration)),
                 declaration,

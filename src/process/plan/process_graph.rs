@@ -97,12 +97,10 @@ fn process_graph(
         graph.order(before, after);
     }
     for output in outputs {
-        let writers = nodes.iter().filter(|node| node.declaration.written().any(|target| target == output));
-        let mut kinds: Vec<_> = writers.map(|node| node.declaration.views).collect();
-        // The pipeline's reflections are for other views to sample.
-        if kinds.contains(&ViewKind::Main) {
-            kinds.retain(|kind| *kind != ViewKind::Reflection);
-        }
+        // In further kinds of views, processes draw what others sample.
+        let own = added.iter().filter(|(_, planned)| planned.is_of_own_kind);
+        let writers = own.filter(|(_, planned)| planned.declaration.written().any(|target| target == output));
+        let mut kinds: Vec<_> = writers.map(|(_, planned)| planned.declaration.views).collect();
         if kinds.is_empty() {
             kinds.push(ViewKind::Main);
         }

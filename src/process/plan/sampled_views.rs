@@ -10,7 +10,9 @@ pub(super) fn check_sampled_views(processes: &[PlannedProcess], targets: &[Plann
     for planned in processes {
         for (target, access) in &planned.declaration.accesses {
             let Access::SampleView(views, index) = *access else { continue };
-            if sampled_target(targets, views, target).is_none() {
+            let draws_views = processes.iter().any(|other| other.declaration.views == views);
+            let found = sampled_target(targets, views, target).filter(|found| found.views == views || !draws_views);
+            if found.is_none() {
                 let view = planned.declaration.sampled_views[index].clone();
                 return Err(PlanError::UnknownSampledTarget {
                     process: planned.name.clone(),

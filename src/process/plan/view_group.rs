@@ -24,23 +24,31 @@ pub enum ViewOrder {
 }
 
 impl ViewGroup {
-    /// The passes of the group's views in submission order, in parts that nothing is submitted between: a part for each view, or one
-    /// for all if they are submitted process by process. A view whose picture is cached has none.
+    /// The passes of the group's views in submission order, in parts that nothing is submitted between: for each kind what draws once a
+    /// frame, then a part for each view; or one part for all if they are submitted process by process. A view whose picture is cached has
+    /// none.
     pub(super) fn parts(&self, processes: &[PlannedProcess], views: &[RenderView]) -> Vec<Vec<Pass>> {
         let (mut parts, mut is_begun): (Vec<Vec<Pass>>, _) = (Vec::new(), [false; ViewKind::COUNT]);
         let drawn = |(_, view): &(usize, &RenderView)| self.kinds.contains(&view.kind()) && !view.is_cached;
         for (view_index, kind) in views.iter().enumerate().filter(drawn).map(|(index, view)| (index, view.kind())) {
             let is_first = !std::mem::replace(&mut is_begun[kind as usize], true);
-            let of_kind = |(_, planned): &(usize, &PlannedProcess)| {
-                planned.declaration.views == kind && (is_first || !planned.declaration.once_a_frame)
+            let mut passes_of = |once_a_frame: bool| {
+                let of_kind = |(_, planned): &(usize, &PlannedProcess)| {
+                    planned.declaration.views == kind && planned.declaration.once_a_frame == once_a_frame
+                };
+                let of_kind = processes.iter().enumerate().filter(of_kind);
+                let passes: Vec<_> = of_kind.map(|(process_index, _)| Pass { process_index, view_index }).collect();
+                parts.extend((!passes.is_empty()).then_some(passes));
             };
-            let passes = processes.iter().enumerate().filter(of_kind);
-            parts.push(passes.map(|(process_index, _)| Pass { process_index, view_index }).collect());
+            if is_first {
+                passes_of(true);
+            }
+            passes_of(false);
         }
         if self.order == ViewOrder::ProcessByProcess {
             let mut passes: Vec<Pass> = parts.concat();
             passes.sort_unstable_by_key(|pass| (pass.process_index, pass.view_index));
-            parts = vec![passes];
+            parts = if passes.is_empty() { Vec::new() } else { vec![passes] };
         }
         parts
     }

@@ -194,7 +194,7 @@ fn position_from_depth(clip: vec2<f32>, depth: f32) -> vec3<f32> {
         let matrix = view.clip_from_relative;
         // 0 unless the near plane is oblique.
         let depth_at_infinity = dot(vec3<f32>(matrix[0].z, matrix[1].z, matrix[2].z), ray);
-        return ray * (matrix[3].z / (depth - depth_at_infinity));
+        return ray * (matrix[3].z / max(depth - depth_at_infinity, 0.0));
     }
     return across + view.forward * mix(view.far, view.near, depth);
 }

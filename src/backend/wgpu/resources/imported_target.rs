@@ -119,6 +119,12 @@ fn needed_usages(plan: &FramePlan, planned: &PlannedTarget) -> wgpu::TextureUsag
             };
         }
     }
+    let samples = |(name, access): &(String, Access)| {
+        *name == planned.name && matches!(access, Access::SampleView(views, _) if *views == planned.views)
+    };
+    if plan.processes().iter().any(|process| process.declaration.accesses.iter().any(samples)) {
+        usages |= wgpu::TextureUsages::TEXTURE_BINDING;
+    }
     let has_history = plan
         .targets()
         .iter()

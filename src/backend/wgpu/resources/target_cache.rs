@@ -17,7 +17,7 @@ pub(crate) struct WgpuTargets {
     /// The targets that all views of a kind share.
     layered: Vec<LayeredTarget>,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format and number of samples.
-    blank: Vec<(Format, bool, wgpu::TextureView)>,
+    placeholder: Vec<(Format, bool, wgpu::TextureView)>,
 }
 
 /// A target as one view draws into it.
@@ -59,9 +59,10 @@ impl WgpuTargets {
     }
 
     /// A pixel of zeros in place of a target of a view that the frame does not have.
-    pub(crate) fn find_blank(&self, planned: &PlannedTarget) -> Option<&wgpu::TextureView> {
-        let is_wanted = |blank: &&(Format, bool, _)| (blank.0, blank.1) == (planned.format, planned.multisampled);
-        self.blank.iter().find(is_wanted).map(|(.., texture)| texture)
+    pub(crate) fn find_placeholder(&self, planned: &PlannedTarget) -> Option<&wgpu::TextureView> {
+        let is_wanted =
+            |placeholder: &&(Format, bool, _)| (placeholder.0, placeholder.1) == (planned.format, planned.multisampled);
+        self.placeholder.iter().find(is_wanted).map(|(.., texture)| texture)
     }
 
     /// Copies what processes of later frames read of this one.
@@ -174,7 +175,7 @@ impl TargetCache {
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push((view.name().to_owned(), targets));
         }
-        next.blank = self.blank_targets(device, plan)?;
+        next.placeholder = self.placeholder_targets(device, plan)?;
         self.current = Arc::new(next);
         self.plan = Some(plan.identity());
         self.views.clear();
@@ -208,21 +209,21 @@ impl TargetCache {
         Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 })
     }
 
-    fn blank_targets(
+    fn placeholder_targets(
         &self,
         device: &wgpu::Device,
         plan: &FramePlan,
     ) -> Result<Vec<(Format, bool, wgpu::TextureView)>, BackendError> {
-        let mut blank: Vec<(Format, bool, wgpu::TextureView)> = Vec::new();
+        let mut placeholder: Vec<(Format, bool, wgpu::TextureView)> = Vec::new();
         let accesses = plan.processes().iter().flat_map(|planned| &planned.declaration.accesses);
         for (target, access) in accesses {
             let Access::SampleView(views, _) = *access else { continue };
             let Some(planned) = plan.sampled_target(views, target) else { continue };
             let (format, multisampled) = (planned.format, planned.multisampled);
-            if blank.iter().any(|(known, samples, _)| (*known, *samples) == (format, multisampled)) {
+            if placeholder.iter().any(|(known, samples, _)| (*known, *samples) == (format, multisampled)) {
                 continue;
             }
-            let sampled = match self.current.find_blank(planned) {
+            let sampled = match self.current.find_placeholder(planned) {
                 Some(cached) => cached.clone(),
                 // wgpu clears a texture before it is first read.
                 None => {
@@ -231,9 +232,9 @@ impl TargetCache {
                     new_views(&texture, format, &wgpu::TextureViewDescriptor::default()).1
                 }
             };
-            blank.push((format, multisampled, sampled));
+            placeholder.push((format, multisampled, sampled));
         }
-        Ok(blank)
+        Ok(placeholder)
     }
 
     fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {
