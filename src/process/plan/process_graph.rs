@@ -1,7 +1,7 @@
 //! From processes to the graph of what they read and write.
 
 use super::order::{AddedProcess, order_constraints};
-use super::resource_names::{buffer_name, resource_name};
+use super::resource_names::{buffer_name, resource_name, views_of_output};
 use super::{PlanError, PlannedProcess, PlannedTarget};
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Access, BufferAccess, previous_name};
@@ -97,16 +97,7 @@ fn process_graph(
         graph.order(before, after);
     }
     for output in outputs {
-        let writers = nodes.iter().filter(|node| node.declaration.written().any(|target| target == output));
-        let mut kinds: Vec<_> = writers.map(|node| node.declaration.views).collect();
-        // The pipeline's reflections are for other views to sample.
-        if kinds.contains(&ViewKind::Main) {
-            kinds.retain(|kind| *kind != ViewKind::Reflection);
-        }
-        if kinds.is_empty() {
-            kinds.push(ViewKind::Main);
-        }
-        for kind in kinds {
+        for kind in views_of_output(nodes.iter().map(|node| &node.declaration), output) {
             let resource = graph.resource(resource_name(kind, output));
             graph.output(resource);
         }

@@ -1,4 +1,4 @@
-//! The names of targets and buffers in the graph of processes.
+//! The names of targets and buffers in the graph of processes, and which of them are outputs.
 
 use crate::process::{BufferAccess, Declaration};
 use crate::scene::ViewKind;
@@ -26,6 +26,20 @@ pub(super) fn passed_on_resources(before: &Declaration, after: &Declaration) -> 
     names.sort_unstable();
     names.dedup();
     names.join(", ")
+}
+
+/// The kinds of views in which a target is an output of the frame, if processes have these declarations.
+pub(super) fn views_of_output<'a>(declarations: impl Iterator<Item = &'a Declaration>, output: &str) -> Vec<ViewKind> {
+    let writers = declarations.filter(|declaration| declaration.written().any(|target| target == output));
+    let mut kinds: Vec<_> = writers.map(|declaration| declaration.views).collect();
+    // The pipeline's reflections are for other views to sample.
+    if kinds.contains(&ViewKind::Main) {
+        kinds.retain(|kind| *kind != ViewKind::Reflection);
+    }
+    if kinds.is_empty() {
+        kinds.push(ViewKind::Main);
+    }
+    kinds
 }
 
 /// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.
