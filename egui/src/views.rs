@@ -1,5 +1,6 @@
 //! What each view draws, and what that costs.
 
+use drawloom::backend::TargetMemory;
 use egui::{Grid, Ui};
 
 use crate::frame_history::FrameHistory;
@@ -43,6 +44,9 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
         "objects: {}, lights: {}, bytes uploaded: {}",
         statistics.objects, statistics.lights, statistics.uploaded
     ));
+    if let Some(text) = text_of_targets(&statistics.targets) {
+        ui.label(text).on_hover_text("See WgpuBackend::transient_targets.");
+    }
     let stages = &statistics.stages;
     let times = [
         ("visibility", stages.visibility),
@@ -53,4 +57,25 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
     ];
     let texts = times.map(|(name, time)| format!("{name} {:.0} µs", time.as_secs_f64() * 1e6));
     ui.label(texts.join(", ")).on_hover_text("The thread time of each group of stages, over all views.");
+}
+
+/// What the targets of a frame take; `None` for a backend that does not tell.
+fn text_of_targets(memory: &TargetMemory) -> Option<String> {
+    let TargetMemory { textures, bytes, dedicated_bytes } = *memory;
+    let [bytes, dedicated] = [bytes, dedicated_bytes].map(|bytes| bytes as f64 / f64::from(1 << 20));
+    let text = || format!("targets: {textures} textures, {bytes:.1} MiB ({dedicated:.1} MiB without sharing)");
+    (textures > 0).then(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_are_told_with_and_without_sharing() {
+        assert_eq!(text_of_targets(&TargetMemory::default()), None);
+        let memory = TargetMemory { textures: 9, bytes: 48_024_000, dedicated_bytes: 79_167_000 };
+        let text = text_of_targets(&memory);
+        assert_eq!(text.as_deref(), Some("targets: 9 textures, 45.8 MiB (75.5 MiB without sharing)"));
+    }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::error::BackendError;
 use super::requests::{FrameRequest, PassRequest};
+use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
@@ -30,7 +31,7 @@ use crate::timeline::{Labels, TuningChoice};
 /// - Depth is reversed: 1 at the near plane, and 0 at the far plane or at infinity. Depth targets are cleared to 0, and
 ///   what is nearer has a greater depth.
 /// - Views with [`RenderView::is_cached`](crate::view::RenderView::is_cached) have no passes in the frame, but processes of other
-///   views sample their targets. So the targets of a view keep their content from frame to frame.
+///   views sample their targets. So the targets of such a view keep their content from frame to frame.
 /// - Batches whose state has a [subdivision level](crate::command::DrawState::subdivision_level) above 0 draw their mesh
 ///   [subdivided](crate::scene::Mesh::subdivided), as a triangle list whose longest edge is that of the mesh, halved that often.
 ///   Objects whose mesh cannot be subdivided that far are drawn nevertheless, and counted as
@@ -86,6 +87,12 @@ pub trait Backend: Send + Sync + 'static {
     fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
         let _ = frame;
         0
+    }
+
+    /// The memory of the targets of a frame; all 0 for a backend that does not tell.
+    fn target_memory(&self, frame: &Self::Frame) -> TargetMemory {
+        let _ = frame;
+        TargetMemory::default()
     }
 
     /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the [columns](crate::scene::ObjectColumn) of these

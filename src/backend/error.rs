@@ -123,6 +123,17 @@ pub enum BackendError {
         /// The requested name.
         target: String,
     },
+    /// The target shared its texture with others, so what it held is gone: see
+    /// [`WgpuBackend::transient_targets`](super::WgpuBackend::transient_targets).
+    #[error(
+        "target {target:?} of view {view} is transient, so it cannot be read back: name it as an output of the renderer to keep it"
+    )]
+    TransientTarget {
+        /// The view's index.
+        view: usize,
+        /// The name of the target.
+        target: String,
+    },
     /// A texture cannot be [imported](super::WgpuBackend::import_target) as a view's target.
     #[error("cannot import a texture as target {target:?} of view {view:?}: {problem}")]
     InvalidImport {

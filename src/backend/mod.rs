@@ -11,6 +11,7 @@ mod requests;
 mod software;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod subdivision_cache;
+mod target_memory;
 mod view_queue;
 #[cfg(feature = "wgpu")]
 mod wgpu;
@@ -27,4 +28,5 @@ pub use picture::Picture;
 pub use requests::{FrameRequest, PassRequest};
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
+pub use target_memory::TargetMemory;
 pub use view_queue::ViewQueue;

@@ -66,7 +66,7 @@ impl Recorded<crate::backend::WgpuBackend> {
     /// [`Format::R32Uint`]: crate::process::Format::R32Uint
     ///
     /// # Errors
-    /// If there is no such target, the rectangle is empty or not in it, or is a part of a depth target, which is copied as a whole.
+    /// If there is no such target, it is [transient](crate::backend::WgpuBackend::transient_targets), the rectangle is empty or not in it, or is a part of a depth target, which is copied as a whole.
     pub fn read_back(
         &mut self,
         view: usize,

@@ -233,7 +233,8 @@ impl<B: Backend> Renderer<B> {
         let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
-        let statistics = FrameStatistics::new(&request, &self.tables, uploaded, clock.times(), tuning);
+        let memory = (uploaded, self.backend.target_memory(&frame));
+        let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
         self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);

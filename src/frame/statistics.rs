@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::tables::FrameTables;
-use crate::backend::FrameRequest;
+use crate::backend::{FrameRequest, TargetMemory};
 use crate::raster::CulledTriangles;
 use crate::scene::ViewKind;
 use crate::timeline::FrameTuning;
@@ -20,6 +20,8 @@ pub struct FrameStatistics {
     pub views: Vec<ViewStatistics>,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
+    /// The memory of the frame's targets. The software backend does not tell.
+    pub targets: TargetMemory,
     /// The thread time of each group of stages.
     pub stages: StageTimes,
     /// What was left out or cannot be drawn as requested, and why.
@@ -74,7 +76,7 @@ impl FrameStatistics {
     pub(super) fn new(
         request: &FrameRequest<'_>,
         tables: &FrameTables,
-        uploaded: u64,
+        (uploaded, targets): (u64, TargetMemory),
         stages: StageTimes,
         tuning: FrameTuning,
     ) -> Self {
@@ -85,6 +87,7 @@ impl FrameStatistics {
             lights: request.lights.len(),
             views: views.collect(),
             uploaded,
+            targets,
             stages,
             rejections: request.rejections.list(),
             tuning,

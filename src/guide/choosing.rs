@@ -15,6 +15,9 @@
 //!
 //! - Several windows or split screens are cameras of one frame, not several renderers: meshes, materials and object data are shared.
 //! - A view that need not be new in every frame is left out of the cameras in the frames between, and its texture is kept.
+//! - Each view has targets of its own, some 20 bytes a pixel beside its picture. With [`WgpuBackend::transient_targets`], views of the same
+//!   size share them, and only outputs can be read back. Use it wherever there are several cameras, and always where there are hundreds:
+//!   wgpu's bookkeeping grows with the number of views times the number of textures.
 //! - `casts_shadow: false` on lights whose shadows nobody sees removes a view each. [`ShadowQuality::interval`] draws maps less often.
 //!
 //! # Granularity
@@ -41,4 +44,5 @@
 //! [`Quality::balanced`]: crate::quality::Quality::balanced
 //! [`Scheduler::with_available_parallelism`]: crate::task::Scheduler::with_available_parallelism
 //! [`ShadowQuality::interval`]: crate::quality::ShadowQuality::interval
+//! [`WgpuBackend::transient_targets`]: crate::backend::WgpuBackend::transient_targets
 //! [triangle culling]: crate::scene::Mesh::with_triangle_culling

@@ -73,6 +73,7 @@ fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
         .recording_strategy(RecordingStrategy::CachedBundles)
         .unwrap()
         .encoding_strategy(EncodingStrategy::PerPass);
+    let backend = if workers > 1 { backend.transient_targets() } else { backend };
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {

@@ -44,8 +44,25 @@ impl Fixture {
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<Self, Failed> {
         let (device, queue) = device.ok_or("there is no graphics adapter")?;
+        Self::on_backend(WgpuBackend::new(device, queue)?, workers, build)
+    }
+
+    /// With other render processes or settings, and with transient targets.
+    pub fn with_transient_targets(
+        workers: usize,
+        build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+    ) -> Result<Self, Failed> {
+        let (device, queue) = device().ok_or("there is no graphics adapter")?;
+        Self::on_backend(WgpuBackend::new(device, queue)?.transient_targets(), workers, build)
+    }
+
+    fn on_backend(
+        backend: WgpuBackend,
+        workers: usize,
+        build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+    ) -> Result<Self, Failed> {
         let scheduler = Arc::new(Scheduler::new(workers)?);
-        let (renderer, submitter) = build(Renderer::builder(WgpuBackend::new(device, queue)?)).build(scheduler)?;
+        let (renderer, submitter) = build(Renderer::builder(backend)).build(scheduler)?;
         Ok(Self { renderer, submitter })
     }
 

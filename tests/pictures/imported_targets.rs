@@ -26,10 +26,10 @@ pub const CASES: &[Case] = &[
     ("an_imported_texture_of_another_device_is_an_error", another_device),
 ];
 
-const USAGE: TextureUsages =
+pub const USAGE: TextureUsages =
     TextureUsages::RENDER_ATTACHMENT.union(TextureUsages::TEXTURE_BINDING).union(TextureUsages::COPY_SRC);
 
-fn texture(
+pub fn texture(
     device: &wgpu::Device,
     [width, height]: [u32; 2],
     format: TextureFormat,

@@ -49,6 +49,7 @@ mod stencil;
 mod strategies;
 mod target_formats;
 mod transforms;
+mod transient_targets;
 mod transparency;
 mod triangles;
 
@@ -107,6 +108,7 @@ fn main() {
         (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (target_formats::CASES, Needs::Adapter),
         (transforms::CASES, Needs::Adapter),
+        (transient_targets::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),
         (imported_meshes::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),

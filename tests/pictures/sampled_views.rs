@@ -40,7 +40,7 @@ const WORLD: LayerMask = LayerMask::layer(0);
 /// Draws the objects of a layer with the picture of another view, at the same position of the picture or mirrored. Black where there is no
 /// such view.
 #[derive(Clone, Copy)]
-struct Surface {
+pub struct Surface {
     name: &'static str,
     view: &'static str,
     mirrors: bool,
@@ -97,7 +97,7 @@ fn submitted(fixture: &mut Fixture, scene: &Scene) -> Result<WgpuSubmission, Fai
     fixture.submit(recorded)
 }
 
-const MIRROR: Surface = Surface { name: "mirror surface", view: "mirror", mirrors: true };
+pub const MIRROR: Surface = Surface { name: "mirror surface", view: "mirror", mirrors: true };
 const WINDOW: Surface = Surface { name: "window surface", view: "window", mirrors: false };
 
 /// Cubes in front of the plane z = -4 and behind it, in light that travels along the plane.
@@ -121,7 +121,7 @@ fn world(positions: &[(Vec3, DVec3)]) -> Result<Scene, Failed> {
 }
 
 /// The mirror's plane, and the cubes in front of it.
-const PLANE: ClipPlane = ClipPlane { point: DVec3::new(0.0, 0.0, -4.0), normal: Vec3::Z };
+pub const PLANE: ClipPlane = ClipPlane { point: DVec3::new(0.0, 0.0, -4.0), normal: Vec3::Z };
 const NEAR: [(Vec3, DVec3); 2] =
     [(Vec3::X, DVec3::new(-0.9, 0.3, -1.5)), (Vec3::new(1.0, 0.8, 0.1), DVec3::new(0.8, -0.5, -2.6))];
 
@@ -136,7 +136,7 @@ fn add_surface(scene: &mut Scene, position: DVec3, orientation: Quat) -> Result<
 }
 
 /// A mirror in front of a green cube, which is between the mirrored camera and the mirror.
-fn mirror_scene() -> Result<Scene, Failed> {
+pub fn mirror_scene() -> Result<Scene, Failed> {
     let hidden = (Vec3::Y, DVec3::new(0.1, 0.1, -6.0));
     let mut scene = world(&[NEAR[0], NEAR[1], hidden])?;
     add_surface(&mut scene, PLANE.point, Quat::IDENTITY)?;

@@ -15,7 +15,7 @@ use super::resources::{
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::timing::{DeviceClock, DeviceTiming};
 use crate::backend::subdivision_cache::SubdivisionCache;
-use crate::backend::{Backend, BackendError};
+use crate::backend::{Backend, BackendError, TargetMemory};
 use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
@@ -51,6 +51,8 @@ pub struct WgpuBackend {
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
     /// `None` if passes are not timed.
     pub(super) device_timing: Option<DeviceTiming>,
+    /// Whether targets share textures.
+    pub(super) transient_targets: bool,
 }
 
 impl WgpuBackend {
@@ -124,6 +126,7 @@ impl WgpuBackend {
             workers: AtomicUsize::new(1),
             latest: Mutex::default(),
             device_timing: None,
+            transient_targets: false,
         })
     }
 
@@ -151,6 +154,27 @@ impl WgpuBackend {
     /// once, and is among [`WgpuBackend::shader_errors`] until the shader compiles.
     pub fn keep_working_shaders(self) -> Self {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
+    }
+
+    /// Lets the targets of a frame share textures. A target's life begins with the first pass that uses it and ends with the last one, of
+    /// any view. Targets whose lives do not overlap and that are alike in format, size, samples and use share one texture. Pictures stay the
+    /// same; what the targets of all views need is often little more than what one view needs.
+    /// [`WgpuBackend::resources`] and [`FrameStatistics::targets`](crate::FrameStatistics::targets) tell how much is saved.
+    ///
+    /// When the frame is drawn, the texture of such a target may hold another one. So reading it back returns
+    /// [`BackendError::TransientTarget`], and [`WgpuSubmission::texture`](super::WgpuSubmission::texture) returns `None`. These targets
+    /// have textures of their own, and stay readable:
+    ///
+    /// - outputs: name what is read back with [`RendererBuilder::output`](crate::RendererBuilder::output),
+    /// - imported ones, and those whose history a process reads,
+    /// - all targets of shadow views, and all that are drawn in layers.
+    ///
+    /// What a target holds before it is first drawn into is undefined. So a raw pass that [writes](crate::process::Declare::writes) a target
+    /// must write each of its pixels, and it must not keep the texture for later frames.
+    ///
+    /// Which targets share a texture is decided when the plan, the cameras or the imports change, and costs nothing in other frames.
+    pub fn transient_targets(self) -> Self {
+        Self { transient_targets: true, ..self }
     }
 
     /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for example into a
@@ -219,9 +243,15 @@ impl WgpuBackend {
     /// What the backend keeps on the device from frame to frame, beside the scene's meshes and textures.
     pub fn resources(&self) -> WgpuResources {
         let pipelines = self.pipelines.lock().pipeline_count();
-        let (targets, target_bytes) = self.targets.lock().current().sizes();
+        let TargetMemory { textures, bytes, dedicated_bytes } = self.targets.lock().current().memory();
         let buffer_bytes = self.buffers.bytes() + self.storage_buffers.lock().size();
-        WgpuResources { pipelines, targets, target_bytes, buffer_bytes }
+        WgpuResources {
+            pipelines,
+            targets: textures,
+            target_bytes: bytes,
+            dedicated_target_bytes: dedicated_bytes,
+            buffer_bytes,
+        }
     }
 
     /// Reads the device's clock. It waits for all earlier submissions, so do not call it amid a frame; and it takes
@@ -260,6 +290,8 @@ pub struct WgpuResources {
     pub targets: usize,
     /// The size of these textures in bytes.
     pub target_bytes: u64,
+    /// What their size would be without [transient targets](WgpuBackend::transient_targets).
+    pub dedicated_target_bytes: u64,
     /// The size in bytes of all buffers that processes share, and of those for objects, views, lights, parameters and triangles that no
     /// frame in flight uses.
     pub buffer_bytes: u64,

@@ -12,7 +12,7 @@ use super::pipelines::PipelineVariant;
 use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
-use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, TargetMemory, ViewQueue};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::Quality;
@@ -64,6 +64,10 @@ impl Backend for WgpuBackend {
 
     fn objects_epoch(&self, frame: &WgpuFrame) -> u64 {
         frame.buffers.held_epoch()
+    }
+
+    fn target_memory(&self, frame: &WgpuFrame) -> TargetMemory {
+        frame.targets.memory()
     }
 
     fn upload_objects(

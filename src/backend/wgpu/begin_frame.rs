@@ -24,7 +24,7 @@ impl WgpuBackend {
         request: &FrameRequest<'_>,
         imports: &[ResolvedImport<'_>],
     ) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, views, scene, rejections, .. } = *request;
+        let FrameRequest { plan, draws, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
         self.check_device()?;
         let quality = request.quality;
@@ -42,7 +42,7 @@ impl WgpuBackend {
             Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))
         })
         .flatten()?;
-        let update = || self.targets.lock().update(&self.device, plan, views, imports);
+        let update = || self.targets.lock().update(&self.device, request, imports, self.transient_targets);
         let targets = with_error_scope(&self.device, "targets", update)??;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;

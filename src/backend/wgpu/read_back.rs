@@ -146,7 +146,7 @@ impl ReadBackCopy {
 /// A read-back of a rectangle of a view's target, and the copy that its frame makes for it.
 ///
 /// # Errors
-/// If there is no such target, it cannot be copied from, or the rectangle is empty, not in it, or a part of a depth target.
+/// If there is no such target, it is transient, it cannot be copied from, or the rectangle is empty, not in it, or a part of a depth target.
 pub(crate) fn new_read_back(
     device: &wgpu::Device,
     targets: &WgpuTargets,
@@ -156,6 +156,9 @@ pub(crate) fn new_read_back(
 ) -> Result<(WgpuReadBack, ReadBackCopy), BackendError> {
     let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
     let found = targets.find(view, target).ok_or_else(unknown)?.clone();
+    if found.is_transient {
+        return Err(BackendError::TransientTarget { view, target: target.to_owned() });
+    }
     let (whole, format) = ([found.texture.width(), found.texture.height()], found.format());
     let is_within = |axis: usize| origin[axis].checked_add(size[axis]).is_some_and(|end| end <= whole[axis]);
     let problem = if size.contains(&0) {

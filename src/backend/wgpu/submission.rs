@@ -40,9 +40,10 @@ impl WgpuSubmission {
     }
 
     /// The texture of a view's target, to present or to copy; for a shared target, the texture array of all views. The next frame
-    /// draws into the same texture.
+    /// draws into the same texture. `None` if there is no such target, or it is
+    /// [transient](super::WgpuBackend::transient_targets).
     pub fn texture(&self, view: usize, target: &str) -> Option<&wgpu::Texture> {
-        self.targets.find(view, target).map(|target| &target.texture)
+        self.targets.find(view, target).filter(|target| !target.is_transient).map(|target| &target.texture)
     }
 
     /// Waits until the device has drawn the frame.
@@ -56,7 +57,7 @@ impl WgpuSubmission {
     /// Waits until the device has drawn the frame, and reads back a view's target.
     ///
     /// # Errors
-    /// If there is no such target, or the device refuses or is lost.
+    /// If there is no such target, it is [transient](super::WgpuBackend::transient_targets), or the device refuses or is lost.
     pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
         // Only this reports a lost device; the calls below do not.
         self.wait()?;

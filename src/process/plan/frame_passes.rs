@@ -18,7 +18,7 @@ pub(crate) struct FramePasses {
 }
 
 /// The views that passes sample: those with a process that [samples other views](crate::process::Declare::samples_view).
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SampledViews {
     /// Of each such pass, by its process's [sampled views](crate::process::Declaration::sampled_views): the view's index.
     of_pass: HashMap<Pass, Vec<Option<usize>>>,

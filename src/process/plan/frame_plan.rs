@@ -102,7 +102,7 @@ impl FramePlan {
             return Err(PlanError::Empty);
         }
         let view_groups = view_groups(&processes, &edges);
-        let mut targets = targets_of(&processes)?;
+        let mut targets = targets_of(&processes, outputs)?;
         targets.extend(placeholder);
         check_sampled_views(&processes, &targets)?;
         let (columns, material_types) = (columns_of(&processes)?, material_types_of(&processes)?);
@@ -262,6 +262,7 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, Planne
         layered: true,
         size: TargetSize::Picture,
         multisampled: false,
+        output: false,
         copy_of: None,
     })
 }

@@ -1,5 +1,6 @@
 //! The targets that a plan's processes use.
 
+use super::resource_names::views_of_output;
 use super::{PlanError, PlannedProcess, ProcessError};
 use crate::process::{Access, BlendEquation, Declaration, Draws, Format, TargetSize, previous_name};
 use crate::scene::{Blend, ViewKind};
@@ -21,6 +22,9 @@ pub struct PlannedTarget {
     pub size: TargetSize,
     /// Whether it is [multisampled](crate::process::Declare::multisampled).
     pub multisampled: bool,
+    /// Whether it is an output of the frame: of a pipeline, or [named](crate::RendererBuilder::output) by the engine. Targets of reflections
+    /// are none where main views have the same one.
+    pub output: bool,
     /// The target whose content is copied here at the end of each frame; `None` for one that processes write.
     pub copy_of: Option<String>,
 }
@@ -39,13 +43,14 @@ impl AttachmentExtent {
     pub const PICTURE: Self = Self { size: TargetSize::Picture, multisampled: false };
 }
 
-/// The targets of all processes, in the order in which they are first written, then the copies of those whose history is read.
+/// The targets of all processes, in the order in which they are first written, then the copies of those whose history is read. `outputs`
+/// are the names of the frame's outputs.
 ///
 /// # Errors
 /// If processes disagree about a target's format, layers or size, use depth as colour or colour as depth, draw into targets of
 /// different sizes or numbers of samples, resolve one that cannot be resolved, or read the history of a target that is not written, is
 /// multisampled or is drawn in layers.
-pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
+pub(super) fn targets_of(processes: &[PlannedProcess], outputs: &[String]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut targets = written_targets(processes)?;
     for (planned, name, access) in accesses(processes) {
         let views = access.views(planned.declaration.views);
@@ -70,6 +75,11 @@ pub(super) fn targets_of(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarg
     }
     processes.iter().try_for_each(|planned| check_attachments(planned, &targets))?;
     check_once_a_frame(processes)?;
+    for output in outputs {
+        let kinds = views_of_output(processes.iter(), output);
+        let named = targets.iter_mut().filter(|target| target.name == *output && kinds.contains(&target.views));
+        named.for_each(|target| target.output = true);
+    }
     let copies = copied_targets(processes, &targets)?;
     targets.extend(copies);
     Ok(targets)
@@ -108,8 +118,18 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
             Some(_) => {}
             None => {
                 let (name, copy_of) = (name.clone(), None);
-                let stored = false;
-                targets.push(PlannedTarget { name, views, format, stored, layered, size, multisampled, copy_of });
+                let (stored, output) = (false, false);
+                targets.push(PlannedTarget {
+                    name,
+                    views,
+                    format,
+                    stored,
+                    layered,
+                    size,
+                    multisampled,
+                    output,
+                    copy_of,
+                });
             }
         }
     }
@@ -331,7 +351,7 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
             None => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
             Some(source) => {
                 let (name, copy_of) = (name.clone(), Some(source.name.clone()));
-                copies.push(PlannedTarget { name, copy_of, stored: false, ..source.clone() });
+                copies.push(PlannedTarget { name, copy_of, stored: false, output: false, ..source.clone() });
             }
         }
     }

@@ -1,7 +1,7 @@
 //! From processes to the graph of what they read and write.
 
 use super::order::{AddedProcess, order_constraints};
-use super::resource_names::{buffer_name, resource_name};
+use super::resource_names::{buffer_name, resource_name, views_of_output};
 use super::{PlanError, PlannedProcess, PlannedTarget};
 use crate::graph::{FrameGraph, Schedule};
 use crate::process::{Access, BufferAccess, previous_name};
@@ -97,14 +97,7 @@ fn process_graph(
         graph.order(before, after);
     }
     for output in outputs {
-        // In further kinds of views, processes draw what others sample.
-        let own = added.iter().filter(|(_, planned)| planned.is_of_own_kind);
-        let writers = own.filter(|(_, planned)| planned.declaration.written().any(|target| target == output));
-        let mut kinds: Vec<_> = writers.map(|(_, planned)| planned.declaration.views).collect();
-        if kinds.is_empty() {
-            kinds.push(ViewKind::Main);
-        }
-        for kind in kinds {
+        for kind in views_of_output(added.iter().map(|(_, planned)| planned), output) {
             let resource = graph.resource(resource_name(kind, output));
             graph.output(resource);
         }

@@ -1,5 +1,6 @@
-//! The names of targets and buffers in the graph of processes.
+//! The names of targets and buffers in the graph of processes, and which of them are outputs.
 
+use super::PlannedProcess;
 use crate::process::{BufferAccess, Declaration};
 use crate::scene::ViewKind;
 
@@ -26,6 +27,16 @@ pub(super) fn passed_on_resources(before: &Declaration, after: &Declaration) -> 
     names.sort_unstable();
     names.dedup();
     names.join(", ")
+}
+
+/// The kinds of views whose target of this name is an output: those in which processes write it that declare to draw there. In further kinds
+/// of views they draw what others sample. Main views if there is none.
+pub(super) fn views_of_output<'a>(processes: impl Iterator<Item = &'a PlannedProcess>, output: &str) -> Vec<ViewKind> {
+    let writers = processes
+        .filter(|planned| planned.is_of_own_kind)
+        .filter(|planned| planned.declaration.written().any(|target| target == output));
+    let kinds: Vec<_> = writers.map(|planned| planned.declaration.views).collect();
+    if kinds.is_empty() { vec![ViewKind::Main] } else { kinds }
 }
 
 /// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.

@@ -68,7 +68,7 @@ impl AttachmentFormats {
         let (sampled, writes_buffers) = (sampled.collect(), writes_buffers.collect());
         let drawn = declaration.colors().map(|(target, _)| target).chain(declaration.depth().map(|(target, _)| target));
         let mut drawn = drawn.filter_map(|target| planned(declaration.views, target));
-        let samples = drawn.next().map_or(1, sample_count);
+        let samples = drawn.next().map_or(1, |planned| sample_count(planned.multisampled));
         Self { colors, can_be_blended, depth, samples, sampled, writes_buffers }
     }
 }

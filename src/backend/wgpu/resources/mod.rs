@@ -17,6 +17,7 @@ mod storage_buffers;
 mod subdivided_mesh;
 mod target_cache;
 mod texture_arrays;
+mod transient_targets;
 mod upload_queue;
 mod vertex_layout;
 

@@ -1,11 +1,13 @@
 //! The cache of the views' targets.
 
+use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 
 use super::bind_group_layouts::texture_format;
 use super::imported_target::ResolvedImport;
-use crate::backend::BackendError;
-use crate::process::{Access, Format, FramePlan, PlannedTarget};
+use super::transient_targets::{TextureKind, TransientTargets, uses_transient};
+use crate::backend::{BackendError, FrameRequest, TargetMemory};
+use crate::process::{Access, Format, FramePlan, Pass, PlannedTarget, SampledViews};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -16,6 +18,9 @@ pub(crate) struct WgpuTargets {
     views: Vec<(String, Vec<ViewTarget>)>,
     /// The targets that all views of a kind share.
     layered: Vec<LayeredTarget>,
+    /// Those that transient targets share.
+    transient: Vec<TransientSlot>,
+    memory: TargetMemory,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format and number of samples.
     placeholder: Vec<(Format, bool, wgpu::TextureView)>,
 }
@@ -30,6 +35,17 @@ pub(crate) struct ViewTarget {
     /// The same as shaders sample it: depth without the stencil.
     pub(crate) sampled: wgpu::TextureView,
     pub(crate) layer: u32,
+    /// Whether other targets of the frame may have the same texture.
+    pub(crate) is_transient: bool,
+}
+
+/// A texture that transient targets share.
+#[derive(Clone)]
+struct TransientSlot {
+    kind: TextureKind,
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+    sampled: wgpu::TextureView,
 }
 
 /// A texture array in which each view of a kind has a layer.
@@ -82,16 +98,28 @@ impl WgpuTargets {
         self.views.iter().any(|(_, targets)| targets.iter().any(|target| target.planned.copy_of.is_some()))
     }
 
-    /// The number of textures, and their size in bytes.
-    pub(crate) fn sizes(&self) -> (usize, u64) {
-        let own = self.views.iter().flat_map(|(_, targets)| targets).filter(|target| !target.planned.layered);
-        let textures = own.map(|target| (&target.planned, &target.texture));
-        let textures = textures.chain(self.layered.iter().map(|target| (&target.planned, &target.texture)));
-        textures.fold((0, 0), |(count, bytes), (planned, texture)| {
-            let size = texture.size();
-            let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
-            (count + 1, bytes + pixels * planned.format.bytes() as u64 * u64::from(texture.sample_count()))
-        })
+    /// The memory of those that are not imported.
+    pub(crate) fn memory(&self) -> TargetMemory {
+        self.memory
+    }
+
+    /// Computes the memory of these targets, none of which is imported.
+    fn computed_memory(&self) -> TargetMemory {
+        let mut memory = TargetMemory::default();
+        for target in self.views.iter().flat_map(|(_, targets)| targets).filter(|target| !target.planned.layered) {
+            let bytes = texture_bytes(target.planned.format, &target.texture);
+            memory.dedicated_bytes += bytes;
+            if !target.is_transient {
+                memory.add_texture(bytes);
+            }
+        }
+        for target in &self.layered {
+            let bytes = texture_bytes(target.planned.format, &target.texture);
+            memory.dedicated_bytes += bytes;
+            memory.add_texture(bytes);
+        }
+        self.transient.iter().for_each(|slot| memory.add_texture(texture_bytes(slot.kind.format, &slot.texture)));
+        memory
     }
 }
 
@@ -105,10 +133,12 @@ pub(crate) struct TargetCache {
     views: Vec<(ViewKind, [u32; 2], u32)>,
     /// The targets that are not among the current ones because they were imported: the view's index, and the name.
     imported: Vec<(usize, String)>,
+    /// What decides which targets share textures, beside the above: see [`uses_transient`]. `None` if none may.
+    order: Option<(Vec<Pass>, SampledViews)>,
 }
 
 impl TargetCache {
-    /// The targets of these views. Imported textures are those of this frame only.
+    /// The targets of a frame's views, transient ones if `transient`. Imported textures are those of this frame only.
     ///
     /// # Errors
     /// - If a picture is larger than the device allows.
@@ -116,11 +146,11 @@ impl TargetCache {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        plan: &FramePlan,
-        views: &[RenderView],
+        request: &FrameRequest<'_>,
         imports: &[ResolvedImport<'_>],
+        transient: bool,
     ) -> Result<Arc<WgpuTargets>, BackendError> {
-        self.update_own(device, plan, views, imports)?;
+        self.update_own(device, request, imports, transient)?;
         if imports.is_empty() {
             return Ok(Arc::clone(&self.current));
         }
@@ -130,7 +160,7 @@ impl TargetCache {
             let (planned, texture) = (Arc::new(PlannedTarget::clone(planned)), texture.clone());
             let (view, sampled) = new_views(&texture, planned.format, &import.view_descriptor());
             let (_, targets) = &mut with_imports.views[*view_index];
-            targets.push(ViewTarget { planned, texture, view, sampled, layer: 0 });
+            targets.push(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: false });
         }
         Ok(Arc::new(with_imports))
     }
@@ -143,16 +173,23 @@ impl TargetCache {
     fn update_own(
         &mut self,
         device: &wgpu::Device,
-        plan: &FramePlan,
-        views: &[RenderView],
+        &FrameRequest { plan, views, passes, sampled_views, .. }: &FrameRequest<'_>,
         imports: &[ResolvedImport<'_>],
+        transient: bool,
     ) -> Result<(), BackendError> {
         let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
         let names = self.current.views.iter().map(|(name, _)| name.as_str());
         let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
         let imported = || imports.iter().map(|import| (import.view_index, import.planned.name.as_str()));
         let known = self.imported.iter().map(|(view, target)| (*view, target.as_str()));
-        if self.plan == Some(plan.identity()) && are_same_views && known.eq(imported()) {
+        let is_same_order = match &self.order {
+            Some((known, known_views)) => {
+                let using = passes.iter().filter(|pass| uses_transient(plan, views, **pass));
+                transient && known.iter().eq(using) && known_views == sampled_views
+            }
+            None => !transient,
+        };
+        if self.plan == Some(plan.identity()) && are_same_views && known.eq(imported()) && is_same_order {
             return Ok(());
         }
         // If an error occurs below, no targets are current.
@@ -161,27 +198,66 @@ impl TargetCache {
         for planned in plan.targets().iter().filter(|planned| planned.layered) {
             next.layered.push(self.layered_target(device, planned, views)?);
         }
+        let is_imported = |view: usize, target: &str| imported().any(|import| import == (view, target));
+        let order = transient.then(|| {
+            let using = passes.iter().filter(|pass| uses_transient(plan, views, **pass));
+            (using.copied().collect::<Vec<_>>(), sampled_views.clone())
+        });
+        let shared = order.as_ref().map_or_else(TransientTargets::default, |(passes, sampled_views)| {
+            TransientTargets::new(plan, views, (passes, sampled_views), is_imported)
+        });
+        next.transient = self.transient_slots(device, shared.textures())?;
+        let planned: Vec<_> = plan.targets().iter().map(|planned| Arc::new(planned.clone())).collect();
         for (index, view) in views.iter().enumerate() {
-            let is_own = |planned: &&PlannedTarget| !imported().any(|import| import == (index, planned.name.as_str()));
-            let planned = plan.targets().iter().filter(|planned| planned.views == view.kind()).filter(is_own);
-            let targets = planned.map(|planned| {
+            let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
+            let own = of_kind.filter(|(_, planned)| !is_imported(index, &planned.name));
+            let targets = own.map(|(target_index, planned)| {
+                if let Some(slot) = shared.texture_of(index, target_index).and_then(|slot| next.transient.get(slot)) {
+                    let TransientSlot { texture, view, sampled, .. } = slot.clone();
+                    let planned = Arc::clone(planned);
+                    return Ok(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: true });
+                }
                 if !planned.layered {
                     return self.own_target(device, planned, index, view);
                 }
-                let shared = next.layered.iter().find(|shared| *shared.planned == *planned);
+                let layered = next.layered.iter().find(|layered| *layered.planned == **planned);
                 let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
-                Ok(self.layer_target(shared.ok_or_else(missing)?, index, view.layer))
+                Ok(self.layer_target(layered.ok_or_else(missing)?, index, view.layer))
             });
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push((view.name().to_owned(), targets));
         }
         next.placeholder = self.placeholder_targets(device, plan)?;
+        next.memory = next.computed_memory();
         self.current = Arc::new(next);
         self.plan = Some(plan.identity());
         self.views.clear();
         self.views.extend(requested());
         self.imported = imported().map(|(view, target)| (view, target.to_owned())).collect();
+        self.order = order;
         Ok(())
+    }
+
+    /// Textures for transient targets, each at the position of its kind; those of the frame before where they fit.
+    ///
+    /// # Errors
+    /// If a picture is larger than the device allows.
+    fn transient_slots(
+        &self,
+        device: &wgpu::Device,
+        kinds: &[TextureKind],
+    ) -> Result<Vec<TransientSlot>, BackendError> {
+        let mut unused: HashMap<TextureKind, VecDeque<&TransientSlot>> = HashMap::new();
+        self.current.transient.iter().for_each(|slot| unused.entry(slot.kind).or_default().push_back(slot));
+        let slots = kinds.iter().map(|&kind| {
+            if let Some(slot) = unused.get_mut(&kind).and_then(VecDeque::pop_front) {
+                return Ok(slot.clone());
+            }
+            let texture = new_texture(device, "transient targets", kind, 1)?;
+            let (view, sampled) = new_views(&texture, kind.format, &wgpu::TextureViewDescriptor::default());
+            Ok(TransientSlot { kind, texture, view, sampled })
+        });
+        slots.collect()
     }
 
     /// The latest frame's targets.
@@ -192,21 +268,24 @@ impl TargetCache {
     fn own_target(
         &self,
         device: &wgpu::Device,
-        planned: &PlannedTarget,
+        planned: &Arc<PlannedTarget>,
         index: usize,
         view: &RenderView,
     ) -> Result<ViewTarget, BackendError> {
-        let [width, height] = planned.size.in_view(view.camera.size);
+        let kind = TextureKind::of(planned, view.camera.size);
+        let [width, height] = kind.size;
         let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         // Another view has no part in this one's history.
         let is_same_view = self.current.views.get(index).is_some_and(|(name, _)| name == view.name());
         let cached = self.current.find(index, &planned.name).filter(|_| is_same_view || planned.copy_of.is_none());
-        if let Some(cached) = cached.filter(|cached| *cached.planned == *planned && cached.texture.size() == extent) {
+        let mut cached = cached.filter(|cached| cached.planned == *planned && cached.texture.size() == extent);
+        if let Some(cached) = cached.take_if(|cached| !cached.is_transient) {
             return Ok(cached.clone());
         }
-        let texture = new_texture(device, planned, extent)?;
+        let texture = new_texture(device, &planned.name, kind, 1)?;
         let (view, sampled) = new_views(&texture, planned.format, &wgpu::TextureViewDescriptor::default());
-        Ok(ViewTarget { planned: Arc::new(planned.clone()), texture, view, sampled, layer: 0 })
+        let planned = Arc::clone(planned);
+        Ok(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: false })
     }
 
     fn placeholder_targets(
@@ -227,8 +306,8 @@ impl TargetCache {
                 Some(cached) => cached.clone(),
                 // wgpu clears a texture before it is first read.
                 None => {
-                    let size = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
-                    let texture = new_texture(device, planned, size)?;
+                    let kind = TextureKind { size: [1, 1], ..TextureKind::of(planned, [1, 1]) };
+                    let texture = new_texture(device, target, kind, 1)?;
                     new_views(&texture, format, &wgpu::TextureViewDescriptor::default()).1
                 }
             };
@@ -249,7 +328,8 @@ impl TargetCache {
             ..wgpu::TextureViewDescriptor::default()
         };
         let (view, sampled) = new_views(&shared.texture, shared.planned.format, &descriptor);
-        ViewTarget { planned: Arc::clone(&shared.planned), texture: shared.texture.clone(), view, sampled, layer }
+        let (planned, texture) = (Arc::clone(&shared.planned), shared.texture.clone());
+        ViewTarget { planned, texture, view, sampled, layer, is_transient: false }
     }
 
     fn layered_target(
@@ -273,7 +353,8 @@ impl TargetCache {
         if let Some(cached) = cached.find(|cached| fits(cached.texture.size())) {
             return Ok(cached.clone());
         }
-        let texture = new_texture(device, planned, extent)?;
+        let kind = TextureKind { size: [width, height], ..TextureKind::of(planned, [width, height]) };
+        let texture = new_texture(device, &planned.name, kind, layers)?;
         let dimension = Some(wgpu::TextureViewDimension::D2Array);
         let descriptor = wgpu::TextureViewDescriptor { dimension, ..Default::default() };
         let (_, array) = new_views(&texture, planned.format, &descriptor);
@@ -281,10 +362,17 @@ impl TargetCache {
     }
 }
 
-/// The number of samples of a target's pixels.
-pub(crate) fn sample_count(planned: &PlannedTarget) -> u32 {
+/// The number of samples of the pixels of a target.
+pub(crate) fn sample_count(multisampled: bool) -> u32 {
     // The only number beside 1 that every device has.
-    if planned.multisampled { 4 } else { 1 }
+    if multisampled { 4 } else { 1 }
+}
+
+/// The size of a texture in bytes.
+fn texture_bytes(format: Format, texture: &wgpu::Texture) -> u64 {
+    let size = texture.size();
+    let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+    pixels * format.bytes() as u64 * u64::from(texture.sample_count())
 }
 
 /// A view to draw into, and one that shaders sample.
@@ -305,17 +393,19 @@ fn new_views(
 
 fn new_texture(
     device: &wgpu::Device,
-    planned: &PlannedTarget,
-    size: wgpu::Extent3d,
+    label: &str,
+    kind: TextureKind,
+    layers: u32,
 ) -> Result<wgpu::Texture, BackendError> {
-    let missing = texture_format(planned.format).required_features() - device.features();
+    let TextureKind { format, multisampled, stored, size: [width, height] } = kind;
+    let missing = texture_format(format).required_features() - device.features();
     if !missing.is_empty() {
         return Err(BackendError::MissingFeature { missing: missing.to_string() });
     }
     let limits = device.limits();
     for (limit, allowed, needed) in [
-        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, size.width.max(size.height)),
-        ("max_texture_array_layers", limits.max_texture_array_layers, size.depth_or_array_layers),
+        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, width.max(height)),
+        ("max_texture_array_layers", limits.max_texture_array_layers, layers),
     ] {
         if needed > allowed {
             return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
@@ -323,15 +413,15 @@ fn new_texture(
     }
     let sampled = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
     let copied = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
-    let usage = if planned.multisampled { sampled } else { sampled | copied };
+    let usage = if multisampled { sampled } else { sampled | copied };
     Ok(device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(&planned.name),
-        size,
+        label: Some(label),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
         mip_level_count: 1,
-        sample_count: sample_count(planned),
+        sample_count: sample_count(multisampled),
         dimension: wgpu::TextureDimension::D2,
-        format: texture_format(planned.format),
-        usage: if planned.stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },
+        format: texture_format(format),
+        usage: if stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },
         view_formats: &[],
     }))
 }
