@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::Backend;
+use drawloom::backend::{Backend, TargetMemory};
 use drawloom::scene::{Camera, SceneRef};
-use drawloom::{Renderer, Submitter};
+use drawloom::{FrameStatistics, Renderer, Submitter};
 use serde::Serialize;
 
 use crate::gallery::Gallery;
@@ -47,7 +47,7 @@ pub fn measure<B: Backend>(
     submitter: &Submitter<B>,
     frames: u32,
     mut drawn: impl FnMut(),
-) -> Result<Vec<ViewCost>, Box<dyn Error>> {
+) -> Result<(Vec<ViewCost>, TargetMemory), Box<dyn Error>> {
     let mut draw = |cameras: &[Camera]| -> Result<Duration, Box<dyn Error>> {
         let scene = SceneRef { cameras, ..gallery.scene.as_scene_ref() };
         let start = Instant::now();
@@ -89,7 +89,7 @@ pub fn measure<B: Backend>(
             }
         }
     }
-    let views = statistics.map(|statistics| statistics.views).unwrap_or_default();
+    let FrameStatistics { views, targets, .. } = statistics.ok_or("no frame was drawn")?;
     let names: Vec<_> = views.iter().map(|view| view.name.clone()).collect();
     let cost_of = |view: drawloom::ViewStatistics| {
         let parent = view.name.rsplit_once('/').map(|(parent, _)| parent.to_owned());
@@ -103,17 +103,21 @@ pub fn measure<B: Backend>(
             name: view.name,
         }
     };
-    Ok(views.into_iter().map(cost_of).collect())
+    Ok((views.into_iter().map(cost_of).collect(), targets))
 }
 
-/// Prints a line for each view.
-pub fn print(views: &[ViewCost]) {
+/// Prints a line for each view, and the memory of all.
+pub fn print(views: &[ViewCost], targets: TargetMemory) {
     println!("{:<28} {:<10} {:>8} {:>9} {:>8} {:>9}", "view", "kind", "objects", "commands", "ms", "saves ms");
     for view in views {
         let saves = view.saves_ms.map_or_else(|| "-".to_owned(), |saves| format!("{saves:.3}"));
         let ViewCost { name, kind, objects, commands, ms, .. } = view;
         println!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9}");
     }
+    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let TargetMemory { textures, bytes, dedicated_bytes, .. } = targets;
+    let (bytes, dedicated) = (mebibytes(bytes), mebibytes(dedicated_bytes));
+    println!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
 }
 
 /// Writes what was printed as JSON.

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
-use drawloom::backend::{Backend, BackendError, Picture, SoftwareBackend, WgpuBackend};
+use drawloom::backend::{Backend, BackendError, Picture, SoftwareBackend, TargetMemory, WgpuBackend};
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder, Submitter};
@@ -76,8 +76,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             draw(arguments, renderer, submitter, |submission, view| submission.read(view, contact_sheet::TARGET))?;
         }
     }
-    let views = measured_costs(arguments)?;
-    costs::print(&views);
+    let (views, targets) = measured_costs(arguments)?;
+    costs::print(&views, targets);
     match &arguments.report {
         Some(path) => costs::write(&views, path),
         None => Ok(()),
@@ -108,15 +108,15 @@ fn draw<B: Backend>(
 }
 
 /// Measures on a device that draws nothing, so that only the processor's work counts.
-fn measured_costs(arguments: &Arguments) -> Result<Vec<costs::ViewCost>, Box<dyn Error>> {
+fn measured_costs(arguments: &Arguments) -> Result<(Vec<costs::ViewCost>, TargetMemory), Box<dyn Error>> {
     let gallery = Gallery::new()?;
     let (device, queue) = adapter::noop_device()?;
     let scheduler = Arc::new(Scheduler::builder().timeline_capacity(1 << 16).build()?);
-    let builder = with_processes(Renderer::builder(WgpuBackend::new(device, queue)?));
+    let builder = with_processes(Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets()));
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let progress = ProgressBar::new(costs::frames_to_draw(&gallery, arguments.frames));
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
-    let views = costs::measure(&gallery, &mut renderer, &submitter, arguments.frames, || progress.inc(1))?;
+    let measured = costs::measure(&gallery, &mut renderer, &submitter, arguments.frames, || progress.inc(1))?;
     progress.finish_and_clear();
-    Ok(views)
+    Ok(measured)
 }

@@ -1,7 +1,7 @@
 //! Cameras.
 
 use drawloom::glam::{DAffine3, DVec3};
-use drawloom::scene::{Camera, Projection, ViewKind};
+use drawloom::scene::{Camera, Projection};
 
 use crate::error::Problem;
 use crate::transforms::decompose;
@@ -49,14 +49,13 @@ pub(crate) fn read_camera(
     }
     let placed = decompose(world);
     Ok(Camera {
-        name: "main".to_owned(),
         position: placed.translation,
         orientation: placed.rotation.as_quat().normalize(),
         projection,
         near,
         far,
         size,
-        kind: ViewKind::Main,
+        ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z)
     })
 }
 
