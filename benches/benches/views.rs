@@ -180,7 +180,7 @@ impl Runner {
     /// The number of objects that all views see, and the time.
     fn frame(&mut self, scene: &Scene) -> Result<(usize, Duration), Box<dyn Error>> {
         for camera in &mut self.cameras {
-            camera.position.x += if self.frames % 2 == 0 { 0.01 } else { -0.01 };
+            camera.position.x += if self.frames.is_multiple_of(2) { 0.01 } else { -0.01 };
         }
         let changes = if self.frames == 0 { Changes::Unknown } else { Changes::NONE };
         self.frames += 1;
