@@ -251,6 +251,50 @@ fn what_is_drawn_once_a_frame_comes_before_all_views_that_use_it() {
     assert!(passes.contains(&("draw particles", 0)) && passes.contains(&("draw particles", 1)));
 }
 
+/// Draws in one kind of views what a function declares.
+struct Declaring(&'static str, fn(&mut Declare));
+
+impl RenderProcess for Declaring {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (self.1)(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+/// Main views read the layers of all shadow maps, and one of these shows a picture that is drawn later otherwise.
+#[test]
+fn views_that_read_all_layers_come_after_views_that_sample() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).output("picture").process(Declaring("gobo", |declare| {
+        declare.views(ViewKind::Post);
+        declare.clears_color("gobo", Format::Rgba8Unorm, ClearColor::Background);
+    }));
+    let builder = builder.process(Declaring("caster", |declare| {
+        declare.views(ViewKind::Shadow);
+        declare.samples_view(ViewKind::Post, "gobo", "gobo");
+        declare.clears_depth_layer("maps", Format::Depth32Float);
+    }));
+    let builder = builder.process(Declaring("lit", |declare| {
+        declare.samples_layers(ViewKind::Shadow, "maps");
+        declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background);
+    }));
+    let (mut renderer, submitter) = builder.build(scheduler).unwrap();
+    let mut scene = scene();
+    for (name, kind) in [("map", ViewKind::Shadow), ("gobo", ViewKind::Post)] {
+        scene.cameras.push(Camera { name: name.to_owned(), kind, ..scene.cameras[0].clone() });
+    }
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let passes: Vec<_> = submitted.submission.passes.iter().map(|pass| pass.process.as_str()).collect();
+    assert_eq!(passes, ["gobo", "caster", "lit"]);
+}
+
 /// Draws over reflections only.
 struct Tint;
 

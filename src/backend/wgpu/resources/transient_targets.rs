@@ -40,8 +40,8 @@ struct Life {
 }
 
 impl TransientTargets {
-    /// Assigns textures to the targets of these views. `passes` are at least those that [use transient targets](uses_transient). Targets for which `is_imported` is true, by the view's index and the target's name,
-    /// are left out.
+    /// Assigns textures to the targets of these views. `passes` are at least those that [use transient targets](uses_transient). Targets for
+    /// which `is_imported` is true, by the view's index and the target's name, are left out.
     pub(crate) fn new(
         plan: &FramePlan,
         views: &[RenderView],
