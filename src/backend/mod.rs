@@ -3,6 +3,8 @@
 mod backend_trait;
 mod error;
 #[cfg(any(feature = "wgpu", feature = "software"))]
+mod kept_views;
+#[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
 mod null;
 mod picture;

@@ -9,6 +9,7 @@ use super::pixel_formats::append_bytes;
 use super::precision::Precision;
 use super::submission::ReadTargets;
 use super::tiles::{Tile, Tiling};
+use crate::backend::kept_views::kept_views;
 use crate::backend::{BackendError, Picture};
 use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
@@ -41,8 +42,8 @@ impl<R> Clone for SoftwareTarget<R> {
 
 /// The targets of one frame.
 pub(super) struct SoftwareTargets<R> {
-    /// Of each view: its name, its own targets, and its layers of shared ones.
-    views: Vec<(String, Vec<SoftwareTarget<R>>)>,
+    /// Of each view its own targets, and its layers of shared ones.
+    views: Vec<Vec<SoftwareTarget<R>>>,
     /// The targets that all views of a kind share.
     layered: Vec<Arc<TiledTexture<R>>>,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format.
@@ -58,7 +59,7 @@ impl<R> Default for SoftwareTargets<R> {
 impl<R> SoftwareTargets<R> {
     /// A view's target by its name.
     pub(super) fn find(&self, view: usize, name: &str) -> Option<&SoftwareTarget<R>> {
-        self.views.get(view)?.1.iter().find(|target| target.texture.planned.name == name)
+        self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
     }
 
     /// Copies what processes of later frames read of this one.
@@ -66,7 +67,7 @@ impl<R> SoftwareTargets<R> {
     where
         R: Precision,
     {
-        for (view, (_, targets)) in self.views.iter().enumerate() {
+        for (view, targets) in self.views.iter().enumerate() {
             for copy in targets {
                 let source = copy.texture.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
                 if let Some(source) = source {
@@ -96,11 +97,13 @@ impl<R> SoftwareTargets<R> {
 /// dropped.
 pub(super) struct TargetCache<R> {
     current: Arc<SoftwareTargets<R>>,
+    /// The kind and name of each of its views.
+    views: Vec<(ViewKind, String)>,
 }
 
 impl<R> Default for TargetCache<R> {
     fn default() -> Self {
-        Self { current: Arc::default() }
+        Self { current: Arc::default(), views: Vec::new() }
     }
 }
 
@@ -128,7 +131,8 @@ impl<R: Precision> TargetCache<R> {
             };
             next.layered.push(texture);
         }
-        for (index, view) in views.iter().enumerate() {
+        let kept_views = kept_views(self.views.iter().map(|(kind, name)| (*kind, name.as_str())), views);
+        for (view, kept_view) in views.iter().zip(kept_views) {
             let mut targets = Vec::new();
             for planned in plan.targets().iter().filter(|planned| planned.views == view.kind()) {
                 if planned.layered {
@@ -141,16 +145,15 @@ impl<R: Precision> TargetCache<R> {
                 }
                 let size = planned.size.in_view(view.camera.size);
                 // Another view has no part in this one's history.
-                let is_same_view = self.current.views.get(index).is_some_and(|(name, _)| name == view.name());
-                let kept = self.current.find(index, &planned.name);
-                let kept = kept.filter(|_| is_same_view || planned.copy_of.is_none());
+                let kept = kept_view.filter(|kept| kept.is_same || planned.copy_of.is_none());
+                let kept = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
                 let texture = match kept.filter(|kept| kept.texture.is_for(planned, size)) {
                     Some(kept) => Arc::clone(&kept.texture),
                     None => Arc::new(TiledTexture::new(planned, size, 1)?),
                 };
                 targets.push(SoftwareTarget { texture, layer: 0 });
             }
-            next.views.push((view.name().to_owned(), targets));
+            next.views.push(targets);
         }
         for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
             let Access::SampleView(views, _) = *access else { continue };
@@ -161,6 +164,7 @@ impl<R: Precision> TargetCache<R> {
             }
         }
         self.current = Arc::new(next);
+        self.views = views.iter().map(|view| (view.kind(), view.name().to_owned())).collect();
         Ok(Arc::clone(&self.current))
     }
 }

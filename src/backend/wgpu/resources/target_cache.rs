@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::bind_group_layouts::texture_format;
 use super::imported_target::ResolvedImport;
 use super::transient_targets::{TextureKind, TransientTargets, uses_transient};
+use crate::backend::kept_views::{KeptView, kept_views};
 use crate::backend::{BackendError, FrameRequest, TargetMemory};
 use crate::process::{Access, Format, FramePlan, Pass, PlannedTarget, SampledViews};
 use crate::scene::ViewKind;
@@ -208,6 +209,9 @@ impl TargetCache {
         });
         next.transient = self.transient_slots(device, shared.textures())?;
         let planned: Vec<_> = plan.targets().iter().map(|planned| Arc::new(planned.clone())).collect();
+        let kinds_and_names =
+            self.views.iter().zip(&self.current.views).map(|((kind, ..), (name, _))| (*kind, name.as_str()));
+        let kept = kept_views(kinds_and_names, views);
         for (index, view) in views.iter().enumerate() {
             let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
             let own = of_kind.filter(|(_, planned)| !is_imported(index, &planned.name));
@@ -218,11 +222,11 @@ impl TargetCache {
                     return Ok(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: true });
                 }
                 if !planned.layered {
-                    return self.own_target(device, planned, index, view);
+                    return self.own_target(device, planned, kept[index], view);
                 }
                 let layered = next.layered.iter().find(|layered| *layered.planned == **planned);
                 let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
-                Ok(self.layer_target(layered.ok_or_else(missing)?, index, view.layer))
+                Ok(self.layer_target(layered.ok_or_else(missing)?, kept[index], view.layer))
             });
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push((view.name().to_owned(), targets));
@@ -269,15 +273,15 @@ impl TargetCache {
         &self,
         device: &wgpu::Device,
         planned: &Arc<PlannedTarget>,
-        index: usize,
+        kept: Option<KeptView>,
         view: &RenderView,
     ) -> Result<ViewTarget, BackendError> {
         let kind = TextureKind::of(planned, view.camera.size);
         let [width, height] = kind.size;
         let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         // Another view has no part in this one's history.
-        let is_same_view = self.current.views.get(index).is_some_and(|(name, _)| name == view.name());
-        let cached = self.current.find(index, &planned.name).filter(|_| is_same_view || planned.copy_of.is_none());
+        let kept = kept.filter(|kept| kept.is_same || planned.copy_of.is_none());
+        let cached = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
         let mut cached = cached.filter(|cached| cached.planned == *planned && cached.texture.size() == extent);
         if let Some(cached) = cached.take_if(|cached| !cached.is_transient) {
             return Ok(cached.clone());
@@ -316,8 +320,8 @@ impl TargetCache {
         Ok(placeholder)
     }
 
-    fn layer_target(&self, shared: &LayeredTarget, view: usize, layer: u32) -> ViewTarget {
-        let cached = self.current.find(view, &shared.planned.name);
+    fn layer_target(&self, shared: &LayeredTarget, kept: Option<KeptView>, layer: u32) -> ViewTarget {
+        let cached = kept.and_then(|kept| self.current.find(kept.index, &shared.planned.name));
         if let Some(cached) = cached.filter(|cached| cached.texture == shared.texture && cached.layer == layer) {
             return cached.clone();
         }

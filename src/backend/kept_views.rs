@@ -1,0 +1,75 @@
+//! Whose targets a frame's views keep.
+
+use std::collections::{HashMap, VecDeque};
+
+use crate::scene::ViewKind;
+use crate::view::RenderView;
+
+/// The view of the frame before whose targets a view keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct KeptView {
+    /// Its index in the frame before.
+    pub(crate) index: usize,
+    /// Whether it is the same view, so that what its targets held is this view's history.
+    pub(crate) is_same: bool,
+}
+
+/// For each view the one of the frame before whose targets it keeps, by the kinds and names of those: the view of the same kind and name, of
+/// several the one at the same place among them; otherwise one of the same kind that no other view keeps.
+pub(crate) fn kept_views<'a>(
+    before: impl Iterator<Item = (ViewKind, &'a str)> + Clone,
+    views: &'a [RenderView],
+) -> Vec<Option<KeptView>> {
+    let mut named: HashMap<(ViewKind, &str), VecDeque<usize>> = HashMap::new();
+    for (index, view) in before.clone().enumerate() {
+        named.entry(view).or_default().push_back(index);
+    }
+    let mut kept = Vec::with_capacity(views.len());
+    for view in views {
+        let index = named.get_mut(&(view.kind(), view.name())).and_then(VecDeque::pop_front);
+        kept.push(index.map(|index| KeptView { index, is_same: true }));
+    }
+
+    let mut left: Vec<_> = named.into_values().flatten().collect();
+    left.sort_unstable();
+    let kinds: Vec<_> = before.map(|(kind, _)| kind).collect();
+    let mut of_kind: HashMap<ViewKind, VecDeque<usize>> = HashMap::new();
+    for index in left {
+        of_kind.entry(kinds[index]).or_default().push_back(index);
+    }
+    for (kept, view) in kept.iter_mut().zip(views).filter(|(kept, _)| kept.is_none()) {
+        let index = of_kind.get_mut(&view.kind()).and_then(VecDeque::pop_front);
+        *kept = index.map(|index| KeptView { index, is_same: false });
+    }
+    kept
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Camera;
+
+    #[test]
+    fn views_keep_the_targets_of_their_name_and_kind_or_of_a_view_that_is_gone() {
+        use ViewKind::{Main, Reflection};
+        let view = |(kind, name): (ViewKind, &str)| {
+            RenderView::new(&Camera { kind, ..Camera::looking_at(name, DVec3::Z, DVec3::ZERO) })
+        };
+        let found = |before: &[(ViewKind, &str)], now: &[(ViewKind, &str)]| {
+            let views: Vec<_> = now.iter().copied().map(view).collect();
+            let kept = kept_views(before.iter().copied(), &views);
+            kept.into_iter().map(|kept| kept.map(|kept| (kept.index, kept.is_same))).collect::<Vec<_>>()
+        };
+        let before = [(Main, "main"), (Reflection, "mirror"), (Main, "main"), (Main, "side")];
+        assert_eq!(found(&before, &before), [0, 1, 2, 3].map(|index| Some((index, true))));
+        // A mirror comes before the main view, and goes.
+        assert_eq!(found(&before[..1], &[(Reflection, "mirror"), (Main, "main")]), [None, Some((0, true))]);
+        assert_eq!(found(&before[1..3], &[(Main, "main")]), [Some((1, true))]);
+        // Another name takes the targets of a view that is gone, but not those of another kind, or of a view that is still there.
+        assert_eq!(found(&before, &[(Main, "other"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
+        assert_eq!(found(&before[..2], &[(Main, "mirror"), (Main, "main")]), [None, Some((0, true))]);
+        assert_eq!(found(&[], &[(Main, "main")]), [None]);
+    }
+}
