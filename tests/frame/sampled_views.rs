@@ -6,7 +6,8 @@ use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Place, PlanError, RenderProcess, StorageBuffer,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, Place, PlanError, PostStep, RenderProcess,
+    StorageBuffer, ToneMapping,
 };
 use drawloom::scene::{Camera, ClipPlane, LayerMask, Light, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
@@ -252,6 +253,7 @@ fn what_is_drawn_once_a_frame_comes_before_all_views_that_use_it() {
 }
 
 /// Draws in one kind of views what a function declares.
+#[derive(Clone, Copy)]
 struct Declaring(&'static str, fn(&mut Declare));
 
 impl RenderProcess for Declaring {
@@ -293,6 +295,60 @@ fn views_that_read_all_layers_come_after_views_that_sample() {
     let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
     let passes: Vec<_> = submitted.submission.passes.iter().map(|pass| pass.process.as_str()).collect();
     assert_eq!(passes, ["gobo", "caster", "lit"]);
+}
+
+/// Mixes a picture with its own of the frame before, as a motion in main views says.
+struct TemporalFilter;
+
+impl PostStep for TemporalFilter {
+    fn process(&self, source: &str, target: &str) -> Arc<dyn RenderProcess> {
+        Arc::new(Filter { source: source.to_owned(), target: target.to_owned() })
+    }
+}
+
+struct Filter {
+    source: String,
+    target: String,
+}
+
+impl RenderProcess for Filter {
+    fn name(&self) -> &str {
+        "temporal filter"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples(&self.source);
+        declare.samples("motion");
+        declare.samples_previous(&self.target);
+        declare.clears_color(&self.target, Format::Rgba8Srgb, ClearColor::Background);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen::default())
+    }
+}
+
+#[test]
+fn reflections_have_no_steps_that_nothing_samples_though_these_have_a_history() {
+    let motion = Declaring("motion", |declare| {
+        declare.at(Place::AfterGeometry);
+        declare.clears_color("motion", Format::Rg16Float, ClearColor::Background);
+    });
+    let build = |mirror: Mirror| {
+        let deferred = Deferred::new().post(ToneMapping::default()).post(TemporalFilter);
+        let builder = Renderer::builder(NullBackend).deferred(deferred).process(mirror);
+        builder.process(motion).build(Arc::new(Scheduler::new(1).unwrap()))
+    };
+    let (mut renderer, submitter) = build(RADIANCE).unwrap();
+    let mut scene = scene();
+    scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
+    let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+    let passes: Vec<_> = submitted.submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
+    assert!(passes.contains(&("temporal filter", 0)) && !passes.contains(&("temporal filter", 1)), "{passes:?}");
+    // The filter has no motion in reflections, which only main views have.
+    let error = build(Mirror { target: "picture", place: Place::AfterLighting }).err().unwrap().to_string();
+    assert!(error.contains("temporal filter") && error.contains("motion"), "{error}");
 }
 
 /// Draws over reflections only.

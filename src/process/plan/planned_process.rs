@@ -55,7 +55,9 @@ impl PlannedProcess {
         kinds.dedup();
         let own_kind = *views;
         let of_kind = |views| {
-            let declaration = Declaration { views, ..declaration.clone() };
+            // The engine has not said that the process has side effects in the views of `with_main`.
+            let keep = declaration.keep && (views == own_kind || also_views.contains(&views));
+            let declaration = Declaration { views, keep, ..declaration.clone() };
             Self {
                 process: Arc::clone(process),
                 name: name.clone(),

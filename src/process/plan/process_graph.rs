@@ -11,7 +11,8 @@ use crate::scene::ViewKind;
 /// descending priority, each with its slot in the chain if it has one.
 ///
 /// What a process samples of other views is an output of those: which view that is, and the order of views, depends on the scene. So
-/// targets that the remaining processes sample are added to the outputs until none is missing.
+/// targets that the remaining processes sample are added to the outputs until none is missing, and so are histories that they read in
+/// further kinds of views.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -28,12 +29,16 @@ pub(super) fn compile(
         let mut missing = Vec::new();
         for (_, planned) in schedule.nodes() {
             for (target, access) in &planned.declaration.accesses {
-                let Access::SampleView(views, _) = *access else { continue };
-                let wanted = (views, target.clone());
-                let is_written = added.iter().any(|(_, other)| {
-                    other.declaration.views == views && other.declaration.written().any(|written| written == target)
-                });
-                if is_written && !sampled.contains(&wanted) && !missing.contains(&wanted) {
+                let (views, is_wanted): (_, &dyn Fn(&str) -> bool) = match *access {
+                    Access::SampleView(views, _) => (views, &|written| written == target),
+                    Access::SamplePrevious => (planned.declaration.views, &|written| previous_name(written) == *target),
+                    _ => continue,
+                };
+                let of_views = added.iter().filter(|(_, other)| other.declaration.views == views);
+                let mut written = of_views.flat_map(|(_, other)| other.declaration.written());
+                let Some(found) = written.find(|written| is_wanted(written)) else { continue };
+                let wanted = (views, found.to_owned());
+                if !sampled.contains(&wanted) && !missing.contains(&wanted) {
                     missing.push(wanted);
                 }
             }
@@ -64,7 +69,9 @@ fn process_graph(
         let id = graph.add(node_name(added, planned), planned.clone());
         for (target, access) in &declaration.accesses {
             if *access == Access::SamplePrevious {
-                histories.push((declaration.views, target.clone()));
+                if planned.is_of_own_kind {
+                    histories.push((declaration.views, target.clone()));
+                }
                 continue;
             }
             let resource = graph.resource(resource_name(access.views(declaration.views), target));
