@@ -59,6 +59,17 @@ pub enum Projection {
     Paraboloid,
 }
 
+impl Projection {
+    /// Half the picture's height, in metres; in perspective at a distance of 1.
+    pub(crate) fn half_height(self) -> f64 {
+        match self {
+            Self::Perspective { field_of_view } => (f64::from(field_of_view) * 0.5).tan(),
+            Self::Orthographic { height } => f64::from(height) * 0.5,
+            Self::Paraboloid => 1.0,
+        }
+    }
+}
+
 /// The purpose of a view (M listing 10.4). If two views do not depend on each other, the earlier kind comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ViewKind {

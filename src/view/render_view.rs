@@ -1,6 +1,6 @@
 //! A camera's view within a frame.
 
-use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4, Mat4, Vec2, Vec3};
 
 use super::Frustum;
 use crate::command::Selection;
@@ -97,22 +97,31 @@ impl RenderView {
     /// everywhere in the picture if a is 1 ÷ (the largest normal · r of its corners).
     fn oblique_depth(&self) -> Option<DVec4> {
         let plane = self.camera.clip_plane?;
-        let Projection::Perspective { field_of_view } = self.camera.projection else { return None };
+        if !matches!(self.camera.projection, Projection::Perspective { .. }) {
+            return None;
+        }
         let offset = plane.distance(self.camera.position);
         if offset >= 0.0 {
             return None;
         }
-        let half = (f64::from(field_of_view) * 0.5).tan();
-        let half = DVec2::new(half * f64::from(self.camera.size[0]) / f64::from(self.camera.size[1]), half);
-        let axis = |direction: DVec3| self.camera.orientation.as_dquat().normalize() * direction;
-        let [right, up, forward] = [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(axis);
+        let [right, up, center] = self.precise_picture_axes();
+        let forward = self.camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
         let normal = plane.normal.as_dvec3().normalize();
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|corner| {
-            let DVec2 { x, y } = (DVec2::from(corner) + self.camera.shift.as_dvec2()) * half;
-            normal.dot(right * x + up * y + forward)
-        });
+        let corners =
+            [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| normal.dot(right * x + up * y + center));
         let largest = corners.into_iter().fold(MIN_OBLIQUE_SLOPE, f64::max);
         Some((forward - normal / largest).extend(-offset / largest))
+    }
+
+    /// [`RenderView::picture_axes`] in f64.
+    pub(crate) fn precise_picture_axes(&self) -> [DVec3; 3] {
+        let camera = &self.camera;
+        let [width, height] = camera.size.map(f64::from);
+        let orientation = camera.orientation.as_dquat().normalize();
+        let half = camera.projection.half_height();
+        let [right, up] = [orientation * DVec3::X * half * (width / height), orientation * DVec3::Y * half];
+        let shift = camera.shift.as_dvec2();
+        [right, up, orientation * DVec3::NEG_Z + right * shift.x + up * shift.y]
     }
 
     /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance

@@ -115,31 +115,18 @@ pub(super) fn view_as_uploaded(view: &RenderView, gpu_view: &GpuView) -> ShaderV
 /// A view computed from its camera, in f64.
 pub(super) fn exact_view(view: &RenderView, scene: &SceneRef<'_>) -> ShaderView<f64> {
     let camera = &view.camera;
-    let orientation = camera.orientation.as_dquat().normalize();
-    let [width, height] = camera.size.map(f64::from);
-    let half = half_height(camera.projection);
-    let [right, up] = [orientation * DVec3::X * half * (width / height), orientation * DVec3::Y * half];
-    let shift = camera.shift.as_dvec2();
+    let [right, up, forward] = view.precise_picture_axes().map(Vector3::of);
     ShaderView {
         clip_from_relative: view.precise_clip_from_relative().to_cols_array_2d().map(Vector),
-        right: Vector3::of(right),
-        up: Vector3::of(up),
-        forward: Vector3::of(orientation * DVec3::NEG_Z + right * shift.x + up * shift.y),
+        right,
+        up,
+        forward,
         near: f64::from(camera.near),
         far: f64::from(camera.far),
         size: size_of(view),
         projection: camera.projection,
         clamps_near: clamps_near(view),
         ambient: Vector3::of_single(scene.ambient),
-    }
-}
-
-/// Half the picture's height, in metres; in perspective at a distance of 1.
-fn half_height(projection: Projection) -> f64 {
-    match projection {
-        Projection::Perspective { field_of_view } => (f64::from(field_of_view) * 0.5).tan(),
-        Projection::Orthographic { height } => f64::from(height) * 0.5,
-        Projection::Paraboloid => 1.0,
     }
 }
 
@@ -196,7 +183,7 @@ pub(super) fn exact_light(
         values.direction = Vector3::of(direction.as_dvec3().normalize());
     }
     if let Some(map) = map {
-        values.shadow_half = half_height(map.camera.projection);
+        values.shadow_half = map.camera.projection.half_height();
         values.shadow_orientation = Quaternion::of(map.camera.orientation.as_dquat().normalize());
         if let Projection::Orthographic { .. } = map.camera.projection {
             values.position = relative(map.camera.position);

@@ -78,18 +78,16 @@ impl<R> SoftwareTargets<R> {
         }
     }
 
-    /// A target that all views of a kind share, from its first layer on.
-    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<SoftwareTarget<R>> {
-        let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
-        self.layered.iter().find(is_wanted).map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
-    }
-}
-
-impl<R> SoftwareTargets<R> {
     /// A pixel of zeros in place of a target of a view that the frame does not have.
     pub(super) fn find_placeholder(&self, planned: &PlannedTarget) -> Option<SoftwareTarget<R>> {
         let found = self.placeholder.iter().find(|placeholder| placeholder.planned.format == planned.format);
         found.map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
+    }
+
+    /// A target that all views of a kind share, from its first layer on.
+    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<SoftwareTarget<R>> {
+        let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
+        self.layered.iter().find(is_wanted).map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 }
 
@@ -160,7 +158,11 @@ impl<R: Precision> TargetCache<R> {
             if let Some(planned) = plan.sampled_target(views, target)
                 && next.find_placeholder(planned).is_none()
             {
-                next.placeholder.push(Arc::new(TiledTexture::new(planned, [1, 1], 1)?));
+                let placeholder = match self.current.find_placeholder(planned) {
+                    Some(kept) => kept.texture,
+                    None => Arc::new(TiledTexture::new(planned, [1, 1], 1)?),
+                };
+                next.placeholder.push(placeholder);
             }
         }
         self.current = Arc::new(next);

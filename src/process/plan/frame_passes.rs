@@ -1,6 +1,6 @@
 //! The passes of a frame, in the order in which they are submitted, and the views that they sample.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::{self, Display, Formatter};
 
 use super::{Pass, PlannedProcess};
@@ -49,12 +49,12 @@ impl FramePasses {
             graph.keep(node);
             nodes.push(node);
             for pass in part {
-                for nodes in [
+                for listed in [
                     nodes_of_view.entry(pass.view_index).or_default(),
                     nodes_of_process.entry(ProcessClass::of(&processes[pass.process_index])).or_default(),
                 ] {
-                    if nodes.last() != Some(&node) {
-                        nodes.push(node);
+                    if listed.last() != Some(&node) {
+                        listed.push(node);
                     }
                 }
             }
@@ -73,14 +73,16 @@ impl FramePasses {
         classes.dedup();
         for [before, after] in classes.into_iter().filter(|[before, after]| before != after) {
             let of_class = |class| nodes_of_process.get(&class).map_or(&[][..], Vec::as_slice);
+            // A part that is submitted process by process may be on both sides.
             let (before_nodes, after_nodes) = (of_class(before), of_class(after));
+            let [is_before, is_after] = [before_nodes, after_nodes].map(|nodes| nodes.iter().collect::<HashSet<_>>());
             // One node in between, instead of an order for each pair.
             let between = graph.add(format!("{before} before {after}"), None);
             graph.keep(between);
-            for node in before_nodes.iter().filter(|node| !after_nodes.contains(node)) {
+            for node in before_nodes.iter().filter(|node| !is_after.contains(node)) {
                 graph.order(*node, between);
             }
-            for node in after_nodes.iter().filter(|node| !before_nodes.contains(node)) {
+            for node in after_nodes.iter().filter(|node| !is_before.contains(node)) {
                 graph.order(between, *node);
             }
         }

@@ -10,7 +10,7 @@ use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::material_types::{check_material_types, material_types_of};
 use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
-use super::process_graph::{compile, is_node_of};
+use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
 use super::sampled_views::{check_sampled_views, sampled_target};
 use super::view_group::view_groups;
@@ -91,8 +91,9 @@ impl FramePlan {
         let dot =
             schedule.to_labelled_dot(|before, after| passed_on_resources(declarations[before], declarations[after]));
         let dropped = schedule.dropped().to_vec();
-        let is_of_chain = |name: &String| slot_names.iter().any(|slot| is_node_of(name, slot));
-        for process in dropped.iter().filter(|name| !is_of_chain(name)) {
+        let shipped = added.iter().filter(|(_, planned)| slot_names.contains(&planned.name));
+        let shipped: Vec<_> = shipped.map(|(_, planned)| node_name(&added, planned)).collect();
+        for process in dropped.iter().filter(|name| !shipped.contains(name)) {
             tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
         }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));

@@ -31,7 +31,10 @@ pub(super) fn compile(
             for (target, access) in &planned.declaration.accesses {
                 let (views, is_wanted): (_, &dyn Fn(&str) -> bool) = match *access {
                     Access::SampleView(views, _) => (views, &|written| written == target),
-                    Access::SamplePrevious => (planned.declaration.views, &|written| previous_name(written) == *target),
+                    // In the kind that the process declares, it is an output from the start.
+                    Access::SamplePrevious if !planned.is_of_own_kind => {
+                        (planned.declaration.views, &|written| previous_name(written) == *target)
+                    }
                     _ => continue,
                 };
                 let of_views = added.iter().filter(|(_, other)| other.declaration.views == views);
@@ -48,12 +51,6 @@ pub(super) fn compile(
         }
         sampled.extend(missing);
     }
-}
-
-/// Whether a node of the graph is the process of this name, in some kind of view.
-pub(super) fn is_node_of(node: &str, process: &str) -> bool {
-    node == process
-        || node.strip_prefix(process).is_some_and(|rest| rest.starts_with(" in ") && rest.ends_with(" views"))
 }
 
 fn process_graph(
@@ -127,7 +124,7 @@ fn process_graph(
 
 /// The name of a process, with the kind of view if it draws in main views too. Two processes of the same name and kind keep it, so that the
 /// graph reports it.
-fn node_name(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> String {
+pub(super) fn node_name(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> String {
     let views = planned.declaration.views;
     let count = |kind: ViewKind| {
         added.iter().filter(|(_, other)| other.name == planned.name && other.declaration.views == kind).count()
