@@ -116,7 +116,12 @@ impl World {
                     illuminance: Vec3::splat(2.5),
                     casts_shadow: true,
                 },
-                Light::Point { position: DVec3::Y * 4.0, intensity: Vec3::new(20.0, 30.0, 60.0), range: 30.0 },
+                Light::Point {
+                    position: DVec3::Y * 4.0,
+                    intensity: Vec3::new(20.0, 30.0, 60.0),
+                    range: 30.0,
+                    casts_shadow: false,
+                },
             ],
             assets,
             positions: vec![DVec3::ZERO; count],

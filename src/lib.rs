@@ -100,8 +100,9 @@ pub mod guide;
 pub use backend::ViewQueue;
 pub use bytemuck;
 pub use frame::{
-    BuildError, FrameError, FrameStatistics, Granularity, Recorded, Renderer, RendererBuilder, StageTimes, SubmitError,
-    Submitted, Submitter, ViewStatistics,
+    BudgetError, BudgetedView, BuildError, FrameError, FrameStatistics, Granularity, LevelStatistics, Recorded,
+    Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
+    ViewStatistics,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

@@ -59,7 +59,7 @@ fn heading<const COLUMNS: usize>(ui: &mut Ui, names: [&str; COLUMNS]) {
 fn owner(labels: &Labels) -> String {
     match (&labels.process, &labels.view) {
         (Some(process), Some(view)) => format!("{process} in {view}"),
-        (Some(name), None) | (None, Some(name)) => name.clone(),
+        (Some(name), None) | (None, Some(name)) => name.to_string(),
         (None, None) => "the frame".into(),
     }
 }

@@ -12,8 +12,8 @@ use drawloom::{Renderer, Submitter};
 use drawloom_egui::Inspector;
 use egui::Shape;
 use egui::accesskit::Role;
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, Node};
 
 /// An engine that draws a frame and the inspector over it.
 struct Engine {
@@ -133,11 +133,11 @@ fn a_preset_changes_the_quality() {
 fn a_value_changes_one_setting_and_one_that_does_not_fit_cannot_be_chosen() {
     let mut harness = harness(Engine::new());
     click(&mut harness, "Quality");
-    choose(&mut harness, 2, "oriented box");
-    choose(&mut harness, 3, "8 pixels");
+    choose(&mut harness, "culling volume", "oriented box");
+    choose(&mut harness, "occlusion culling", "8 pixels");
     let expected = Quality { culling: CullingVolume::OrientedBox, occlusion: Some(8), ..Quality::balanced() };
     assert_eq!(*harness.state().renderer.quality(), expected);
-    choose(&mut harness, 2, "none");
+    choose(&mut harness, "culling volume", "none");
     assert_eq!(*harness.state().renderer.quality(), expected);
 }
 
@@ -156,8 +156,7 @@ fn a_pipeline_with_settings_of_its_own_keeps_them_until_one_is_chosen() {
 fn a_measurement_goes_on_while_the_window_is_collapsed() {
     let mut harness = harness(Engine::new());
     click(&mut harness, "Quality");
-    harness.get_all_by_label("Measure").nth(7).unwrap().click();
-    harness.run_steps(2);
+    measure(&mut harness, "depth pre-pass");
     click(&mut harness, "Hide");
     assert!(harness.query_by_label("Stop").is_none(), "it is not collapsed");
     harness.run_steps(400);
@@ -166,9 +165,19 @@ fn a_measurement_goes_on_while_the_window_is_collapsed() {
     assert!(texts(&harness).iter().any(is_price));
 }
 
-/// Chooses a value of the `index`-th setting.
-fn choose(harness: &mut Harness<'_, Engine>, index: usize, value: &str) {
-    harness.get_all_by_role(Role::ComboBox).nth(index).unwrap().click();
+/// Starts a measurement of a setting's values.
+fn measure(harness: &mut Harness<'_, Engine>, setting: &str) {
+    let height = harness.get_by_label(setting).rect().center().y;
+    let is_in_row = |node: &Node<'_>| node.rect().y_range().contains(height);
+    harness.get_all_by_label("Measure").find(is_in_row).unwrap().click();
+    harness.run_steps(2);
+}
+
+/// Chooses a value of a setting.
+fn choose(harness: &mut Harness<'_, Engine>, setting: &str, value: &str) {
+    let height = harness.get_by_label(setting).rect().center().y;
+    let is_in_row = |node: &Node<'_>| node.rect().y_range().contains(height);
+    harness.get_all_by_role(Role::ComboBox).find(is_in_row).unwrap().click();
     harness.run_steps(2);
     // The chosen value of another setting may have the same name.
     harness.get_all_by_label(value).last().unwrap().click();
@@ -180,7 +189,7 @@ fn a_measurement_shows_prices_and_leaves_the_quality_as_it_was() {
     let mut harness = harness(Engine::new());
     click(&mut harness, "Quality");
     click(&mut harness, "exact");
-    harness.get_all_by_label("Measure").nth(4).unwrap().click();
+    measure(&mut harness, "normals");
     let mut qualities = Vec::new();
     for _ in 0..1000 {
         harness.step();
@@ -232,7 +241,12 @@ fn a_timeline_that_the_engine_records_goes_on() {
 #[test]
 fn what_is_not_drawn_is_a_warning() {
     let mut engine = Engine::new();
-    engine.scene.lights.push(Light::Point { position: DVec3::ZERO, intensity: Vec3::NAN, range: 1.0 });
+    engine.scene.lights.push(Light::Point {
+        position: DVec3::ZERO,
+        intensity: Vec3::NAN,
+        range: 1.0,
+        casts_shadow: false,
+    });
     let mut harness = harness(engine);
     click(&mut harness, "Warnings (1)");
     assert_shown(&harness, &["index 1", "in the latest frame"]);

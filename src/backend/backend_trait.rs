@@ -14,7 +14,7 @@ use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
 /// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
-/// most of them by several workers at once. Those that record take the worker as proof that they run in a job (M 10.3
+/// most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also beside a frame. Those that record take the worker as proof that they run in a job (M 10.3
 /// asserts it).
 ///
 /// The order within a frame:
@@ -81,6 +81,12 @@ pub trait Backend: Send + Sync + 'static {
 
     /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame alone.
     fn discard_frame(&self) {}
+
+    /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. Such a view is never cached.
+    fn imports_targets_of(&self, view: &str) -> bool {
+        let _ = view;
+        false
+    }
 
     /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none.
     /// If it is the current one, nothing is uploaded.

@@ -22,6 +22,22 @@ pub enum BackendError {
         /// What Drawloom needs.
         needed: u64,
     },
+    /// More views have a layer of one texture than the device's textures can have layers: shadow maps, as a rule, of which a point light has
+    /// six.
+    #[error(
+        "{views} views, the shadow maps of {lights} lights among them, each have a layer of the target {target:?}, and device limit \
+         max_texture_array_layers is {allowed}"
+    )]
+    TooManyLayers {
+        /// The target.
+        target: String,
+        /// The views that share it.
+        views: u64,
+        /// The lights whose shadow maps are among them.
+        lights: u64,
+        /// The layers that the device allows.
+        allowed: u64,
+    },
     /// A process's WGSL does not compile.
     #[error("the {part} of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
     Shader {

@@ -27,6 +27,11 @@ pub(super) fn mip_chain(texture: &Texture, side: u32) -> Vec<Vec<u8>> {
     chain
 }
 
+/// The number of levels of a complete chain for a texture of this size.
+pub(super) fn mip_level_count(size: [u32; 2]) -> u32 {
+    size[0].max(size[1]).max(1).ilog2() + 1
+}
+
 /// Decodes sRGB to linear, both from 0 to 1.
 pub(super) fn srgb_to_linear<R: Real>(value: R) -> R {
     if value <= R::of(0.04045) {

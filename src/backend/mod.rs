@@ -2,10 +2,11 @@
 
 mod backend_trait;
 mod error;
-#[cfg(any(feature = "wgpu", feature = "software"))]
 mod kept_views;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
+#[cfg(any(feature = "wgpu", feature = "software"))]
+mod mip_schedule;
 mod null;
 mod picture;
 mod requests;
@@ -25,6 +26,7 @@ pub use self::wgpu::{
 };
 pub use backend_trait::Backend;
 pub use error::BackendError;
+pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
 pub use requests::{FrameRequest, PassRequest};

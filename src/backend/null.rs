@@ -11,7 +11,7 @@ use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::command::DrawList;
 use crate::process::{Draws, Pass};
-use crate::scene::Mesh;
+use crate::scene::Assets;
 use crate::task::Worker;
 use crate::view::GpuView;
 
@@ -59,8 +59,6 @@ pub struct NullPass {
 #[derive(Debug)]
 pub struct NullFrame {
     passes: Vec<Pass>,
-    /// The number of triangles of the mesh in each slot; `None` for an empty slot.
-    triangles: Vec<Option<usize>>,
     object_count: usize,
     uploaded: Mutex<BTreeSet<usize>>,
     /// The number of objects that each pass was prepared for.
@@ -93,13 +91,8 @@ impl Backend for NullBackend {
                 return Err(BackendError::ViewOutOfReach { view: view.name().to_owned() });
             }
         }
-        let mut triangles = vec![None; request.scene.assets.meshes.slot_count()];
-        for (handle, mesh) in request.scene.assets.iter::<Mesh>() {
-            triangles[handle.index() as usize] = Some(mesh.triangle_count());
-        }
         Ok(NullFrame {
             passes: request.passes.to_vec(),
-            triangles,
             object_count: request.scene.object_count(),
             uploaded: Mutex::default(),
             prepared: Mutex::default(),
@@ -155,7 +148,7 @@ impl Backend for NullBackend {
         &self,
         _worker: &Worker,
         frame: &NullFrame,
-        &PassRequest { pass, list, .. }: &PassRequest<'_>,
+        &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
         bundles: Range<usize>,
         emit: &mut dyn FnMut(NullBundle),
     ) -> Result<(), BackendError> {
@@ -164,7 +157,7 @@ impl Backend for NullBackend {
             ensure(first_time, || {
                 format!("each bundle is recorded once, but bundle {bundle} of {pass:?} is recorded again")
             })?;
-            emit(record_bundle(frame, list, bundle)?);
+            emit(record_bundle(request.scene.assets, list, bundle)?);
         }
         Ok(())
     }
@@ -220,7 +213,7 @@ impl Backend for NullBackend {
     }
 }
 
-fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
+fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
     let batches = list.bundle(bundle);
     let within = (1..=DrawList::BATCHES_PER_BUNDLE).contains(&batches.len());
     ensure(within, || {
@@ -232,12 +225,12 @@ fn record_bundle(frame: &NullFrame, list: &DrawList, bundle: usize) -> Result<Nu
         ensure(batch.first == end && batch.count > 0, || {
             format!("batches have no gaps or overlaps, but there is one at object {end}")
         })?;
-        let mesh = frame.triangles.get(batch.mesh as usize).copied().flatten();
-        let Some(mesh_triangles) = mesh else {
+        let Some((_, mesh)) = assets.meshes.get_with_revision(batch.mesh) else {
             return Err(BackendError::BrokenRule {
                 rule: format!("a batch draws an existing mesh, but slot {} is empty", batch.mesh),
             });
         };
+        let mesh_triangles = mesh.triangle_count_of(batch.state.level_of_detail());
         triangles += match list.remaining(index) {
             None => mesh_triangles * batch.count as usize,
             Some(remaining) => {

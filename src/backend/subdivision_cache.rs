@@ -30,11 +30,14 @@ pub(crate) struct CachedSubdivision<T> {
     used_in: AtomicU64,
 }
 
-/// The subdivided meshes of a frame, by mesh slot and subdivision level.
-pub(crate) type SubdividedMeshes<T> = HashMap<(u32, u32), Arc<CachedSubdivision<T>>>;
+/// The subdivided meshes of a frame, by what [`subdivision_of`] a batch is drawn.
+pub(crate) type SubdividedMeshes<T> = HashMap<Subdivision, Arc<CachedSubdivision<T>>>;
 
-/// Mesh slot, the mesh's revision, subdivision level, and vertex format.
-type Key = (u32, u64, u32, VertexFormat);
+/// Mesh slot, level of detail, and subdivision level.
+pub(crate) type Subdivision = (u32, u32, u32);
+
+/// A subdivision, the mesh's revision, and vertex format.
+type Key = (Subdivision, u64, VertexFormat);
 
 /// The maximum number of triangles of a subdivided mesh.
 const MAX_TRIANGLES: usize = 1 << 18;
@@ -66,7 +69,7 @@ impl<T> SubdivisionCache<T> {
         self.meshes.lock().clear();
     }
 
-    /// Calls `emit` with each subdivided mesh that a list draws, by slot and level. `create` makes the geometry of missing ones.
+    /// Calls `emit` with each subdivided mesh that a list draws. `create` makes the geometry of missing ones.
     /// Counts objects whose edges stay too long.
     ///
     /// # Errors
@@ -77,19 +80,17 @@ impl<T> SubdivisionCache<T> {
         list: &DrawList,
         vertices: VertexFormat,
         mut create: impl FnMut(Mesh) -> Result<T, BackendError>,
-        mut emit: impl FnMut((u32, u32), Arc<CachedSubdivision<T>>),
+        mut emit: impl FnMut(Subdivision, Arc<CachedSubdivision<T>>),
     ) -> Result<(), BackendError> {
-        for &Batch { mesh, state, first, count } in
-            list.batches.iter().filter(|batch| batch.state.subdivision_level() > 0)
-        {
-            let level = state.subdivision_level();
-            let found = self.get_or_create(request.scene.assets, mesh, level, vertices, &mut create)?;
+        for batch in list.batches.iter().filter(|batch| batch.state.subdivision_level() > 0) {
+            let &Batch { first, count, .. } = batch;
+            let found = self.get_or_create(request.scene.assets, subdivision_of(batch), vertices, &mut create)?;
             if found.is_coarse {
                 for &object in &list.objects[first as usize..][..count as usize] {
                     request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
                 }
             }
-            emit((mesh, level), found);
+            emit(subdivision_of(batch), found);
         }
         Ok(())
     }
@@ -97,19 +98,22 @@ impl<T> SubdivisionCache<T> {
     fn get_or_create(
         &self,
         assets: &Assets,
-        slot: u32,
-        level: u32,
+        subdivision: Subdivision,
         vertices: VertexFormat,
         create: impl FnOnce(Mesh) -> Result<T, BackendError>,
     ) -> Result<Arc<CachedSubdivision<T>>, BackendError> {
+        let (slot, level_of_detail, level) = subdivision;
         let (revision, mesh) = assets.meshes.get_with_revision(slot).ok_or_else(missing_mesh_error)?;
-        let key = (slot, revision, level, vertices);
+        let key = (subdivision, revision, vertices);
         let cached = self.meshes.lock().get(&key).cloned();
         let found = match cached {
             Some(cached) => cached,
             None => {
                 // Two passes may do this at once. One result is discarded, which is cheaper than holding the lock meanwhile.
-                let (mesh, is_coarse) = subdivided(mesh, level);
+                let (mesh, is_coarse) = match level_of_detail {
+                    0 => subdivided(mesh, level),
+                    coarser => subdivided(&mesh.at_level(coarser), level),
+                };
                 let created =
                     Arc::new(CachedSubdivision { geometry: create(mesh)?, is_coarse, used_in: AtomicU64::new(0) });
                 Arc::clone(self.meshes.lock().entry(key).or_insert(created))
@@ -118,6 +122,11 @@ impl<T> SubdivisionCache<T> {
         found.used_in.store(self.frame.load(Ordering::Relaxed), Ordering::Relaxed);
         Ok(found)
     }
+}
+
+/// The subdivision of its mesh that a batch draws.
+pub(crate) fn subdivision_of(batch: &Batch) -> Subdivision {
+    (batch.mesh, batch.state.level_of_detail(), batch.state.subdivision_level())
 }
 
 /// The mesh subdivided to a level, and whether its edges are still too long.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Bins;
+use super::{Bins, DrawState};
 
 /// The objects of one pass among a segment of a view's visible objects, ordered by bin: by draw state, by mesh, and by object.
 ///
@@ -15,12 +15,24 @@ pub struct BinnedSegment {
     bins: Vec<u32>,
     /// The objects by bin.
     by_bin: Vec<u32>,
-    /// The bins that have objects, in draw order, each with the end of its objects in `by_bin`.
-    ends: Vec<(u32, u32)>,
+    /// The bins that have objects, in draw order.
+    runs: Vec<Run>,
     /// Scratch memory: a counter for each bin.
     counts: Vec<u32>,
     /// Scratch memory: keys to sort by.
     keys: Vec<u64>,
+    /// Scratch memory: runs that are divided by level of detail, and the objects of one of them.
+    divided_runs: Vec<Run>,
+    undivided: Vec<u32>,
+}
+
+/// Consecutive objects of one bin at one level of detail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    bin: u32,
+    level_of_detail: u32,
+    /// The end of its objects in [`BinnedSegment::by_bin`].
+    end: u32,
 }
 
 impl BinnedSegment {
@@ -39,7 +51,7 @@ impl BinnedSegment {
 
     /// Orders the objects by bin.
     pub fn order(&mut self, bins: &Bins) {
-        self.ends.clear();
+        self.runs.clear();
         if bins.len() > self.objects.len() * BINS_PER_OBJECT {
             self.sort(bins);
         } else {
@@ -48,7 +60,7 @@ impl BinnedSegment {
     }
 
     fn count_and_scatter(&mut self, bins: &Bins) {
-        let Self { objects, bins: bin_of, by_bin, ends, counts, .. } = self;
+        let Self { objects, bins: bin_of, by_bin, runs, counts, .. } = self;
         counts.clear();
         counts.resize(bins.len(), 0);
         for &bin in &*bin_of {
@@ -60,7 +72,7 @@ impl BinnedSegment {
             let count = std::mem::replace(&mut counts[bin as usize], next);
             next += count;
             if count > 0 {
-                ends.push((bin, next));
+                runs.push(Run { bin, level_of_detail: 0, end: next });
             }
         }
         by_bin.resize(objects.len(), 0);
@@ -72,7 +84,7 @@ impl BinnedSegment {
     }
 
     fn sort(&mut self, bins: &Bins) {
-        let Self { objects, bins: bin_of, by_bin, ends, keys, .. } = self;
+        let Self { objects, bins: bin_of, by_bin, runs, keys, .. } = self;
         keys.clear();
         keys.extend(
             objects.iter().zip(&*bin_of).map(|(&object, &bin)| u64::from(bins.rank(bin)) << 32 | u64::from(object)),
@@ -81,7 +93,8 @@ impl BinnedSegment {
         by_bin.clear();
         for same_bin in keys.chunk_by(|one, next| one >> 32 == next >> 32) {
             by_bin.extend(same_bin.iter().map(|key| *key as u32));
-            ends.push((bins.in_order()[(same_bin[0] >> 32) as usize], by_bin.len() as u32));
+            let bin = bins.in_order()[(same_bin[0] >> 32) as usize];
+            runs.push(Run { bin, level_of_detail: 0, end: by_bin.len() as u32 });
         }
     }
 
@@ -94,12 +107,12 @@ impl BinnedSegment {
         is_drawn: impl Fn(u32) -> bool,
         is_visible: impl Fn(u32) -> bool,
     ) {
-        let Self { by_bin, ends, .. } = self;
-        ends.clear();
+        let Self { by_bin, runs, .. } = self;
+        runs.clear();
         by_bin.resize(positions.len(), 0);
         let (mut start, mut count) = (positions.start, 0);
-        let first = all.ends.partition_point(|&(_, end)| end as usize <= positions.start);
-        for &(bin, end) in &all.ends[first..] {
+        let first = all.runs.partition_point(|run| run.end as usize <= positions.start);
+        for &Run { bin, end, .. } in &all.runs[first..] {
             let run = start..(end as usize).min(positions.end);
             if run.is_empty() {
                 break;
@@ -115,10 +128,41 @@ impl BinnedSegment {
                 count += usize::from(is_visible(object));
             }
             if count > count_before {
-                ends.push((bin, count as u32));
+                runs.push(Run { bin, level_of_detail: 0, end: count as u32 });
             }
         }
         by_bin.truncate(count);
+    }
+
+    /// Divides the ordered objects of each bin that `has_levels` by `level_of` detail, the finest first. Objects of one level stay in order.
+    pub(crate) fn divide_by_level(&mut self, has_levels: impl Fn(u32) -> bool, level_of: impl Fn(u32) -> u32) {
+        let Self { by_bin, runs, divided_runs, undivided, .. } = self;
+        divided_runs.clear();
+        let mut start = 0;
+        for &run in &*runs {
+            let objects = &mut by_bin[start..run.end as usize];
+            if has_levels(run.bin) {
+                let mut counts = [0; DrawState::MAX_LEVEL_OF_DETAIL as usize + 1];
+                objects.iter().for_each(|&object| counts[level_of(object) as usize] += 1);
+                undivided.clear();
+                undivided.extend_from_slice(objects);
+                let (mut next, mut end) = ([0; DrawState::MAX_LEVEL_OF_DETAIL as usize + 1], start as u32);
+                for (level_of_detail, &count) in (0..).zip(&counts).filter(|(_, count)| **count > 0) {
+                    next[level_of_detail as usize] = end as usize - start;
+                    end += count;
+                    divided_runs.push(Run { bin: run.bin, level_of_detail, end });
+                }
+                for &object in &*undivided {
+                    let position = &mut next[level_of(object) as usize];
+                    objects[*position] = object;
+                    *position += 1;
+                }
+            } else {
+                divided_runs.push(run);
+            }
+            start = run.end as usize;
+        }
+        std::mem::swap(runs, divided_runs);
     }
 
     /// The number of objects in the segment.
@@ -131,11 +175,11 @@ impl BinnedSegment {
         &mut self.by_bin
     }
 
-    /// One of the bins that have objects, by index in draw order, with the range of its objects.
-    pub(super) fn run(&self, index: usize) -> Option<(u32, Range<usize>)> {
-        let &(bin, end) = self.ends.get(index)?;
-        let start = index.checked_sub(1).map_or(0, |before| self.ends[before].1);
-        Some((bin, start as usize..end as usize))
+    /// One of the bins that have objects, with one of their levels of detail, by index in draw order, and the range of its objects.
+    pub(super) fn run(&self, index: usize) -> Option<((u32, u32), Range<usize>)> {
+        let &Run { bin, level_of_detail, end } = self.runs.get(index)?;
+        let start = index.checked_sub(1).map_or(0, |before| self.runs[before].end);
+        Some(((bin, level_of_detail), start as usize..end as usize))
     }
 
     /// The objects in a range of a run.
@@ -211,6 +255,29 @@ mod tests {
             prop_assert!(of_some_bins.by_bin.iter().all(is_expected));
             let expected_count = (0..kinds.len() as u32).filter(is_expected).count();
             prop_assert_eq!(of_some_bins.len(), expected_count);
+
+            let level_of = |object: u32| object * 7 % 5 % 3;
+            let has_levels = |mesh: u32| mesh.is_multiple_of(2);
+            let mut divided: Vec<_> = edges.windows(2).map(|edge| {
+                let mut segment = BinnedSegment::default();
+                segment.select(&all, edge[0]..edge[1], |_| true, |object| kinds[object as usize].1);
+                segment.divide_by_level(|bin| has_levels(bins.get(bin).mesh), level_of);
+                Box::new(segment)
+            }).collect();
+            let mut divided_list = DrawList::default();
+            divided_list.join_bins(&mut divided, &bins, |mesh| mesh != unmergeable);
+            let mut by_level: Vec<_> = drawn.iter().map(|&(object, bin)| {
+                (bin, if has_levels(bin.mesh) { level_of(object) } else { 0 }, object)
+            }).collect();
+            by_level.sort();
+            prop_assert_eq!(&divided_list.objects, &by_level.iter().map(|drawn| drawn.2).collect::<Vec<_>>());
+            let levels = divided_list.batches.iter().flat_map(|batch| {
+                let bin = Bin { mesh: batch.mesh, state: batch.state.with_level_of_detail(0) };
+                vec![(bin, batch.state.level_of_detail()); batch.count as usize]
+            });
+            prop_assert!(levels.eq(by_level.iter().map(|&(bin, level, _)| (bin, level))));
+            let is_merged = |pair: &[Batch]| (pair[0].state, pair[0].mesh) != (pair[1].state, pair[1].mesh);
+            prop_assert!(divided_list.batches.windows(2).all(|pair| is_merged(pair) || pair[0].mesh == unmergeable));
 
             let mut expected = drawn;
             expected.sort_by_key(|&(object, bin)| (bin.state, bin.mesh, object));

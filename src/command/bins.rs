@@ -22,14 +22,14 @@ pub struct Bins {
 /// What the objects of a bin have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Bin {
-    /// The fixed-function state, of subdivision level 0.
+    /// The fixed-function state, of subdivision level 0 and level of detail 0.
     pub state: DrawState,
     /// The mesh's slot.
     pub mesh: u32,
 }
 
-/// The number of states of subdivision level 0.
-const STATES: usize = DrawState::COUNT >> 3;
+/// The number of states of subdivision level 0 and level of detail 0.
+const STATES: usize = DrawState::COUNT >> 6;
 
 const NO_BIN: u32 = u32::MAX;
 
@@ -43,7 +43,7 @@ impl Bins {
     /// The number of a bin; a new one if it has none.
     ///
     /// # Panics
-    /// If the state has a subdivision level above 0.
+    /// If the state has a subdivision level or a level of detail above 0.
     pub fn insert(&mut self, bin: Bin) -> u32 {
         if let Some(number) = self.find(bin) {
             return number;

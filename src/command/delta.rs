@@ -16,7 +16,7 @@ use super::RenderCommand;
 ///
 /// ```text
 /// byte 0 … 3 | 4 … 7    | 8 … 15            | 16 …
-/// "DLC2"     | checksum | count of commands | the commands
+/// "DLC3"     | checksum | count of commands | the commands
 /// ```
 ///
 /// All numbers are little-endian. The checksum is the CRC-32 of the coded commands followed by their count. It detects
@@ -96,7 +96,7 @@ pub enum DeltaError {
 }
 
 /// The first bytes: the format and its version.
-const MAGIC: [u8; 4] = *b"DLC2";
+const MAGIC: [u8; 4] = *b"DLC3";
 /// The length of the header.
 const HEADER: usize = 16;
 /// The number of commands that are coded on the stack before they are appended.

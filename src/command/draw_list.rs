@@ -75,7 +75,7 @@ impl DrawList {
         self.objects.extend_from_slice(&bucket.objects);
     }
 
-    /// Joins the segments of a pass that orders its objects by bin. Each bin becomes one batch. If `can_merge` is false for its mesh's
+    /// Joins the segments of a pass that orders its objects by bin. Each bin becomes one batch for each level of detail. If `can_merge` is false for its mesh's
     /// slot, each object becomes a batch. The list may take the vectors of the segments and leave its own in exchange.
     ///
     /// The list has no commands. It does not depend on where the segments begin.
@@ -87,8 +87,8 @@ impl DrawList {
     ) {
         if let [segment] = segments {
             let mut index = 0;
-            while let Some((bin, objects)) = segment.run(index) {
-                self.push_batches(bins, bin, objects, &can_merge);
+            while let Some((run, objects)) = segment.run(index) {
+                self.push_batches(bins, run, objects, &can_merge);
                 index += 1;
             }
             std::mem::swap(&mut self.objects, segment.by_bin_mut());
@@ -96,27 +96,34 @@ impl DrawList {
         }
         debug_assert!(segments.len() <= Self::MAX_SEGMENTS);
         let mut positions = [0; Self::MAX_SEGMENTS];
-        let next_bin = |positions: &[usize], segments: &[S]| {
+        let next_run = |positions: &[usize], segments: &[S]| {
             let runs = segments.iter().zip(positions).filter_map(|(segment, &index)| segment.run(index));
-            runs.map(|(bin, _)| bin).min_by_key(|&bin| bins.rank(bin))
+            runs.map(|(run, _)| run).min_by_key(|&(bin, level)| (bins.rank(bin), level))
         };
-        while let Some(bin) = next_bin(&positions, segments) {
+        while let Some(run) = next_run(&positions, segments) {
             let start = self.objects.len();
             for (segment, index) in segments.iter().zip(&mut positions) {
-                if let Some((_, objects)) = segment.run(*index).filter(|(other, _)| *other == bin) {
+                if let Some((_, objects)) = segment.run(*index).filter(|(other, _)| *other == run) {
                     self.objects.extend_from_slice(segment.objects(objects));
                     *index += 1;
                 }
             }
-            self.push_batches(bins, bin, start..self.objects.len(), &can_merge);
+            self.push_batches(bins, run, start..self.objects.len(), &can_merge);
         }
     }
 
     /// The most segments that can be joined.
     pub const MAX_SEGMENTS: usize = 32;
 
-    fn push_batches(&mut self, bins: &Bins, bin: u32, objects: Range<usize>, can_merge: impl Fn(u32) -> bool) {
+    fn push_batches(
+        &mut self,
+        bins: &Bins,
+        (bin, level): (u32, u32),
+        objects: Range<usize>,
+        can_merge: impl Fn(u32) -> bool,
+    ) {
         let Bin { mesh, state } = bins.get(bin);
+        let state = state.with_level_of_detail(level);
         let step = if can_merge(mesh) { objects.len() } else { 1 };
         let batches = objects.step_by(step).map(|first| Batch { mesh, state, first: first as u32, count: step as u32 });
         self.batches.extend(batches);

@@ -1,67 +1,80 @@
-//! The fixed-function state of a draw, in one byte.
+//! The fixed-function state of a draw, in two bytes.
 
-use crate::scene::{Blend, Topology};
+use crate::scene::{Blend, LevelOfDetail, Topology};
 
-/// Topology, culling, blending and subdivision level in one byte (M listing 10.1). With the process that draws, it determines a
-/// command's pipeline; with the mesh, its triangles.
+/// Topology, culling, blending, subdivision level and level of detail in two bytes (M listing 10.1). With the process that draws, it
+/// determines a command's pipeline; with the mesh, its triangles.
 ///
 /// ```text
-/// bit   7  6  5     | 4  3 | 2  1 | 0
-///       subdivision | blend| cull | topology
+/// bit   10  9  8        | 7  6  5     | 4  3 | 2  1 | 0
+///       level of detail | subdivision | blend| cull | topology
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct DrawState(u8);
+pub struct DrawState(u16);
 
 impl DrawState {
     /// A single-sided opaque triangle list.
     pub const PLAIN: Self = Self(0);
 
     /// The number of states: [`DrawState::index`] is less.
-    pub const COUNT: usize = 1 << 8;
+    pub const COUNT: usize = 1 << 11;
 
     /// The highest subdivision level: a mesh's edges can be halved 7 times.
     pub const MAX_SUBDIVISION_LEVEL: u32 = 7;
 
-    /// A state of subdivision level 0.
+    /// The coarsest level of detail: see [`Mesh::levels`](crate::scene::Mesh::levels).
+    pub const MAX_LEVEL_OF_DETAIL: u32 = LevelOfDetail::MAX_COUNT as u32;
+
+    /// A state of subdivision level 0 and level of detail 0.
     pub fn new(topology: Topology, cull: Cull, blend: Blend) -> Self {
-        Self(topology as u8 | (cull as u8) << 1 | (blend as u8) << 3)
+        Self(topology as u16 | (cull as u16) << 1 | (blend as u16) << 3)
     }
 
     /// The same state with another topology.
     pub(crate) fn with_topology(self, topology: Topology) -> Self {
-        Self(self.0 & !1 | topology as u8)
+        Self(self.0 & !1 | topology as u16)
     }
 
     /// The same state with another subdivision level, at most [`DrawState::MAX_SUBDIVISION_LEVEL`].
     pub fn with_subdivision_level(self, level: u32) -> Self {
-        Self(self.0 & 0b1_1111 | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u8) << 5)
+        Self(self.0 & !(0b111 << 5) | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u16) << 5)
     }
 
     /// How often the mesh's edges are halved.
     pub fn subdivision_level(self) -> u32 {
-        u32::from(self.0 >> 5)
+        u32::from(self.0 >> 5 & 0b111)
     }
 
-    /// The part of the state that selects the pipeline. A subdivided mesh is a triangle list, whatever its own topology is.
+    /// The same state with another level of detail, at most [`DrawState::MAX_LEVEL_OF_DETAIL`].
+    pub fn with_level_of_detail(self, level: u32) -> Self {
+        Self(self.0 & !(0b111 << 8) | (level.min(Self::MAX_LEVEL_OF_DETAIL) as u16) << 8)
+    }
+
+    /// Which of the mesh's levels is drawn: 0 for the mesh itself.
+    pub fn level_of_detail(self) -> u32 {
+        u32::from(self.0 >> 8)
+    }
+
+    /// The part of the state that selects the pipeline, on which the level of detail has no influence. A subdivided mesh is a triangle list, whatever its own topology is.
     pub fn pipeline_state(self) -> Self {
         match self.subdivision_level() {
-            0 => self,
+            0 => self.with_level_of_detail(0),
             _ => Self::new(Topology::TriangleList, self.cull(), self.blend()),
         }
     }
 
-    /// The byte as an index.
+    /// The bits as an index.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 
-    /// The state with this byte.
-    pub(super) fn from_byte(byte: u8) -> Self {
-        Self(byte)
+    /// The state with these bits; `None` if there is none.
+    pub(super) fn from_bits(bits: u16) -> Option<Self> {
+        (usize::from(bits) < Self::COUNT).then_some(Self(bits))
     }
 
-    /// The byte.
-    pub(super) fn byte(self) -> u8 {
+    /// The bits.
+    pub(super) fn bits(self) -> u16 {
         self.0
     }
 
@@ -108,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_field_survives_the_byte() {
+    fn every_field_survives_the_bits() {
         let mut seen = std::collections::BTreeSet::new();
         for topology in [Topology::TriangleList, Topology::TriangleStrip] {
             for cull in [Cull::Back, Cull::Front, Cull::Nothing] {
@@ -124,6 +137,13 @@ mod tests {
                     assert_eq!(subdivided.with_subdivision_level(0), state);
                     assert_eq!(state.pipeline_state(), state);
                     assert_eq!(subdivided.pipeline_state(), DrawState::new(Topology::TriangleList, cull, blend));
+                    let coarse = subdivided.with_level_of_detail(9);
+                    assert_eq!(
+                        (state.level_of_detail(), coarse.level_of_detail(), coarse.subdivision_level()),
+                        (0, DrawState::MAX_LEVEL_OF_DETAIL, DrawState::MAX_SUBDIVISION_LEVEL)
+                    );
+                    assert_eq!(coarse.with_level_of_detail(0), subdivided);
+                    assert_eq!(state.with_level_of_detail(3).pipeline_state(), state);
                     assert!(seen.insert(state));
                 }
             }

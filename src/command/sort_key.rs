@@ -6,8 +6,8 @@ use super::DrawState;
 /// with equal keys are ordered by object index.
 ///
 /// ```text
-/// bit    63 62 | 61 … 54 | 53 52 | 51 … 20 | 19 … 0
-/// opaque  0  0 | state   | 0     | mesh    | depth, near to far
+/// bit    63 62 | 61 … 56 | 55 … 24 | 23 … 21         | 20 | 19 … 0
+/// opaque  0  0 | state   | mesh    | level of detail | 0  | depth, near to far
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
@@ -34,12 +34,13 @@ impl SortKey {
     /// The largest key, of empty commands.
     pub const LAST: Self = Self(u64::MAX);
 
-    /// The key of an opaque command: by state and mesh, then front to back. `depth` is a
+    /// The key of an opaque command: by state, mesh and level of detail, then front to back. `depth` is a
     /// [quantised](crate::quality::DepthKey::quantize) depth.
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
-        let state = (state.index() as u64 & 0xff) << 54;
-        let mesh = u64::from(mesh) << 20;
-        Self(state | mesh | u64::from(depth >> 12))
+        let (bits, level) = (u64::from(state.bits()), u64::from(state.level_of_detail()));
+        // Subdivision level, culling and topology.
+        let state = (bits >> 5 & 0b111) << 3 | bits & 0b111;
+        Self(state << 56 | u64::from(mesh) << 24 | level << 21 | u64::from(depth >> 12))
     }
 
     /// The key of a blended command: back to front, exact to the last bit of `depth`, a
@@ -65,7 +66,9 @@ impl SortKey {
 
     /// The state and the mesh slot in the key of an opaque command; `None` for other keys.
     pub(super) fn state_and_mesh(self) -> Option<(DrawState, u32)> {
-        (self.0 >> 62 == 0).then(|| (DrawState::from_byte((self.0 >> 54) as u8), (self.0 >> 20) as u32))
+        let field = |shift: u32| (self.0 >> shift) as u16 & 0b111;
+        let state = DrawState::from_bits(field(56) | field(59) << 5 | field(21) << 8);
+        state.filter(|_| self.0 >> 62 == 0).map(|state| (state, (self.0 >> 24) as u32))
     }
 }
 
@@ -115,8 +118,9 @@ mod tests {
         }
 
         #[test]
-        fn only_opaque_keys_contain_state_and_mesh(byte in any::<u8>(), mesh in any::<u32>(), depth in any::<u32>()) {
-            let state = DrawState::from_byte(byte);
+        fn only_opaque_keys_contain_state_and_mesh(bits in 0..DrawState::COUNT as u16, mesh in any::<u32>(), depth in any::<u32>()) {
+            // An opaque state has no blending.
+            let state = DrawState::from_bits(bits & !0b1_1000).unwrap();
             prop_assert_eq!(SortKey::opaque(state, mesh, depth).state_and_mesh(), Some((state, mesh)));
             prop_assert_eq!(SortKey::blended(depth).state_and_mesh(), None);
             prop_assert_eq!(SortKey::LAST.state_and_mesh(), None);

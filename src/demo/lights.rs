@@ -46,6 +46,7 @@ pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
             position: camera.position + lamp,
             intensity,
             range: Light::range_for(intensity).max(f32::MIN_POSITIVE),
+            casts_shadow: false,
         },
     ]
 }

@@ -11,7 +11,7 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::AttachmentExtent;
 use crate::scene::Projection;
-use crate::view::ObjectFilter;
+use crate::view::{ObjectLevels, SelectionFilter};
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -34,6 +34,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     /// Whether the triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
     pub(super) workers: usize,
+    /// The number of passes that order their objects by bin.
+    pub(super) binning_passes: usize,
 }
 
 impl<B: Backend> FrameContext<'_, B> {
@@ -47,6 +49,11 @@ impl<B: Backend> FrameContext<'_, B> {
         self.tables.visibility[self.view_index_of(pass)].set.count()
     }
 
+    /// The levels of detail in a view, by index; `None` if all are 0.
+    pub(super) fn levels_of_detail(&self, view: usize) -> Option<&ObjectLevels> {
+        self.tables.levels.get(view).map(|view| &view.levels)
+    }
+
     /// Whether a pass orders its objects by bin, and not by depth.
     pub(super) fn orders_by_bin(&self, pass: usize) -> bool {
         self.tables.passes[pass].orders_by_bin
@@ -57,9 +64,10 @@ impl<B: Backend> FrameContext<'_, B> {
         let view_index = self.view_index_of(pass);
         let objects = &self.tables.objects;
         let selection = self.tables.passes[pass].selection.unwrap_or_default();
-        let filter = ObjectFilter::new(objects, self.request.scene, selection);
+        let filter = SelectionFilter::new(objects, self.request.scene, selection);
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
+            levels: self.levels_of_detail(view_index).map(ObjectLevels::version),
             selection,
             layers: (!filter.ignores_layers()).then(|| objects.epoch()),
             material_types: objects.material_types_revision(),
@@ -87,8 +95,7 @@ impl<B: Backend> FrameContext<'_, B> {
     /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share the workers.
     pub(super) fn segment_count(&self, pass: usize) -> usize {
         let by_size = self.visible_count(pass) / MIN_OBJECTS_PER_SEGMENT;
-        let binning = self.tables.passes.iter().filter(|table| table.orders_by_bin).count();
-        let by_workers = self.workers.div_ceil(binning.max(1));
+        let by_workers = self.workers.div_ceil(self.binning_passes.max(1));
         by_size.min(by_workers).clamp(1, DrawList::MAX_SEGMENTS)
     }
 

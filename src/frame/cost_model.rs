@@ -54,6 +54,13 @@ impl CostModel {
         }
     }
 
+    /// Takes over estimates of another model. `same` are pairs of cost kinds that are the same, of this model and of the other.
+    pub(super) fn inherit_estimates(&mut self, before: &Self, same: impl IntoIterator<Item = (usize, usize)>) {
+        for (kind, kind_before) in same {
+            self.costs[kind].estimate = before.costs[kind_before].estimate;
+        }
+    }
+
     /// Adds a sample: the time of a job over `items` items of a node.
     pub(super) fn add_sample(&self, node: usize, items: usize, took: Duration) {
         let cost = &self.costs[self.kinds[node]];

@@ -59,6 +59,31 @@ pub enum FrameError {
         /// Two views.
         views: [String; 2],
     },
+    /// A view that is a face of a cube map, and not square.
+    #[error("view {view:?} is a face of a cube map, and has {width}x{height} pixels")]
+    OblongCubeFace {
+        /// The view.
+        view: String,
+        /// In pixels.
+        width: u32,
+        /// In pixels.
+        height: u32,
+    },
+    /// More views than [`FrameError::MAX_VIEWS`].
+    #[error("{views} views are more than the {} of a frame", Self::MAX_VIEWS)]
+    TooManyViews {
+        /// How many.
+        views: usize,
+    },
+    /// The [predicate on materials](crate::scene::ObjectFilter::materials) of a view's filter panicked. Where the program is built with
+    /// `panic = "abort"` the program ends instead.
+    #[error("the filter of view {view:?} panicked: {message}")]
+    FilterPanicked {
+        /// The view.
+        view: String,
+        /// What the panic said.
+        message: String,
+    },
     /// The processes that the scene requires make no frame.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -102,6 +127,11 @@ pub enum FrameError {
     StageGraph(GraphProblem),
 }
 
+impl FrameError {
+    /// The most views of a frame, shadow maps among them. Each has passes and targets of its own.
+    pub const MAX_VIEWS: usize = 4_096;
+}
+
 impl From<RunError> for FrameError {
     fn from(error: RunError) -> Self {
         match error {
@@ -110,6 +140,61 @@ impl From<RunError> for FrameError {
             RunError::Scheduler(panic) => Self::Scheduler(panic),
         }
     }
+}
+
+/// Why a [`ViewBudget`](super::ViewBudget) is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BudgetError {
+    /// The time is no budget.
+    #[error(
+        "a budget of {milliseconds} ms a frame is not from {} to {} ms",
+        Self::MIN_MILLISECONDS,
+        Self::MAX_MILLISECONDS
+    )]
+    InvalidBudget {
+        /// The time.
+        milliseconds: f64,
+    },
+    /// A rung of a view's ladder is invalid.
+    #[error("rung {rung} of view {view:?} has {problem}")]
+    InvalidRung {
+        /// The view.
+        view: String,
+        /// The rung.
+        rung: usize,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// A rung of a view's ladder comes after the one that leaves the view out.
+    #[error("rung {rung} of view {view:?} comes after the rung that leaves the view out, which must be the last one")]
+    RungAfterLeftOut {
+        /// The view.
+        view: String,
+        /// The rung.
+        rung: usize,
+    },
+    /// Two cameras of one name.
+    #[error("the budget has two cameras named {camera:?}: in view {:?} and in view {:?}", views[0], views[1])]
+    DuplicateCamera {
+        /// The name.
+        camera: String,
+        /// The views that have them, which may be the same.
+        views: [String; 2],
+    },
+    /// Two views of one name.
+    #[error("the budget has two views named {view:?}")]
+    DuplicateView {
+        /// The name.
+        view: String,
+    },
+}
+
+impl BudgetError {
+    /// The smallest budget of a frame: a nanosecond.
+    pub const MIN_MILLISECONDS: f64 = 1e-6;
+    /// The largest budget of a frame.
+    pub const MAX_MILLISECONDS: f64 = 1e12;
 }
 
 /// Why a recorded frame was not submitted.

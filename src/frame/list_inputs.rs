@@ -12,6 +12,8 @@ use crate::view::RenderView;
 pub(super) struct ListInputs {
     /// The version of the view's visible set.
     pub(super) visible: Version,
+    /// The version of the levels of detail in the view; `None` if all are 0.
+    pub(super) levels: Option<Version>,
     pub(super) selection: Selection,
     /// The epoch of the object table, if the layers of objects decide which are drawn.
     pub(super) layers: Option<u64>,

@@ -3,6 +3,7 @@
 //! [`Renderer::record`] has the steps of a frame in order, and `stages.rs` lists the stages that its jobs run.
 
 mod blended_object_witness;
+mod budgeted_view;
 mod builder;
 mod column_check;
 mod context;
@@ -10,6 +11,7 @@ mod cost_model;
 mod error;
 mod granularity;
 mod job_size;
+mod light_maps;
 mod list_inputs;
 mod occluders;
 mod occlusion_control;
@@ -18,26 +20,34 @@ mod plan_cache;
 mod recorded;
 mod renderer;
 mod scene_check;
-mod shadow_cache;
 mod stage;
 mod stage_clock;
 mod stage_graph;
 mod stage_tuning;
 mod stages;
 mod statistics;
+mod table_keys;
 mod tables;
 mod triangle_culling;
 mod valid_lights;
+mod view_budget;
+mod view_cache;
+mod view_cost;
+mod view_filter;
+mod view_levels;
 mod view_occlusion;
+mod view_times;
 mod view_visibility;
 mod views;
 mod warnings;
 
+pub use budgeted_view::{BudgetedView, Rung, ViewForm};
 pub use builder::RendererBuilder;
-pub use error::{BuildError, FrameError, SubmitError};
+pub use error::{BudgetError, BuildError, FrameError, SubmitError};
 pub use granularity::Granularity;
 #[cfg(feature = "report")]
 pub(crate) use job_size::job_size;
 pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
-pub use statistics::{FrameStatistics, StageTimes, ViewStatistics};
+pub use statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};
+pub use view_budget::ViewBudget;

@@ -52,6 +52,14 @@ impl OcclusionControl {
         Self { occluders, tuner: Tuner::new(MAX_PAUSES), frames: 0, chosen: WITH_TEST, is_trial: false, previous: None }
     }
 
+    /// Takes over what was measured of the same view in the frames of another graph.
+    pub(super) fn inherit_measurements(&mut self, before: &Self) {
+        if self.is_possible() && before.is_possible() {
+            // The tables of the other graph may be gone, so the first frame does not count as warm.
+            *self = Self { occluders: self.occluders.take(), previous: None, ..before.clone() };
+        }
+    }
+
     /// Whether the view can test for occlusion.
     pub(super) fn is_possible(&self) -> bool {
         self.occluders.is_some()
@@ -65,7 +73,7 @@ impl OcclusionControl {
     /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None` where the view
     /// cannot test for occlusion, or did not though it was chosen, because its picture is too large.
     fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
-        let alternative = |(name, nanoseconds)| TuningAlternative { name, nanoseconds };
+        let alternative = |(name, nanoseconds): (&'static str, _)| TuningAlternative { name: name.into(), nanoseconds };
         (self.is_possible() && has_tested == self.is_on()).then(|| TuningChoice {
             subject: TuningSubject::OcclusionTest,
             labels: Arc::clone(labels),

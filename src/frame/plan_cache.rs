@@ -12,6 +12,8 @@ use crate::view::ShadowMaps;
 /// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
 pub(super) struct PlanCache {
     deferred: Option<Deferred>,
+    /// What every plan has, whatever the scene requires.
+    kept: Requirements,
     processes: Vec<Arc<dyn RenderProcess>>,
     outputs: Vec<String>,
     shadow_maps: ShadowMaps,
@@ -38,10 +40,14 @@ impl PlanCache {
             catch_panics(|| deferred.check())?;
             compile(Some(deferred), &processes, &outputs, &all)?;
         }
-        let nothing = Requirements::default();
+        let kept = match &deferred {
+            Some(deferred) => catch_panics(|| Ok(deferred.kept_requirements()))?,
+            None => Requirements::default(),
+        };
+        let nothing = Requirements::default().union(kept);
         let current = Arc::new(compile(deferred.as_ref(), &processes, &outputs, &nothing)?);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
-        Ok(Self { deferred, processes, outputs, shadow_maps, compiled, current })
+        Ok(Self { deferred, kept, processes, outputs, shadow_maps, compiled, current })
     }
 
     /// A cache with another deferred pipeline.
@@ -100,6 +106,7 @@ impl PlanCache {
     /// If the processes make no frame.
     fn plan_for(&mut self, requirements: Requirements) -> Result<Arc<FramePlan>, PlanError> {
         let Some(deferred) = &self.deferred else { return Ok(Arc::clone(&self.current)) };
+        let requirements = requirements.union(self.kept);
         if let Some(plan) = self.compiled.get(&requirements) {
             return Ok(Arc::clone(plan));
         }

@@ -4,14 +4,14 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::shadow_cache::InFlight;
+use super::view_cache::InFlight;
 use super::{FrameStatistics, SubmitError};
 use crate::backend::{Backend, ViewQueue};
 use crate::process::Pass;
 use crate::timeline::Timeline;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
-/// dropped without being submitted, the next frame draws the shadow maps again that this one would have drawn.
+/// dropped without being submitted, the next frame draws all of its views, also those that it would have [cached](crate::scene::Redraw).
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.

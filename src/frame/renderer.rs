@@ -10,11 +10,12 @@ use super::pass_recording::PassRecording;
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::Recorded;
 use super::scene_check::check_scene;
-use super::shadow_cache::ShadowCache;
 use super::stage_clock::{StageClock, StageGroup};
 use super::stage_graph::{StageGraphCache, StageOptions};
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
+use super::view_cache::ViewCache;
+use super::view_filter::count_unknown_objects;
 use super::views::FrameViews;
 use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
@@ -23,8 +24,9 @@ use crate::command::DrawList;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
-use crate::task::Scheduler;
-use crate::view::possible_draw_states;
+use crate::task::{BackgroundJob, Scheduler};
+use crate::timeline::TuningChoice;
+use crate::view::{RenderView, possible_draw_states};
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
@@ -66,9 +68,11 @@ pub struct Renderer<B: Backend> {
     scheduler: Arc<Scheduler>,
     graphs: StageGraphCache<B>,
     tables: FrameTables,
-    shadow_cache: ShadowCache,
+    view_cache: ViewCache,
     /// One for each pass of the latest frame.
     recordings: Vec<PassRecording<B>>,
+    /// What the engine chose for the next frame.
+    choices: Vec<TuningChoice>,
     warnings: Warnings,
     column_check: ColumnCheck,
 }
@@ -92,8 +96,9 @@ impl<B: Backend> Renderer<B> {
             scheduler,
             graphs: StageGraphCache::default(),
             tables: FrameTables::default(),
-            shadow_cache: ShadowCache::default(),
+            view_cache: ViewCache::default(),
             recordings: Vec::new(),
+            choices: Vec::new(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
         }
@@ -113,7 +118,8 @@ impl<B: Backend> Renderer<B> {
     /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
-        let recorded = self.record_frame(&scene);
+        let choices = std::mem::take(&mut self.choices);
+        let recorded = self.record_frame(&scene, choices);
         match recorded {
             Ok(_) => self.tables.end_frame(),
             Err(_) => {
@@ -122,6 +128,12 @@ impl<B: Backend> Renderer<B> {
             }
         }
         recorded
+    }
+
+    /// Adds choices that the engine made by measured cost for the next frame, such as those of a
+    /// [`ViewBudget`](crate::ViewBudget), to what that frame [reports](FrameStatistics::tuning).
+    pub fn add_choices(&mut self, choices: impl IntoIterator<Item = TuningChoice>) {
+        self.choices.extend(choices);
     }
 
     /// Compiles the shaders of frames of this scene, and of one that requires every process of the pipeline, and makes their pipelines for
@@ -133,19 +145,64 @@ impl<B: Backend> Renderer<B> {
     /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
     /// frame.
     pub fn prepare_pipelines(&mut self, scene: SceneRef<'_>) -> Result<(), FrameError> {
-        let transparency = Requirements::any_needs_transparency(&scene);
-        for plan in self.plans.plans_to_prepare(scene.lights, transparency, scene.cameras)? {
-            let draws = plan.draws()?;
+        self.preparation(&scene)?()
+    }
+
+    /// Does what [`prepare_pipelines`](Self::prepare_pipelines) does as a [background job](Scheduler::background), while frames go on: before
+    /// a light is switched on, or glass comes into sight. Frames do not wait for it; one that needs a pipeline which is not there yet makes
+    /// it itself.
+    ///
+    /// ```
+    /// # use drawloom::{FrameError, Renderer, backend::Backend, scene::SceneRef};
+    /// # fn load<B: Backend>(renderer: &mut Renderer<B>, next_room: SceneRef<'_>) -> Result<(), Box<dyn std::error::Error>> {
+    /// let preparation = renderer.prepare_pipelines_in_background(next_room)?;
+    /// // Some frames later:
+    /// if preparation.is_finished() {
+    ///     preparation.wait()??;
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// If a process panics, or its draws do not fit its declaration. A shader that does not compile is an error of the job.
+    pub fn prepare_pipelines_in_background(
+        &mut self,
+        scene: SceneRef<'_>,
+    ) -> Result<BackgroundJob<Result<(), FrameError>>, FrameError> {
+        let preparation = self.preparation(&scene)?;
+        Ok(self.scheduler.background(preparation))
+    }
+
+    /// A closure that makes the pipelines of this scene, and of one that requires everything. It owns all that it needs, so that it can run in
+    /// the background.
+    fn preparation(
+        &mut self,
+        scene: &SceneRef<'_>,
+    ) -> Result<impl FnOnce() -> Result<(), FrameError> + Send + use<B>, FrameError> {
+        let transparency = Requirements::any_needs_transparency(scene);
+        let plans = self.plans.plans_to_prepare(scene.lights, transparency, scene.cameras)?;
+        let mut states_of_plans = Vec::new();
+        for plan in &plans {
             let states_of = |draws: &Draws<'_>| {
                 draws.selection().map_or_else(Vec::new, |selection| possible_draw_states(selection, scene.assets))
             };
-            let states: Vec<_> = draws.iter().map(states_of).collect();
-            self.backend.prepare_pipelines(&plan, &draws, &states, &self.quality)?;
+            states_of_plans.push(plan.draws()?.iter().map(states_of).collect::<Vec<_>>());
         }
-        Ok(())
+        let (backend, quality) = (Arc::clone(&self.backend), self.quality);
+        Ok(move || {
+            for (plan, states) in plans.iter().zip(&states_of_plans) {
+                backend.prepare_pipelines(plan, &plan.draws()?, states, &quality)?;
+            }
+            Ok(())
+        })
     }
 
-    fn record_frame(&mut self, scene: &SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
+    fn record_frame(
+        &mut self,
+        scene: &SceneRef<'_>,
+        mut choices: Vec<TuningChoice>,
+    ) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
         let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
@@ -155,27 +212,31 @@ impl<B: Backend> Renderer<B> {
         // Scene → views: one for each camera, and one for each shadow map.
         self.tables.objects.configure(self.quality.culling);
         self.tables.objects.begin_frame(scene);
+        count_unknown_objects(scene, self.tables.objects.rejections());
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects);
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
-        let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), &plan)?;
-        let (frame_views, shadow_maps) = self.shadow_cache.resolve(self.quality.shadows.interval, &plan, requested);
-        let FrameViews { views, lights } = frame_views;
+        let interval = self.quality.shadows.interval;
+        let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;
+        let is_imported = |view: &str| self.backend.imports_targets_of(view);
+        let FrameViews { views, lights, arrays } = self.view_cache.resolve(&plan, requested, is_imported);
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
         self.tables.cullable_meshes.update(scene.assets, self.tables.objects.used_meshes());
+        self.tables.mesh_levels.update(scene.assets, self.tables.objects.used_meshes());
         // The bounds of triangle culling hold only for camera-relative transforms.
         let culls_triangles =
             !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;
         let options = StageOptions {
             occlusion_tile: self.quality.occlusion,
             culls_triangles,
+            chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
         };
         let graph = self.graphs.get(&plan, &draws, &views, options)?;
-        graph.begin_frame(&mut self.tables, scene, &views, self.quality.culling, self.scheduler.workers());
+        graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::default();
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, separate_shadowed_lights));
@@ -210,6 +271,7 @@ impl<B: Backend> Renderer<B> {
             occlusion: &graph.tuning.occlusion,
             culls_triangles,
             workers: self.scheduler.workers(),
+            binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
         };
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
             graph.tuning.costs.discard_frame();
@@ -226,7 +288,9 @@ impl<B: Backend> Renderer<B> {
                 return Err(error.into());
             }
         }
-        let tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
+        let mut tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
+        choices.append(&mut tuning.choices);
+        tuning.choices = choices;
         self.scheduler.timeline().add_tuning(frame_number, &tuning);
 
         // Record → per-camera queues, for the submitter.
@@ -235,11 +299,11 @@ impl<B: Backend> Renderer<B> {
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         let memory = (uploaded, self.backend.target_memory(&frame));
         let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
-        self.warnings.report(&statistics.rejections, views.iter().any(|view| view.is_cached));
+        self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);
-        let in_flight = self.shadow_cache.store(shadow_maps);
         let submission_order = graph.passes.clone();
+        let in_flight = self.view_cache.store(&plan, FrameViews { views, lights, arrays });
         let backend = Arc::clone(&self.backend);
         Ok(Recorded { queues, submission_order, frame, statistics, backend, frame_number, in_flight })
     }
@@ -251,7 +315,7 @@ impl<B: Backend> Renderer<B> {
     pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
         self.plans = self.plans.with_deferred(deferred)?;
         self.pipeline_has_quality = false;
-        self.shadow_cache.invalidate();
+        self.view_cache.invalidate();
         Ok(())
     }
 
@@ -269,7 +333,7 @@ impl<B: Backend> Renderer<B> {
         }
         (self.quality, self.pipeline_has_quality) = (quality, true);
         self.tables.invalidate();
-        self.shadow_cache.invalidate();
+        self.view_cache.invalidate();
         Ok(())
     }
 
@@ -285,7 +349,7 @@ impl<B: Backend> Renderer<B> {
     }
 
     /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed. `None` where the
-    /// process draws no commands in that view, or its picture was cached.
+    /// process draws no commands in that view, or the view was [cached](crate::scene::Redraw).
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
         let name = |pass: &Pass| graph.plan.processes()[pass.process_index].name.as_str();

@@ -80,6 +80,8 @@ pub(super) struct StageNeeds {
     pub(super) tests_occlusion: bool,
     /// Whether the scene has meshes whose triangles are culled.
     pub(super) culls_triangles: bool,
+    /// Whether views choose levels of detail.
+    pub(super) chooses_levels: bool,
 }
 
 impl StageNeeds {
@@ -105,6 +107,8 @@ pub(super) struct StageNode<B> {
     pub(super) stage: Box<dyn Stage<B>>,
     /// Its index in the cost model.
     pub(super) node: usize,
+    /// The view that it works for, by index; `None` for a stage of the frame.
+    pub(super) view: Option<usize>,
     /// The view whose occlusion tuner counts the node's time, by index.
     pub(super) tuned_view: Option<usize>,
 }
@@ -130,6 +134,9 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
     fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
         let job = StageJob { items: items.clone(), worker, node: self.node };
         let (result, took) = frame.clock.measure(self.stage.info().group, || self.stage.run(frame, job));
+        if let Some(view) = self.view {
+            frame.tables.view_times.add(view, took);
+        }
         if let Some(view) = self.tuned_view {
             frame.tables.occlusion[view].add_time(took);
         }

@@ -1,5 +1,6 @@
 //! The frame's stage graph: which stages a frame has, and which waits for which.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::FrameError;
@@ -8,15 +9,17 @@ use super::occlusion_control::OcclusionControl;
 use super::stage::{Stage, StageNeeds, StageNode};
 use super::stage_tuning::{StageTuning, TuningLabels};
 use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
+use super::table_keys::TableKeys;
 use super::tables::{FrameTables, PassTable};
-use crate::backend::Backend;
+use super::view_levels::ViewLevels;
+use crate::backend::{Backend, kept_views};
 use crate::command::Selection;
 use crate::graph::{FrameGraph, NodeId, Schedule};
 use crate::process::{Draws, FramePasses, FramePlan, Pass, SampledViews};
-use crate::quality::{CullingVolume, DepthKey};
+use crate::quality::{DepthKey, Quality};
 use crate::scene::{LayerMask, Projection, SceneRef, ViewKind};
 use crate::timeline::Labels;
-use crate::view::RenderView;
+use crate::view::{LevelSelector, RenderView};
 
 /// The stages of a frame for one plan and one list of views, compiled to a schedule, with what is measured about them.
 pub(super) struct StageGraph<B: Backend> {
@@ -26,9 +29,17 @@ pub(super) struct StageGraph<B: Backend> {
     pub(super) passes: Vec<Pass>,
     pub(super) sampled_views: SampledViews,
     pub(super) plan: Arc<FramePlan>,
+    table_keys: Arc<TableKeys>,
+    /// For each view whether a pass of it draws commands.
+    view_draws_commands: Vec<bool>,
+    /// The cost kinds of the tuning, by stage and by the index of the process.
+    cost_kinds: HashMap<(&'static str, Option<usize>), usize>,
     /// What else the graph was built for.
     key: GraphKey,
 }
+
+/// What a cost kind is known by in all graphs: the stage, and the kind of views and the name of the process.
+type CostKindName<'a> = (&'static str, Option<(ViewKind, &'a str)>);
 
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
 #[derive(Debug)]
@@ -54,6 +65,8 @@ pub(super) struct StageOptions {
     pub(super) occlusion_tile: Option<u32>,
     /// Whether triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
+    /// Whether views choose levels of detail.
+    pub(super) chooses_levels: bool,
     /// The order of opaque objects.
     pub(super) opaque_order: DepthKey,
 }
@@ -68,6 +81,7 @@ struct ViewKey {
     is_paraboloid: bool,
     has_oblique_near_plane: bool,
     layers: LayerMask,
+    samples_views: bool,
 }
 
 impl ViewKey {
@@ -75,17 +89,18 @@ impl ViewKey {
         Self {
             name: view.name().to_owned(),
             kind: view.kind(),
-            is_cached: view.is_cached,
+            is_cached: view.is_cached(),
             is_paraboloid: is_paraboloid(view),
             has_oblique_near_plane: view.has_oblique_near_plane(),
             layers: view.camera.layers,
+            samples_views: view.camera.samples_views,
         }
     }
 
     fn fits(&self, view: &RenderView) -> bool {
-        (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached)
+        (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached())
             && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
-            && self.layers == view.camera.layers
+            && (self.layers, self.samples_views) == (view.camera.layers, view.camera.samples_views)
     }
 }
 
@@ -132,7 +147,7 @@ impl<B: Backend> StageGraph<B> {
     ) -> Result<Self, FrameError> {
         let FramePasses { passes, sampled_views } = plan.passes(views).map_err(FrameError::CircularViews)?;
         for view in views {
-            if !view.is_cached && !plan.draws_views(view.kind()) {
+            if !view.is_cached() && !plan.draws_views(view.kind()) {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
@@ -144,8 +159,13 @@ impl<B: Backend> StageGraph<B> {
         };
         let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();
         let mut builder = GraphBuilder::default();
-        let every_frame =
-            StageNeeds { draws_commands: true, orders_by_bin: false, tests_occlusion: false, culls_triangles: false };
+        let every_frame = StageNeeds {
+            draws_commands: true,
+            orders_by_bin: false,
+            tests_occlusion: false,
+            culls_triangles: false,
+            chooses_levels: false,
+        };
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
         for (index, pass) in passes.iter().enumerate() {
@@ -157,6 +177,7 @@ impl<B: Backend> StageGraph<B> {
                     .is_some_and(|selection| orders_by_bin(selection, view, key.options.opaque_order)),
                 tests_occlusion: occlusion[pass.view_index].is_possible(),
                 culls_triangles: key.options.culls_triangles,
+                chooses_levels: key.options.chooses_levels,
             };
             // The stages of a view stand right before those of its first pass: a serial run has what they write in its
             // caches.
@@ -175,11 +196,14 @@ impl<B: Backend> StageGraph<B> {
             };
             builder.add(pass_scope, stages_of_pass(index), needs);
         }
-        let GraphBuilder { graph, kind_of_node, labels, .. } = builder;
+        let GraphBuilder { graph, cost_kinds, kind_of_node, labels, .. } = builder;
         let labels = TuningLabels::new(labels, plan, &passes, views);
         Ok(Self {
             schedule: graph.compile().map_err(|error| FrameError::StageGraph(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
+            view_draws_commands: view_scopes.iter().map(Option::is_some).collect(),
+            table_keys: Arc::new(TableKeys::new(plan, &passes, views)),
+            cost_kinds,
             passes,
             sampled_views,
             plan: Arc::clone(plan),
@@ -187,16 +211,44 @@ impl<B: Backend> StageGraph<B> {
         })
     }
 
+    /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a frame that requires
+    /// something else does not try out again what is known.
+    fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
+        self.schedule.inherit_measurements(&before.schedule);
+        let kinds_before: HashMap<_, _> = before.cost_kind_names().collect();
+        let pairs = self.cost_kind_names().filter_map(|(name, kind)| Some((kind, *kinds_before.get(&name)?)));
+        let pairs: Vec<_> = pairs.collect();
+        self.tuning.costs.inherit_estimates(&before.tuning.costs, pairs);
+        let views_before = before.key.views.iter().map(|view| (view.kind, view.name.as_str()));
+        for (control, kept) in self.tuning.occlusion.iter_mut().zip(kept_views(views_before, views)) {
+            if let Some(kept) = kept.filter(|kept| kept.is_same) {
+                control.inherit_measurements(&before.tuning.occlusion[kept.index]);
+            }
+        }
+    }
+
+    /// The cost kinds by their names.
+    fn cost_kind_names(&self) -> impl Iterator<Item = (CostKindName<'_>, usize)> {
+        self.cost_kinds.iter().map(|((stage, process), kind)| {
+            let planned = process.map(|index| &self.plan.processes()[index]);
+            ((*stage, planned.map(|planned| (planned.declaration.views, planned.name.as_str()))), *kind)
+        })
+    }
+
     /// Begins a frame of these views in the tables. The object table has begun it already.
+    ///
+    /// # Errors
+    /// If the predicate of a view's filter panics.
     pub(super) fn begin_frame(
         &self,
         tables: &mut FrameTables,
         scene: &SceneRef<'_>,
         views: &[RenderView],
-        culling: CullingVolume,
+        quality: &Quality,
         workers: usize,
-    ) {
-        let StageOptions { occlusion_tile: tile, culls_triangles, opaque_order } = self.key.options;
+    ) -> Result<(), FrameError> {
+        let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order } = self.key.options;
+        tables.set_keys(&self.table_keys, views);
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
@@ -205,20 +257,31 @@ impl<B: Backend> StageGraph<B> {
             let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
             table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
         }
-        if tile.is_some() {
-            tables.occluder_meshes.sync(scene.assets);
+        if self.tuning.occlusion.iter().any(OcclusionControl::is_possible) {
+            tables.occluder_meshes.sync(scene.assets, tables.objects.used_meshes());
+        }
+        if chooses_levels {
+            ViewLevels::keep(&mut tables.levels, views);
+        } else {
+            tables.levels.clear();
         }
         for (index, view) in views.iter().enumerate() {
             tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
-            let draws_commands =
-                |pass: &Pass| pass.view_index == index && self.key.draws[pass.process_index].selection.is_some();
-            if self.passes.iter().any(draws_commands) {
+            if self.view_draws_commands[index] {
                 let tests_occlusion = tables.occlusion[index].is_on();
-                tables.visibility[index].begin_frame(view, &tables.objects, culling, tests_occlusion);
+                let (visibility, objects) = (&mut tables.visibility[index], &tables.objects);
+                visibility.begin_frame(view, objects, scene.assets, quality.culling, tests_occlusion).map_err(
+                    |panic| FrameError::FilterPanicked { view: view.name().to_owned(), message: panic.message },
+                )?;
+                if let Some(levels) = tables.levels.get_mut(index) {
+                    let selector = LevelSelector::new(view, quality);
+                    levels.begin_frame(selector, &tables.visibility[index], tables.objects.len());
+                }
             } else {
                 tables.visibility[index].clear();
             }
         }
+        Ok(())
     }
 }
 
@@ -226,16 +289,19 @@ impl<B: Backend> StageGraph<B> {
 struct GraphBuilder<B: Backend> {
     graph: FrameGraph<StageNode<B>>,
     /// A stage of one process has the same cost kind in all views, whatever its nodes.
-    cost_kinds: Vec<(&'static str, Option<usize>)>,
+    cost_kinds: HashMap<(&'static str, Option<usize>), usize>,
     /// By node, in the order in which nodes were added: the index of its cost kind, and what it belongs to.
     kind_of_node: Vec<usize>,
     labels: Vec<Arc<Labels>>,
+    /// The names of the stages, which nodes share.
+    stage_names: HashMap<&'static str, Arc<str>>,
 }
 
 /// What a node belongs to: the frame, a view or a pass. Not the job system's `Scope`.
 #[derive(Clone, Debug, Default)]
 struct Scope {
-    view: Option<String>,
+    /// The view's index, and its name in graphs.
+    view: Option<(usize, Arc<str>)>,
     process: Option<usize>,
     labels: Labels,
     tuned_view: Option<usize>,
@@ -246,8 +312,8 @@ struct Scope {
 impl Scope {
     fn of_view(&self, index: usize, view: &RenderView, tests_occlusion: bool) -> Self {
         let mut scope = self.clone();
-        scope.view = Some(format!("view {index} {:?}", view.name()));
-        scope.labels.view = Some(view.name().to_owned());
+        scope.view = Some((index, format!("view {index} {:?}", view.name()).into()));
+        scope.labels.view = Some(view.name().into());
         scope.tuned_view = tests_occlusion.then_some(index);
         scope
     }
@@ -255,15 +321,15 @@ impl Scope {
     fn of_process(&self, index: usize, name: &str) -> Self {
         let mut scope = self.clone();
         scope.process = Some(index);
-        scope.labels.process = Some(name.to_owned());
+        scope.labels.process = Some(name.into());
         scope
     }
 
     /// The name of a stage's node.
     fn name_of(&self, stage: &str) -> String {
         match (&self.labels.process, &self.view) {
-            (Some(process), Some(view)) => format!("{process}, {view}, {stage}"),
-            (None, Some(view)) => format!("{stage}, {view}"),
+            (Some(process), Some((_, view))) => format!("{process}, {view}, {stage}"),
+            (None, Some((_, view))) => format!("{stage}, {view}"),
             _ => stage.to_owned(),
         }
     }
@@ -271,7 +337,13 @@ impl Scope {
 
 impl<B: Backend> Default for GraphBuilder<B> {
     fn default() -> Self {
-        Self { graph: FrameGraph::new(), cost_kinds: Vec::new(), kind_of_node: Vec::new(), labels: Vec::new() }
+        Self {
+            graph: FrameGraph::new(),
+            cost_kinds: HashMap::new(),
+            kind_of_node: Vec::new(),
+            labels: Vec::new(),
+            stage_names: HashMap::new(),
+        }
     }
 }
 
@@ -281,18 +353,20 @@ impl<B: Backend> GraphBuilder<B> {
         for stage in stages.into_iter().filter(|stage| stage.is_needed(&needs)) {
             let info = stage.info();
             let cost_kind = (info.cost_kind, scope.process);
-            let kind = self.cost_kinds.iter().position(|known| *known == cost_kind).unwrap_or_else(|| {
-                self.cost_kinds.push(cost_kind);
-                self.cost_kinds.len() - 1
-            });
+            let next_kind = self.cost_kinds.len();
+            let kind = *self.cost_kinds.entry(cost_kind).or_insert(next_kind);
             let node = self.kind_of_node.len();
-            let labels_of = |stage: &str| Labels { stage: Some(stage.to_owned()), ..scope.labels.clone() };
+            let mut labels_of = |stage: &'static str| {
+                let name = self.stage_names.entry(stage).or_insert_with(|| stage.into());
+                Labels { stage: Some(Arc::clone(name)), ..scope.labels.clone() }
+            };
             self.kind_of_node.push(kind);
             // The stage whose jobs a node sizes is the one that it shares its cost kind with.
             self.labels.push(Arc::new(labels_of(info.cost_kind)));
             let labels = labels_of(info.name);
             let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
-            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, node, tuned_view });
+            let view = scope.view.as_ref().map(|(index, _)| *index);
+            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, node, view, tuned_view });
             self.graph.label(id, labels);
             self.graph.keep(id);
             let find = |name: &&str| scope.stages.iter().rev().find(|(known, _)| known == name);
@@ -337,7 +411,13 @@ impl<B: Backend> StageGraphCache<B> {
             .position(|graph| graph.plan.identity() == plan.identity() && graph.key.fits(draws, views, options));
         let graph = match found {
             Some(index) => self.latest_first.remove(index),
-            None => StageGraph::new(plan, draws, views, GraphKey::new(draws, views, options))?,
+            None => {
+                let mut graph = StageGraph::new(plan, draws, views, GraphKey::new(draws, views, options))?;
+                if let Some(before) = self.latest_first.first() {
+                    graph.inherit_measurements(before, views);
+                }
+                graph
+            }
         };
         self.latest_first.truncate(Self::CAPACITY - 1);
         self.latest_first.insert(0, graph);

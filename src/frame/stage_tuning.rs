@@ -31,7 +31,7 @@ impl TuningLabels {
     /// The labels of a graph. Those of nodes are in the order of the cost model.
     pub(super) fn new(nodes: Vec<Arc<Labels>>, plan: &FramePlan, passes: &[Pass], views: &[RenderView]) -> Self {
         let labels = |process: Option<&str>, view: &RenderView| {
-            let (process, view) = (process.map(str::to_owned), Some(view.name().to_owned()));
+            let (process, view) = (process.map(Arc::from), Some(Arc::from(view.name())));
             Arc::new(Labels { process, stage: None, view })
         };
         let name = |pass: &Pass| plan.processes()[pass.process_index].name.as_str();
@@ -71,8 +71,8 @@ impl StageTuning {
 fn run_mode_choice(choice: ModeChoice) -> TuningChoice {
     let ModeChoice { parallel, is_trial, serial_nanoseconds, parallel_nanoseconds } = choice;
     let alternatives = vec![
-        TuningAlternative { name: "serial", nanoseconds: serial_nanoseconds },
-        TuningAlternative { name: "parallel", nanoseconds: Some(parallel_nanoseconds) },
+        TuningAlternative { name: "serial".into(), nanoseconds: serial_nanoseconds },
+        TuningAlternative { name: "parallel".into(), nanoseconds: Some(parallel_nanoseconds) },
     ];
     let (subject, chosen) = (TuningSubject::RunMode, usize::from(parallel));
     TuningChoice { subject, labels: Arc::default(), alternatives, chosen, is_trial }

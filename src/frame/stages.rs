@@ -9,7 +9,7 @@ mod of_view;
 
 use of_frame::{Bins, Objects, Upload};
 use of_pass::{Bin, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
-use of_view::{CoarseDepth, Compact, Occluders, Occlusion, Visibility};
+use of_view::{CoarseDepth, Compact, Levels, Occluders, Occlusion, Visibility};
 
 use super::stage::Stage;
 use crate::backend::Backend;
@@ -23,6 +23,7 @@ pub(super) fn stages_of_frame<B: Backend>() -> Vec<Box<dyn Stage<B>>> {
 pub(super) fn stages_of_view<B: Backend>(view: usize) -> Vec<Box<dyn Stage<B>>> {
     vec![
         Box::new(Visibility { view }),
+        Box::new(Levels { view }),
         Box::new(Occluders { view }),
         Box::new(CoarseDepth { view }),
         Box::new(Occlusion { view }),

@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use super::tables::FrameTables;
+use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
+use crate::command::Batch;
 use crate::raster::CulledTriangles;
-use crate::scene::ViewKind;
-use crate::timeline::FrameTuning;
+use crate::scene::{Assets, ViewKind};
+use crate::timeline::{FrameTuning, TuningSubject};
 use crate::view::{Rejection, RenderView};
 
 /// Statistics of a frame.
@@ -18,6 +19,8 @@ pub struct FrameStatistics {
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,
+    /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is not drawn.
+    pub view_times: Vec<Duration>,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
     /// The memory of the frame's targets. The software backend does not tell.
@@ -37,6 +40,9 @@ pub struct ViewStatistics {
     pub name: String,
     /// The kind of view.
     pub kind: ViewKind,
+    /// How many frames before this one it was drawn: 0 if this frame draws it. Else all figures below are 0: see
+    /// [`Redraw`](crate::scene::Redraw).
+    pub age: u32,
     /// Objects it sees.
     pub visible: usize,
     /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
@@ -52,6 +58,18 @@ pub struct ViewStatistics {
     /// Triangles that were tested and culled on the CPU, over all its processes: see
     /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
     pub culled_triangles: CulledTriangles,
+    /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) is 0 or no mesh
+    /// has levels.
+    pub levels_of_detail: Option<LevelStatistics>,
+}
+
+/// The triangles of objects at their levels of detail, over all processes of a view, before any are subdivided or culled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LevelStatistics {
+    /// At the levels that are drawn. Cached views draw none.
+    pub triangles: usize,
+    /// At level 0.
+    pub full_detail_triangles: usize,
 }
 
 /// The thread time of each group of stages, summed over workers.
@@ -71,7 +89,21 @@ pub struct StageTimes {
     pub submit: Duration,
 }
 
+impl StageTimes {
+    /// The thread time of all groups.
+    pub fn total(&self) -> Duration {
+        let Self { visibility, fill, sort, instance, record, submit } = *self;
+        visibility + fill + sort + instance + record + submit
+    }
+}
+
 impl FrameStatistics {
+    /// The rung of each view of a [`ViewBudget`](super::ViewBudget), by name: 0 at its best.
+    pub fn rungs(&self) -> impl Iterator<Item = (&str, usize)> {
+        let choices = self.tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::Rung);
+        choices.filter_map(|choice| Some((choice.labels.view.as_deref()?, choice.chosen)))
+    }
+
     /// The statistics of a frame whose stages have run.
     pub(super) fn new(
         request: &FrameRequest<'_>,
@@ -80,12 +112,17 @@ impl FrameStatistics {
         stages: StageTimes,
         tuning: FrameTuning,
     ) -> Self {
-        let views =
-            request.views.iter().enumerate().map(|(index, view)| ViewStatistics::new(index, view, request, tables));
+        let views = request.views.iter().enumerate();
+        let mut views: Vec<_> =
+            views.map(|(index, view)| ViewStatistics::without_passes(index, view, tables)).collect();
+        for (pass, table) in request.passes.iter().zip(&tables.passes) {
+            views[pass.view_index].add_pass(table, request.scene.assets);
+        }
         Self {
             objects: request.scene.object_count(),
             lights: request.lights.len(),
-            views: views.collect(),
+            views,
+            view_times: tables.view_times.times().collect(),
             uploaded,
             targets,
             stages,
@@ -96,25 +133,41 @@ impl FrameStatistics {
 }
 
 impl ViewStatistics {
-    fn new(index: usize, view: &RenderView, request: &FrameRequest<'_>, tables: &FrameTables) -> Self {
-        let mut statistics = Self {
+    /// The statistics of a view, by index, before its passes are counted.
+    fn without_passes(index: usize, view: &RenderView, tables: &FrameTables) -> Self {
+        Self {
             name: view.name().to_owned(),
             kind: view.kind(),
+            age: view.age,
             visible: tables.visibility[index].set.count(),
             occluded: tables.occlusion[index].hidden(),
-            lights: tables.lights[index].gpu_lights().len(),
+            lights: tables.lights[index].light_count(),
             commands: 0,
             batches: 0,
             bundles: 0,
             culled_triangles: CulledTriangles::default(),
-        };
-        for (table, _) in tables.passes.iter().zip(request.passes).filter(|(_, pass)| pass.view_index == index) {
-            let list = table.list.read();
-            statistics.commands += list.objects.len();
-            statistics.batches += list.batches.len();
-            statistics.bundles += list.bundle_count();
-            statistics.culled_triangles += table.triangles.read().culled();
+            levels_of_detail: tables.levels.get(index).map(|_| LevelStatistics::default()),
         }
-        statistics
+    }
+
+    fn add_pass(&mut self, table: &PassTable, assets: &Assets) {
+        let list = table.list.read();
+        self.commands += list.objects.len();
+        self.batches += list.batches.len();
+        self.bundles += list.bundle_count();
+        self.culled_triangles += table.triangles.read().culled();
+        if let Some(levels) = &mut self.levels_of_detail {
+            levels.add(&list.batches, assets);
+        }
+    }
+}
+
+impl LevelStatistics {
+    fn add(&mut self, batches: &[Batch], assets: &Assets) {
+        for &Batch { mesh, state, count, .. } in batches {
+            let Some((_, mesh)) = assets.meshes.get_with_revision(mesh) else { continue };
+            self.triangles += mesh.triangle_count_of(state.level_of_detail()) * count as usize;
+            self.full_detail_triangles += mesh.triangle_count() * count as usize;
+        }
     }
 }

@@ -1,23 +1,30 @@
 //! The tables that the stages of a frame fill for each other.
 
+use std::sync::Arc;
+
 use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
 use super::list_inputs::ListInputs;
+use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::triangle_culling::{CullableMeshes, PassTriangles};
+use super::view_levels::ViewLevels;
 use super::view_occlusion::ViewOcclusion;
+use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
 use crate::chunked_array::ChunkedArray;
 use crate::command::{BinnedSegment, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version};
 use crate::scene::Light;
-use crate::view::{LightTable, ObjectTable, OccluderMeshes, RenderView};
+use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
     /// Whether an object needs transparency.
     pub(super) blended_object: BlendedObjectWitness,
+    /// The thread time of each view.
+    pub(super) view_times: ViewTimes,
     /// One for each view.
     pub(super) visibility: Vec<ViewVisibility>,
     /// One for each view.
@@ -26,22 +33,43 @@ pub(super) struct FrameTables {
     pub(super) occluder_meshes: OccluderMeshes,
     /// The meshes whose triangles are culled.
     pub(super) cullable_meshes: CullableMeshes,
+    /// The meshes that have levels of detail.
+    pub(super) mesh_levels: MeshLevels,
+    /// One for each view of a frame that chooses levels of detail.
+    pub(super) levels: Vec<ViewLevels>,
     /// The lights that reach each view.
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
     pub(super) passes: Vec<PassTable>,
     /// One for each worker.
     pub(super) sort_scratch: Vec<Mutex<SortScratch>>,
+    /// What the tables of views and passes belong to; `None` before the first frame.
+    keys: Option<Arc<TableKeys>>,
     /// The number of frames that began.
     frames: u64,
     is_in_frame: bool,
 }
 
 impl FrameTables {
+    /// Gives the tables to the views and passes of a stage graph, so that what it shares with the graph before makes nothing anew. Does nothing
+    /// for the graph of the frame before.
+    pub(super) fn set_keys(&mut self, keys: &Arc<TableKeys>, views: &[RenderView]) {
+        let before = match self.keys.replace(Arc::clone(keys)) {
+            Some(before) if !Arc::ptr_eq(&before, keys) => before,
+            _ => return,
+        };
+        let TakenTables { of_views, of_passes } = keys.taken_from(&before, views);
+        rearrange(&mut self.visibility, &of_views);
+        rearrange(&mut self.occlusion, &of_views);
+        rearrange(&mut self.lights, &of_views);
+        rearrange(&mut self.passes, &of_passes);
+    }
+
     /// Begins a frame of `views` views on `workers` workers. The object table has begun it already.
     pub(super) fn begin_frame(&mut self, views: usize, workers: usize) {
         self.frames += 1;
         self.is_in_frame = true;
+        self.view_times.reset(views);
         self.visibility.resize_with(views, ViewVisibility::default);
         self.occlusion.resize_with(views, ViewOcclusion::default);
         self.lights.resize_with(views, LightTable::default);
@@ -58,6 +86,7 @@ impl FrameTables {
     pub(super) fn abandon_frame(&mut self) {
         if std::mem::take(&mut self.is_in_frame) {
             self.passes.iter_mut().for_each(PassTable::clear_list);
+            self.levels.clear();
         }
         self.invalidate();
     }
@@ -74,9 +103,10 @@ impl FrameTables {
         Version { frame: self.frames, index }
     }
 
-    /// Finds the lights that reach each view: see [`LightTable::fill`].
+    /// Finds the lights that reach each view that is drawn: see [`LightTable::fill`].
     pub(super) fn fill_lights(&mut self, views: &[RenderView], lights: &[Light], separate_shadowed_lights: bool) {
         for (view, table) in views.iter().zip(&mut self.lights) {
+            let lights = if view.is_cached() { &[] } else { lights };
             table.fill(view, lights, views, separate_shadowed_lights);
         }
     }

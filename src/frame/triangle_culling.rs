@@ -75,7 +75,9 @@ impl PassTriangles {
         let mut room = MAX_PASS_TRIANGLES;
         let cullable_batches = (0..).zip(&list.batches).filter(|(_, batch)| cullable.contains(batch.mesh));
         for (batch, drawn) in cullable_batches {
-            let count = assets.meshes.get_with_revision(drawn.mesh).map_or(0, |(_, mesh)| mesh.triangle_count());
+            let level = drawn.state.level_of_detail();
+            let mesh = assets.meshes.get_with_revision(drawn.mesh);
+            let count = mesh.map_or(0, |(_, mesh)| mesh.triangle_count_of(level));
             let Some(left) = room.checked_sub(count) else { continue };
             room = left;
             let starts = (0..count).step_by(MAX_ITEM_TRIANGLES);
@@ -104,10 +106,11 @@ impl PassTriangles {
     pub(super) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
         let mut culled = CulledTriangles::default();
         for (item, remaining) in self.items[items.clone()].iter().zip(&self.remaining[items]) {
-            let object = list.objects[list.batches[item.batch as usize].first as usize] as usize;
+            let batch = &list.batches[item.batch as usize];
+            let drawn = (list.objects[batch.first as usize] as usize, batch.state.level_of_detail());
             let mut remaining = remaining.lock();
             remaining.clear();
-            culled += view.cull_triangle_range(scene, object, item.triangles.clone(), &mut remaining);
+            culled += view.cull_triangle_range(scene, drawn, item.triangles.clone(), &mut remaining);
         }
         *self.culled.lock() += culled;
     }

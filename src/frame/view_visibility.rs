@@ -2,8 +2,11 @@
 
 use std::ops::Range;
 
+use super::view_filter::ViewFilter;
 use crate::command::Version;
 use crate::quality::CullingVolume;
+use crate::scene::{Assets, ObjectList};
+use crate::task::JobPanic;
 use crate::view::{ChangedWord, Frustum, ObjectTable, Overlap, RenderView, VisibleSet};
 
 /// The visible set of a view, and what it was found with. While the view does not change, a frame tests the
@@ -13,6 +16,7 @@ pub(super) struct ViewVisibility {
     pub(super) set: VisibleSet,
     /// `None` where the next frame must test all objects.
     tested_with: Option<TestedWith>,
+    filter: ViewFilter,
     tests: TestScope,
 }
 
@@ -21,6 +25,8 @@ pub(super) struct ViewVisibility {
 struct TestedWith {
     frustum: Frustum,
     volume: CullingVolume,
+    /// The revision of the view's filter.
+    filter: u64,
     objects: usize,
     epoch: u64,
 }
@@ -37,20 +43,49 @@ pub(super) enum TestScope {
     None,
 }
 
+impl TestScope {
+    /// The number of words with objects to test.
+    pub(super) fn word_count(self, set: &VisibleSet, table: &ObjectTable) -> usize {
+        match self {
+            Self::All => set.word_count(),
+            Self::Changed => table.changed_word_count(),
+            Self::None => 0,
+        }
+    }
+
+    /// One of these words, by its index among them, and a mask of the objects to test.
+    pub(super) fn word(self, index: usize, table: &ObjectTable) -> (usize, u64) {
+        match self {
+            Self::Changed => {
+                let ChangedWord { word, mask } = table.changed_word(index);
+                (word, mask)
+            }
+            Self::All | Self::None => (index, u64::MAX),
+        }
+    }
+}
+
 const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
 
 impl ViewVisibility {
     /// Begins a frame of a view that draws commands: decides which objects it tests.
+    ///
+    /// # Errors
+    /// If the predicate of the view's filter panics.
     pub(super) fn begin_frame(
         &mut self,
         view: &RenderView,
         table: &ObjectTable,
+        assets: &Assets,
         volume: CullingVolume,
         tests_occlusion: bool,
-    ) {
-        let now = TestedWith { frustum: view.frustum.clone(), volume, objects: table.len(), epoch: table.epoch() };
+    ) -> Result<(), JobPanic> {
+        self.filter.update(&view.camera.filter, assets)?;
+        let (frustum, filter) = (view.frustum.clone(), self.filter.revision());
+        let now = TestedWith { frustum, volume, filter, objects: table.len(), epoch: table.epoch() };
         let is_same_view = |before: &TestedWith| {
-            (&before.frustum, before.volume, before.objects) == (&now.frustum, now.volume, now.objects)
+            (&before.frustum, before.volume, before.filter, before.objects)
+                == (&now.frustum, now.volume, now.filter, now.objects)
         };
         self.tests = match &self.tested_with {
             _ if tests_occlusion => TestScope::All,
@@ -65,6 +100,7 @@ impl ViewVisibility {
         if self.tests == TestScope::All {
             self.set.reset(table.len());
         }
+        Ok(())
     }
 
     /// Empties the set of a view that draws no commands.
@@ -78,13 +114,14 @@ impl ViewVisibility {
         self.tested_with = None;
     }
 
+    /// Which objects the frame tests.
+    pub(super) fn scope(&self) -> TestScope {
+        self.tests
+    }
+
     /// The number of words with objects to test.
     pub(super) fn word_count(&self, table: &ObjectTable) -> usize {
-        match self.tests {
-            TestScope::All => self.set.word_count(),
-            TestScope::Changed => table.changed_word_count(),
-            TestScope::None => 0,
-        }
+        self.tests.word_count(&self.set, table)
     }
 
     /// Tests the objects of some words, by index among those that are tested.
@@ -96,9 +133,15 @@ impl ViewVisibility {
         volume: CullingVolume,
     ) {
         if self.tests == TestScope::Changed {
-            for ChangedWord { word, mask } in indices.map(|index| table.changed_word(index)) {
-                let block = table.block(word / WORDS_PER_BLOCK);
-                self.set.replace(word, mask, block.visible_among(frustum, volume, word % WORDS_PER_BLOCK, mask));
+            for (word, mask) in indices.map(|index| self.tests.word(index, table)) {
+                self.set.replace(word, mask, self.visible_among(word, mask, table, frustum, volume));
+            }
+            return;
+        }
+        if let ObjectList::Only(set) = self.filter.objects() {
+            // Words without listed objects stay empty, and need no work.
+            for (word, mask) in set.masks(indices) {
+                self.set.replace(word, u64::MAX, self.visible_among(word, mask, table, frustum, volume));
             }
             return;
         }
@@ -106,7 +149,9 @@ impl ViewVisibility {
         let test_block = |index: usize, overlap: Overlap| {
             let (first, block) = (index * WORDS_PER_BLOCK, table.block(index));
             let words = indices.start.max(first) - first..(indices.end - first).min(WORDS_PER_BLOCK);
-            let put = |word: usize, bits: u64| self.set.replace(first + word, u64::MAX, bits);
+            let put = |word: usize, bits: u64| {
+                self.set.replace(first + word, u64::MAX, self.filter.pass(bits, first + word, &block));
+            };
             if overlap == Overlap::Inside {
                 words.for_each(|word| put(word, block.drawable(word)));
             } else {
@@ -119,6 +164,20 @@ impl ViewVisibility {
         } else {
             table.block_bounds().visit_overlapping(frustum, blocks, test_block);
         }
+    }
+
+    /// The visible ones of a word's objects, of those in a mask.
+    fn visible_among(
+        &self,
+        word: usize,
+        mask: u64,
+        table: &ObjectTable,
+        frustum: &Frustum,
+        volume: CullingVolume,
+    ) -> u64 {
+        let block = table.block(word / WORDS_PER_BLOCK);
+        let visible = block.visible_among(frustum, volume, word % WORDS_PER_BLOCK, mask);
+        self.filter.pass(visible, word, &block)
     }
 
     /// Completes the set when all tests are done and hidden objects removed.

@@ -2,26 +2,30 @@
 
 use super::FrameError;
 use super::valid_lights::ValidLights;
-use crate::process::FramePlan;
-use crate::scene::{Light, SceneRef, ViewKind};
+use crate::process::{FramePlan, SampledShape, ViewArray};
+use crate::scene::{Camera, Light, Redraw, SceneRef, ViewKind};
 use crate::view::{RenderView, ShadowMaps};
 
 /// The views of a frame, and the valid lights that light them.
 pub(super) struct FrameViews {
     pub(super) views: Vec<RenderView>,
     pub(super) lights: Vec<Light>,
+    /// The views whose targets are layers of textures.
+    pub(super) arrays: Vec<ViewArray>,
 }
 
 impl FrameViews {
-    /// The views that a scene requests: one for each camera in the scene's order, then, if `maps` is given, one for each light that
-    /// casts shadows and reaches what a camera may see.
+    /// The views that a scene requests: one for each camera in the scene's order, then, if `maps` is given, those of the shadow maps
+    /// of each light that casts shadows and reaches what a camera may see. Maps are drawn every `interval` frames.
     ///
     /// # Errors
-    /// If views whose targets are layers of one texture differ in size.
+    /// If there are too many views, or those whose targets are layers of one texture differ in size, or are faces of a cube map and not
+    /// square.
     pub(super) fn new(
         scene: &SceneRef<'_>,
         valid: ValidLights,
         maps: Option<&ShadowMaps>,
+        interval: u32,
         plan: &FramePlan,
     ) -> Result<Self, FrameError> {
         let mut views: Vec<_> = scene.cameras.iter().map(RenderView::new).collect();
@@ -34,9 +38,14 @@ impl FrameViews {
                 if !light.casts_shadow() || !light.bounding_sphere().is_none_or(is_reached) {
                     continue;
                 }
-                let camera = maps.camera(format!("shadow of light {scene_index}"), light, scene.cameras);
-                views.extend(camera.map(|camera| RenderView { valid_light: Some(index), ..RenderView::new(&camera) }));
+                for camera in maps.cameras(&format!("shadow of light {scene_index}"), light, scene.cameras) {
+                    let camera = Camera { redraw: Redraw::Interval(interval), ..camera };
+                    views.push(RenderView { valid_light: Some(index), ..RenderView::new(&camera) });
+                }
             }
+        }
+        if views.len() > FrameError::MAX_VIEWS {
+            return Err(FrameError::TooManyViews { views: views.len() });
         }
         let mut layer_counts = [0; ViewKind::COUNT];
         for view in &mut views {
@@ -44,18 +53,38 @@ impl FrameViews {
             view.layer = *count;
             *count += 1;
         }
-        check_layers(plan, &views)?;
-        Ok(Self { views, lights: valid.lights })
+        let arrays = plan.view_arrays(&views);
+        check_layers(plan, &views, &arrays)?;
+        Ok(Self { views, lights: valid.lights, arrays })
+    }
+
+    /// Whether a frame may leave out one of the views.
+    pub(super) fn may_be_cached(&self) -> bool {
+        self.views.iter().any(|view| !view.camera.redraw.is_every_frame())
     }
 }
 
-fn check_layers(plan: &FramePlan, views: &[RenderView]) -> Result<(), FrameError> {
+fn check_layers(plan: &FramePlan, views: &[RenderView], arrays: &[ViewArray]) -> Result<(), FrameError> {
     for target in plan.targets().iter().filter(|target| target.layered) {
         let mut layers = views.iter().filter(|view| view.kind() == target.views);
         let Some(first) = layers.next() else { continue };
         if let Some(other) = layers.find(|view| view.camera.size != first.camera.size) {
             let names = [first, other].map(|view| view.name().to_owned());
             return Err(FrameError::UnequalLayers { target: target.name.clone(), views: names });
+        }
+    }
+    for array in arrays {
+        let target = &plan.targets()[array.target_index];
+        let size_of = |view: &RenderView| target.size.in_view(view.camera.size);
+        let mut layers = array.view_indices.iter().flatten().map(|index| &views[*index]);
+        let Some(first) = layers.next() else { continue };
+        let [width, height] = size_of(first);
+        if let Some(other) = layers.find(|view| size_of(view) != [width, height]) {
+            let names = [first, other].map(|view| view.name().to_owned());
+            return Err(FrameError::UnequalLayers { target: target.name.clone(), views: names });
+        }
+        if array.shapes.contains(&SampledShape::Cube) && width != height {
+            return Err(FrameError::OblongCubeFace { view: first.name().to_owned(), width, height });
         }
     }
     Ok(())

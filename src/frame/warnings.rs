@@ -15,20 +15,32 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
-    /// Warns of the rejections of a frame that are not reported yet. Only drawing shadow maps finds coarse edges, so a frame that
-    /// reads cached maps leaves that report as it is.
-    pub(super) fn report(&mut self, rejections: &[Rejection], has_cached_maps: bool) {
+    /// Warns of the rejections of a frame that are not reported yet. Only drawing shadow maps finds coarse edges, so a frame with
+    /// cached views finds a part of them: that many or more were reported.
+    pub(super) fn report(&mut self, rejections: &[Rejection], has_cached_views: bool) {
+        let is_partial = |reason| has_cached_views && reason == RejectionReason::CoarseEdges;
         for rejection in rejections {
+            let is_part = |known: &Rejection| {
+                is_partial(known.reason) && known.reason == rejection.reason && known.count >= rejection.count
+            };
+            let is_reported = self.reported.iter().any(|known| known == rejection || is_part(known));
             // A light that is switched off is no mistake.
-            if rejection.reason == RejectionReason::DarkLight || self.reported.contains(rejection) {
+            if rejection.reason == RejectionReason::DarkLight || is_reported {
                 continue;
             }
             let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
             tracing::warn!(target: "drawloom", count, first, "not drawn as requested: {reason}");
         }
-        let is_unknown = |rejection: &Rejection| has_cached_maps && rejection.reason == RejectionReason::CoarseEdges;
-        self.reported.retain(is_unknown);
-        self.reported.extend(rejections.iter().filter(|rejection| !is_unknown(rejection)));
+        let before = self.reported.iter().copied().find(|known| is_partial(known.reason));
+        self.reported.clear();
+        self.reported.extend(rejections);
+        if let Some(before) = before {
+            match self.reported.iter_mut().find(|known| known.reason == before.reason) {
+                Some(known) if known.count < before.count => *known = before,
+                Some(_) => {}
+                None => self.reported.push(before),
+            }
+        }
     }
 
     /// Ends a frame of this plan. Warns of what raw passes have not asked for in the first frames that encoded them, though their processes

@@ -69,6 +69,13 @@ const MEASURED_RUNS: Filter = Filter::unlimited(4.0 / 3.0);
 const HYSTERESIS: Hysteresis = Hysteresis::new(1.25);
 
 impl ExecutionPolicy {
+    /// The policy of a schedule that takes the place of this one's, with work like its work: it begins with the same mode and times, and
+    /// measures its own first runs.
+    pub(crate) fn of_successor(&self) -> Self {
+        let Self { serial, parallel, is_serial, .. } = *self;
+        Self { serial, parallel, is_serial, ..Self::default() }
+    }
+
     /// Chooses the mode of the next run.
     pub(crate) fn choose(&mut self, wake_up_cost: Duration) -> RunMode {
         let wake_up_cost = wake_up_cost.as_nanos() as f32;
@@ -164,6 +171,17 @@ mod tests {
     fn run(policy: &mut ExecutionPolicy, runs: usize, serial: u64, parallel: u64) -> usize {
         let are_serial: Vec<bool> = (0..runs).map(|_| run_once(policy, serial, parallel)).collect();
         are_serial.iter().rev().take(10).filter(|&&is_serial| is_serial).count()
+    }
+
+    #[test]
+    fn a_successor_begins_in_the_mode_that_was_faster() {
+        for (serial, parallel) in [(100, 300), (900, 300)] {
+            let mut policy = ExecutionPolicy::default();
+            run(&mut policy, 50, serial, parallel);
+            let mut successor = policy.of_successor();
+            assert_eq!(run_once(&mut successor, serial, parallel), serial < parallel);
+            assert!(successor.latest().is_some_and(|choice| !choice.is_trial));
+        }
     }
 
     fn run_once(policy: &mut ExecutionPolicy, serial: u64, parallel: u64) -> bool {

@@ -73,11 +73,6 @@ impl<P> Schedule<P> {
         self.index(node).map(|index| &mut self.nodes[index])
     }
 
-    /// Takes the schedule apart into the names and payloads of its nodes, in execution order.
-    pub fn into_nodes(self) -> impl ExactSizeIterator<Item = (String, P)> {
-        self.names.into_iter().zip(self.nodes)
-    }
-
     /// The indices of the nodes that a node waits for, ascending; empty if there is no such node.
     ///
     /// Nodes that it only waits for through other nodes may be left out.
@@ -95,6 +90,12 @@ impl<P> Schedule<P> {
     /// worker.
     pub fn always_parallel(&mut self, always: bool) {
         self.always_parallel = always;
+    }
+
+    /// Takes over what was measured of another schedule whose runs do similar work: the first runs are executed in the
+    /// [mode](Self::run_mode) that the other one would have, instead of trying out which.
+    pub fn inherit_measurements(&mut self, before: &Self) {
+        self.policy = before.policy.of_successor();
     }
 
     /// The time from a node's start to its end: an average over the latest measured runs. `None` if no run was measured, or if

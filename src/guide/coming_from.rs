@@ -6,12 +6,12 @@
 //! | `Mesh`, `Mesh3d` | `Mesh`, `MeshHandle` | vertex and index buffers | [`Mesh`], by [`Handle`]; [`Mesh::from_buffers`] for buffers of the engine's |
 //! | `Material`, `AsBindGroup` | `Material` | a bind group and a pipeline | [`Material`] for what ships; a [`MaterialType`] and a shader for the engine's own |
 //! | `Camera`, `RenderTarget` | `Camera` | a view matrix and a target | [`Camera`]: each is a view; [`import_target`] draws it into a texture of the engine's |
-//! | `ViewVisibility`, `RenderLayers` | | an `if` in the loop | culling by [`CullingVolume`], [`LayerMask`] |
+//! | `ViewVisibility`, `RenderLayers` | | an `if` in the loop | culling by [`CullingVolume`], [`LayerMask`], [`ObjectFilter`] |
 //! | render graph node, `RenderSystems` | a routine in a `RenderGraph` | a function that encodes a pass | [`RenderProcess`]: its order follows from what it declares |
 //! | phases, `PhaseItem`, `SetItemPipeline` ... | | a sort of draws | a process's commands, by its [`Selection`] |
 //! | `MeshUniform`, instance data | | a storage buffer by object | an [`ObjectColumn`], lent and uploaded where objects changed |
 //! | `ExtractSchedule`, `Changed<T>` | | a dirty flag | [`Changes`]: what the engine reports; `examples/ecs` derives it from ticks |
-//! | `PipelineCache`, which compiles in the background | | pipelines made at start | [`Renderer::prepare_pipelines`]; otherwise in the frame that needs one first |
+//! | `PipelineCache`, which compiles in the background | | pipelines made at start | [`Renderer::prepare_pipelines_in_background`], or at start; otherwise in the frame that needs one first |
 //! | `ComputeTaskPool`, `par_iter_mut` | | rayon | [`Scheduler`], [`Scheduler::parallel_for_each`]: one set of threads for engine and renderer |
 //! | `PipelinedRenderingPlugin` | | a render thread | `record`, then `submit` on the device thread beside the next update: see [step 7](super::from_wgpu#7-overlap-and-look) |
 //! | `RenderDiagnosticsPlugin`, Tracy | | timers of one's own | the [timeline](crate::timeline), the inspector, `drawloom-tracy` |
@@ -34,8 +34,9 @@
 //! [`Mesh`]: crate::scene::Mesh
 //! [`Mesh::from_buffers`]: crate::scene::Mesh::from_buffers
 //! [`ObjectColumn`]: crate::scene::ObjectColumn
+//! [`ObjectFilter`]: crate::scene::ObjectFilter
 //! [`RenderProcess`]: crate::process::RenderProcess
-//! [`Renderer::prepare_pipelines`]: crate::Renderer::prepare_pipelines
+//! [`Renderer::prepare_pipelines_in_background`]: crate::Renderer::prepare_pipelines_in_background
 //! [`SceneRef`]: crate::scene::SceneRef
 //! [`Scheduler`]: crate::task::Scheduler
 //! [`Scheduler::parallel_for_each`]: crate::task::Scheduler::parallel_for_each

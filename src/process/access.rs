@@ -34,6 +34,9 @@ pub enum Access {
     /// Read by the shader: the target of another view, of this kind. Which view is
     /// [`Declaration::sampled_views`](super::Declaration::sampled_views) at this index.
     SampleView(ViewKind, usize),
+    /// Read by the shader: what the target of another view, or of the view itself, held at the end of the frame before. The name is that of
+    /// [`previous_name`](super::previous_name), the kind and the view are those of [`Access::SampleView`].
+    SampleViewPrevious(ViewKind, usize),
     /// The target of a resolve: overwritten with the mean of a multisampled target's samples.
     Resolve(Format),
     /// Written by a raw pass.
@@ -51,6 +54,7 @@ impl Access {
             self,
             Self::SamplePrevious
                 | Self::SampleView(..)
+                | Self::SampleViewPrevious(..)
                 | Self::ClearColor(..)
                 | Self::ClearDepth(_)
                 | Self::ClearDepthLayer(_)
@@ -70,6 +74,7 @@ impl Access {
                 | Self::SamplePrevious
                 | Self::SampleLayers(_)
                 | Self::SampleView(..)
+                | Self::SampleViewPrevious(..)
                 | Self::Read
         )
     }
@@ -89,7 +94,7 @@ impl Access {
     /// The kind of view that the target belongs to, for a process that draws in views of the kind `own`.
     pub fn views(self, own: ViewKind) -> ViewKind {
         match self {
-            Self::SampleLayers(views) | Self::SampleView(views, _) => views,
+            Self::SampleLayers(views) | Self::SampleView(views, _) | Self::SampleViewPrevious(views, _) => views,
             _ => own,
         }
     }
@@ -116,6 +121,11 @@ impl Access {
     /// Whether it keeps what a depth target holds.
     pub fn keeps_depth(self) -> bool {
         self.is_depth() && self.reads()
+    }
+
+    /// Whether the name is that of a history.
+    pub(crate) fn is_previous(self) -> bool {
+        matches!(self, Self::SamplePrevious | Self::SampleViewPrevious(..))
     }
 
     /// Whether the target is drawn into as colour.

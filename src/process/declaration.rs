@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use super::{Access, BufferAccess, BufferLayout, ClearColor, Format, Place, StorageBuffer, TargetSize};
+use super::{Access, BufferAccess, BufferLayout, ClearColor, Format, Place, SampledView, StorageBuffer, TargetSize};
 use crate::scene::{
     AttributeLayout, AttributeValue, ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, VertexAttribute,
     ViewKind,
@@ -148,70 +148,6 @@ impl Declare {
     /// [`Declare::samples`] does. A raw pass finds it as the [layered target](super::RawPassResources::layered_target).
     pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
         self.access(target, Access::SampleLayers(views));
-    }
-
-    /// Reads a target of another view in the shader, at `@group(2)` as [`Declare::samples`] does: a mirror's picture, a portal's, or that of
-    /// a camera whose picture a screen in the scene shows (M 10.1). The view has the kind `views`. In a view called `V` it is the one
-    /// called `V/view`, which [`Camera::child_name`](crate::scene::Camera::child_name) makes of the two; if the frame has none, the one
-    /// called `view`, which all views share. Of views with the same name it is the first.
-    ///
-    /// That view is submitted before. Views that sample each other in a circle are
-    /// [`FrameError::CircularViews`](crate::FrameError::CircularViews), and so are views that sample each other and are submitted
-    /// [process by process](super::ViewOrder::ProcessByProcess). If the frame has no such view, or only the view itself has that name, the
-    /// texture is a single pixel whose channels and depth are all 0. So a format with alpha tells whether there is one, and the recursion of
-    /// mirrors in mirrors ends where the engine adds no further camera. The shader finds the texture's size with `textureDimensions`. A raw
-    /// pass cannot sample views.
-    ///
-    /// ```
-    /// use drawloom::command::Selection;
-    /// use drawloom::process::{CommandDraws, Declare, Draws, Place, RenderProcess};
-    /// use drawloom::scene::{LayerMask, ViewKind};
-    ///
-    /// const MIRROR: LayerMask = LayerMask::layer(5);
-    ///
-    /// /// Draws the objects of a layer as mirrors, with the picture of the view `mirror`.
-    /// struct Mirror;
-    ///
-    /// impl RenderProcess for Mirror {
-    ///     fn name(&self) -> &str {
-    ///         "mirror"
-    ///     }
-    ///
-    ///     fn declare(&self, declare: &mut Declare) {
-    ///         declare.at(Place::AfterLighting);
-    ///         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
-    ///         declare.draws_over("radiance");
-    ///         // The pipeline has drawn the mirror as an opaque object.
-    ///         declare.matches_depth("depth");
-    ///     }
-    ///
-    ///     fn draws(&self) -> Draws<'_> {
-    ///         Draws::Commands(CommandDraws {
-    ///             selection: Selection::ALL.in_layers(MIRROR),
-    ///             shader: "
-    ///                 @group(2) @binding(1) var mirrored: texture_2d<f32>;
-    ///
-    ///                 @vertex
-    ///                 fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
-    ///                     return clip_position(relative_position(drawn_object(in.instance), in.position));
-    ///                 }
-    ///
-    ///                 @fragment
-    ///                 fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-    ///                     // The reflected camera sees left and right swapped.
-    ///                     let across = position.xy / vec2<f32>(view.width, view.height);
-    ///                     return textureSampleLevel(mirrored, target_sampler, vec2<f32>(1.0 - across.x, across.y), 0.0);
-    ///                 }
-    ///             ",
-    ///             ..CommandDraws::default()
-    ///         })
-    ///     }
-    /// }
-    /// ```
-    pub fn samples_view(&mut self, views: ViewKind, view: &str, target: &str) {
-        let index = self.declaration.sampled_views.len();
-        self.declaration.sampled_views.push(view.to_owned());
-        self.access(target, Access::SampleView(views, index));
     }
 
     /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the next 1, and so
@@ -363,8 +299,8 @@ impl Declare {
     }
 
     /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute shader
-    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. In shadow views it draws
-    /// with the first map that the frame draws anew, and not at all if every map is cached.
+    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. If views are
+    /// [cached](crate::scene::Redraw), it draws in the first that is not, and not at all if all are.
     pub fn once_a_frame(&mut self) {
         self.declaration.once_a_frame = true;
     }
@@ -379,6 +315,17 @@ impl Declare {
         self.declaration
     }
 
+    /// Adds a view whose target is sampled, and returns its index among them.
+    pub(super) fn add_sampled_view(&mut self, view: SampledView) -> usize {
+        self.declaration.sampled_views.push(view);
+        self.declaration.sampled_views.len() - 1
+    }
+
+    /// Adds a target that has mip levels.
+    pub(super) fn add_mipmapped(&mut self, target: &str) {
+        self.declaration.mipmapped.push(target.to_owned());
+    }
+
     /// Changes how the process uses its targets.
     pub(in crate::process) fn replace_accesses(&mut self, replace: impl Fn(Access) -> Access) {
         for (_, access) in &mut self.declaration.accesses {
@@ -386,7 +333,7 @@ impl Declare {
         }
     }
 
-    fn access(&mut self, target: &str, access: Access) {
+    pub(super) fn access(&mut self, target: &str, access: Access) {
         self.declaration.accesses.push((target.to_owned(), access));
     }
 }
@@ -398,14 +345,16 @@ pub struct Declaration {
     pub views: ViewKind,
     /// The further kinds of views that it draws in. A plan has a process for each, with `views` of its own.
     pub also_views: Vec<ViewKind>,
-    /// The names of the views whose targets it samples: see [`Declare::samples_view`].
-    pub sampled_views: Vec<String>,
+    /// The views whose targets it samples: see [`Declare::samples_view`] and [`Declare::samples_view_previous`].
+    pub sampled_views: Vec<SampledView>,
     /// The targets that it uses, and how, in the order declared.
     pub accesses: Vec<(String, Access)>,
     /// The sizes of targets that it creates, if they are not those of the pictures.
     pub sizes: Vec<(String, TargetSize)>,
     /// The targets that it makes multisampled.
     pub multisampled: Vec<String>,
+    /// The targets that it gives mip levels: see [`Declare::mipmapped`].
+    pub mipmapped: Vec<String>,
     /// The multisampled targets that it resolves, each with the one that it is resolved into.
     pub resolves: Vec<(String, String)>,
     /// The data of objects that its shader reads, in the order of their bindings.
@@ -458,7 +407,9 @@ impl Declaration {
     pub fn samples(&self) -> impl Iterator<Item = (ViewKind, &str)> {
         self.accesses.iter().filter_map(|(target, access)| match access {
             Access::Sample | Access::SamplePrevious => Some((self.views, target.as_str())),
-            Access::SampleLayers(views) | Access::SampleView(views, _) => Some((*views, target.as_str())),
+            Access::SampleLayers(views) | Access::SampleView(views, _) | Access::SampleViewPrevious(views, _) => {
+                Some((*views, target.as_str()))
+            }
             _ => None,
         })
     }
@@ -476,5 +427,12 @@ pub struct DeclaredAttribute {
 /// The name of the copy that holds a target's history. The copy is made at the end of each frame: passes read what the target held in
 /// the frame before, and once the frame is submitted, the copy is that of the frame itself.
 pub fn previous_name(target: &str) -> String {
-    format!("{target} of the frame before")
+    format!("{target}{PREVIOUS_SUFFIX}")
 }
+
+/// The target whose history has this name; `None` if it is not the name of a history.
+pub(super) fn source_of_previous(name: &str) -> Option<&str> {
+    name.strip_suffix(PREVIOUS_SUFFIX)
+}
+
+const PREVIOUS_SUFFIX: &str = " of the frame before";

@@ -15,10 +15,12 @@ mod compute_dispatch;
 #[cfg(feature = "software")]
 mod cpu_shader;
 mod declaration;
+mod declare_sampled_views;
 mod deferred;
 mod draws;
 mod face_culling;
 mod format;
+mod mip_levels;
 mod parameters;
 mod plan;
 mod post;
@@ -29,6 +31,7 @@ mod raw_access;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
+mod sampled_view;
 mod shader_file;
 mod shader_resource;
 mod stencil;
@@ -45,6 +48,7 @@ pub use cpu_shader::{
     ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject,
     ShaderView, VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
 };
+use declaration::source_of_previous;
 pub use declaration::{Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
     Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place,
@@ -54,17 +58,18 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
-pub(crate) use plan::FramePasses;
 pub use plan::{
     AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, SampledViews,
     ViewGroup, ViewOrder,
 };
+pub(crate) use plan::{FramePasses, ViewArray};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
 pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
+pub use sampled_view::{SampledShape, SampledView};
 pub use shader_file::ShaderFile;
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};

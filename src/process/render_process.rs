@@ -48,8 +48,9 @@ pub trait RenderProcess: Send + Sync {
     /// beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// What it draws. Called once per frame, and by [`Renderer::prepare_pipelines`](crate::Renderer::prepare_pipelines); the result may change: new parameters cost nothing, another shader or
-    /// blending needs new pipelines.
+    /// What it draws. Called once per frame, and by [`Renderer::prepare_pipelines`](crate::Renderer::prepare_pipelines), in the background
+    /// also beside a frame: so a call should change nothing. The result may change: new parameters cost nothing, another shader or blending
+    /// needs new pipelines.
     fn draws(&self) -> Draws<'_>;
 
     /// What the software backend runs in place of the process's WGSL. Without one, frames with this process return an

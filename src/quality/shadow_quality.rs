@@ -17,8 +17,9 @@ pub struct ShadowQuality {
     /// The depth bias, as a multiple of what a pixel's width and the surface's slope require, at least 0. Below 1, lit
     /// surfaces shadow themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
-    /// Maps are drawn every `interval` frames, at least 1. They are also drawn at once if a light with a map is added
-    /// or removed, if the quality or the plan changes, or if a directional light's map no longer fits what cameras see:
+    /// Maps are drawn every `interval` frames, at least 1, those of different lights in turns: a map is a view that is
+    /// [redrawn](crate::scene::Redraw) every so many frames. They are also drawn at once if a light with a map is added
+    /// or removed, or if the quality or the plan changes; those of a directional light, if one no longer fits what cameras see:
     /// if its centre is off by a quarter of its radius, or its radius is a quarter too small. In between, a light with
     /// a map keeps its position, direction and range, so if it becomes brighter, it still ends where its old brightness
     /// fell to [`light_cut_off`](super::Quality::light_cut_off), and the bound of that is exceeded.

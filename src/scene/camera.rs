@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec2, Vec3};
 
 use super::transform::is_unit;
-use super::{ClipPlane, LayerMask, SceneError};
+use super::{ClipPlane, LayerMask, ObjectFilter, Redraw, SceneError};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,11 +29,22 @@ pub struct Camera {
     pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
+    /// Multiplies [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) in this camera's view: 1 for most cameras, more
+    /// where coarser objects will do, and 0 for full detail. Finite, and not negative.
+    pub level_of_detail_scale: f32,
     /// Only objects that belong to one of these layers are drawn, whichever process draws them: all but the mirror in its own reflection,
     /// or all but what only another player sees.
     pub layers: LayerMask,
+    /// Only objects that it lets pass are drawn, of those in the layers: by a list of objects, and by their materials.
+    pub filter: ObjectFilter,
+    /// Whether processes [sample other views](crate::process::Declare::samples_view) in this one. Without it, what shows another view
+    /// looks as if the frame did not have that: in the faces of a cube map, say, so that a ball may show a screen's surroundings and
+    /// the screen the ball. What views held [in the frame before](crate::process::Declare::samples_view_previous) is shown all the same.
+    pub samples_views: bool,
     /// The purpose of the picture, which determines the render processes that draw it.
     pub kind: ViewKind,
+    /// How often the picture is drawn. Between redraws, what it shows is as old as the latest one.
+    pub redraw: Redraw,
 }
 
 /// How positions are projected onto the picture.
@@ -119,8 +130,12 @@ impl Camera {
             near: 0.05,
             far: f32::INFINITY,
             size: [960, 540],
+            level_of_detail_scale: 1.0,
             layers: LayerMask::ALL,
+            filter: ObjectFilter::ALL,
+            samples_views: true,
             kind: ViewKind::Main,
+            redraw: Redraw::EveryFrame,
         }
     }
 
@@ -153,8 +168,12 @@ impl Camera {
             "its far plane is not beyond its near plane"
         } else if !self.shift.is_finite() || self.shift.abs().max_element() > MAX_SHIFT {
             "its shift is not between -65536 and 65536"
+        } else if !(self.level_of_detail_scale >= 0.0 && self.level_of_detail_scale.is_finite()) {
+            "its level_of_detail_scale is negative or not finite"
         } else if let Some(reason) = self.clip_plane.and_then(|plane| plane.problem()) {
             reason
+        } else if self.redraw == Redraw::Interval(0) {
+            "it is redrawn every 0 frames"
         } else if let Some(reason) = self.projection_problem() {
             reason
         } else {

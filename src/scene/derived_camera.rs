@@ -1,7 +1,10 @@
-//! Cameras derived from another one: of a part of its picture, in a mirror, and through a portal.
+//! Cameras derived from another one or from a position: of a part of a picture, in a mirror, through a portal, and of a cube map.
+
+use std::f32::consts::FRAC_PI_2;
 
 use glam::{DQuat, DVec3, Mat3, Quat, Vec2, Vec3};
 
+use super::camera::child_name;
 use super::{Camera, ClipPlane, Projection, ViewKind};
 
 impl Camera {
@@ -117,6 +120,34 @@ impl Camera {
             kind: ViewKind::Reflection,
             ..self.clone()
         }
+    }
+
+    /// The cameras of the six faces of a cube map around `position`, with the names `name/0` to `name/5`, for a process that
+    /// [samples](crate::process::Declare::samples_view_cube) them as `name`. Each picture is `side` pixels wide and high and sees from `near`
+    /// to infinity. What shows the cube map must be in none of the cameras' [layers](Camera::layers), or it hides everything else. They
+    /// [sample no views](Camera::samples_views).
+    pub fn cube_faces(name: &str, position: DVec3, side: u32, near: f32) -> [Self; 6] {
+        // The order and the upper edges of WebGPU's faces, which are left-handed: the world's -Z is the cube's +Z.
+        let faces = [
+            (Vec3::X, Vec3::Y),
+            (Vec3::NEG_X, Vec3::Y),
+            (Vec3::Y, Vec3::Z),
+            (Vec3::NEG_Y, Vec3::NEG_Z),
+            (Vec3::NEG_Z, Vec3::Y),
+            (Vec3::Z, Vec3::Y),
+        ];
+        let mut layers = 0..;
+        faces.map(|(forward, up)| Self {
+            name: child_name(name, &layers.next().unwrap_or_default().to_string()),
+            position,
+            orientation: Quat::from_mat3(&Mat3::from_cols(forward.cross(up), up, -forward)).normalize(),
+            projection: Projection::Perspective { field_of_view: FRAC_PI_2 },
+            near,
+            size: [side; 2],
+            samples_views: false,
+            kind: ViewKind::Reflection,
+            ..Self::looking_at("", position, position + forward.as_dvec3())
+        })
     }
 
     /// Whether the camera can have a clip plane.

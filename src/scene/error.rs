@@ -38,6 +38,16 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: String,
     },
+    /// A [level of detail](super::LevelOfDetail) that a mesh cannot have.
+    #[error("mesh `{mesh}`: its level of detail {level} {problem}")]
+    InvalidLevel {
+        /// The name of the mesh.
+        mesh: String,
+        /// The number of the level, counted from 1.
+        level: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// An index that points past the vertices.
     #[error("mesh `{mesh}`: index {index} points past its {vertices} vertices")]
     IndexOutOfRange {

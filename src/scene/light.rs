@@ -31,6 +31,10 @@ pub enum Light {
         intensity: Vec3,
         /// The distance at which the light ends, in metres.
         range: f32,
+        /// Whether objects cast shadows in this light. Its shadow maps are the six faces of a cube, and each is a layer of the texture that
+        /// all shadow maps of a frame share. A device allows 256 layers or more: 42 such lights whose range a camera sees. A frame with
+        /// more is [`BackendError::TooManyLayers`](crate::backend::BackendError::TooManyLayers).
+        casts_shadow: bool,
     },
     /// A cone.
     Spot {
@@ -82,13 +86,13 @@ impl Light {
         }
     }
 
-    /// Whether objects cast shadows in this light. Point lights cast no shadows.
+    /// Whether objects cast shadows in this light.
     pub fn casts_shadow(&self) -> bool {
         match *self {
             Self::Directional { casts_shadow, .. }
+            | Self::Point { casts_shadow, .. }
             | Self::Spot { casts_shadow, .. }
             | Self::Hemispherical { casts_shadow, .. } => casts_shadow,
-            Self::Point { .. } => false,
         }
     }
 
@@ -135,7 +139,7 @@ impl Light {
             Self::Directional { direction, illuminance, .. } => {
                 direction_problem(direction).or_else(|| color_problem(illuminance))
             }
-            Self::Point { position, intensity, range } => {
+            Self::Point { position, intensity, range, .. } => {
                 position_problem(position, range).or_else(|| color_problem(intensity))
             }
             Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
@@ -228,7 +232,7 @@ mod tests {
         let (position, direction, casts_shadow) = (DVec3::ZERO, Vec3::X, false);
         let (inner_angle, outer_angle) = (0.2, 0.4);
         [
-            Light::Point { position, intensity, range },
+            Light::Point { position, intensity, range, casts_shadow },
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
             Light::Hemispherical { position, direction, intensity, range, casts_shadow },
         ]

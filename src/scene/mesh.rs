@@ -9,7 +9,7 @@ use glam::Vec3;
 #[cfg(feature = "wgpu")]
 use super::MeshBuffers;
 use super::vertex_attribute::MeshAttribute;
-use super::{AttributeFormat, AttributeLayout, AttributeValue, SceneError, VertexAttribute};
+use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, VertexAttribute};
 
 /// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Mesh {
     corners: [Vec3; 2],
     longest_edge: f32,
     culls_triangles: bool,
+    /// The coarser levels, the finest first.
+    pub(super) levels: Vec<LevelOfDetail>,
     /// If it is not in `vertices` and `indices`.
     #[cfg(feature = "wgpu")]
     buffers: Option<Arc<MeshBuffers>>,
@@ -122,14 +124,21 @@ impl Mesh {
             corners,
             longest_edge: 0.0,
             culls_triangles: false,
+            levels: Vec::new(),
             #[cfg(feature = "wgpu")]
             buffers: None,
         };
-        let triangles = mesh.triangles().map(|corners| corners.map(|corner| mesh.vertices[corner as usize]));
+        mesh.longest_edge = mesh.longest_edge_among(&mesh.indices);
+        mesh
+    }
+
+    /// The length of the longest edge among the triangles of some indices.
+    pub(super) fn longest_edge_among(&self, indices: &[u32]) -> f32 {
+        let triangles = triangles_of(self.topology, indices, 0..triangle_count(self.topology, indices.len()));
+        let triangles = triangles.map(|corners| corners.map(|corner| self.vertices[corner as usize]));
         let edges = triangles.filter(has_distinct_corners).flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest_squared = edges.map(|[one, other]| one.distance_squared(&other)).fold(0.0, f64::max);
-        mesh.longest_edge = root_rounded_up(longest_squared);
-        mesh
+        root_rounded_up(longest_squared)
     }
 
     /// Adds the values of an attribute, one for each vertex.
@@ -190,12 +199,22 @@ impl Mesh {
     ///
     /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
     /// triangles at most; further objects are drawn whole. So are meshes [in the engine's own buffers](Self::from_buffers).
-    pub fn with_triangle_culling(mut self, enabled: bool) -> Self {
+    pub fn with_triangle_culling(self, enabled: bool) -> Self {
         let enabled = enabled && self.has_triangles();
-        if enabled && self.topology == Topology::TriangleStrip {
-            (self.topology, self.indices) = (Topology::TriangleList, self.triangles().flatten().collect());
+        let mesh = if enabled { self.into_list() } else { self };
+        Self { culls_triangles: enabled, ..mesh }
+    }
+
+    /// The mesh and its levels as triangle lists.
+    pub(super) fn into_list(mut self) -> Self {
+        if self.topology == Topology::TriangleStrip {
+            let lists = self.levels.iter_mut().map(|level| &mut level.indices).chain([&mut self.indices]);
+            for indices in lists {
+                let all = 0..triangle_count(Topology::TriangleStrip, indices.len());
+                *indices = triangles_of(Topology::TriangleStrip, indices, all).flatten().collect();
+            }
+            self.topology = Topology::TriangleList;
         }
-        self.culls_triangles = enabled;
         self
     }
 
@@ -245,37 +264,46 @@ impl Mesh {
         let corners = self.indices.len();
         #[cfg(feature = "wgpu")]
         let corners = self.buffers.as_ref().map_or(corners, |buffers| buffers.index_count() as usize);
-        match self.topology {
-            Topology::TriangleList => corners / 3,
-            Topology::TriangleStrip => corners.saturating_sub(2),
-        }
+        triangle_count(self.topology, corners)
     }
 
     /// The indices of each triangle's corners, counter-clockwise seen from its front; none of a mesh
     /// [in the engine's own buffers](Self::from_buffers).
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        self.triangles_in(0..self.triangle_count())
+        self.triangles_in(0, 0..self.triangle_count())
     }
 
-    /// The same for a range of triangles.
+    /// The same for a range of the triangles of a level of detail.
     ///
     /// # Panics
     /// If the range exceeds the number of triangles.
-    pub(crate) fn triangles_in(&self, numbers: Range<usize>) -> impl Iterator<Item = [u32; 3]> + '_ {
-        let (step, alternates) = match self.topology {
-            Topology::TriangleList => (3, false),
-            Topology::TriangleStrip => (1, true),
-        };
+    pub(crate) fn triangles_in(&self, level: u32, numbers: Range<usize>) -> impl Iterator<Item = [u32; 3]> + '_ {
         let numbers = if self.has_triangles() { numbers } else { 0..0 };
-        let indices = &self.indices[numbers.start * step..];
-        let triangles = numbers.zip(indices.array_windows().step_by(step));
-        triangles.map(move |(number, &[a, b, c])| if alternates && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
+        triangles_of(self.topology, self.indices_of(level), numbers)
     }
+}
+
+/// The number of triangles that so many corners form.
+pub(super) fn triangle_count(topology: Topology, corners: usize) -> usize {
+    match topology {
+        Topology::TriangleList => corners / 3,
+        Topology::TriangleStrip => corners.saturating_sub(2),
+    }
+}
+
+/// The corners of some of the triangles that indices form.
+fn triangles_of(topology: Topology, indices: &[u32], numbers: Range<usize>) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let (step, alternates) = match topology {
+        Topology::TriangleList => (3, false),
+        Topology::TriangleStrip => (1, true),
+    };
+    let triangles = numbers.clone().zip(indices[numbers.start * step..].array_windows().step_by(step));
+    triangles.map(move |(number, &[a, b, c])| if alternates && number % 2 == 1 { [a, c, b] } else { [a, b, c] })
 }
 
 /// # Errors
 /// If this many corners form no triangle, or a part of one.
-fn check_corner_count(mesh: &str, topology: Topology, corners: usize) -> Result<(), SceneError> {
+pub(super) fn check_corner_count(mesh: &str, topology: Topology, corners: usize) -> Result<(), SceneError> {
     if corners < 3 {
         return Err(SceneError::EmptyMesh { mesh: mesh.to_owned() });
     }

@@ -12,17 +12,26 @@ mod derived_camera;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
 mod error;
+mod impostor;
 mod layer_mask;
+mod level_of_detail;
 mod light;
 mod material;
+mod material_predicate;
 mod material_type;
 mod mesh;
+mod mesh_levels;
 #[cfg(feature = "obj")]
 pub mod obj;
 mod object_column;
+mod object_filter;
+mod object_set;
 mod owned_scene;
 mod packed_vertex;
+mod redraw;
 mod scene_ref;
+#[cfg(feature = "meshopt")]
+mod simplified_levels;
 mod subdivision;
 mod transform;
 mod vertex_attribute;
@@ -34,8 +43,10 @@ pub use changes::Changes;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;
 pub use layer_mask::LayerMask;
+pub use level_of_detail::LevelOfDetail;
 pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
+pub use material_predicate::MaterialPredicate;
 pub use material_type::{MaterialLayout, MaterialType, MaterialValues};
 pub use mesh::{Bounds, Mesh, Topology, Vertex};
 #[cfg(feature = "wgpu")]
@@ -43,8 +54,11 @@ pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, 
 #[cfg(feature = "wgpu")]
 pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
 pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
+pub use object_filter::{ObjectFilter, ObjectList};
+pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;
+pub use redraw::Redraw;
 pub use scene_ref::SceneRef;
 pub(crate) use transform::is_unit;
 pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VertexAttribute};

@@ -3,7 +3,9 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
-use super::{Asset, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, SceneError, SceneRef};
+use super::{
+    Asset, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet, SceneError, SceneRef,
+};
 use crate::handle::{Handle, Slots, StaleHandle};
 
 /// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
@@ -135,7 +137,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Removes an object. The last object moves to its index.
+    /// Removes an object. The last object moves to its index, so an [`ObjectSet`] that names either is out of date.
     ///
     /// # Errors
     /// If the object has been removed already.
@@ -198,6 +200,34 @@ impl Scene {
     /// The handles of all objects, by index.
     pub fn objects(&self) -> impl Iterator<Item = ObjectHandle> {
         self.handles.iter().copied().map(ObjectHandle)
+    }
+
+    /// The set of some objects at their present indices, for an [`ObjectFilter`](super::ObjectFilter). Removing an object changes indices:
+    /// make the set again then.
+    ///
+    /// ```
+    /// # use drawloom::glam::DVec3;
+    /// # use drawloom::scene::{Material, Mesh, RenderObject, Scene, Topology, Vertex};
+    /// use drawloom::scene::{Camera, ObjectFilter};
+    ///
+    /// # let mut scene = Scene::new();
+    /// # let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+    /// # let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)];
+    /// # let mesh = scene.add(Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?)?;
+    /// # let material = scene.add(Material::default())?;
+    /// # let object = RenderObject::new(mesh, material, DVec3::ZERO);
+    /// let statue = scene.add_object(object)?;
+    /// let portrait = Camera::looking_at("portrait", DVec3::Z * 3.0, DVec3::ZERO);
+    /// let filter = ObjectFilter::only(scene.object_set([statue])?);
+    /// scene.cameras.push(Camera { filter, ..portrait });
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If an object has been removed.
+    pub fn object_set(&self, objects: impl IntoIterator<Item = ObjectHandle>) -> Result<ObjectSet, StaleHandle> {
+        // A scene of more objects than indices makes no frame.
+        objects.into_iter().map(|handle| self.index_of(handle).map(|index| index as u32)).collect()
     }
 
     /// Meshes, materials and textures.
@@ -290,6 +320,17 @@ mod tests {
         assert_eq!(stale.kind, "RenderObject");
         assert_eq!(scene.objects().count(), 2);
         scene.as_scene_ref().check_lengths().unwrap();
+    }
+
+    #[test]
+    fn a_set_of_objects_has_their_present_indices() {
+        let (mut scene, handles) = scene_of(4);
+        let set = |scene: &Scene, objects: &[usize]| scene.object_set(objects.iter().map(|object| handles[*object]));
+        assert_eq!(set(&scene, &[3, 1]), Ok(ObjectSet::new([1, 3])));
+        scene.remove_object(handles[1]).unwrap();
+        assert_eq!(set(&scene, &[3, 0]), Ok(ObjectSet::new([0, 1])), "the last object moved");
+        assert_eq!(set(&scene, &[3, 1]).unwrap_err().kind, "RenderObject");
+        assert_eq!(set(&scene, &[]), Ok(ObjectSet::default()));
     }
 
     #[test]

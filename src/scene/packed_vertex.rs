@@ -58,6 +58,7 @@ impl Mesh {
         let vertices = self.packed_vertices().iter().map(PackedVertex::unpacked).collect();
         Self::from_valid_parts(self.name().to_owned(), self.topology(), vertices, self.indices().to_vec())
             .with_attributes_of(self, &[])
+            .with_levels_of(self)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What was chosen by measurement in a frame, as plain data.
 
+use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 use std::sync::Arc;
 
@@ -41,6 +42,8 @@ pub enum TuningSubject {
     OcclusionTest,
     /// How a pass is recorded and encoded.
     Recording,
+    /// The form in which a view is drawn to keep a [`ViewBudget`](crate::ViewBudget).
+    Rung,
 }
 
 impl TuningSubject {
@@ -50,6 +53,7 @@ impl TuningSubject {
             Self::RunMode => "run mode",
             Self::OcclusionTest => "occlusion test",
             Self::Recording => "recording",
+            Self::Rung => "rung",
         }
     }
 
@@ -59,15 +63,16 @@ impl TuningSubject {
             Self::RunMode => "run",
             Self::OcclusionTest => "object",
             Self::Recording => "batch",
+            Self::Rung => "frame",
         }
     }
 }
 
 /// One alternative of a [`TuningChoice`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TuningAlternative {
-    /// Its name: `serial`, `cached bundles`.
-    pub name: &'static str,
+    /// Its name: `serial`, `cached bundles`, `every 2 frames`.
+    pub name: Cow<'static, str>,
     /// Its estimated cost in nanoseconds per [unit](TuningSubject::unit) when the frame was recorded. `None` if it was not
     /// measured yet, or not since the work has changed; a trial begins without an estimate too.
     pub nanoseconds: Option<f32>,
@@ -118,7 +123,7 @@ impl Display for TuningChoice {
             write!(formatter, ", as a trial")?;
         }
         let others = self.alternatives.iter().enumerate().filter(|&(index, _)| index != self.chosen);
-        let measured = others.filter_map(|(_, other)| Some((other.name, other.nanoseconds?)));
+        let measured = others.filter_map(|(_, other)| Some((&other.name, other.nanoseconds?)));
         for (position, (name, nanoseconds)) in measured.enumerate() {
             write!(formatter, "{} {name} {}", if position == 0 { ";" } else { "," }, Nanoseconds(nanoseconds))?;
         }
@@ -182,13 +187,13 @@ mod tests {
     use super::*;
 
     fn labels() -> Arc<Labels> {
-        let [process, view, stage] = ["geometry buffer", "main", "fill"].map(|label| Some(label.to_owned()));
+        let [process, view, stage] = ["geometry buffer", "main", "fill"].map(|label| Some(label.into()));
         Arc::new(Labels { process, stage, view })
     }
 
     #[test]
     fn a_choice_is_a_line() {
-        let alternative = |name, nanoseconds| TuningAlternative { name, nanoseconds };
+        let alternative = |name: &'static str, nanoseconds| TuningAlternative { name: name.into(), nanoseconds };
         let choice = TuningChoice {
             subject: TuningSubject::Recording,
             labels: labels(),

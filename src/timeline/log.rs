@@ -246,7 +246,7 @@ impl NodeInfo {
     /// The group in which reports count the node: its render process, or its stage if it has none, or else its own
     /// name.
     pub fn group(&self) -> &str {
-        self.labels.process.as_ref().or(self.labels.stage.as_ref()).unwrap_or(&self.name)
+        self.labels.process.as_deref().or(self.labels.stage.as_deref()).unwrap_or(&self.name)
     }
 }
 

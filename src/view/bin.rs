@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::block_reader::BlockReader;
-use super::{ObjectFilter, ObjectTable, VisibleSet, set_bits};
+use super::{ObjectTable, SelectionFilter, VisibleSet, set_bits};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 use crate::scene::Blend;
 
@@ -21,7 +21,7 @@ pub(crate) fn bin_visible(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    filter: ObjectFilter<'_>,
+    filter: SelectionFilter<'_>,
     (index, count): (usize, usize),
     segment: &mut BinnedSegment,
 ) {
@@ -52,7 +52,7 @@ fn collect(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    filter: ObjectFilter<'_>,
+    filter: SelectionFilter<'_>,
     words: Range<usize>,
     segment: &mut BinnedSegment,
 ) {

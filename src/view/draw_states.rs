@@ -116,7 +116,7 @@ fn states_of(double_sided: bool, blend: Blend) -> [DrawState; 2] {
     culls.map(|cull| DrawState::new(Topology::TriangleList, cull, blend))
 }
 
-/// The states that selected objects with these meshes and materials may have, each once: without subdivision, and not mirrored.
+/// The states that selected objects with these meshes and materials may have, each once: without subdivision, at level of detail 0, and not mirrored.
 pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec<DrawState> {
     let mut states = Vec::new();
     let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();

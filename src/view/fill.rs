@@ -6,14 +6,17 @@ use glam::DVec3;
 
 use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
-use super::{ObjectBlock, ObjectFilter, ObjectTable, RejectionReason, RenderView, VisibleSet, set_bits};
+use super::{
+    ObjectBlock, ObjectLevels, ObjectTable, RejectionReason, RenderView, SelectionFilter, VisibleSet, set_bits,
+};
 use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, ColumnValues, Projection, SceneRef};
 
 /// Fills the commands of one pass. Mesh, material and draw state are copied from the object table, which workers only
-/// read. The depth is computed for each view, and so is the state's subdivision level if the view is a paraboloid.
+/// read. The depth is computed for each view, and so are the state's level of detail and, if the view is a paraboloid, its
+/// subdivision level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fill<'a> {
     /// The frame's objects.
@@ -24,7 +27,9 @@ pub(crate) struct Fill<'a> {
     pub(crate) visible: &'a VisibleSet,
     /// The objects that the render process draws.
     pub(crate) selection: Selection,
-    pub(crate) filter: ObjectFilter<'a>,
+    pub(crate) filter: SelectionFilter<'a>,
+    /// The levels of detail in the view; `None` if all are 0.
+    pub(crate) levels: Option<&'a ObjectLevels>,
     /// The scene, for the subdivision level.
     pub(crate) scene: &'a SceneRef<'a>,
     /// The precision of the depth order, and of the subdivision for paraboloids.
@@ -87,10 +92,11 @@ impl Fill<'_> {
         if !self.selection.contains(blend, draw.material) || !self.filter.passes(object) {
             return RenderCommand::EMPTY;
         }
-        let mut state = draw.state;
+        let level_of_detail = self.levels.map_or(0, |levels| levels.get(object));
+        let mut state = draw.state.with_level_of_detail(level_of_detail);
         if self.view.camera.projection == Projection::Paraboloid {
             let widest_angle = f64::from(self.quality.shadows.widest_edge).to_radians();
-            let Some(level) = subdivision_level(self.view, self.scene, object, widest_angle) else {
+            let Some(level) = subdivision_level(self.view, self.scene, (object, level_of_detail), widest_angle) else {
                 return RenderCommand::EMPTY;
             };
             state = state.with_subdivision_level(level);

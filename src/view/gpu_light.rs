@@ -23,9 +23,10 @@ pub struct GpuLight {
     pub cone_begin: f32,
     /// The cosine of the angle at which a spot light ends; 0 for a hemispherical light.
     pub cone_end: f32,
-    /// The layer of its shadow map, or [`GpuLight::NO_SHADOW_MAP`].
+    /// The layer of its shadow map, the first layer if it has several, or [`GpuLight::NO_SHADOW_MAP`].
+    /// [`LightTable`](super::LightTable) has the light as each further map shows it.
     pub shadow_layer: u32,
-    /// Half the shadow map's extent: at a distance of 1 m for a spot light, in metres for a directional one.
+    /// Half the shadow map's extent: at a distance of 1 m for a spot or point light, in metres for a directional one.
     pub shadow_half: f32,
     /// The near plane of the shadow map, in metres.
     pub shadow_near: f32,
@@ -50,7 +51,7 @@ impl GpuLight {
             Light::Directional { direction, illuminance, .. } => {
                 (gpu_light.direction, gpu_light.intensity) = (direction.normalize(), illuminance);
             }
-            Light::Point { position, intensity, range } => {
+            Light::Point { position, intensity, range, .. } => {
                 (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
             }
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {

@@ -6,12 +6,18 @@ use super::{GpuLight, RenderView};
 use crate::scene::{Light, LightKind, ViewKind};
 
 /// The lights that reach one view, grouped by class: each class is one instanced draw.
+///
+/// If a light of the frame has several shadow maps, one more [`GpuLight`] follows for each layer of the maps: the light as that
+/// map shows it. So a light with any number of maps is as small as one with a single map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTable {
     gpu_lights: Vec<GpuLight>,
+    /// For each layer of the shadow maps, if a light has several: the index of the light among the valid ones and of the view;
+    /// `None` for a shadow camera of the engine's own.
+    layers: Vec<Option<(usize, usize)>>,
     /// The class and the index among the frame's valid lights of each light that reaches the view.
     reaching: Vec<(usize, usize)>,
-    /// For each valid light, the index of its shadow map's view.
+    /// For each valid light, the index of its first shadow map's view.
     shadow_views: Vec<Option<usize>>,
     /// By [`LightClass::index`].
     ranges: [Range<u32>; LightClass::COUNT],
@@ -49,19 +55,23 @@ impl LightClass {
 impl LightTable {
     /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a
     /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their own,
-    /// and a shadow map if one of `views` draws it. The table of a shadow map is empty.
+    /// and the shadow maps that `views` draw of them. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
         self.gpu_lights.clear();
+        self.layers.clear();
         self.reaching.clear();
         self.ranges = Default::default();
         if view.kind() == ViewKind::Shadow {
             return;
         }
         self.shadow_views.clear();
-        self.shadow_views.resize(if shadows { lights.len() } else { 0 }, None);
-        for (index, map) in views.iter().enumerate() {
+        let has_maps = shadows && !lights.is_empty() && views.iter().any(|map| map.valid_light.is_some());
+        self.shadow_views.resize(if has_maps { lights.len() } else { 0 }, None);
+        let mut has_several = false;
+        for (index, map) in views.iter().enumerate().filter(|_| has_maps) {
             if let Some(shadow_view) = map.valid_light.and_then(|light| self.shadow_views.get_mut(light)) {
-                *shadow_view = Some(index);
+                has_several |= shadow_view.is_some();
+                shadow_view.get_or_insert(index);
             }
         }
         let mut counts = [0; LightClass::COUNT];
@@ -84,19 +94,39 @@ impl LightTable {
             self.gpu_lights.extend(of_class.map(gpu_light));
             self.ranges[class] = start..self.gpu_lights.len() as u32;
         }
+        if has_several {
+            let maps = views.iter().enumerate().filter(|(_, map)| map.kind() == ViewKind::Shadow);
+            self.layers.extend(maps.map(|(index, map)| map.valid_light.map(|light| (light, index))));
+            let of_layer = |layer: &Option<(usize, usize)>| {
+                let map = |(light, map): (usize, usize)| GpuLight::new(&lights[light], origin, Some(&views[map]));
+                layer.map_or_else(bytemuck::Zeroable::zeroed, map)
+            };
+            self.gpu_lights.extend(self.layers.iter().map(of_layer));
+        }
     }
 
-    /// All lights, ordered by class.
+    /// What shaders read: all lights, ordered by class, and then those by layer.
     pub fn gpu_lights(&self) -> &[GpuLight] {
         &self.gpu_lights
     }
 
-    /// For each of [`LightTable::gpu_lights`]: its index among the frame's valid lights, and the index of the view that
-    /// draws its shadow map, if any.
+    /// The number of lights: as many of [`LightTable::gpu_lights`] come before those by layer.
+    pub fn light_count(&self) -> usize {
+        self.reaching.len()
+    }
+
+    /// For each light: its index among the frame's valid lights, and the index of the view that draws its first shadow map,
+    /// if any.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         let of_class = |class: usize| self.reaching.iter().filter(move |(other, _)| *other == class);
         let lights = (0..LightClass::COUNT).flat_map(of_class);
         lights.map(|&(_, light)| (light, self.shadow_views.get(light).copied().flatten()))
+    }
+
+    /// For each of [`LightTable::gpu_lights`] by layer: the light's index among the frame's valid lights and that of the view that
+    /// draws the layer; `None` for a shadow camera of the engine's own.
+    pub fn layer_sources(&self) -> &[Option<(usize, usize)>] {
+        &self.layers
     }
 
     /// The range of a class within [`LightTable::gpu_lights`].
@@ -113,7 +143,7 @@ mod tests {
     use crate::scene::Camera;
 
     fn point(z: f64) -> Light {
-        Light::Point { position: DVec3::Z * z, intensity: Vec3::splat(z.abs() as f32), range: 2.0 }
+        Light::Point { position: DVec3::Z * z, intensity: Vec3::splat(z.abs() as f32), range: 2.0, casts_shadow: false }
     }
 
     fn spot(z: f64, casts_shadow: bool) -> Light {
@@ -147,6 +177,32 @@ mod tests {
         let depths: Vec<_> = table.gpu_lights().iter().map(|light| light.position.z).collect();
         assert_eq!(depths, [-4.0, -6.0, -5.0, -3.0]);
         assert_eq!(table.gpu_lights()[3].shadow_layer, 7);
+    }
+
+    #[test]
+    fn a_light_with_several_maps_is_listed_for_each_layer_too() {
+        let main = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+        let lamp = Light::Point { position: DVec3::Z * -4.0, intensity: Vec3::ONE, range: 2.0, casts_shadow: true };
+        let lights = [spot(-3.0, true), lamp];
+        let map = |valid_light, layer: u32| {
+            let towards = DVec3::new(0.0, 1.0, f64::from(layer));
+            let camera = Camera { kind: ViewKind::Shadow, ..Camera::looking_at("map", DVec3::ZERO, towards) };
+            RenderView { valid_light, layer, ..RenderView::new(&camera) }
+        };
+        // The first is a camera of the engine's own.
+        let views = [main.clone(), map(None, 0), map(Some(0), 1), map(Some(1), 2), map(Some(1), 3)];
+        let mut table = LightTable::default();
+        table.fill(&main, &lights, &views, true);
+        assert_eq!((table.light_count(), table.gpu_lights().len()), (2, 6));
+        assert_eq!(table.sources().collect::<Vec<_>>(), [(1, Some(3)), (0, Some(2))]);
+        assert_eq!(table.layer_sources(), [None, Some((0, 2)), Some((1, 3)), Some((1, 4))]);
+        for (layer, light) in [(1, &lights[0]), (2, &lamp), (3, &lamp)] {
+            let expected = GpuLight::new(light, DVec3::ZERO, Some(&views[layer + 1]));
+            assert_eq!((table.gpu_lights()[2 + layer], expected.shadow_layer), (expected, layer as u32));
+        }
+        // With a map for each light at most, there are only the lights.
+        table.fill(&main, &lights, &views[..4], true);
+        assert_eq!((table.gpu_lights().len(), table.layer_sources()), (2, [].as_slice()));
     }
 
     #[test]

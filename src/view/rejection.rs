@@ -78,10 +78,13 @@ pub enum RejectionReason {
     StaleTexture,
     /// A texture exceeds the device's limits; the material's plain colour is used.
     TextureLimit,
+    /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
+    /// objects are drawn as it says.
+    UnknownObject,
 }
 
 impl RejectionReason {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -93,6 +96,7 @@ impl RejectionReason {
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
+        Self::UnknownObject,
     ];
 
     /// The description that reports print.
@@ -109,6 +113,7 @@ impl RejectionReason {
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",
+            Self::UnknownObject => "object that a filter lists and the scene does not have",
         }
     }
 }

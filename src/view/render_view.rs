@@ -18,15 +18,15 @@ pub struct RenderView {
     pub valid_light: Option<usize>,
     /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
-    /// Whether its targets still hold an earlier frame's shadow map. Then no render process draws into it, but others
-    /// read its targets: see [`ShadowQuality::interval`](crate::quality::ShadowQuality::interval).
-    pub is_cached: bool,
+    /// How many frames before this one the view was drawn: 0 if this frame draws it. Camera, frustum and light are those that it was drawn
+    /// with.
+    pub age: u32,
 }
 
 impl RenderView {
     /// The view of `camera`.
     pub fn new(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), frustum: Frustum::new(camera), valid_light: None, layer: 0, is_cached: false }
+        Self { camera: camera.clone(), frustum: Frustum::new(camera), valid_light: None, layer: 0, age: 0 }
     }
 
     /// The camera's name, which reports use.
@@ -37,6 +37,12 @@ impl RenderView {
     /// The kind of picture that it draws.
     pub fn kind(&self) -> ViewKind {
         self.camera.kind
+    }
+
+    /// Whether its targets hold what an earlier frame drew. Then no render process draws in it, but others read its targets: see
+    /// [`Redraw`](crate::scene::Redraw).
+    pub fn is_cached(&self) -> bool {
+        self.age > 0
     }
 
     /// Which of the objects that a process draws it draws in this view.

@@ -1,35 +1,50 @@
 //! Shadow maps: a light's view is a view like any other (M 10.4, L 4.2.2).
 
-use glam::{DQuat, DVec2, DVec3, Quat, Vec2, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 
 use super::FixedPosition;
-use crate::scene::{Camera, LayerMask, Light, Projection, ViewKind};
+use super::cascades::{cascade_slice, visible_sphere};
+use crate::scene::{Camera, LayerMask, Light, ObjectFilter, Projection, Redraw, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
+///
+/// So a frame has at most as many maps as the device's textures have layers: 256, unless the device was requested with a higher limit. That
+/// is 42 point lights whose range a camera sees. A frame with more is
+/// [`BackendError::TooManyLayers`](crate::backend::BackendError::TooManyLayers).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
     /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a
-    /// hemispherical light, and 2·d·tan(angle)/side for a spot light. For a directional light it is as wide as the
-    /// diameter of the sphere around what main cameras see, divided by `side`: at 60° and 16:9 some
-    /// 2.3·`max_distance`/side.
+    /// hemispherical light, 2·d·tan(angle)/side for a spot light, and 2·d/(side − 2·`filter` − 2) for a point light,
+    /// where d is along the axis of the cube's face. For a directional light it is as wide as the diameter of the sphere
+    /// around what main cameras see, divided by `side`: at 60° and 16:9 some 2.3·`max_distance`/side.
     pub side: u32,
-    /// The distance from the main cameras, in metres, up to which a directional light's map covers their views; at most
-    /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. There is one map for all main cameras: the farther they are apart,
-    /// the coarser it is.
+    /// The distance from the main cameras, in metres, up to which a directional light's maps cover their views; at most
+    /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. The maps are for all main cameras: the
+    /// farther these are apart, the coarser they are.
     pub max_distance: f32,
+    /// The number of maps of a directional light, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers a slice of what
+    /// main cameras see, between two distances, and a point is looked up in the finest map that contains it. A shadow's
+    /// edge is as sharp as the slice's sphere is small. Each map is a view.
+    pub cascades: u32,
+    /// Where the slices end, from 0, equal depths, to 1, equal ratios of the distances: the λ of the practical split
+    /// scheme (Zhang et al. 2006).
+    pub split_lambda: f32,
     /// The depth bias, as a multiple of what a pixel's width and the surface's slope require. Below 1, lit surfaces
     /// shadow themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
     /// The radius of percentage-closer filtering: shadows fade over 2·`filter` + 1 pixels of the map; 0 is bilinear
     /// filtering. At most [`ShadowMaps::MAX_FILTER`].
     pub filter: u32,
-    /// Only objects that belong to one of these layers cast shadows.
+    /// Only objects that belong to one of these layers cast shadows: an object casts none if it is in others only. The
+    /// [filters](Camera::filter) of the views that the maps light make no difference.
     pub layers: LayerMask,
 }
 
 impl ShadowMaps {
     /// The largest [`ShadowMaps::filter`]: it reads 100 pixels of the map for each pixel of the picture.
     pub const MAX_FILTER: u32 = 4;
+    /// The largest [`ShadowMaps::cascades`].
+    pub const MAX_CASCADES: u32 = 4;
 
     /// Describes the first invalid setting, if any.
     pub(crate) fn problem(&self) -> Option<&'static str> {
@@ -37,6 +52,10 @@ impl ShadowMaps {
             Some("a side of 0 pixels")
         } else if !(self.max_distance > 0.0 && self.max_distance <= 1e6) {
             Some("a max_distance that is not a positive distance of at most 1,000 km")
+        } else if !(1..=Self::MAX_CASCADES).contains(&self.cascades) {
+            Some("a number of cascades that is not from 1 to ShadowMaps::MAX_CASCADES")
+        } else if !(0.0..=1.0).contains(&self.split_lambda) {
+            Some("a split_lambda that is not from 0 to 1")
         } else if !(self.bias >= 0.0 && self.bias.is_finite()) {
             Some("a bias that is negative or not finite")
         } else if self.filter > Self::MAX_FILTER {
@@ -46,81 +65,122 @@ impl ShadowMaps {
         }
     }
 
-    /// The camera of a light's shadow map: a perspective camera for a spot light, a paraboloid for a hemispherical
-    /// light, and for a directional light an orthographic camera around what the main cameras among `cameras` see.
-    /// `None` for a light that casts no shadow, and for a directional light if there is no main camera or if the map's
-    /// camera would be beyond [`FixedPosition::MAX_COORDINATE`].
-    pub fn camera(&self, name: String, light: &Light, cameras: &[Camera]) -> Option<Camera> {
-        if !light.casts_shadow() {
-            return None;
+    /// The cameras of a light's shadow maps, the layers of which follow each other in this order: a perspective camera
+    /// for a spot light, a paraboloid for a hemispherical light, six perspective cameras for a point light, and for a
+    /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what the main
+    /// cameras among `cameras` see. A light has all its maps or none: none if it casts no shadow, and a directional
+    /// light if there is no main camera or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
+    /// invalid: a renderer with such maps is [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
+    ///
+    /// The only map of a light is called `name`, the faces of a cube `name, +X` and so on, and cascades `name, cascade
+    /// 1` and so on.
+    ///
+    /// # The error of a point light's maps
+    ///
+    /// A perspective map keeps straight edges straight, so a shadow's edge in a map is off by what rasterization rounds:
+    /// corners are snapped to 1/256 of a pixel, and a pixel is in shadow as a whole, by its centre, at most half a
+    /// pixel from the edge along each axis. The filter turns that into a fade. A position whose distance from the edge
+    /// is more than `filter` + 1 pixels along each axis of the face reads no pixel beyond the edge, and is exact. Across
+    /// the edge of the cube nothing is added: each face is wider than 90° by the `filter` + 1 pixels that are read, so
+    /// no filter leaves its map, and at the edge of the cube the pixels of both faces have the same width. This holds for maps of at least
+    /// 8/3 · (`filter` + 1) pixels: a smaller one has no room for so many pixels beyond the edge.
+    pub fn cameras(&self, name: &str, light: &Light, cameras: &[Camera]) -> Vec<Camera> {
+        if !light.casts_shadow() || self.problem().is_some() {
+            return Vec::new();
         }
-        let (position, direction, projection, [near, far]) = match *light {
-            Light::Point { .. } => return None,
+        match *light {
+            Light::Point { position, range, .. } => {
+                let field_of_view = 2.0 * self.cube_face_extent().atan() as f32;
+                let face = |(axis, axis_name): &(Vec3, &str)| Camera {
+                    projection: Projection::Perspective { field_of_view },
+                    ..self.camera(format!("{name}, {axis_name}"), position, *axis, range)
+                };
+                CUBE_FACES.iter().map(face).collect()
+            }
             Light::Spot { position, direction, range, outer_angle, .. } => {
                 let field_of_view = (2.0 * outer_angle).min(MAX_SPOT_FIELD_OF_VIEW);
-                (position, direction, Projection::Perspective { field_of_view }, [range * NEAR_PLANE_SHARE, range])
+                let projection = Projection::Perspective { field_of_view };
+                vec![Camera { projection, ..self.camera(name.to_owned(), position, direction, range) }]
             }
             Light::Hemispherical { position, direction, range, .. } => {
-                (position, direction, Projection::Paraboloid, [range * NEAR_PLANE_SHARE, range])
+                let projection = Projection::Paraboloid;
+                vec![Camera { projection, ..self.camera(name.to_owned(), position, direction, range) }]
             }
-            Light::Directional { direction, .. } => {
-                let (center, radius) = self.visible_sphere(cameras)?;
-                // Snapping moves the map by less than a pixel, so it is a pixel larger on every side.
-                let radius = radius * (1.0 + 4.0 / f64::from(self.side));
-                let orientation = looking_along(direction);
-                let center = self.snapped_to_texels(center, radius, orientation.as_dquat().normalize());
-                let height = radius * (CASTER_DISTANCE + 2.0);
-                let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * height;
-                FixedPosition::new(position)?;
-                let (radius, height) = (radius as f32, height as f32);
-                (position, direction, Projection::Orthographic { height: 2.0 * radius }, [radius, height + radius])
-            }
-        };
-        Some(Camera {
+            Light::Directional { direction, .. } => self.cascade_cameras(name, direction, cameras).unwrap_or_default(),
+        }
+    }
+
+    /// A camera of a light at `position` that looks along `direction` as far as `range`.
+    fn camera(&self, name: String, position: DVec3, direction: Vec3, range: f32) -> Camera {
+        Camera {
             name,
             position,
             orientation: looking_along(direction),
-            projection,
+            projection: Projection::Paraboloid,
             shift: Vec2::ZERO,
             clip_plane: None,
-            near: near.max(f32::MIN_POSITIVE),
-            far: far.max(f32::MIN_POSITIVE * 2.0),
+            near: (range * NEAR_PLANE_SHARE).max(f32::MIN_POSITIVE),
+            far: range.max(f32::MIN_POSITIVE * 2.0),
             size: [self.side; 2],
+            level_of_detail_scale: 1.0,
             layers: self.layers,
+            filter: ObjectFilter::ALL,
+            samples_views: true,
             kind: ViewKind::Shadow,
-        })
+            redraw: Redraw::EveryFrame,
+        }
     }
 
-    /// A sphere around all that main cameras see within the maximum distance. Its size does not change when a camera
-    /// turns.
-    fn visible_sphere(&self, cameras: &[Camera]) -> Option<(DVec3, f64)> {
-        let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
-        main.map(|camera| {
-            let far = f64::from(self.max_distance.min(camera.far));
-            let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
-            let aspect = f64::from(camera.aspect());
-            match camera.projection {
-                Projection::Perspective { field_of_view } => {
-                    let up = (f64::from(field_of_view) * 0.5).tan();
-                    // The sphere through the camera and the far corners, or around the far corners if it is larger.
-                    // Less a pixel, so that a jitter of less moves no shadow.
-                    let pixel = 2.0 / DVec2::from(camera.size.map(f64::from));
-                    let shift = (camera.shift.abs().as_dvec2() - pixel).max(DVec2::ZERO);
-                    let corner = DVec2::new(up * aspect, up) * (1.0 + shift);
-                    let spread = corner.length_squared();
-                    let along = if spread < 1.0 { far * (1.0 + spread) * 0.5 } else { far };
-                    let radius = if spread < 1.0 { along } else { far * spread.sqrt() };
-                    (camera.position + forward * along, radius)
-                }
-                Projection::Orthographic { height } => {
-                    let half = f64::from(height) * 0.5;
-                    let radius = (half * half * (1.0 + aspect * aspect) + far * far * 0.25).sqrt();
-                    (camera.position + forward * (far * 0.5), radius)
-                }
-                Projection::Paraboloid => (camera.position, far),
-            }
-        })
-        .reduce(enclosing_sphere)
+    /// Half the width of the map of a cube's face, at a distance of 1: more than 1 by the pixels that the filter reads
+    /// beyond the edge of the face.
+    fn cube_face_extent(&self) -> f64 {
+        self.extent_with_margin(1.0, self.filter + 1)
+    }
+
+    /// Half the width of a map whose outermost pixels, this many on each side, lie beyond `half`. In a map that has
+    /// hardly more pixels than these, they take three quarters of it.
+    fn extent_with_margin(&self, half: f64, pixels: u32) -> f64 {
+        half / (1.0 - 2.0 * f64::from(pixels) / f64::from(self.side)).max(0.25)
+    }
+
+    /// The cameras of a directional light's maps; `None` if there is no main camera or if one would be out of reach.
+    fn cascade_cameras(&self, name: &str, direction: Vec3, cameras: &[Camera]) -> Option<Vec<Camera>> {
+        let spheres = (0..self.cascades).map(|cascade| {
+            let slice = |camera: &Camera| {
+                let far = self.max_distance.min(camera.far);
+                cascade_slice([camera.near, far], self.split_lambda, cascade, self.cascades)
+            };
+            let (center, radius) = visible_sphere(cameras, slice)?;
+            // Snapping moves the map by less than a pixel, so it is a pixel larger on every side; with another map to
+            // go on with, by as much as the filter reads, too, so that no point of the slice needs the coarser one.
+            let radius = match self.cascades {
+                1 => radius * (1.0 + 4.0 / f64::from(self.side)),
+                _ => self.extent_with_margin(radius, self.filter + 2),
+            };
+            Some((center, radius))
+        });
+        let spheres = spheres.collect::<Option<Vec<_>>>()?;
+        let (_, largest) = *spheres.last()?;
+        let orientation = looking_along(direction);
+        let camera = |(cascade, (center, radius)): (usize, (DVec3, f64))| {
+            let center = self.snapped_to_texels(center, radius, orientation.as_dquat().normalize());
+            let casters = (CASTER_DISTANCE * largest).clamp(CASTER_DISTANCE * radius, MAX_CASTER_DISTANCE * radius);
+            let height = casters + 2.0 * radius;
+            let position = center - (orientation * Vec3::NEG_Z).as_dvec3() * height;
+            FixedPosition::new(position)?;
+            let name = match self.cascades {
+                1 => name.to_owned(),
+                _ => format!("{name}, cascade {}", cascade + 1),
+            };
+            let (radius, height) = (radius as f32, height as f32);
+            Some(Camera {
+                projection: Projection::Orthographic { height: 2.0 * radius },
+                near: radius.max(f32::MIN_POSITIVE),
+                far: (height + radius).max(f32::MIN_POSITIVE * 2.0),
+                ..self.camera(name, position, direction, 0.0)
+            })
+        };
+        spheres.into_iter().enumerate().map(camera).collect()
     }
 
     /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to
@@ -135,9 +195,21 @@ impl ShadowMaps {
 
 impl Default for ShadowMaps {
     fn default() -> Self {
-        Self { side: 1024, max_distance: 60.0, bias: 1.0, filter: 1, layers: LayerMask::ALL }
+        Self {
+            side: 1024,
+            max_distance: 60.0,
+            cascades: 1,
+            split_lambda: 0.5,
+            bias: 1.0,
+            filter: 1,
+            layers: LayerMask::ALL,
+        }
     }
 }
+
+/// The directions and names of a cube's faces. Shaders know their order.
+const CUBE_FACES: [(Vec3, &str); 6] =
+    [(Vec3::X, "+X"), (Vec3::NEG_X, "-X"), (Vec3::Y, "+Y"), (Vec3::NEG_Y, "-Y"), (Vec3::Z, "+Z"), (Vec3::NEG_Z, "-Z")];
 
 /// The near plane of a light's map, as a share of its range.
 const NEAR_PLANE_SHARE: f32 = 1e-5;
@@ -147,25 +219,16 @@ const NEAR_PLANE_SHARE: f32 = 1e-5;
 /// f32 rounds: here to within a hundredth of a pixel of 1024.
 const CASTER_DISTANCE: f64 = 16.0;
 
+/// A finer cascade extends as far as the coarsest, up to this many of its own radii: there f32 rounds to within a
+/// tenth of a pixel.
+const MAX_CASTER_DISTANCE: f64 = 128.0;
+
 /// In radians. Towards 180°, the centre of a perspective picture shrinks to nothing.
 const MAX_SPOT_FIELD_OF_VIEW: f32 = 2.967;
 
 /// The orientation of a camera that looks along `direction`.
 fn looking_along(direction: Vec3) -> Quat {
     Camera::looking_at("", DVec3::ZERO, direction.as_dvec3()).orientation
-}
-
-/// The smallest sphere around two spheres.
-fn enclosing_sphere((one, one_radius): (DVec3, f64), (other, other_radius): (DVec3, f64)) -> (DVec3, f64) {
-    let distance = one.distance(other);
-    if distance + other_radius <= one_radius {
-        (one, one_radius)
-    } else if distance + one_radius <= other_radius {
-        (other, other_radius)
-    } else {
-        let radius = (distance + one_radius + other_radius) * 0.5;
-        (one.lerp(other, (radius - one_radius) / distance), radius)
-    }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -182,14 +245,20 @@ mod tests {
     }
 
     proptest! {
-        /// All that a main camera sees within the maximum distance is in the sun's map, and before its far plane.
+        /// All that a main camera sees within the maximum distance is in the sun's map of its cascade, before its far
+        /// plane, and so far inside that the filter reads no pixel outside.
         #[test]
-        fn a_directional_map_covers_what_main_cameras_see(
+        fn a_cascade_covers_what_main_cameras_see_of_its_slice(
             placements in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
-            pixel in prop::array::uniform2(-1.0..1.0_f32),
+            pixel in prop::array::uniform2(prop_oneof![-1.0..1.0_f32, Just(-1.0), Just(1.0)]),
             share in 0.0..1.0_f32,
+            is_at_an_end in any::<bool>(),
+            cascades in 1..=ShadowMaps::MAX_CASCADES,
+            split_lambda in 0.0..=1.0_f32,
+            filter in 0..=ShadowMaps::MAX_FILTER,
+            side in 24..200_u32,
         ) {
-            let maps = ShadowMaps::default();
+            let maps = ShadowMaps { cascades, split_lambda, filter, side, ..ShadowMaps::default() };
             let cameras: Vec<_> = placements
                 .into_iter()
                 .map(|(position, degrees)| Camera {
@@ -197,31 +266,93 @@ mod tests {
                     ..Camera::looking_at("main", DVec3::from(position), DVec3::ZERO)
                 })
                 .collect();
-            let map = RenderView::new(&maps.camera("sun".into(), &sun(), &cameras).unwrap());
+            let of_sun = maps.cameras("sun", &sun(), &cameras);
+            prop_assert_eq!(of_sun.len(), cascades as usize);
+            let [near, far] = [cameras[0].near.max(maps.max_distance * 1e-3), maps.max_distance].map(f64::from);
+            let end = |cascade: u32| {
+                let share = f64::from(cascade) / f64::from(cascades);
+                let [equal_ratio, equal_depth] = [near * (far / near).powf(share), near + (far - near) * share];
+                equal_depth + (equal_ratio - equal_depth) * f64::from(split_lambda)
+            };
+            let slice = (share * cascades as f32) as u32;
+            let [begin, end] = [if slice == 0 { 0.0 } else { end(slice) }, end(slice + 1)];
+            let distance = if is_at_an_end { end } else { begin + (end - begin) * f64::from(share) } as f32;
+            let map = RenderView::new(&of_sun[slice as usize]);
+            let outside = if cascades == 1 { 0.0 } else { (2.0 * filter as f32 + 1.0) / side as f32 };
             for camera in &cameras {
                 let [right, up, forward] = RenderView::new(camera).picture_axes();
-                let seen = (right * pixel[0] + up * pixel[1] + forward) * (share * maps.max_distance);
+                let seen = (right * pixel[0] + up * pixel[1] + forward) * distance;
                 let point = camera.position + seen.as_dvec3() - map.camera.position;
                 let clip = map.clip_from_relative() * point.as_vec3().extend(1.0);
-                prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 + 1e-4, "{clip}");
+                prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 - outside + 1e-4, "{clip}");
                 prop_assert!((-1e-4..=1.0 + 1e-4).contains(&clip.z), "{clip}");
             }
         }
     }
 
     #[test]
-    fn a_directional_map_moves_by_whole_pixels() {
-        let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
-        let pixel_of_origin = |x: f64| {
+    fn directional_maps_move_by_whole_pixels() {
+        let maps = ShadowMaps { side: 64, cascades: 3, ..ShadowMaps::default() };
+        let pixels_of_origin = |x: f64| {
             let camera = Camera::looking_at("main", DVec3::new(x, 1.0, 2.0), DVec3::new(x, 1.0, -9.0));
-            let map = RenderView::new(&maps.camera("sun".into(), &sun(), &[camera]).unwrap());
-            let clip = map.clip_from_relative() * (-map.camera.position).as_vec3().extend(1.0);
-            Vec2::new(clip.x, clip.y) * 32.0
+            let pixel = |map: &Camera| {
+                let map = RenderView::new(map);
+                let clip = map.clip_from_relative() * (-map.camera.position).as_vec3().extend(1.0);
+                Vec2::new(clip.x, clip.y) * 32.0
+            };
+            maps.cameras("sun", &sun(), &[camera]).iter().map(pixel).collect::<Vec<_>>()
         };
-        let first = pixel_of_origin(0.0);
+        let first = pixels_of_origin(0.0);
         for step in 1..20 {
-            let moved = pixel_of_origin(f64::from(step) * 0.37) - first;
-            assert!((moved - moved.round()).abs().max_element() < 1e-3, "{moved}");
+            for (now, first) in pixels_of_origin(f64::from(step) * 0.37).into_iter().zip(&first) {
+                let moved = now - first;
+                assert!((moved - moved.round()).abs().max_element() < 1e-3, "{moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn maps_are_named_after_their_light_and_what_they_show() {
+        let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+        let names = |cascades: u32, light: Light| -> Vec<String> {
+            let maps = ShadowMaps { cascades, ..ShadowMaps::default() };
+            maps.cameras("light", &light, std::slice::from_ref(&main)).into_iter().map(|map| map.name).collect()
+        };
+        let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: true };
+        assert_eq!(names(1, sun()), ["light"]);
+        assert_eq!(names(3, sun()), ["light, cascade 1", "light, cascade 2", "light, cascade 3"]);
+        let faces = ["light, +X", "light, -X", "light, +Y", "light, -Y", "light, +Z", "light, -Z"];
+        assert_eq!(names(3, lamp), faces);
+    }
+
+    #[test]
+    fn a_light_has_all_its_maps_or_none() {
+        let maps = ShadowMaps { cascades: 4, max_distance: 1e6, ..ShadowMaps::default() };
+        let of_sun = |x: f64| {
+            let main = Camera { far: 1e7, ..Camera::looking_at("main", DVec3::X * x, DVec3::ZERO) };
+            maps.cameras("sun", &sun(), &[main]).len()
+        };
+        assert_eq!([of_sun(1.0), of_sun(-FixedPosition::MAX_COORDINATE * 0.9999)], [4, 0]);
+    }
+
+    #[test]
+    fn invalid_maps_have_no_cameras() {
+        let good = ShadowMaps { cascades: 2, ..ShadowMaps::default() };
+        let main = [Camera::looking_at("main", DVec3::Z, DVec3::ZERO)];
+        let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: true };
+        let counts = |maps: ShadowMaps| [sun(), lamp].map(|light| maps.cameras("light", &light, &main).len());
+        assert_eq!(counts(good), [2, 6]);
+        for maps in [
+            ShadowMaps { side: 0, ..good },
+            ShadowMaps { max_distance: -1.0, ..good },
+            ShadowMaps { max_distance: f32::NAN, ..good },
+            ShadowMaps { cascades: 0, ..good },
+            ShadowMaps { cascades: u32::MAX, ..good },
+            ShadowMaps { split_lambda: f32::NAN, ..good },
+            ShadowMaps { bias: -1.0, ..good },
+            ShadowMaps { filter: u32::MAX, ..good },
+        ] {
+            assert_eq!(counts(maps), [0, 0], "{maps:?}");
         }
     }
 
@@ -229,12 +360,12 @@ mod tests {
     fn a_light_that_casts_no_shadow_has_no_map() {
         let maps = ShadowMaps::default();
         let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
-        let map = |light: Light, cameras: &[Camera]| maps.camera("map".into(), &light, cameras);
-        let point = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0 };
-        assert_eq!(map(point, std::slice::from_ref(&main)), None);
-        assert_eq!(map(sun(), &[]), None);
+        let map = |light: Light, cameras: &[Camera]| maps.cameras("map", &light, cameras);
+        let point = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
+        assert_eq!(map(point, std::slice::from_ref(&main)), []);
+        assert_eq!(map(sun(), &[]), []);
         let Light::Directional { direction, illuminance, .. } = sun() else { unreachable!() };
         let moon = Light::Directional { direction, illuminance, casts_shadow: false };
-        assert_eq!(map(moon, &[main]), None);
+        assert_eq!(map(moon, &[main]), []);
     }
 }

@@ -29,7 +29,7 @@ impl RenderView {
         let mesh = scene.assets.get(scene.meshes[object]);
         mesh.map_or_else(
             |_| CulledTriangles::default(),
-            |mesh| self.cull_triangle_range(scene, object, 0..mesh.triangle_count(), remaining),
+            |mesh| self.cull_triangle_range(scene, (object, 0), 0..mesh.triangle_count(), remaining),
         )
     }
 
@@ -43,14 +43,14 @@ impl RenderView {
         }
     }
 
-    /// [`RenderView::cull_triangles`] for a range of the mesh's triangles.
+    /// [`RenderView::cull_triangles`] for a range of the triangles that the mesh has at a level of detail.
     ///
     /// # Panics
     /// If `object` is not in the scene, or the range exceeds the mesh's triangles.
     pub(crate) fn cull_triangle_range(
         &self,
         scene: &SceneRef<'_>,
-        object: usize,
+        (object, level): (usize, u32),
         triangles: Range<usize>,
         remaining: &mut Vec<u32>,
     ) -> CulledTriangles {
@@ -62,7 +62,7 @@ impl RenderView {
             return CulledTriangles::default();
         }
         let count = triangles.len();
-        let corners = || mesh.triangles_in(triangles.clone());
+        let corners = || mesh.triangles_in(level, triangles.clone());
         if !self.can_cull_triangles() {
             remaining.extend(corners().flatten());
             return CulledTriangles { triangles: count, ..CulledTriangles::default() };
@@ -246,7 +246,7 @@ mod tests {
                 let mut start = 0;
                 for length in (1..).map(|part| part * 7 % 50 + 1) {
                     let end = expected.triangles.min(start + length);
-                    found += view.cull_triangle_range(&scene, object, start..end, &mut in_parts);
+                    found += view.cull_triangle_range(&scene, (object, 0), start..end, &mut in_parts);
                     start = end;
                     if start == expected.triangles {
                         break;

@@ -29,6 +29,12 @@ impl UsedMeshes {
         self.meshes.get(slot) == Some(&Some(mesh)) && !self.is_unused[slot]
     }
 
+    /// Whether the mesh in a slot is used.
+    pub(crate) fn contains_slot(&self, slot: u32) -> bool {
+        let slot = slot as usize;
+        self.meshes.get(slot).is_some_and(Option::is_some) && !self.is_unused[slot]
+    }
+
     /// A counter that grows whenever a mesh becomes used.
     pub fn revision(&self) -> u64 {
         self.revision

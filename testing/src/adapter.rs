@@ -42,6 +42,14 @@ pub fn noop_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 
 /// Opens a device on wgpu's no-op backend, as if it lacked some optional features.
 pub fn noop_device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+    let (_, device, queue) = noop_instance_and_device(missing)?;
+    Ok((device, queue))
+}
+
+/// Opens a device on wgpu's no-op backend in an instance of its own, which counts what the device has.
+pub fn noop_instance_and_device(
+    missing: wgpu::Features,
+) -> Result<(wgpu::Instance, wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::NOOP;
     // wgpu's check of indirect draws panics on this backend.
@@ -50,7 +58,8 @@ pub fn noop_device_without(missing: wgpu::Features) -> Result<(wgpu::Device, wgp
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
     // The adapter claims limits that wgpu itself does not support.
-    open(&adapter, missing, wgpu::Limits::default())
+    let (device, queue) = open(&adapter, missing, wgpu::Limits::default())?;
+    Ok((instance, device, queue))
 }
 
 fn best_adapter() -> Result<wgpu::Adapter, Box<dyn Error>> {

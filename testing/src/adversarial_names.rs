@@ -19,7 +19,7 @@ pub fn adversarial_names() -> Vec<String> {
 /// A log in which all names are from this list.
 pub fn log_of(names: &[String]) -> Log {
     let labels = |name: &String| {
-        let name = Some(name.clone());
+        let name = Some(Arc::from(name.as_str()));
         Labels { process: name.clone(), stage: name.clone(), view: name }
     };
     let node = |name: &String| NodeInfo { name: name.clone(), labels: labels(name), ..NodeInfo::default() };

@@ -1,11 +1,14 @@
 //! Code that Drawloom's tests, examples and benchmarks share: scenes, devices, random numbers, and oracles in f64.
 
+pub mod absent_features;
 #[cfg(feature = "wgpu")]
 pub mod adapter;
 pub mod adversarial_names;
 pub mod changing_world;
 pub mod culling;
 pub mod draw_lists;
+pub mod feedback;
+pub mod mip_levels;
 pub mod precision;
 pub mod random;
 pub mod samples;

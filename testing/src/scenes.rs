@@ -1,6 +1,7 @@
 //! Small scenes for tests.
 
 pub mod everything;
+pub mod leveled;
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
@@ -110,7 +111,12 @@ fn make_field(count: usize) -> Result<Scene, SceneError> {
             illuminance: Vec3::splat(2.0),
             casts_shadow: false,
         },
-        Light::Point { position: DVec3::new(0.0, 3.0, -5.0), intensity: Vec3::new(30.0, 10.0, 5.0), range: 40.0 },
+        Light::Point {
+            position: DVec3::new(0.0, 3.0, -5.0),
+            intensity: Vec3::new(30.0, 10.0, 5.0),
+            range: 40.0,
+            casts_shadow: false,
+        },
     ];
     scene.ambient = Vec3::splat(0.1);
     scene.background = Vec3::new(0.02, 0.03, 0.05);

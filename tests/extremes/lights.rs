@@ -36,9 +36,10 @@ fn wall(diffuse: f32) -> Result<Scene, Failed> {
 
 /// A light of every kind that has a position, with and without a shadow.
 fn lamps(position: DVec3, intensity: Vec3, range: f32, direction: Vec3) -> Vec<Light> {
-    let mut lamps = vec![Light::Point { position, intensity, range }];
+    let mut lamps = Vec::new();
     for casts_shadow in [false, true] {
         let (inner_angle, outer_angle) = (0.2, 0.8);
+        lamps.push(Light::Point { position, intensity, range, casts_shadow });
         lamps.push(Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow });
         lamps.push(Light::Hemispherical { position, direction, intensity, range, casts_shadow });
     }

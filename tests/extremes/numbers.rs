@@ -78,7 +78,7 @@ impl TestScene {
         let (position, intensity) = (DVec3::new(1.0, 1.0, -3.5), Vec3::ONE);
         let (direction, casts_shadow) = (Vec3::NEG_Z, true);
         scene.lights = vec![
-            Light::Point { position, intensity, range: 10.0 },
+            Light::Point { position, intensity, range: 10.0, casts_shadow: false },
             Light::Spot {
                 position,
                 direction,
@@ -289,7 +289,7 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
 
 /// Changes a light that has a position.
 fn change(test: &mut TestScene, light: usize, by: impl Fn(&mut DVec3, &mut Vec3, &mut f32)) {
-    if let Light::Point { position, intensity, range }
+    if let Light::Point { position, intensity, range, .. }
     | Light::Spot { position, intensity, range, .. }
     | Light::Hemispherical { position, intensity, range, .. } = &mut test.scene.lights[light]
     {

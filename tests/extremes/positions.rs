@@ -130,7 +130,8 @@ fn out_of_reach(harness: &mut Harness) -> Result<(), Failed> {
         markers.add(Marker { position: DVec3::Z * far, ..markers.markers[0] })?;
         markers.markers.pop();
         let intensity = Vec3::ONE;
-        markers.scene.lights = vec![Light::Point { position: DVec3::X * far, intensity, range: 10.0 }];
+        markers.scene.lights =
+            vec![Light::Point { position: DVec3::X * far, intensity, range: 10.0, casts_shadow: false }];
         let drawn = harness.draw(&markers.scene)?;
         let rejections: Vec<_> = drawn.rejections.iter().map(|rejection| (rejection.reason, rejection.count)).collect();
         if rejections != [(RejectionReason::OutOfReach, 1), (RejectionReason::LightOutOfReach, 1)] {
@@ -156,7 +157,7 @@ fn enlarged(factor: f64) -> Result<Scene, Failed> {
     }
     for light in &mut scene.lights {
         match light {
-            Light::Point { position, intensity, range }
+            Light::Point { position, intensity, range, .. }
             | Light::Spot { position, intensity, range, .. }
             | Light::Hemispherical { position, intensity, range, .. } => {
                 *position *= factor;

@@ -95,6 +95,8 @@ fn limits(harness: &mut Harness) -> Result<(), Failed> {
         Quality { normals: NormalFormat::Octahedral16, ..usual },
         Quality { diffuse: DiffuseFormat::HalfFloat, ..usual },
         Quality { vertices: VertexFormat::Packed, ..usual },
+        Quality { level_of_detail: f32::MAX, ..usual },
+        Quality { level_of_detail: f32::from_bits(1), ..usual },
         Quality { depth_pre_pass: true, ..usual },
         Quality { shadows: ShadowQuality { side: 1, ..shadows }, ..usual },
         Quality { shadows: ShadowQuality { side: 1, filter: 4, ..shadows }, ..usual },
@@ -121,6 +123,7 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
     let key = |bits, curve| DepthKey { bits, curve };
     for (wrong, setting) in [
         (Quality { occlusion: Some(32), ..usual }, "occlusion"),
+        (Quality { level_of_detail: f32::INFINITY, ..usual }, "level_of_detail"),
         (Quality { light_cut_off: f32::NAN, ..usual }, "light_cut_off"),
         (Quality { light_cut_off: -f32::from_bits(1), ..usual }, "light_cut_off"),
         (Quality { blended_order: key(0, DepthCurve::Logarithmic), ..usual }, "blended_order"),

@@ -346,8 +346,12 @@ fn objects_of_removed_meshes_or_materials_are_counted_and_left_out() {
 #[test]
 fn invalid_lights_are_counted_and_left_out() {
     let mut scene = field(10);
-    let point =
-        |intensity: f32, range| Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range };
+    let point = |intensity: f32, range| Light::Point {
+        position: DVec3::ZERO,
+        intensity: Vec3::splat(intensity),
+        range,
+        casts_shadow: false,
+    };
     let spot = |inner_angle, outer_angle| Light::Spot {
         position: DVec3::ZERO,
         direction: Vec3::NEG_Y,
@@ -364,7 +368,7 @@ fn invalid_lights_are_counted_and_left_out() {
         point(1.0, 0.0),
         point(1.0, f32::INFINITY),
         Light::Directional { direction: Vec3::ZERO, illuminance: Vec3::ONE, casts_shadow: true },
-        Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 },
+        Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0, casts_shadow: false },
         spot(0.0, 0.0),
         spot(0.5, 0.4),
         spot(0.0, PI),

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, Fxaa, Place, PlanError, RenderProcess, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, Place, PlanError, RenderProcess,
+    ToneMapping,
 };
-use drawloom::scene::{Camera, Light, Scene, ViewKind};
+use drawloom::scene::{Camera, LayerMask, Light, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
@@ -88,6 +89,7 @@ fn a_scene_with_everything_uses_every_process_in_order() {
         "directional lights",
         "shadowed directional lights",
         "point lights",
+        "shadowed point lights",
         "spot lights",
         "shadowed spot lights",
         "hemispherical lights",
@@ -120,6 +122,7 @@ fn each_class_of_lights_has_its_own_process() {
         "directional lights",
         "shadowed directional lights",
         "point lights",
+        "shadowed point lights",
         "spot lights",
         "shadowed spot lights",
         "hemispherical lights",
@@ -146,6 +149,10 @@ fn invalid_shadow_maps_are_refused() {
         (ShadowMaps { max_distance: f32::NAN, ..good }, "max_distance"),
         (ShadowMaps { max_distance: f32::INFINITY, ..good }, "max_distance"),
         (ShadowMaps { max_distance: 0.0, ..good }, "max_distance"),
+        (ShadowMaps { cascades: 0, ..good }, "cascades"),
+        (ShadowMaps { cascades: 5, ..good }, "cascades"),
+        (ShadowMaps { split_lambda: 1.1, ..good }, "split_lambda"),
+        (ShadowMaps { split_lambda: f32::NAN, ..good }, "split_lambda"),
         (ShadowMaps { bias: -0.1, ..good }, "bias"),
         (ShadowMaps { bias: f32::NAN, ..good }, "bias"),
         (ShadowMaps { filter: ShadowMaps::MAX_FILTER + 1, ..good }, "filter"),
@@ -170,6 +177,8 @@ fn unknown_names_are_refused_and_known_ones_are_listed() {
     let no_pre_pass = Deferred::to_picture().leave_out("depth pre-pass");
     for (deferred, wrong) in [
         (Deferred::to_picture().leave_out("Transparency"), "Transparency"),
+        (Deferred::to_picture().keep("Transparency"), "Transparency"),
+        (Deferred::to_picture().shadow_maps(None).keep("shadowed point lights"), "shadowed point lights"),
         (replaced, "fog"),
         (no_maps, "shadow casters"),
         (no_pre_pass, "depth pre-pass"),
@@ -192,7 +201,7 @@ fn a_replacement_takes_the_position_of_the_replaced_process() {
     let fog = own("fog", |declare| {
         declare.draws_over("radiance");
         declare.after("point lights");
-        declare.before("spot lights");
+        declare.before("shadowed point lights");
     });
     let mut renderer = build(builder(deferred).process(fog)).unwrap();
     let names = processes(&mut renderer, &everything());
@@ -203,6 +212,7 @@ fn a_replacement_takes_the_position_of_the_replaced_process() {
         "shadowed directional lights",
         "glow",
         "fog",
+        "shadowed point lights",
         "spot lights",
         "shadowed spot lights",
         "hemispherical lights",
@@ -220,11 +230,65 @@ fn a_left_out_process_is_in_no_plan() {
     let deferred = Deferred::to_picture().leave_out("point lights").leave_out("transparency");
     let mut renderer = build(builder(deferred)).unwrap();
     let names = processes(&mut renderer, &everything());
-    assert_eq!(names.len(), 9);
+    assert_eq!(names.len(), 10);
     assert!(names.iter().all(|name| name != "point lights" && name != "transparency"), "{names:?}");
     // A process cannot be left out if others read its targets.
     let error = build_error(builder(Deferred::to_picture().leave_out("geometry buffer"))).to_string();
     assert!(error.contains("nothing writes") && error.contains("lights"), "{error}");
+}
+
+#[test]
+fn a_kept_process_is_in_every_plan() {
+    let mut renderer = build(builder(Deferred::to_picture().keep("point lights").keep("transparency"))).unwrap();
+    let expected = ["geometry buffer", "point lights", "transparency", "tone mapping"];
+    let planned: Vec<_> = renderer.plan().processes().iter().map(|planned| planned.name.as_str()).collect();
+    assert_eq!(planned, expected);
+    assert_eq!(processes(&mut renderer, &empty()), expected);
+    let mut lit = empty();
+    let lamp = |light: &&Light| matches!(light, Light::Point { casts_shadow: false, .. });
+    lit.lights.extend(everything().lights.iter().filter(lamp).copied());
+    assert_eq!(processes(&mut renderer, &lit), expected);
+    assert_eq!((lit.lights.len(), renderer.plan_count()), (1, 1));
+    // Lights with shadows need maps.
+    let mut renderer = build(builder(Deferred::to_picture().keep("shadowed spot lights"))).unwrap();
+    let expected = ["shadow casters", "geometry buffer", "shadowed spot lights", "tone mapping"];
+    assert_eq!(processes(&mut renderer, &empty()), expected);
+    // What is left out stays out.
+    let left_out = ["shadow casters", "transparency"]
+        .into_iter()
+        .fold(Deferred::to_picture(), |deferred, name| deferred.keep(name).leave_out(name));
+    let mut renderer = build(builder(left_out.keep("shadowed spot lights"))).unwrap();
+    assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "tone mapping"]);
+}
+
+struct Wind;
+
+impl Deformation for Wind {
+    fn name(&self) -> &str {
+        "wind"
+    }
+
+    fn layers(&self) -> LayerMask {
+        LayerMask::layer(3)
+    }
+
+    fn declare(&self, _declare: &mut Declare) {}
+
+    fn shader(&self) -> &str {
+        ""
+    }
+}
+
+#[test]
+fn a_process_of_deformed_objects_is_kept_with_the_one_that_it_draws_over() {
+    let deferred = Deferred::to_picture().deformation(Wind).keep("wind: transparency");
+    let names = processes(&mut build(builder(deferred)).unwrap(), &empty());
+    assert!(
+        ["transparency", "wind: transparency"].iter().all(|name| names.iter().any(|found| found == name)),
+        "{names:?}"
+    );
+    let error = build_error(builder(Deferred::to_picture().keep("wind: transparency")));
+    assert!(matches!(error, PlanError::NoSuchProcess { .. }), "{error}");
 }
 
 #[test]
@@ -240,7 +304,7 @@ fn processes_may_be_ordered_relative_to_an_absent_one() {
     });
     let mut renderer = build(builder(Deferred::to_picture()).process(after).process(before)).unwrap();
     let names = processes(&mut renderer, &everything());
-    assert_eq!(names[8..], ["shadowed hemispherical lights", "fog", "transparency", "rain", "tone mapping"][..]);
+    assert_eq!(names[9..], ["shadowed hemispherical lights", "fog", "transparency", "rain", "tone mapping"][..]);
 
     let mut scene = empty();
     scene.lights = vec![spot()];
@@ -316,7 +380,7 @@ fn an_ambiguous_order_or_an_unknown_name_is_refused() {
 fn shadow_views_follow_the_cameras_and_are_named_after_their_light() {
     let mut scene = everything();
     scene.cameras.push(sized(Camera::looking_at("side", DVec3::X * 9.0, DVec3::ZERO), [20, 30]));
-    let invalid = Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0 };
+    let invalid = Light::Point { position: DVec3::NAN, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
     // A left-out light keeps its number.
     scene.lights.insert(0, invalid);
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
@@ -324,15 +388,21 @@ fn shadow_views_follow_the_cameras_and_are_named_after_their_light() {
     let views = &recorded.statistics().views;
     let found: Vec<_> = views.iter().map(|view| (view.name.as_str(), view.kind, view.lights)).collect();
     let expected = [
-        ("main", ViewKind::Main, 7),
-        ("side", ViewKind::Main, 7),
+        ("main", ViewKind::Main, 8),
+        ("side", ViewKind::Main, 8),
         ("shadow of light 2", ViewKind::Shadow, 0),
-        ("shadow of light 5", ViewKind::Shadow, 0),
-        ("shadow of light 7", ViewKind::Shadow, 0),
+        ("shadow of light 4, +X", ViewKind::Shadow, 0),
+        ("shadow of light 4, -X", ViewKind::Shadow, 0),
+        ("shadow of light 4, +Y", ViewKind::Shadow, 0),
+        ("shadow of light 4, -Y", ViewKind::Shadow, 0),
+        ("shadow of light 4, +Z", ViewKind::Shadow, 0),
+        ("shadow of light 4, -Z", ViewKind::Shadow, 0),
+        ("shadow of light 6", ViewKind::Shadow, 0),
+        ("shadow of light 8", ViewKind::Shadow, 0),
     ];
     assert_eq!(found, expected);
     let queues: Vec<_> = recorded.queues().iter().map(|queue| (queue.view, queue.passes.len())).collect();
-    assert_eq!(queues, [(0, 10), (1, 10), (2, 1), (3, 1), (4, 1)]);
+    assert_eq!(queues, [[(0, 11), (1, 11)].as_slice(), &std::array::from_fn::<_, 9, _>(|map| (2 + map, 1))].concat());
 }
 
 #[test]
@@ -379,7 +449,7 @@ fn dark_and_invalid_lights_require_no_process() {
     let statistics = recorded.statistics();
     let rejections = statistics.rejections.iter();
     let found: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
-    let mut expected = [(RejectionReason::DarkLight, 7, 0), (RejectionReason::InvalidLight, 4, 7)];
+    let mut expected = [(RejectionReason::DarkLight, 8, 0), (RejectionReason::InvalidLight, 4, 8)];
     expected.sort_by_key(|(reason, ..)| *reason as usize);
     assert_eq!(found, expected);
     assert_eq!((statistics.lights, statistics.views.len(), statistics.views[0].lights), (0, 1, 0));

@@ -15,9 +15,9 @@ use drawloom_testing::scenes::field;
 use proptest::prelude::*;
 
 /// Draws the depth of the objects that it selects.
-struct Depth {
-    name: String,
-    selection: Selection,
+pub struct Depth {
+    pub name: String,
+    pub selection: Selection,
 }
 
 impl RenderProcess for Depth {
@@ -35,7 +35,8 @@ impl RenderProcess for Depth {
     }
 }
 
-const SELECTIONS: [Selection; 3] = [Selection::OPAQUE, Selection::BLENDED, Selection::ALL];
+/// Of opaque objects, of blended ones, and of all.
+pub const SELECTIONS: [Selection; 3] = [Selection::OPAQUE, Selection::BLENDED, Selection::ALL];
 
 /// A renderer with each selection twice: of all layers, and of these.
 fn renderer(layers: LayerMask, quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {

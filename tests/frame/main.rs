@@ -1,20 +1,30 @@
 //! Frames up to their submission, on the null backend, which draws nothing and checks the rules.
 
+#[cfg(feature = "wgpu")]
+mod absent_features;
+mod backward_reach;
 mod bad_input;
 mod changes;
 #[cfg(feature = "wgpu")]
 mod declared_resources;
+mod declaring;
 mod deferred;
 mod determinism;
 mod failing_process;
 mod layers;
+mod levels_of_detail;
+mod mip_levels;
 mod null_backend;
+mod object_filter;
 mod object_table;
 mod occlusion;
 mod order;
 mod quality;
+mod redraw;
 mod requirements;
 mod retained;
+mod sampled_histories;
+mod sampled_layers;
 mod sampled_views;
 mod shadow_interval;
 mod targets;
@@ -23,14 +33,17 @@ mod triangles;
 mod tuning;
 #[cfg(feature = "wgpu")]
 mod uploads;
+mod view_budget;
 mod views;
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, LazyLock, Mutex};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer, Submitter};
+use tracing::Dispatch;
+use tracing::subscriber::NoSubscriber;
 
 /// The shipped processes on the null backend.
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -40,6 +53,10 @@ fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>,
 
 /// What this thread reports through `tracing` during a call, as text.
 fn reported(call: impl FnOnce()) -> String {
+    /// While there is only one subscriber, the thread that is first to reach an event decides for all threads whether a subscriber wants
+    /// it, and it may have none. So there is a second one.
+    static SECOND: LazyLock<Dispatch> = LazyLock::new(|| Dispatch::new(NoSubscriber::default()));
+    LazyLock::force(&SECOND);
     let written = Arc::new(Mutex::new(Vec::new()));
     let writer = {
         let written = Arc::clone(&written);

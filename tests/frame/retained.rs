@@ -120,6 +120,62 @@ fn a_frame_in_which_nothing_changed_tests_describes_and_orders_no_object() {
     }
 }
 
+#[test]
+fn views_and_passes_keep_what_they_have_when_others_come_or_go() {
+    let scene = field(2_000);
+    let main = scene.cameras[0].clone();
+    let with_other =
+        [Camera { name: "other".to_owned(), position: main.position + DVec3::X, ..main.clone() }, main.clone()];
+    let point = Light::Point { position: main.position, intensity: Vec3::ONE, range: 50.0, casts_shadow: false };
+    let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
+    let (mut renderer, submitter) = renderer(Quality::balanced(), 1);
+    // A view comes before the main one, and goes; a process of lights comes before others; maps come.
+    let frames: [(&[Camera], &[Light]); 6] = [
+        (std::slice::from_ref(&main), &[]),
+        (std::slice::from_ref(&main), &[]),
+        (&with_other, &[]),
+        (&with_other, &[point]),
+        (&with_other, &[sun, point]),
+        (std::slice::from_ref(&main), &[sun]),
+    ];
+    for (frame, (cameras, lights)) in frames.into_iter().enumerate() {
+        renderer.scheduler().timeline().start();
+        let changes = if frame < 2 { Changes::Unknown } else { Changes::NONE };
+        let now = SceneRef { cameras, lights, changes, ..scene.as_scene_ref() };
+        let recorded = renderer.record(now).unwrap();
+        let difference =
+            difference(&contents(&renderer, recorded.statistics()), &of_a_new_renderer(Quality::balanced(), now));
+        assert_eq!(difference, None, "frame {frame}");
+        submitter.submit(recorded).unwrap();
+        let log = renderer.scheduler().timeline().take();
+        let nodes = log.runs[0].graph.nodes.iter().enumerate();
+        let of_main = nodes.filter(|(_, node)| node.labels.view.as_deref() == Some(&*main.name));
+        let width_of = |name: &str| {
+            let of_stage = of_main.clone().filter(|(_, node)| node.labels.stage.as_deref() == Some(name));
+            of_stage.map(|(index, _)| log.runs[0].width(index)).sum::<usize>()
+        };
+        let widths = ["visibility", "bin", "fill", "sort"].map(width_of);
+        assert_eq!(widths == [0; 4], frame >= 2, "frame {frame}: {widths:?}");
+    }
+}
+
+#[test]
+fn what_was_measured_holds_when_the_scene_requires_something_else() {
+    let scene = field(2_000);
+    let (mut renderer, submitter) = renderer(Quality::balanced(), 2);
+    let mut frame = |lights: &[Light]| {
+        let recorded = renderer.record(SceneRef { lights, ..scene.as_scene_ref() }).unwrap();
+        submitter.submit(recorded).unwrap().statistics.tuning
+    };
+    (0..8).for_each(|_| drop(frame(&[])));
+    let before = frame(&[]);
+    let now = frame(&[Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 50.0, casts_shadow: false }]);
+    let stages_before: Vec<_> = before.job_sizes.iter().map(|size| &size.labels).collect();
+    let known = now.job_sizes.iter().filter(|size| stages_before.contains(&&size.labels));
+    assert!(known.clone().count() > 3);
+    known.for_each(|size| assert!(size.nanoseconds_per_item.is_some(), "{:?}", size.labels));
+}
+
 /// Enough objects that several jobs order what a view sees.
 #[test]
 fn cameras_that_turn_draw_the_lists_of_a_new_renderer() {

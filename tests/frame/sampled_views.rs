@@ -15,6 +15,8 @@ use drawloom::view::ShadowMaps;
 use drawloom::{BuildError, FrameError, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
+use crate::declaring::Declaring;
+
 const MIRROR: LayerMask = LayerMask::layer(3);
 
 /// Draws mirrors with what the view `mirror` has in a target.
@@ -252,38 +254,20 @@ fn what_is_drawn_once_a_frame_comes_before_all_views_that_use_it() {
     assert!(passes.contains(&("draw particles", 0)) && passes.contains(&("draw particles", 1)));
 }
 
-/// Draws in one kind of views what a function declares.
-#[derive(Clone, Copy)]
-struct Declaring(&'static str, fn(&mut Declare));
-
-impl RenderProcess for Declaring {
-    fn name(&self) -> &str {
-        self.0
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        (self.1)(declare);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        Draws::Commands(CommandDraws::default())
-    }
-}
-
 /// Main views read the layers of all shadow maps, and one of these shows a picture that is drawn later otherwise.
 #[test]
 fn views_that_read_all_layers_come_after_views_that_sample() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).output("picture").process(Declaring("gobo", |declare| {
+    let builder = Renderer::builder(NullBackend).output("picture").process(Declaring::new("gobo", |declare| {
         declare.views(ViewKind::Post);
         declare.clears_color("gobo", Format::Rgba8Unorm, ClearColor::Background);
     }));
-    let builder = builder.process(Declaring("caster", |declare| {
+    let builder = builder.process(Declaring::new("caster", |declare| {
         declare.views(ViewKind::Shadow);
         declare.samples_view(ViewKind::Post, "gobo", "gobo");
         declare.clears_depth_layer("maps", Format::Depth32Float);
     }));
-    let builder = builder.process(Declaring("lit", |declare| {
+    let builder = builder.process(Declaring::new("lit", |declare| {
         declare.samples_layers(ViewKind::Shadow, "maps");
         declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background);
     }));
@@ -331,14 +315,14 @@ impl RenderProcess for Filter {
 
 #[test]
 fn reflections_have_no_steps_that_nothing_samples_though_these_have_a_history() {
-    let motion = Declaring("motion", |declare| {
+    let motion = |declare: &mut Declare| {
         declare.at(Place::AfterGeometry);
         declare.clears_color("motion", Format::Rg16Float, ClearColor::Background);
-    });
+    };
     let build = |mirror: Mirror| {
         let deferred = Deferred::new().post(ToneMapping::default()).post(TemporalFilter);
         let builder = Renderer::builder(NullBackend).deferred(deferred).process(mirror);
-        builder.process(motion).build(Arc::new(Scheduler::new(1).unwrap()))
+        builder.process(Declaring::new("motion", motion)).build(Arc::new(Scheduler::new(1).unwrap()))
     };
     let (mut renderer, submitter) = build(RADIANCE).unwrap();
     let mut scene = scene();

@@ -14,37 +14,15 @@ use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
 
+use crate::declaring::Declaring;
 use crate::reported;
-
-/// A process with a name, and a function that declares.
-struct Declaring(&'static str, Box<dyn Fn(&mut Declare) + Send + Sync>);
-
-impl Declaring {
-    fn new(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> Self {
-        Self(name, Box::new(declare))
-    }
-}
-
-impl RenderProcess for Declaring {
-    fn name(&self) -> &str {
-        self.0
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        (self.1)(declare);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen::default())
-    }
-}
 
 fn clears(declare: &mut Declare, target: &str) {
     declare.clears_color(target, Format::Rgba8Unorm, ClearColor::Background);
     declare.keep();
 }
 
-fn plan_error<const N: usize>(processes: [Declaring; N]) -> PlanError {
+pub fn plan_error<const N: usize>(processes: [Declaring; N]) -> PlanError {
     let builder = Renderer::builder(NullBackend);
     let builder = processes.into_iter().fold(builder, |builder, process| builder.process(process));
     match builder.build(Arc::new(Scheduler::new(1).unwrap())).err() {

@@ -67,8 +67,8 @@ fn every_node_is_labelled_with_its_process_stage_and_view() {
     let _recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let log = renderer.scheduler().timeline().take();
     let labels = || log.runs[0].graph.nodes.iter().map(|node| &node.labels);
-    let plan = renderer.plan().processes().iter().map(|planned| planned.name.clone());
-    let processes: BTreeSet<_> = labels().filter_map(|labels| labels.process.clone()).collect();
+    let plan = renderer.plan().processes().iter().map(|planned| planned.name.as_str());
+    let processes: BTreeSet<_> = labels().filter_map(|labels| labels.process.as_deref()).collect();
     assert_eq!(processes, plan.collect::<BTreeSet<_>>());
     let views: BTreeSet<_> = labels().filter_map(|labels| labels.view.as_deref()).collect();
     assert!(scene.cameras.iter().all(|camera| views.contains(camera.name.as_str())), "{views:?}");

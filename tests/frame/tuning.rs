@@ -75,7 +75,7 @@ fn a_frame_that_tests_for_occlusion_says_so() {
         let statistics = recorded.statistics();
         let view = &statistics.views[0];
         let choices = choices_of(&statistics.tuning, TuningSubject::OcclusionTest);
-        let choice = choices.iter().find(|choice| choice.labels.view.as_ref() == Some(&view.name)).unwrap();
+        let choice = choices.iter().find(|choice| choice.labels.view.as_deref() == Some(&*view.name)).unwrap();
         assert_eq!(choice.alternatives[choice.chosen].name == "on", view.occluded > 0);
         chosen.insert((choice.chosen, choice.is_trial));
     }

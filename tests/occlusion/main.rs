@@ -32,7 +32,7 @@ fn occlusion(scene: &SceneRef<'_>, tile_size: u32) -> (Vec<bool>, Vec<bool>) {
     };
     let visible_before: Vec<bool> = bits(&visible);
     let mut meshes = OccluderMeshes::default();
-    meshes.sync(scene.assets);
+    meshes.sync(scene.assets, table.used_meshes());
     let mut culler = OcclusionCuller::default();
     culler.reset(&view, tile_size);
     culler.select_occluders(scene, &table, &visible, &meshes, |_, draw| draw.state.blend() == Blend::None);

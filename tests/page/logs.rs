@@ -22,7 +22,7 @@ pub fn real_runs() -> Result<Log, Failed> {
             Ok(())
         });
         let node = graph.add(format!("node {index}"), body.with_width(move |_| width).with_chunk(16));
-        let stage = Some(["cull", "fill", "sort"][index % 3].to_owned());
+        let stage = Some(["cull", "fill", "sort"][index % 3].into());
         graph.label(node, Labels { stage, ..Labels::default() });
         for _ in 0..random.usize(..3).min(nodes.len()) {
             graph.order(nodes[random.usize(..nodes.len())], node);
@@ -48,7 +48,7 @@ pub fn many_chunks(count: usize, frames: usize) -> Log {
     let nodes = count / frames / CHUNKS;
     let node = |index: usize| NodeInfo {
         name: format!("node {index}"),
-        labels: Labels { stage: Some(format!("stage {}", index % 9)), ..Labels::default() },
+        labels: Labels { stage: Some(format!("stage {}", index % 9).into()), ..Labels::default() },
         dependencies: index.checked_sub(1).into_iter().collect(),
         ..NodeInfo::default()
     };

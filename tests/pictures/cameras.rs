@@ -117,7 +117,7 @@ fn two_cubes() -> Result<Scene, Failed> {
         scene.add_object(RenderObject::new(mesh, material, position))?;
     }
     let position = DVec3::new(1.0, 2.0, 1.0);
-    scene.lights.push(Light::Point { position, range: 40.0, intensity: Vec3::splat(120.0) });
+    scene.lights.push(Light::Point { position, range: 40.0, intensity: Vec3::splat(120.0), casts_shadow: false });
     scene.ambient = Vec3::splat(0.1);
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z), SIZE)];
     Ok(scene)

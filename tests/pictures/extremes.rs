@@ -36,7 +36,12 @@ fn black() -> Result<(), Failed> {
     for intensity in [1.0, 1e30, 3e38] {
         for casts_shadow in [false, true] {
             let mut scene = wall(0.0)?;
-            let point = Light::Point { position: DVec3::Z * 0.25, intensity: Vec3::splat(intensity), range: 10.0 };
+            let point = Light::Point {
+                position: DVec3::Z * 0.25,
+                intensity: Vec3::splat(intensity),
+                range: 10.0,
+                casts_shadow: false,
+            };
             let sun = Light::Directional { direction: Vec3::NEG_Z, illuminance: Vec3::splat(intensity), casts_shadow };
             scene.lights = vec![lamp(0.25, intensity, casts_shadow), point, sun];
             assert_color(pixel(&draw(&scene)?, 15, 15), [0; 3])?;

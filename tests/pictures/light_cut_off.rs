@@ -32,8 +32,12 @@ fn scene() -> Scene {
     let mut scene = field(300);
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     let position = DVec3::new(0.0, 6.0, 12.0);
-    let point =
-        Light::Point { position: DVec3::new(0.0, 3.0, -5.0), intensity: Vec3::new(30.0, 10.0, 5.0), range: 1e3 };
+    let point = Light::Point {
+        position: DVec3::new(0.0, 3.0, -5.0),
+        intensity: Vec3::new(30.0, 10.0, 5.0),
+        range: 1e3,
+        casts_shadow: false,
+    };
     scene.lights = vec![point, spot(position, down, 60.0), hemisphere(DVec3::new(-3.0, 5.0, 10.0), down)];
     for light in &mut scene.lights {
         if let Light::Spot { range, .. } | Light::Hemispherical { range, .. } = light {

@@ -26,7 +26,7 @@ pub const CASES: &[Case] = &[
 const RANGE: f64 = 4.0;
 
 fn point(position: DVec3) -> Light {
-    Light::Point { position, intensity: Vec3::new(50.0, 40.0, 30.0), range: RANGE as f32 }
+    Light::Point { position, intensity: Vec3::new(50.0, 40.0, 30.0), range: RANGE as f32, casts_shadow: false }
 }
 
 /// It is bright up to its edge, so that a clipped edge shows.
@@ -257,7 +257,7 @@ fn hundred() -> Result<(), Failed> {
         let [column, row] = [index % 10, index / 10].map(f64::from);
         let position = DVec3::new(column - 4.5, row - 4.5, 0.3 + 0.05 * ((column * 3.0 + row * 7.0) % 5.0));
         let intensity = Vec3::new(1.0 + (index % 3) as f32, (index % 5) as f32, 0.25 * (index % 7) as f32);
-        Light::Point { position, intensity, range: 1.0 + 0.5 * (index % 4) as f32 }
+        Light::Point { position, intensity, range: 1.0 + 0.5 * (index % 4) as f32, casts_shadow: false }
     };
     let panel_scene = PanelScene::new(vec![wall], (0..100).map(light).collect());
     let view = camera(DVec3::new(0.5, -1.0, 9.0), DVec3::ZERO, 65.0);
@@ -276,7 +276,9 @@ fn depth_is_left_alone() -> Result<(), Failed> {
     let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 2.0);
     let behind = DVec3::NEG_Z;
     let small = |light: Light| match light {
-        Light::Point { position, intensity, .. } => Light::Point { position, intensity, range: 0.9 },
+        Light::Point { position, intensity, .. } => {
+            Light::Point { position, intensity, range: 0.9, casts_shadow: false }
+        }
         other => other,
     };
     let lights = [small(point(behind)), spot(behind, DVec3::NEG_Z, 60.0), hemisphere(behind, DVec3::NEG_Z)];

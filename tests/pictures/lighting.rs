@@ -64,7 +64,12 @@ fn windowed(distance: f64, range: f64) -> f64 {
 
 fn point() -> Result<(), Failed> {
     for distance in [0.5, 1.0, 2.0, 4.0, 7.9, 8.1] {
-        let light = Light::Point { position: DVec3::Z * distance, intensity: Vec3::new(4.0, 2.0, 1.0), range: 8.0 };
+        let light = Light::Point {
+            position: DVec3::Z * distance,
+            intensity: Vec3::new(4.0, 2.0, 1.0),
+            range: 8.0,
+            casts_shadow: false,
+        };
         let share = if distance < 8.0 { windowed(distance, 8.0) } else { 0.0 };
         expect(light, [4.0 * share, 2.0 * share, share])?;
     }
@@ -128,7 +133,8 @@ fn ambient_and_emission() -> Result<(), Failed> {
 fn invalid_light() -> Result<(), Failed> {
     let without = middle_of_wall(None, |scene| scene.ambient = Vec3::splat(0.2))?;
     for intensity in [f32::INFINITY, -5.0] {
-        let light = Light::Point { position: DVec3::Z, intensity: Vec3::splat(intensity), range: 5.0 };
+        let light =
+            Light::Point { position: DVec3::Z, intensity: Vec3::splat(intensity), range: 5.0, casts_shadow: false };
         assert_color(middle_of_wall(Some(light), |scene| scene.ambient = Vec3::splat(0.2))?, without)?;
     }
     Ok(())

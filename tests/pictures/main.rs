@@ -6,10 +6,13 @@
 
 mod attributes;
 mod buffers;
+mod cached_layers;
 mod cameras;
+mod cascades;
 mod changes;
 mod changing_shaders;
 mod columns;
+mod cube_shadows;
 mod deformation;
 mod determinism;
 mod compute;
@@ -23,11 +26,15 @@ mod geometry;
 mod history;
 mod image_distance;
 mod imported_targets;
+mod kept_processes;
+mod levels_of_detail;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
 mod materials;
+mod mip_levels;
 mod multisampling;
+mod object_filter;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -35,14 +42,18 @@ mod prepared_pipelines;
 mod processes;
 mod rays;
 mod read_back;
+mod redraw;
 mod references;
 mod requirements;
 mod resources;
 mod retained;
+mod sampled_histories;
+mod sampled_layers;
 mod sampled_views;
 mod shadow_bias;
 mod shadow_casters;
 mod shadow_interval;
+mod shadow_scenes;
 mod shadows;
 mod software;
 mod stencil;
@@ -67,33 +78,43 @@ fn main() {
     let cases = [
         (attributes::CASES, Needs::Adapter),
         (buffers::CASES, Needs::Adapter),
+        (cached_layers::CASES, Needs::Adapter),
         (cameras::CASES, Needs::Adapter),
+        (cascades::CASES, Needs::Adapter),
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
+        (kept_processes::CASES, Needs::Adapter),
+        (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (changing_shaders::CASES, Needs::Adapter),
         (columns::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
+        (cube_shadows::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
         (materials::CASES, Needs::Adapter),
+        (mip_levels::CASES, Needs::Adapter),
         (multisampling::CASES, Needs::Adapter),
+        (object_filter::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
         (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
+        (redraw::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
         (references::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (requirements::CASES, Needs::Adapter),
         (resources::CASES, Needs::Adapter),
         (retained::CASES, Needs::Adapter),
+        (sampled_histories::CASES, Needs::Adapter),
+        (sampled_layers::CASES, Needs::Adapter),
         (sampled_views::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
@@ -103,6 +124,7 @@ fn main() {
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),
         (shadow_interval::CASES, Needs::Adapter),
+        (shadow_scenes::CASES, Needs::Adapter),
         (shadows::CASES, Needs::Adapter),
         (software::CASES, Needs::Adapter),
         (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),

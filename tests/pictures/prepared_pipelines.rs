@@ -12,6 +12,7 @@ use crate::fixture::Fixture;
 
 pub const CASES: &[Case] = &[
     ("a_first_frame_makes_no_pipelines_that_were_prepared", first_frame),
+    ("pipelines_that_are_prepared_in_the_background_are_those_of_frames", in_the_background),
     ("preparing_pipelines_finds_what_is_wrong_with_a_shader", wrong_shader),
 ];
 
@@ -46,6 +47,31 @@ fn first_frame() -> Result<(), Failed> {
     Ok(())
 }
 
+/// Frames of a bare scene go on while a job makes the pipelines of everything.
+fn in_the_background() -> Result<(), Failed> {
+    let (scene, bare) = (scene()?, field(0));
+    let count = |fixture: &Fixture| fixture.renderer.backend().resources().pipelines;
+    let mut fixture = Fixture::with(2, shipped)?;
+    let before = fixture.draw(&bare)?;
+    let of_bare = count(&fixture);
+    let preparation = fixture.renderer.prepare_pipelines_in_background(scene.as_scene_ref())?;
+    while !preparation.is_finished() {
+        if fixture.draw(&bare)? != before {
+            return Err("a frame differs while pipelines are prepared".into());
+        }
+    }
+    preparation.wait()??;
+    let prepared = count(&fixture);
+    let picture = fixture.draw(&scene)?;
+    if prepared <= of_bare || count(&fixture) != prepared {
+        return Err(format!("{of_bare} pipelines, {prepared} prepared, {} after a frame", count(&fixture)).into());
+    }
+    if picture != Fixture::with(2, shipped)?.draw(&scene)? {
+        return Err("prepared pipelines draw another picture".into());
+    }
+    Ok(())
+}
+
 /// A process that no frame has drawn yet, with a mistake in its second line.
 struct Wrong;
 
@@ -68,7 +94,12 @@ impl RenderProcess for Wrong {
 fn wrong_shader() -> Result<(), Failed> {
     let mut fixture = Fixture::with(2, |builder| shipped(builder).process(Wrong))?;
     let error = fixture.renderer.prepare_pipelines(scene()?.as_scene_ref()).err().ok_or("it is compiled")?;
+    let in_background = fixture.renderer.prepare_pipelines_in_background(scene()?.as_scene_ref())?.wait()?;
+    let in_background = in_background.err().ok_or("it is compiled in the background")?;
     let found = error.to_string();
+    if in_background.to_string() != found {
+        return Err(in_background.to_string().into());
+    }
     let is_complete = ["\"wrong\"", "line 2", "missing"].iter().all(|part| found.contains(part));
     if is_complete { Ok(()) } else { Err(found.into()) }
 }

@@ -197,7 +197,8 @@ impl PanelScene {
             camera,
             faces: self.panels.iter().map(Face::new).collect(),
             lights: &self.lights,
-            map_pixels: self.lights.iter().map(|light| map_pixel(light, &self.maps, cameras)).collect(),
+            map_pixels: self.lights.iter().map(|light| map_pixels(light, &self.maps, cameras)).collect(),
+            slice_ends: slice_ends(&self.maps, camera),
             filter: self.maps.filter,
         };
         let [width, height] = camera.size;
@@ -240,8 +241,10 @@ struct Rays<'a> {
     camera: &'a Camera,
     faces: Vec<Face>,
     lights: &'a [Light],
-    /// One for each light.
-    map_pixels: Vec<f64>,
+    /// For each light, that of each of its cascades, or of all its maps.
+    map_pixels: Vec<Vec<f64>>,
+    /// The distances at which the cascades end.
+    slice_ends: Vec<f64>,
     filter: u32,
 }
 
@@ -288,7 +291,11 @@ impl Rays<'_> {
         let footprint = center.distance(point_at(1.0, 0.0)).max(center.distance(point_at(0.0, 1.0)));
         let error = footprint / 256.0 + from.distance(center) * 1e-5;
         let mut sum = Bounds { low: DVec3::ZERO, high: DVec3::ZERO };
-        for (light, &pixel) in self.lights.iter().zip(&self.map_pixels) {
+        let [.., forward] = self.ray_camera.axes;
+        let depth = (center - self.ray_camera.position).dot(forward);
+        let slice = self.slice_ends.iter().take_while(|end| depth > **end).count();
+        for (light, pixels) in self.lights.iter().zip(&self.map_pixels) {
+            let pixel = pixels[slice.min(pixels.len() - 1)];
             let [low, high] = illuminance(light, center, normal, error);
             let [least, most] = if high > 0.0 { self.lit(light, pixel, index, center, normal) } else { [0.0; 2] };
             let color = color(light) / PI;
@@ -349,32 +356,48 @@ impl Rays<'_> {
     }
 }
 
-/// The width of a pixel of a light's map: in metres for a directional light, and at a distance of 1 m for others, as
-/// the documentation of [`ShadowMaps`] defines it.
-fn map_pixel(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> f64 {
+/// Where the cascades of `maps` end in what a camera sees, in metres, by the practical split scheme.
+fn slice_ends(maps: &ShadowMaps, camera: &Camera) -> Vec<f64> {
+    let far = f64::from(maps.max_distance.min(camera.far));
+    let near = f64::from(camera.near).max(far / 1000.0);
+    let end = |cascade: u32| {
+        let share = f64::from(cascade) / f64::from(maps.cascades);
+        let lambda = f64::from(maps.split_lambda);
+        lambda * near * (far / near).powf(share) + (1.0 - lambda) * (near + share * (far - near))
+    };
+    (1..=maps.cascades).map(end).collect()
+}
+
+/// The width of a pixel of a light's maps: in metres for a directional light, for each of its cascades, and at a distance
+/// of 1 m for others, as the documentation of [`ShadowMaps`] defines it.
+fn map_pixels(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> Vec<f64> {
     let side = f64::from(maps.side);
-    match *light {
+    let pixel = match *light {
+        Light::Point { .. } => 2.0 / (side - 2.0 * f64::from(maps.filter) - 2.0),
         Light::Spot { outer_angle, .. } => 2.0 * f64::from(outer_angle.min(1.4835)).tan() / side,
         // Straight edges of 5° are off by half a pixel of 1024.
         Light::Hemispherical { .. } => 4.0 / side + 1.0 / 1024.0,
         // The pixel of a map for several cameras depends on all of them.
         Light::Directional { .. } => {
-            maps.camera(String::new(), light, cameras).map_or(0.0, |map| match map.projection {
+            let pixel = |map: &Camera| match map.projection {
                 Projection::Orthographic { height } => f64::from(height) / side,
                 _ => f64::NAN,
-            })
+            };
+            let pixels: Vec<_> = maps.cameras("", light, cameras).iter().map(pixel).collect();
+            return if pixels.is_empty() { vec![0.0] } else { pixels };
         }
         _ => 0.0,
-    }
+    };
+    vec![pixel]
 }
 
 /// How far from its geometric edge a shadow may fade, in metres on the surface: half of the filter's width and half a
 /// pixel of the map, along a diagonal of the map's pixels, and more on a surface that is inclined to the light. A pixel
-/// is that of [`map_pixel`].
+/// is that of [`map_pixels`].
 fn edge_width(light: &Light, pixel: f64, filter: u32, point: DVec3, normal: DVec3) -> f64 {
     let (pixel, towards) = match *light {
         Light::Directional { direction, .. } => (pixel, -direction.as_dvec3()),
-        Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
+        Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
             (pixel * point.distance(position), (position - point).normalize())
         }
         _ => (pixel, normal),

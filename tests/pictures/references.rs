@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use drawloom::backend::Picture;
 use drawloom::demo;
 use drawloom::glam::Vec3;
 use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
@@ -53,7 +54,12 @@ fn small(mut scene: Scene) -> Scene {
 }
 
 fn compare(name: &str, scene: &Scene) -> Result<(), Failed> {
-    let drawn = as_image(&draw(scene)?)?;
+    compare_picture(name, &draw(scene)?)
+}
+
+/// Fails unless a picture is that of the reference called `name`.
+pub fn compare_picture(name: &str, picture: &Picture) -> Result<(), Failed> {
+    let drawn = as_image(picture)?;
     let path = reference_path(name);
     if std::env::var_os("DRAWLOOM_RENEW_REFERENCES").is_some() {
         drawn.save(&path)?;

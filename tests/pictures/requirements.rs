@@ -1,13 +1,18 @@
 //! The deferred pipeline has the processes that a scene requires, and no others.
 
-use drawloom::backend::{Picture, WgpuResources};
+mod cached_plans;
+mod cost;
+mod needed_processes;
+
+use drawloom::backend::Picture;
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
-use drawloom::scene::{Blend, Changes, LayerMask, Light, LightKind, Material, Mesh, Scene, SceneRef, ViewKind};
+use drawloom::scene::{Changes, LayerMask, Light, LightKind, Mesh, Scene, SceneRef};
 use drawloom::view::{LightClass, ShadowMaps};
 use drawloom_testing::scenes::cube;
 use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use libtest_mimic::Failed;
 
+use self::cost::{Cost, drawn, expect_changed, expect_difference, expect_same, expect_saved};
 use crate::Case;
 use crate::fixture::Fixture;
 
@@ -21,12 +26,21 @@ pub const CASES: &[Case] = &[
     ("an_empty_scene_is_cleared_and_tone_mapped", empty_scene),
     ("without_post_processing_steps_there_is_none", no_post),
     ("without_a_depth_pre_pass_there_is_none", no_depth_pre_pass),
-    ("every_process_is_needed_by_another_or_changes_the_picture", every_process_is_needed),
+    ("every_process_is_needed_by_another_or_changes_the_picture", needed_processes::every_process_is_needed),
+    ("every_process_in_a_mirror_changes_what_it_shows", needed_processes::every_process_of_a_mirror_is_needed),
     ("a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it", first_use_of_meshes),
-    ("processes_change_with_the_requirements_and_are_cached", cached_plans),
+    ("processes_change_with_the_requirements_and_are_cached", cached_plans::cached_plans),
 ];
 
-const MAPS: ShadowMaps = ShadowMaps { side: 128, max_distance: 20.0, bias: 1.0, filter: 1, layers: LayerMask::ALL };
+const MAPS: ShadowMaps = ShadowMaps {
+    side: 128,
+    max_distance: 20.0,
+    cascades: 1,
+    split_lambda: 0.5,
+    bias: 1.0,
+    filter: 1,
+    layers: LayerMask::ALL,
+};
 const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
 /// A list, a mirrored list, and a double-sided strip, which subdivision converts to a list.
 const OPAQUE_STATES: i64 = 3;
@@ -37,89 +51,13 @@ fn deferred() -> Deferred {
     Deferred::to_picture().shadow_maps(Some(MAPS))
 }
 
-/// The processes of one frame of a new renderer, and their costs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Cost {
-    passes: i64,
-    pipelines: i64,
-    targets: i64,
-    target_bytes: i64,
-    shadow_views: i64,
-    lights: i64,
-}
-
-impl Cost {
-    fn minus(self, other: Self) -> Self {
-        Self {
-            passes: self.passes - other.passes,
-            pipelines: self.pipelines - other.pipelines,
-            targets: self.targets - other.targets,
-            target_bytes: self.target_bytes - other.target_bytes,
-            shadow_views: self.shadow_views - other.shadow_views,
-            lights: self.lights - other.lights,
-        }
+/// The number of shadow maps of the scene's lights of a class, one light of each.
+fn map_count(class: LightClass) -> i64 {
+    match class.kind {
+        _ if !class.shadowed => 0,
+        LightKind::Point => 6,
+        _ => 1,
     }
-}
-
-/// A new renderer's picture of a scene, and its costs.
-fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
-    let output = deferred.output();
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
-    let recorded = fixture.record(scene)?;
-    let views = &recorded.statistics().views;
-    let mut cost = Cost {
-        passes: recorded.queues().iter().map(|queue| queue.passes.len() as i64).sum(),
-        shadow_views: views.iter().filter(|view| view.kind == ViewKind::Shadow).count() as i64,
-        lights: views.iter().map(|view| view.lights as i64).sum(),
-        ..Cost::default()
-    };
-    let picture = fixture.submit(recorded)?.read(0, output)?;
-    let WgpuResources { pipelines, targets, target_bytes, .. } = fixture.renderer.backend().resources();
-    (cost.pipelines, cost.targets, cost.target_bytes) = (pipelines as i64, targets as i64, target_bytes as i64);
-    Ok((cost, picture))
-}
-
-/// Checks a scene without a feature. Its cost and its picture must equal those of a bare pipeline without a process for the
-/// feature, and its cost must be lower than that of the scene with everything, by `saved`.
-fn expect_saved(
-    full: &(Cost, Picture),
-    context: &str,
-    scene: &Scene,
-    bare: Deferred,
-    saved: Cost,
-) -> Result<(), Failed> {
-    let (cost, picture) = drawn(deferred(), scene)?;
-    let (bare_cost, bare_picture) = drawn(bare, scene)?;
-    if cost != bare_cost {
-        return Err(format!("{context}: {cost:?}, where a pipeline without it has {bare_cost:?}").into());
-    }
-    if picture != bare_picture {
-        return Err(format!("{context}: a pipeline without it draws another picture").into());
-    }
-    if full.0.minus(cost) != saved {
-        return Err(format!("{context}: {:?} is saved, and should be {saved:?}", full.0.minus(cost)).into());
-    }
-    expect_changed(context, &full.1, &picture)
-}
-
-/// Fails if two pictures differ by no more than rounding.
-fn expect_changed(context: &str, one: &Picture, other: &Picture) -> Result<(), Failed> {
-    let pixels = one.bytes.chunks_exact(4).zip(other.bytes.chunks_exact(4));
-    let differ = |one: &[u8], other: &[u8]| one.iter().zip(other).any(|(one, other)| one.abs_diff(*other) > 8);
-    let changed = pixels.filter(|(one, other)| differ(one, other)).count();
-    if changed >= 20 { Ok(()) } else { Err(format!("{context}: only {changed} pixels change").into()) }
-}
-
-fn expect_same(context: &str, one: &(Cost, Picture), other: &(Cost, Picture)) -> Result<(), Failed> {
-    if one.0 != other.0 {
-        return Err(format!("{context}: {:?} should be {:?}", one.0, other.0).into());
-    }
-    if one.1 == other.1 { Ok(()) } else { Err(format!("{context}: the picture differs").into()) }
-}
-
-/// Every class of lights.
-fn classes() -> impl Iterator<Item = LightClass> {
-    LightClass::all().filter(|class| class.kind != LightKind::Point || !class.shadowed)
 }
 
 fn scene_without(class: LightClass) -> Scene {
@@ -134,11 +72,12 @@ fn full() -> Result<(Cost, Picture), Failed> {
 
 fn no_light_of_a_class(shadowed: bool) -> Result<(), Failed> {
     let full = full()?;
-    for class in classes().filter(|class| class.shadowed == shadowed) {
+    for class in LightClass::all().filter(|class| class.shadowed == shadowed) {
         let name = LightVolumes::name_of(class);
         let mut saved = Cost { passes: 1, pipelines: 1, lights: 1, ..Cost::default() };
         if class.shadowed {
-            saved = Cost { passes: 2, target_bytes: BYTES_OF_A_MAP, shadow_views: 1, ..saved };
+            let maps = map_count(class);
+            saved = Cost { passes: 1 + maps, target_bytes: maps * BYTES_OF_A_MAP, shadow_views: maps, ..saved };
             // Only hemispherical lights see the strip subdivided.
             saved.pipelines += i64::from(class.kind == LightKind::Hemispherical);
         }
@@ -148,7 +87,7 @@ fn no_light_of_a_class(shadowed: bool) -> Result<(), Failed> {
 }
 
 fn dark_lights() -> Result<(), Failed> {
-    for class in classes() {
+    for class in LightClass::all() {
         let mut scene = everything();
         for light in scene.lights.iter_mut().filter(|light| class_of(light) == class) {
             *light = dark(*light);
@@ -162,16 +101,17 @@ fn dark_lights() -> Result<(), Failed> {
 fn no_casters() -> Result<(), Failed> {
     let mut scene = everything();
     let casters = scene.lights.iter().filter(|light| light.casts_shadow()).count() as i64;
+    let maps: i64 = scene.lights.iter().map(|light| map_count(class_of(light))).sum();
     for light in &mut scene.lights {
         *light = without_shadow(*light);
     }
     let saved = Cost {
-        passes: casters + casters,
+        passes: casters + maps,
         pipelines: casters + OPAQUE_STATES_IN_MAPS,
         targets: 1,
-        target_bytes: casters * BYTES_OF_A_MAP,
-        shadow_views: casters,
-        lights: 0,
+        target_bytes: maps * BYTES_OF_A_MAP,
+        shadow_views: maps,
+        ..Cost::default()
     };
     let bare = || Deferred::to_picture().shadow_maps(None);
     expect_saved(&full()?, "shadows", &scene, bare(), saved)?;
@@ -200,15 +140,16 @@ fn no_glass() -> Result<(), Failed> {
 fn no_light() -> Result<(), Failed> {
     let mut scene = everything();
     let lights = scene.lights.len() as i64;
-    let casters = scene.lights.iter().filter(|light| light.casts_shadow()).count() as i64;
+    let maps: i64 = scene.lights.iter().map(|light| map_count(class_of(light))).sum();
     scene.lights.clear();
     let saved = Cost {
-        passes: lights + casters,
+        passes: lights + maps,
         pipelines: lights + OPAQUE_STATES_IN_MAPS,
         targets: 1,
-        target_bytes: casters * BYTES_OF_A_MAP,
-        shadow_views: casters,
+        target_bytes: maps * BYTES_OF_A_MAP,
+        shadow_views: maps,
         lights,
+        ..Cost::default()
     };
     let kinds = LightKind::ALL.map(|kind| LightVolumes::name_of(LightClass { kind, shadowed: false }));
     let bare = kinds.into_iter().fold(Deferred::to_picture().shadow_maps(None), Deferred::leave_out);
@@ -222,7 +163,10 @@ fn empty_scene() -> Result<(), Failed> {
     let pixels = i64::from(SIZE[0] * SIZE[1]);
     // Depth, normal, diffuse and radiance, and the picture.
     let expected = Cost { passes: 2, pipelines: 1, targets: 5, target_bytes: pixels * 24, ..Cost::default() };
-    if cost == expected { Ok(()) } else { Err(format!("{cost:?} should be {expected:?}").into()) }
+    if (cost.draws, cost.commands) != (0, 0) {
+        return Err(format!("{cost:?} draws nothing").into());
+    }
+    expect_difference("an empty scene", cost, expected)
 }
 
 fn no_post() -> Result<(), Failed> {
@@ -232,9 +176,7 @@ fn no_post() -> Result<(), Failed> {
     let (one, one_picture) = drawn(deferred(), &everything())?;
     let (two, two_picture) = drawn(deferred().post(Fxaa::default()), &everything())?;
     for saved in [one.minus(without.0), two.minus(one)] {
-        if saved != step {
-            return Err(format!("a step costs {saved:?}, and should cost {step:?}").into());
-        }
+        expect_difference("a step", saved, step)?;
     }
     expect_changed("fxaa", &one_picture, &two_picture)?;
     let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
@@ -247,95 +189,8 @@ fn no_depth_pre_pass() -> Result<(), Failed> {
     let (with, with_picture) = drawn(deferred().depth_pre_pass(true), &everything())?;
     let (without, picture) = drawn(deferred(), &everything())?;
     let saved = Cost { passes: 1, pipelines: OPAQUE_STATES, ..Cost::default() };
-    if with.minus(without) != saved {
-        return Err(format!("{:?} is saved, and should be {saved:?}", with.minus(without)).into());
-    }
+    expect_difference("a depth pre-pass", with.minus(without), saved)?;
     if with_picture == picture { Ok(()) } else { Err("it changes the picture".into()) }
-}
-
-fn every_process_is_needed() -> Result<(), Failed> {
-    let all = || deferred().depth_pre_pass(true).post(Fxaa::default());
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
-    let picture = fixture.draw(&everything())?;
-    let names = fixture.renderer.plan().processes().iter().map(|planned| planned.name.clone());
-    let mut needed_by_others = Vec::new();
-    let (mut count, mut changed) = (0, 0);
-    for name in names {
-        count += 1;
-        let without = all().leave_out(&name);
-        match Fixture::with(2, |builder| builder.deferred(without)) {
-            Ok(mut fixture) => {
-                expect_changed(&name, &picture, &fixture.draw(&everything())?)?;
-                changed += 1;
-            }
-            Err(error) => needed_by_others.push((name, error.message().unwrap_or_default().to_owned())),
-        }
-    }
-    let expected = [("depth pre-pass", "\"depth\""), ("geometry buffer", "\"normal\"")];
-    let named = needed_by_others.iter().zip(expected);
-    if needed_by_others.len() != expected.len()
-        || !named.clone().all(|((name, error), (other, target))| name == other && error.contains(target))
-    {
-        return Err(format!("{needed_by_others:?} should be {expected:?}").into());
-    }
-    // A process per class of lights, shadow casters, transparency, and the two steps of post-processing.
-    if (changed, count) == (11, 13) { Ok(()) } else { Err(format!("{changed} of {count} change the picture").into()) }
-}
-
-/// A change of the scene; the number of cached plans after it is first drawn, and the number of new pipelines then.
-type Step = (&'static str, usize, usize, fn(&mut Scene) -> Result<(), Failed>);
-
-const STEPS: &[Step] = &[
-    // The plan of an empty scene always exists.
-    ("everything", 2, EVERY_PIPELINE, |_| Ok(())),
-    ("the last spot light with a shadow is removed", 3, 0, |scene| {
-        scene.lights.retain(|light| light.kind() != LightKind::Spot || !light.casts_shadow());
-        Ok(())
-    }),
-    ("it is added again", 3, 0, |scene| {
-        scene.lights = everything().lights;
-        Ok(())
-    }),
-    // Without shadows the shader of glass reads no maps.
-    ("all shadows are disabled", 4, GLASS_STATES as usize, |scene| {
-        scene.lights = everything().lights.into_iter().map(without_shadow).collect();
-        Ok(())
-    }),
-    ("they are enabled again", 4, 0, |scene| {
-        scene.lights = everything().lights;
-        Ok(())
-    }),
-    ("most glass is removed", 4, 0, |scene| make_opaque(scene, 2)),
-    ("the last glass is removed", 5, 0, |scene| make_opaque(scene, 3)),
-    ("most lights are removed", 6, 0, |scene| {
-        scene.lights.retain(|light| matches!(light, Light::Directional { casts_shadow: false, .. }));
-        Ok(())
-    }),
-    // The rest requires no more than an empty scene.
-    ("all lights are removed", 6, 0, |scene| {
-        scene.lights.clear();
-        Ok(())
-    }),
-    ("everything is added again", 6, 0, |scene| {
-        scene.lights = everything().lights;
-        make_opaque(scene, 0)
-    }),
-];
-
-/// The pipelines for objects in maps, for opaque objects and for glass, for seven classes of lights, and for tone mapping.
-const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 7 + 1;
-
-/// Makes this many of the glass materials opaque.
-fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
-    let handles = scene.assets().iter::<Material>().map(|(handle, _)| handle);
-    let originals = everything();
-    let originals = originals.assets().iter::<Material>().map(|(_, material)| material.clone());
-    let glasses = handles.zip(originals).filter(|(_, material)| material.blend != Blend::None);
-    for (index, (glass, material)) in glasses.collect::<Vec<_>>().into_iter().enumerate() {
-        let blend = if index < count { Blend::None } else { material.blend };
-        scene.replace(glass, Material { blend, ..material })?;
-    }
-    Ok(())
 }
 
 /// The objects get their meshes one after the other. Some of these are larger than the buffers of the meshes before.
@@ -369,44 +224,4 @@ fn first_use_of_meshes() -> Result<(), Failed> {
         }
     }
     Ok(())
-}
-
-fn cached_plans() -> Result<(), Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
-    let mut scene = everything();
-    let mut pictures = Vec::new();
-    let mut pipelines = 0;
-    for (context, plans, new_pipelines, change) in STEPS {
-        change(&mut scene)?;
-        let picture = fixture.draw(&scene)?;
-        if fixture.renderer.plan_count() != *plans {
-            return Err(format!("{context}: {} plans should be {plans}", fixture.renderer.plan_count()).into());
-        }
-        let kept = fixture.renderer.backend().resources();
-        pipelines += new_pipelines;
-        if kept.pipelines != pipelines {
-            return Err(format!("{context}: {} pipelines should be {pipelines}", kept.pipelines).into());
-        }
-        let (fresh, fresh_picture) = drawn(deferred(), &scene)?;
-        if picture != fresh_picture {
-            return Err(format!("{context}: a new renderer draws another picture").into());
-        }
-        // The backend keeps up to twice as many shadow maps as are drawn.
-        let max_bytes = fresh.target_bytes + fresh.shadow_views * BYTES_OF_A_MAP;
-        if kept.targets as i64 != fresh.targets
-            || !(fresh.target_bytes..=max_bytes).contains(&(kept.target_bytes as i64))
-        {
-            return Err(format!("{context}: {kept:?}, where a new renderer has {fresh:?}").into());
-        }
-        pictures.push(picture);
-    }
-    let kept = |fixture: &Fixture| (fixture.renderer.plan_count(), fixture.renderer.backend().resources().pipelines);
-    let before = kept(&fixture);
-    for ((context, .., change), before) in STEPS.iter().zip(&pictures) {
-        change(&mut scene)?;
-        if fixture.draw(&scene)? != *before {
-            return Err(format!("{context}: the second time, the picture differs").into());
-        }
-    }
-    if kept(&fixture) == before { Ok(()) } else { Err(format!("{before:?} grows to {:?}", kept(&fixture)).into()) }
 }

@@ -34,7 +34,8 @@ pub const CASES: &[Case] = &[
 ];
 
 const SIZE: [u32; 2] = [96, 64];
-const SURFACE: LayerMask = LayerMask::layer(7);
+/// The objects that are drawn with the picture of another view.
+pub const SURFACE: LayerMask = LayerMask::layer(7);
 const WORLD: LayerMask = LayerMask::layer(0);
 
 /// Draws the objects of a layer with the picture of another view, at the same position of the picture or mirrored. Black where there is no

@@ -11,7 +11,7 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::{Fixture, radiance};
 use crate::rays::{Panel, PanelScene};
-use crate::shadows::{MAPS, camera, fixture_with, hemisphere, spot, sun, with_context, without_shadow};
+use crate::shadows::{MAPS, camera, fixture_with, hemisphere, lamp, spot, sun, with_context, without_shadow};
 
 pub const CASES: &[Case] = &[
     ("lit_surfaces_do_not_shadow_themselves_in_the_sun", || surfaces(|_, axis| sun(axis), &[0.0])),
@@ -19,6 +19,8 @@ pub const CASES: &[Case] = &[
         surfaces(|position, axis| spot(position, axis, 57.0), &[0.0, 40.0])
     }),
     ("lit_surfaces_do_not_shadow_themselves_in_a_hemisphere", || surfaces(hemisphere, &[0.0, 45.0, 80.0])),
+    // On a face of the cube, and across its edge.
+    ("lit_surfaces_do_not_shadow_themselves_in_a_point_light", || surfaces(|position, _| lamp(position), &[0.0, 36.4])),
     ("without_bias_lit_surfaces_shadow_themselves", without_bias),
     ("a_ball_does_not_shadow_its_lit_side", ball),
     ("a_shadow_begins_at_the_foot_of_its_caster", box_on_a_floor),
@@ -90,8 +92,9 @@ const SLOPES: [f64; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
 fn without_bias() -> Result<(), Failed> {
     for bias in [0.0, 0.5] {
         let mut fixture = fixture_with(ShadowMaps { bias, ..MAPS })?;
-        for light in [|_, axis| sun(axis), |position, axis| spot(position, axis, 57.0), hemisphere]
-            as [fn(DVec3, DVec3) -> Light; 3]
+        for light in
+            [|_, axis| sun(axis), |position, axis| spot(position, axis, 57.0), hemisphere, |position, _| lamp(position)]
+                as [fn(DVec3, DVec3) -> Light; 4]
         {
             let (panel, view, light) = slope(light, 4.0, [70.0, PI / 4.0, 0.0]);
             let scene = |light| PanelScene::new(vec![panel], vec![light]).scene(std::slice::from_ref(&view));
@@ -131,7 +134,7 @@ fn ball() -> Result<(), Failed> {
         let mut fixture = fixture_with(ShadowMaps { side, ..MAPS })?;
         let axis = DVec3::new(0.3, -0.9, -0.3).normalize();
         let position = -axis * 5.0;
-        for light in [sun(axis), spot(position, axis, 30.0), hemisphere(position, axis)] {
+        for light in [sun(axis), spot(position, axis, 30.0), hemisphere(position, axis), lamp(position)] {
             let scene = |light| -> Result<Scene, Failed> {
                 let mut scene = Scene::new();
                 scene.cameras = vec![camera(DVec3::new(1.0, 2.5, 2.5), DVec3::ZERO, 40.0)];
@@ -164,7 +167,7 @@ fn box_on_a_floor() -> Result<(), Failed> {
             let (sine, cosine) = degrees.to_radians().sin_cos();
             let axis = DVec3::new(sine * 0.8, -cosine, sine * 0.6);
             let position = DVec3::Y * 0.5 - axis * 6.0;
-            for light in [sun(axis), spot(position, axis, 30.0), hemisphere(position, axis)] {
+            for light in [sun(axis), spot(position, axis, 30.0), hemisphere(position, axis), lamp(position)] {
                 let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 8.0);
                 let mut panel_scene = PanelScene { panels: vec![floor], lights: vec![light], maps };
                 let mut scene =

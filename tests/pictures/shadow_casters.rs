@@ -2,27 +2,29 @@
 
 use drawloom::glam::{DVec2, DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Blend, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, Topology};
+use drawloom::scene::{Blend, Camera, LayerMask, Light, Material, Mesh, Projection, RenderObject, Scene, Topology};
+use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::{cube, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::rays::{Panel, PanelScene};
-use crate::shadows::{MAPS, camera, fixture_with, hemisphere, spot, sun, with_context};
+use crate::shadows::{MAPS, camera, fixture_with, hemisphere, lamp, spot, sun, with_context};
 
 pub const CASES: &[Case] = &[
     ("boxes_cast_their_shadow_mirrored_or_not", boxes),
     ("squares_cast_their_shadow_as_lists_and_as_strips", squares),
     ("blended_objects_cast_no_shadow", blended_casts_none),
     ("blended_objects_are_darker_in_shadow", blended_receives),
+    ("objects_outside_of_the_layers_of_maps_cast_no_shadow", layers),
     ("extreme_scales_do_not_corrupt_a_shadow_map", extreme_scales),
     ("a_shadow_map_holds_the_nearest_depth", depths),
 ];
 
-fn lights() -> [Light; 3] {
+fn lights() -> [Light; 4] {
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     let position = DVec3::new(-0.4, 3.0, 0.9);
-    [sun(down), spot(position, down, 45.0), hemisphere(position, down)]
+    [sun(down), spot(position, down, 45.0), hemisphere(position, down), lamp(position)]
 }
 
 fn floor() -> Panel {
@@ -172,12 +174,41 @@ fn blended_receives() -> Result<(), Failed> {
 fn halved(light: Light) -> Light {
     let mut light = light;
     if let Light::Directional { illuminance: color, .. }
+    | Light::Point { intensity: color, .. }
     | Light::Spot { intensity: color, .. }
     | Light::Hemispherical { intensity: color, .. } = &mut light
     {
         *color *= 0.5;
     }
     light
+}
+
+/// A square over the floor, in a layer whose objects cast shadows or in another one.
+fn layers() -> Result<(), Failed> {
+    let maps = ShadowMaps { layers: LayerMask::layer(3), cascades: 3, ..MAPS };
+    let mut fixture = fixture_with(maps)?;
+    for light in lights() {
+        for (layers, casts) in [(LayerMask::layer(3), true), (LayerMask::layer(2), false)] {
+            let mut floor_scene = FloorScene::new(light)?;
+            // From below, the square is not visible.
+            floor_scene.scene.cameras.remove(0);
+            let mesh = floor_scene.scene.add(square(Topology::TriangleList))?;
+            floor_scene.add(mesh, Material { double_sided: true, ..white() }, |object| {
+                object.orientation = Quat::from_rotation_x(-90_f32.to_radians());
+                object.scale = Vec3::splat(0.5);
+                object.layers = layers;
+            })?;
+            floor_scene.floor.maps = maps;
+            let square = Panel::facing(DVec3::Y, DVec3::Y, 0.5).double_sided();
+            let panels = if casts { vec![square] } else { Vec::new() };
+            let counts = floor_scene.with(panels).expect_of(&mut fixture, &floor_scene.scene);
+            let counts = counts.map_err(|failed| with_context(failed, format!("{layers:?} {light:?}")))?;
+            if (counts.fading > 20) != casts {
+                return Err(format!("{layers:?} {light:?}: {counts:?}").into());
+            }
+        }
+    }
+    Ok(())
 }
 
 fn extreme_scales() -> Result<(), Failed> {
@@ -218,18 +249,21 @@ fn depths() -> Result<(), Failed> {
         panels.extend(Panel::closed_box(DVec3::new(0.3, 1.2, -0.2), DVec3::new(0.5, 0.2, 0.6)));
         let panel_scene = PanelScene { panels, lights: vec![light], maps: MAPS };
         let view = camera(DVec3::new(2.0, 3.0, 2.0), DVec3::ZERO, 60.0);
-        let map = MAPS.camera(String::new(), &light, std::slice::from_ref(&view)).ok_or("there is no map")?;
+        let maps = MAPS.cameras("", &light, std::slice::from_ref(&view));
         let recorded = fixture.record(&panel_scene.scene(&[view])?)?;
-        let picture = fixture.submit(recorded)?.read(1, "shadow map")?;
-        if [picture.width, picture.height] != [MAPS.side; 2] {
-            return Err(format!("it is {} by {}", picture.width, picture.height).into());
+        let submission = fixture.submit(recorded)?;
+        for (index, map) in maps.iter().enumerate() {
+            let picture = submission.read(1 + index, "shadow map")?;
+            if [picture.width, picture.height] != [MAPS.side; 2] {
+                return Err(format!("it is {} by {}", picture.width, picture.height).into());
+            }
+            let depth = |x: u32, y: u32| {
+                let start = (y * MAPS.side + x) as usize * 4;
+                let bytes = [0, 1, 2, 3].map(|byte| picture.bytes[start + byte]);
+                f64::from(f32::from_le_bytes(bytes))
+            };
+            compare_depths(&panel_scene, map, depth).map_err(|problem| format!("{light:?}{}: {problem}", map.name))?;
         }
-        let depth = |x: u32, y: u32| {
-            let start = (y * MAPS.side + x) as usize * 4;
-            let bytes = [0, 1, 2, 3].map(|byte| picture.bytes[start + byte]);
-            f64::from(f32::from_le_bytes(bytes))
-        };
-        compare_depths(&panel_scene, &map, depth).map_err(|problem| format!("{light:?}: {problem}"))?;
     }
     Ok(())
 }

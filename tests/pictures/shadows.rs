@@ -27,7 +27,15 @@ pub const CASES: &[Case] = &[
     ("shadows_far_from_the_origin_equal_those_near_it", far_away),
 ];
 
-pub const MAPS: ShadowMaps = ShadowMaps { side: 512, max_distance: 12.0, bias: 1.0, filter: 1, layers: LayerMask::ALL };
+pub const MAPS: ShadowMaps = ShadowMaps {
+    side: 512,
+    max_distance: 12.0,
+    cascades: 1,
+    split_lambda: 0.5,
+    bias: 1.0,
+    filter: 1,
+    layers: LayerMask::ALL,
+};
 
 /// The shipped processes with these shadow maps.
 pub fn fixture_with(maps: ShadowMaps) -> Result<Fixture, Failed> {
@@ -61,6 +69,10 @@ pub fn hemisphere(position: DVec3, direction: DVec3) -> Light {
     }
 }
 
+pub fn lamp(position: DVec3) -> Light {
+    Light::Point { position, intensity: Vec3::new(50.0, 40.0, 30.0), range: 15.0, casts_shadow: true }
+}
+
 pub fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
     let projection = Projection::Perspective { field_of_view: degrees.to_radians() as f32 };
     sized(Camera { projection, ..Camera::looking_at("main", position, target) }, [64, 64])
@@ -70,6 +82,7 @@ pub fn camera(position: DVec3, target: DVec3, degrees: f64) -> Camera {
 pub fn without_shadow(light: Light) -> Light {
     let mut light = light;
     if let Light::Directional { casts_shadow, .. }
+    | Light::Point { casts_shadow, .. }
     | Light::Spot { casts_shadow, .. }
     | Light::Hemispherical { casts_shadow, .. } = &mut light
     {
@@ -84,7 +97,7 @@ fn panel_scene(panels: Vec<Panel>, lights: Vec<Light>, maps: ShadowMaps) -> Pane
 
 /// Fails unless at least these fractions of the pixels are certainly lit and certainly dark, and at most a fifth is
 /// uncertain.
-fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
+pub fn expect(counts: Counts, lit: f64, dark: f64) -> Result<(), Failed> {
     let all = (counts.lit + counts.dark + counts.fading + counts.edges) as f64;
     let enough = counts.lit as f64 >= lit * all && counts.dark as f64 >= dark * all;
     let sure = (counts.fading + counts.edges) as f64 <= 0.2 * all;
@@ -116,7 +129,7 @@ fn square_occluder() -> Result<(), Failed> {
             let position = up * 3.0 + sideways * 0.7 + across * 0.4;
             let down = (-up - sideways * 0.2).normalize();
             let eye = up * 4.0 - sideways * 3.0 + across * 2.0;
-            for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
+            for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down), lamp(position)] {
                 let panel_scene = panel_scene(vec![floor, square], vec![light], maps);
                 let view = camera(eye, sideways * -0.5, 50.0);
                 let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, up))?;
@@ -164,7 +177,8 @@ fn long_beam() -> Result<(), Failed> {
     for (y, z) in [(-2.2, 0.1), (-1.5, -1.6), (-0.3, -2.2)] {
         let normal = DVec3::new(0.0, y, z).normalize();
         let beam = Panel::new(DVec3::new(0.0, y, z), DVec3::X * 10.0, normal.cross(DVec3::X) * 0.1).double_sided();
-        for light in [hemisphere(DVec3::ZERO, DVec3::NEG_Y), sun(normal), spot(DVec3::ZERO, normal, 80.0)] {
+        let lamps = [hemisphere(DVec3::ZERO, DVec3::NEG_Y), spot(DVec3::ZERO, normal, 80.0), lamp(DVec3::ZERO)];
+        for light in lamps.into_iter().chain([sun(normal)]) {
             // A map of this extent would be too coarse for the beam.
             let maps = if matches!(light, Light::Directional { .. }) {
                 ShadowMaps { max_distance: 20.0, ..maps }
@@ -330,7 +344,12 @@ fn several_lights() -> Result<(), Failed> {
         outer_angle: 0.9,
         casts_shadow: false,
     };
-    let lamp = Light::Point { position: right + DVec3::Y, intensity: Vec3::new(0.0, 0.0, 9.0), range: 12.0 };
+    let lamp = Light::Point {
+        position: right + DVec3::Y,
+        intensity: Vec3::new(0.0, 0.0, 9.0),
+        range: 12.0,
+        casts_shadow: false,
+    };
     let dark = tinted(red, Vec3::ZERO);
     let orders = [
         vec![red, green],
@@ -405,7 +424,7 @@ fn orthographic() -> Result<(), Failed> {
     let square = Panel::facing(DVec3::Y, DVec3::Y, 0.6).double_sided();
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     let position = DVec3::new(0.5, 3.0, 0.2);
-    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
+    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down), lamp(position)] {
         for far in [8.0, 40.0] {
             let looking = Camera::looking_at("plan", DVec3::new(1.0, 4.0, 4.0), DVec3::ZERO);
             let projection = Projection::Orthographic { height: 4.0 };
@@ -424,7 +443,7 @@ fn far_away() -> Result<(), Failed> {
     let square = Panel::facing(shift + DVec3::Y, DVec3::Y, 0.6).double_sided();
     let down = DVec3::new(0.2, -0.9, -0.3).normalize();
     let position = shift + DVec3::new(0.5, 3.0, 0.2);
-    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down)] {
+    for light in [sun(down), spot(position, down, 50.0), hemisphere(position, down), lamp(position)] {
         let view = camera(shift + DVec3::new(1.0, 4.0, 4.0), shift, 45.0);
         expect(panel_scene(vec![floor, square], vec![light], MAPS).expect(&mut fixture, &[view])?, 0.4, 0.01)?;
     }

@@ -5,20 +5,23 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::demo;
+use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::Scene;
+use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::draw;
 use crate::references::shared;
+use crate::shadows::fixture_with;
 
 pub const CASES: &[Case] = &[
     ("software_draws_the_demo_scene_as_wgpu_does", || compare(demo::colonnade()?)),
     ("software_draws_everything_as_wgpu_does", || compare(everything())),
+    ("software_draws_cascades_as_wgpu_does", cascades),
     ("software_draws_a_field_of_boxes_as_wgpu_does", || compare(field(400))),
 ];
 
@@ -27,16 +30,27 @@ pub const CASES_OF_SHARED_SCENES: &[Case] = &[
     ("software_draws_sponza_as_wgpu_does", || compare(shared("sponza/sponza_part.obj")?)),
 ];
 
+/// With a camera over the boxes, so that all cascades are in the picture.
+fn cascades() -> Result<(), Failed> {
+    let mut scene = everything();
+    scene.cameras[0] = Camera::looking_at("main", DVec3::new(0.5, 1.5, 4.0), DVec3::new(0.0, 0.3, 0.0));
+    compare_with(scene, ShadowMaps { side: 256, cascades: 4, max_distance: 12.0, ..ShadowMaps::default() })
+}
+
+fn compare(scene: Scene) -> Result<(), Failed> {
+    compare_with(scene, ShadowMaps::default())
+}
+
 /// Compares wgpu's picture with those of the software backend in f32 and in f64.
-fn compare(mut scene: Scene) -> Result<(), Failed> {
+fn compare_with(mut scene: Scene, maps: ShadowMaps) -> Result<(), Failed> {
     for camera in &mut scene.cameras {
         // Without optimisation the software backend takes about thirty times as long.
         camera.size = if cfg!(debug_assertions) { [240, 135] } else { [960, 540] };
     }
-    let by_wgpu = draw(&scene)?;
+    let by_wgpu = fixture_with(maps)?.draw(&scene)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let single = draw_on(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, &scene)?;
-    let double = draw_on(SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?), &scene)?;
+    let single = draw_on(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, &scene, maps)?;
+    let double = draw_on(SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?), &scene, maps)?;
     let differences = [("f32", &single), ("the reference", &double)]
         .map(|(name, picture)| (name, Difference::new(&by_wgpu, picture)));
     println!("{differences:?}");
@@ -46,8 +60,14 @@ fn compare(mut scene: Scene) -> Result<(), Failed> {
     Err(format!("wgpu's picture and the CPU's differ: {differences:?}").into())
 }
 
-fn draw_on(backend: SoftwareBackend, scheduler: Arc<Scheduler>, scene: &Scene) -> Result<Picture, Failed> {
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+fn draw_on(
+    backend: SoftwareBackend,
+    scheduler: Arc<Scheduler>,
+    scene: &Scene,
+    maps: ShadowMaps,
+) -> Result<Picture, Failed> {
+    let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
     Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
 }
 

@@ -148,7 +148,7 @@ fn behind_a_wall() -> Result<(), Failed> {
 fn lights() -> Vec<Light> {
     let (position, intensity, range) = (DVec3::new(0.5, 1.5, 4.0), Vec3::new(9.0, 7.0, 5.0), 12.0);
     let direction = -position.as_vec3().normalize();
-    let mut lights = vec![Light::Point { position, intensity, range }];
+    let mut lights = vec![Light::Point { position, intensity, range, casts_shadow: false }];
     for casts_shadow in [false, true] {
         let (inner_angle, outer_angle) = (0.3, 0.5);
         lights.extend([
@@ -256,7 +256,12 @@ fn lit_on_the_visible_side() -> Result<(), Failed> {
         let mut scene = panes(&[(0.0, Material { double_sided, ..glass(Blend::Alpha, Vec3::splat(0.5), 1.0) })])?;
         scene.ambient = Vec3::ZERO;
         scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 5.0 * eye, DVec3::ZERO), [SIDE; 2])];
-        scene.lights = vec![Light::Point { position: DVec3::Z * 2.0 * lamp, intensity: Vec3::splat(4.0), range: 8.0 }];
+        scene.lights = vec![Light::Point {
+            position: DVec3::Z * 2.0 * lamp,
+            intensity: Vec3::splat(4.0),
+            range: 8.0,
+            casts_shadow: false,
+        }];
         let expected = expected.map_or(BACKGROUND.as_dvec3().to_array(), |radiance| [radiance; 3]);
         let context = format!("viewed from {eye}, lit from {lamp}, double-sided: {double_sided}");
         expect(&context, &drawn(&mut fixture, &scene)?, expected)?;

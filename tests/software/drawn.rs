@@ -138,7 +138,7 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     let floor = RenderObject { scale: Vec3::new(30.0, 0.1, 30.0), ..RenderObject::new(mesh, material, DVec3::NEG_Y) };
     scene.add_object(floor).unwrap();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 4.0, 12.0), DVec3::ZERO), [150, 100])];
-    let light = |position| Light::Point { position, intensity: Vec3::splat(20.0), range: 3.0 };
+    let light = |position| Light::Point { position, intensity: Vec3::splat(20.0), range: 3.0, casts_shadow: false };
     let mut fixture = Fixture::new(2, |builder| builder.deferred(Deferred::to_picture()));
     for position in [[0.0, 0.5, 0.0], [-9.0, 0.5, -6.0], [1.0, 4.0, 12.5], [0.0, 2.0, 9.0], [7.0, 1.0, 4.0]] {
         scene.lights = vec![light(DVec3::from(position))];

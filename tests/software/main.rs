@@ -1,8 +1,10 @@
 //! Frames on the software backend, which need no graphics adapter.
 
 mod drawn;
+mod mip_levels;
 mod refused;
 mod same_bytes;
+mod sampled_histories;
 
 use std::sync::Arc;
 

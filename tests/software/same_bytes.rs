@@ -1,10 +1,12 @@
 //! A frame has the same bytes however it is distributed over workers.
 
 use drawloom::backend::SoftwareBackend;
-use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Changes, Scene, SceneRef};
+use drawloom::process::{Deferred, ToneMapping};
+use drawloom::quality::{CullingVolume, Quality, ShadowQuality, VertexFormat};
+use drawloom::scene::{Changes, Mesh, Scene, SceneRef};
 use drawloom::{Granularity, RendererBuilder};
 use drawloom_testing::scenes::everything::everything;
+use drawloom_testing::scenes::leveled::{coarsest, distance_from_edges, halved, plates, whole};
 use drawloom_testing::scenes::{as_list, culled, field, with_meshes};
 
 use crate::{Fixture, deferred};
@@ -108,5 +110,49 @@ fn triangle_culling_changes_nothing() {
             let submission = fixture.submitter.submit(recorded).unwrap().submission;
             assert!(submission.read(0, "picture").unwrap() == expected);
         }
+    }
+}
+
+#[test]
+fn levels_of_detail_draw_the_bytes_of_their_triangles() {
+    let quality = |level_of_detail| {
+        let shadows = ShadowQuality { side: 64, ..ShadowQuality::default() };
+        Quality { level_of_detail, shadows, vertices: VertexFormat::Packed, ..Quality::balanced() }
+    };
+    for is_reference in [false, true] {
+        let picture = |scene: &Scene, level_of_detail| {
+            let mut fixture =
+                if is_reference { Fixture::reference() } else { Fixture::with_granularity(2, Granularity::Adaptive) };
+            fixture.renderer.set_quality(quality(level_of_detail)).unwrap();
+            fixture.picture(scene)
+        };
+        for leveled in [halved, |mesh: &Mesh| culled(&halved(&as_list(mesh)))] {
+            let scene = with_meshes(everything(), leveled);
+            let (full, coarse) =
+                (picture(&with_meshes(everything(), |mesh| whole(&leveled(mesh))), 0.0), picture(&scene, 1e9));
+            assert!(coarse == picture(&with_meshes(with_meshes(everything(), leveled), coarsest), 0.0));
+            assert!(full == picture(&scene, 0.0) && full != coarse);
+        }
+    }
+}
+
+#[test]
+fn levels_of_detail_move_silhouettes_by_no_more_than_the_error() {
+    let scene = plates();
+    let width = scene.cameras[0].size[0] as usize;
+    let picture = |level_of_detail: f32| {
+        let quality = Quality { level_of_detail, ..Quality::balanced() };
+        let deferred = Deferred::new().post(ToneMapping::default());
+        let picture = Fixture::new(2, |builder| builder.deferred(deferred).quality(quality)).picture(&scene);
+        picture.bytes.as_chunks::<4>().0.to_vec()
+    };
+    let full = picture(0.0);
+    for pixels in [4.0, 8.0] {
+        let coarse = picture(pixels);
+        let moved = distance_from_edges(&[&full], width, |pixel| coarse[pixel] != full[pixel]);
+        assert!(
+            moved >= 0.7 * f64::from(pixels) - 1.0 && moved <= f64::from(pixels) + 0.5,
+            "{moved} pixels at {pixels}"
+        );
     }
 }

@@ -138,7 +138,7 @@ fn check(record: &Record, schedule: &Schedule<Work>, ran: &[RanChunk], has_paren
 fn fields(number: usize) -> Fields {
     let labels = labels(number).unwrap_or_default();
     let labels = [("process", labels.process), ("stage", labels.stage), ("view", labels.view)];
-    let labels = labels.into_iter().filter_map(|(name, value)| Some((name, value?)));
+    let labels = labels.into_iter().filter_map(|(name, value)| Some((name, value?.to_string())));
     labels.chain([("name", format!("node {number}"))]).collect()
 }
 

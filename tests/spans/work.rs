@@ -87,8 +87,8 @@ pub fn schedules() -> impl Strategy<Value = Schedule<Work>> {
 
 /// The labels of a node; odd ones have none.
 pub fn labels(number: usize) -> Option<Labels> {
-    let [process, stage] = [format!("part {number}"), "fill".to_owned()].map(Some);
-    number.is_multiple_of(2).then_some(Labels { process, stage, view: (number != 0).then(|| "main".to_owned()) })
+    let [process, stage] = [format!("part {number}"), "fill".to_owned()].map(|label| Some(label.into()));
+    number.is_multiple_of(2).then_some(Labels { process, stage, view: (number != 0).then(|| "main".into()) })
 }
 
 /// How a schedule without measurements is executed.

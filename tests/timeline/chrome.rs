@@ -160,7 +160,7 @@ fn check_jobs(log: &Log, trace: &Trace) {
                 }
                 let labels = &node.labels;
                 for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
-                    label.iter().for_each(|label| arguments[key] = label.as_str().into());
+                    label.iter().for_each(|label| arguments[key] = (&**label).into());
                 }
                 let times = (nanos(chunk.started), nanos(chunk.ended), chunk.worker as u64 + 1);
                 expected.push(format!("{:?} {times:?} {arguments}", node.name));

@@ -271,7 +271,8 @@ proptest! {
         let [name, process_label, stage, view, worker, thread, span_name, counter, device, pass_name, pass_view, idle_worker] = &names[..] else {
             unreachable!("there are twelve")
         };
-        let labels = Labels { process: Some(process_label.clone()), stage: Some(stage.clone()), view: Some(view.clone()) };
+        let label = |name: &String| Some(name.as_str().into());
+        let labels = Labels { process: label(process_label), stage: label(stage), view: label(view) };
         let mut log = log(vec![run(vec![NodeInfo { labels, ..node(name, &[]) }], 9, vec![chunk(0, 1, 1, 2, 3)])]);
         log.workers[0].name.clone_from(idle_worker);
         log.workers[0].idle.push(Idle { kind: IdleKind::Searching, began: at(0), ended: at(9) });

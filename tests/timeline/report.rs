@@ -18,7 +18,7 @@ fn chunk(node: usize, item: usize, worker: usize, times: Range<u64>) -> Chunk {
 }
 
 fn node(name: &str, group: &str, dependencies: &[usize]) -> NodeInfo {
-    let labels = Labels { process: Some(group.to_owned()), ..Labels::default() };
+    let labels = Labels { process: Some(group.into()), ..Labels::default() };
     NodeInfo { name: name.to_owned(), labels, dependencies: dependencies.to_vec(), ..NodeInfo::default() }
 }
 

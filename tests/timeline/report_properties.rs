@@ -52,7 +52,7 @@ fn schedule_of(specs: &[NodeSpec]) -> Schedule<Closure<'static, Context>> {
     let mut nodes = Vec::new();
     for (index, &NodeSpec { ref dependencies, width, cost, group }) in specs.iter().enumerate() {
         let group = format!("group {group}");
-        let label = Labels { process: Some(group.clone()), ..Labels::default() };
+        let label = Labels { process: Some(group.as_str().into()), ..Labels::default() };
         let body = Closure::new(move |context: &Context, range, _worker| {
             range.for_each(|item| context.spend(cost + item as u64));
             Ok(())

@@ -103,7 +103,7 @@ fn the_traced_program() {
     let scheduler = Scheduler::builder().workers(2).on_start(drawloom_tracy::name_worker).build().unwrap();
     let mut graph = FrameGraph::new();
     let node = graph.add(NODE, Closure::new(|(): &(), _, _| Ok(())).with_width(|()| 100));
-    let [process, stage, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.to_owned()));
+    let [process, stage, view] = [SECRETS[0], SECRETS[1], SECRETS[2]].map(|secret| Some(secret.into()));
     graph.label(node, Labels { process, stage, view });
     graph.keep(node);
     let mut schedule = graph.compile().unwrap();

@@ -74,7 +74,7 @@ fn small_light(index: usize, random: &mut Random) -> Light {
     let color = random.vector(0.2, 1.0);
     let range = random.between(2.7, 3.3) as f32;
     if index.is_multiple_of(2) {
-        Light::Point { position: DVec3::new(x, 1.2, z), intensity: color * 2.0, range }
+        Light::Point { position: DVec3::new(x, 1.2, z), intensity: color * 2.0, range, casts_shadow: false }
     } else {
         Light::Spot {
             position: DVec3::new(x, 2.4, z),

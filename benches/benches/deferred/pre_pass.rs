@@ -84,7 +84,12 @@ fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
         let material = scene.add(Material { name: format!("wall {behind}"), diffuse, ..Material::default() })?;
         scene.add_object(RenderObject::new(wall, material, DVec3::NEG_Z * (5.0 + behind as f64)))?;
     }
-    scene.lights.push(Light::Point { position: DVec3::NEG_Z * 3.0, intensity: Vec3::splat(10.0), range: 8.0 });
+    scene.lights.push(Light::Point {
+        position: DVec3::NEG_Z * 3.0,
+        intensity: Vec3::splat(10.0),
+        range: 8.0,
+        casts_shadow: false,
+    });
     scene.cameras.push(Camera { size: extent.picture, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) });
     Ok(scene)
 }

@@ -82,7 +82,7 @@ impl<'a> CameraCase<'a> {
         let mut table = ObjectTable::default();
         table.update(scene);
         let mut meshes = OccluderMeshes::default();
-        meshes.sync(scene.assets);
+        meshes.sync(scene.assets, table.used_meshes());
         let view = RenderView::new(camera);
         let sees = |object: usize| {
             let bounds = table.block(object / ObjectTable::BLOCK_SIZE).spheres.get(object % ObjectTable::BLOCK_SIZE);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use drawloom::command::RenderCommand;
 use drawloom::quality::{DepthKey, Quality, TransformPrecision};
-use drawloom::scene::{Blend, Camera, Light, Material, Scene};
+use drawloom::scene::{Blend, Camera, Light, Material, Mesh, Scene};
 
 use crate::Failure;
 use crate::measure::{Measurement, Measurements};
@@ -67,6 +67,11 @@ pub fn of(
         Knob::DepthPrePass => Ok(case.pixels_that_differ()),
         Knob::Normals | Knob::Vertices => case.normals(setting.knob),
         Knob::Diffuse => case.diffuse(),
+        Knob::LevelOfDetail => {
+            let has_levels = scene.assets().iter::<Mesh>().any(|(_, mesh)| !mesh.levels().is_empty());
+            let error = has_levels.then_some(measured.differing[1]);
+            Ok(KnobError { error, ..case.pixels_that_visibly_differ() })
+        }
         Knob::ShadowSide | Knob::ShadowFilter | Knob::ShadowBias | Knob::ShadowInterval => {
             Ok(case.pixels_that_visibly_differ())
         }
@@ -206,7 +211,9 @@ impl Case<'_> {
         let of_light = 1.089 * f64::from(self.quality.light_cut_off) * diffuse / PI;
         let bound = (of_light * lights as f64 + brightest * lights as f64 * 2_f64.powi(-10)) * layers as f64;
         let has_maps = scene.lights.iter().any(|light| match *light {
-            Light::Spot { casts_shadow, .. } | Light::Hemispherical { casts_shadow, .. } => casts_shadow,
+            Light::Point { casts_shadow, .. }
+            | Light::Spot { casts_shadow, .. }
+            | Light::Hemispherical { casts_shadow, .. } => casts_shadow,
             _ => false,
         });
         let error = if lights == 0 { None } else { differences.reduce(worst_of) };

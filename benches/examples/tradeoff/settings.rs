@@ -25,6 +25,7 @@ pub enum Knob {
     Normals,
     Diffuse,
     Vertices,
+    LevelOfDetail,
     DepthPrePass,
     ShadowSide,
     ShadowFilter,
@@ -38,7 +39,7 @@ pub enum Knob {
 
 impl Knob {
     /// All knobs, in the order of reports.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Preset,
         Self::OpaqueOrder,
         Self::BlendedOrder,
@@ -47,6 +48,7 @@ impl Knob {
         Self::Normals,
         Self::Diffuse,
         Self::Vertices,
+        Self::LevelOfDetail,
         Self::DepthPrePass,
         Self::ShadowSide,
         Self::ShadowFilter,
@@ -69,6 +71,7 @@ impl Knob {
             Self::Normals => "normals",
             Self::Diffuse => "diffuse",
             Self::Vertices => "vertices",
+            Self::LevelOfDetail => "level_of_detail",
             Self::DepthPrePass => "depth_pre_pass",
             Self::ShadowSide => "shadows.side",
             Self::ShadowFilter => "shadows.filter",
@@ -93,6 +96,7 @@ impl Knob {
             Self::Normals => changed.normals = other.normals,
             Self::Diffuse => changed.diffuse = other.diffuse,
             Self::Vertices => changed.vertices = other.vertices,
+            Self::LevelOfDetail => changed.level_of_detail = other.level_of_detail,
             Self::DepthPrePass => changed.depth_pre_pass = other.depth_pre_pass,
             Self::ShadowSide => changed.shadows.side = other.shadows.side,
             Self::ShadowFilter => changed.shadows.filter = other.shadows.filter,
@@ -154,6 +158,10 @@ pub fn all() -> Vec<Setting> {
     }
     add(Knob::Diffuse, "sRGB, 8 bits", Quality { diffuse: DiffuseFormat::Srgb8, ..exact });
     add(Knob::Vertices, "packed", Quality { vertices: VertexFormat::Packed, ..exact });
+    for level_of_detail in [0.5, 1.0, 2.0, 4.0] {
+        let name = format!("{level_of_detail} pixels");
+        add(Knob::LevelOfDetail, &name, Quality { level_of_detail, ..exact });
+    }
     add(Knob::DepthPrePass, "on", Quality { depth_pre_pass: true, ..exact });
 
     let shadows = exact.shadows;

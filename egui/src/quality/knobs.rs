@@ -102,6 +102,18 @@ pub const KNOBS: &[Knob] = &[
         ],
     },
     Knob {
+        name: "levels of detail",
+        explanation: "Error: pixels by which surfaces are off. Cost: a choice for each visible object; coarser levels save triangles. No \
+            effect on meshes without levels.",
+        values: &[
+            ("full detail", |quality| quality.level_of_detail = 0.0),
+            ("0.5 pixels", |quality| quality.level_of_detail = 0.5),
+            ("1 pixel", |quality| quality.level_of_detail = 1.0),
+            ("2 pixels", |quality| quality.level_of_detail = 2.0),
+            ("4 pixels", |quality| quality.level_of_detail = 4.0),
+        ],
+    },
+    Knob {
         name: "depth pre-pass",
         explanation: "Error: none, but where surfaces coincide. Cost: all vertices twice; it saves the shading of hidden pixels.",
         values: &[("off", |quality| quality.depth_pre_pass = false), ("on", |quality| quality.depth_pre_pass = true)],
@@ -202,6 +214,7 @@ mod tests {
             normals,
             diffuse,
             vertices,
+            level_of_detail,
             depth_pre_pass,
             shadows: ShadowQuality { side, filter, bias, interval, widest_edge },
             light_cut_off,
@@ -216,6 +229,7 @@ mod tests {
             format!("{normals:?}"),
             format!("{diffuse:?}"),
             format!("{vertices:?}"),
+            format!("{level_of_detail:?}"),
             format!("{depth_pre_pass:?}"),
             format!("{side:?}"),
             format!("{filter:?}"),

@@ -37,7 +37,7 @@ pub(crate) fn read_light(
     };
     Ok(Some(match light.kind() {
         Kind::Directional => Light::Directional { direction, illuminance: intensity, casts_shadow: true },
-        Kind::Point => Light::Point { position, intensity, range },
+        Kind::Point => Light::Point { position, intensity, range, casts_shadow: false },
         Kind::Spot { inner_cone_angle, outer_cone_angle } => {
             let (inner_angle, outer_angle) = (inner_cone_angle, outer_cone_angle);
             let is_cone =

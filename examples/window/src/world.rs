@@ -62,7 +62,12 @@ impl World {
                     illuminance: Vec3::new(2.6, 2.4, 2.1),
                     casts_shadow: true,
                 },
-                Light::Point { position: DVec3::Y * 3.0, intensity: Vec3::new(20.0, 30.0, 60.0), range: 30.0 },
+                Light::Point {
+                    position: DVec3::Y * 3.0,
+                    intensity: Vec3::new(20.0, 30.0, 60.0),
+                    range: 30.0,
+                    casts_shadow: false,
+                },
             ],
             orientations,
             scales,

@@ -6,6 +6,7 @@ use parking_lot::Mutex;
 
 use super::pixel_formats::{blended, stored};
 use super::precision::Precision;
+use super::target_mip_levels::MipLevel;
 use super::targets::{SoftwareTarget, TargetReader, TiledTexture};
 use super::tiles::{Tile, Tiling, index_in_tile};
 use crate::backend::BackendError;
@@ -17,8 +18,8 @@ use crate::scene::Blend;
 pub(super) struct Attachments<R> {
     pub(super) colors: Vec<ColorAttachment<R>>,
     pub(super) depth: Option<DepthAttachment<R>>,
-    /// In the order declared.
-    pub(super) sampled: Vec<SoftwareTarget<R>>,
+    /// In the order declared, each with its layers.
+    pub(super) sampled: Vec<Vec<SoftwareTarget<R>>>,
 }
 
 /// A colour target that a pass draws into.
@@ -61,7 +62,7 @@ impl<R: Precision> Attachments<R> {
         let is_same = |one: &SoftwareTarget<R>, other: &SoftwareTarget<R>| Arc::ptr_eq(&one.texture, &other.texture);
         let repeats =
             |(index, target): (usize, &&SoftwareTarget<R>)| written[..index].iter().any(|other| is_same(target, other));
-        let reads = |target: &&SoftwareTarget<R>| self.sampled.iter().any(|other| is_same(target, other));
+        let reads = |target: &&SoftwareTarget<R>| self.sampled.iter().flatten().any(|other| is_same(target, other));
         if written.iter().enumerate().any(repeats) || written.iter().any(reads) {
             return Err(refused("a target that is drawn into is used twice"));
         }
@@ -82,15 +83,15 @@ impl<R: Precision> Attachments<R> {
         let mut writable = writable.map(|depth| depth.target.texture.tiles.write());
         let tested = self.depth.as_ref().filter(|depth| !depth.is_writable).map(|depth| &depth.target);
         // A pass may test and sample the same depth target: it is locked once.
-        let mut read: Vec<(&Arc<TiledTexture<R>>, _)> = Vec::new();
-        for SoftwareTarget { texture, .. } in tested.into_iter().chain(&self.sampled) {
-            if !read.iter().any(|(other, _)| Arc::ptr_eq(other, texture)) {
-                read.push((texture, texture.tiles.read()));
+        let mut read: Vec<(&Arc<TiledTexture<R>>, _, _)> = Vec::new();
+        for SoftwareTarget { texture, .. } in tested.into_iter().chain(self.sampled.iter().flatten()) {
+            if !read.iter().any(|(other, ..)| Arc::ptr_eq(other, texture)) {
+                read.push((texture, texture.tiles.read(), texture.mip_levels.read()));
             }
         }
-        let tiles_of = |target: &SoftwareTarget<R>| -> &[Tile<R>] {
-            let found = read.iter().find(|(texture, _)| Arc::ptr_eq(texture, &target.texture));
-            found.map_or(&[], |(_, tiles)| tiles)
+        let pixels_of = |target: &SoftwareTarget<R>| -> (&[Tile<R>], &[MipLevel<R>]) {
+            let found = read.iter().find(|(texture, ..)| Arc::ptr_eq(texture, &target.texture));
+            found.map_or((&[], &[]), |(_, tiles, mip_levels)| (tiles, mip_levels))
         };
 
         let tiling = self.tiling();
@@ -98,7 +99,7 @@ impl<R: Precision> Attachments<R> {
             colors.iter_mut().zip(&self.colors).map(|(tiles, color)| tiles[color.target.tiles()].iter_mut()).collect();
         let depth_range = self.depth.as_ref().map_or(0..0, |depth| depth.target.tiles());
         let mut depth_tiles = writable.as_mut().map(|tiles| tiles[depth_range.clone()].iter_mut());
-        let mut tested_tiles = tested.map(|target| tiles_of(target)[depth_range].iter());
+        let mut tested_tiles = tested.map(|target| pixels_of(target).0[depth_range].iter());
         let tiles = (0..tiling.count()).map(|tile| {
             let depth = match (&mut depth_tiles, &mut tested_tiles) {
                 (Some(tiles), _) => tiles.next().map(|tile| TileDepth::Written(tile.numbers_mut())),
@@ -113,7 +114,14 @@ impl<R: Precision> Attachments<R> {
             })
         });
         let tiles = tiles.collect();
-        let sampled = self.sampled.iter().map(|target| target.sampled(tiles_of(target))).collect();
+        let reader = |layers: &Vec<SoftwareTarget<R>>| {
+            let layer = |target: &SoftwareTarget<R>| {
+                let (tiles, mip_levels) = pixels_of(target);
+                target.layer_reader(tiles, mip_levels)
+            };
+            TargetReader::new(layers.iter().map(layer).collect())
+        };
+        let sampled = self.sampled.iter().map(reader).collect();
         work(&OpenAttachments { tiling, tiles, sampled })
     }
 }

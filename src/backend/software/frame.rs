@@ -1,5 +1,6 @@
 //! A frame in one precision.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ use super::software_pass::{SoftwareDraws, SoftwarePass};
 use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
-use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
+use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
 use crate::backend::{BackendError, PassRequest, ViewQueue};
 use crate::command::Batch;
 use crate::process::ShaderColumns;
@@ -39,7 +40,6 @@ pub(super) struct TypedFrame<R: Precision> {
     /// The format of the vertices that it draws.
     pub(super) vertices: VertexFormat,
     pub(super) meshes: Meshes,
-    /// By mesh slot and subdivision level.
     pub(super) subdivided: Mutex<SubdividedMeshes<Arc<Mesh>>>,
     pub(super) materials: Arc<MaterialTable>,
     pub(super) targets: Arc<SoftwareTargets<R>>,
@@ -66,7 +66,8 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
             };
             self.draw(known.ok_or_else(unknown)?, commands)?;
         }
-        self.targets.copy_histories();
+        let drawn: HashSet<_> = queues.iter().map(|queue| queue.view).collect();
+        self.targets.copy_histories(|view| drawn.contains(&view));
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
     }
 }
@@ -87,7 +88,7 @@ impl<R: Precision> TypedFrame<R> {
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
                         0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
-                        level => subdivided.get(&(batch.mesh, level)).map(|mesh| &mesh.geometry),
+                        _ => subdivided.get(&subdivision_of(batch)).map(|mesh| &mesh.geometry),
                     };
                     mesh.cloned().ok_or_else(missing_mesh_error)
                 };
@@ -100,7 +101,13 @@ impl<R: Precision> TypedFrame<R> {
             SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &**shader, *blend),
             SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &**shader, lights.clone()),
         };
+        let generate = || {
+            pass.outdated_mip_levels
+                .iter()
+                .try_for_each(|target| target.texture.generate_mip_levels(&self.context.executor))
+        };
         outcome
+            .and_then(|()| generate())
             .map_err(|panic| BackendError::CpuShaderPanicked { process: pass.process.clone(), message: panic.message })
     }
 }

@@ -114,7 +114,7 @@ mod tests {
     }
 
     fn light_bounds(camera: &Camera, position: DVec3, range: f32) -> LightBounds {
-        let light = Light::Point { position, intensity: Vec3::ONE, range };
+        let light = Light::Point { position, intensity: Vec3::ONE, range, casts_shadow: false };
         LightBounds::new(&view_of(camera), &light_as_uploaded(&GpuLight::new(&light, camera.position, None)))
     }
 

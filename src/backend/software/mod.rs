@@ -29,6 +29,7 @@ mod screen_pass;
 mod shader_inputs;
 mod software_pass;
 mod submission;
+mod target_mip_levels;
 mod targets;
 mod tiles;
 mod triangle_setup;

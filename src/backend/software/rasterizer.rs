@@ -12,17 +12,18 @@ use super::frame_recording::{BeginFrame, FrameRecording};
 use super::materials::MaterialCache;
 use super::meshes::MeshCache;
 use super::precision::Precision;
-use super::shader_inputs::CameraPosition;
+use super::shader_inputs::{CameraPosition, light_as_uploaded};
 use super::software_pass::{DepthWrites, SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
+use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
 use crate::scene::ViewKind;
 use crate::task::catch;
-use crate::view::{FixedPosition, GpuView};
+use crate::view::{FixedPosition, GpuLight, GpuView};
 
 /// Draws frames in one precision, and keeps meshes, materials and targets over frames.
 pub(super) struct Rasterizer<R: Precision> {
@@ -60,8 +61,15 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let FrameRequest { plan, views, passes, scene, rejections, .. } = *request;
         let view_states = (0..views.len()).map(|view| view_state(request, view)).collect::<Result<_, _>>()?;
         let targets = self.targets.lock().update(plan, views)?;
-        let pass = |&pass: &Pass| software_pass(request, pass, &shaders[pass.process_index], &targets);
-        let passes = passes.iter().map(pass).collect::<Result<_, _>>()?;
+        let mip_schedule = MipSchedule::new(plan, views, (passes, request.sampled_views));
+        let pass = |(index, &pass): (usize, &Pass)| {
+            let outdated = mip_schedule.after(index).iter();
+            let outdated_mip_levels =
+                outdated.filter_map(|&(view, target)| targets.find(view, &plan.targets()[target].name));
+            let outdated_mip_levels = outdated_mip_levels.cloned().collect();
+            software_pass(request, (pass, outdated_mip_levels), &shaders[pass.process_index], &targets)
+        };
+        let passes = passes.iter().enumerate().map(pass).collect::<Result<_, _>>()?;
         self.context.subdivisions.begin_frame(scene.assets);
         // The reference draws the scene's own vertices.
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
@@ -103,24 +111,36 @@ pub(super) fn cpu_shaders_of(request: &FrameRequest<'_>) -> Result<Vec<CpuShader
 fn view_state<R: Precision>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
     let (view, lights, scene) = (&request.views[index], &request.light_tables[index], request.scene);
     let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
-    let gpu_view = GpuView::new(view, scene, lights.gpu_lights().len()).ok_or_else(out_of_reach)?;
+    let gpu_view = GpuView::new(view, scene, lights.light_count()).ok_or_else(out_of_reach)?;
     let camera = CameraPosition {
         exact: view.camera.position,
         fixed: FixedPosition::from_halves(gpu_view.position_low, gpu_view.position_high),
         transforms: request.quality.transforms,
     };
-    let light = |(gpu_light, (light, map)): (_, (usize, Option<usize>))| {
+    let light = |(gpu_light, (light, map)): (&GpuLight, (usize, Option<usize>))| {
         R::light(gpu_light, &request.lights[light], &camera, map.map(|map| &request.views[map]))
     };
+    let of_layer = |(gpu_light, source): (&GpuLight, &Option<(usize, usize)>)| match *source {
+        Some((index, map)) => light((gpu_light, (index, Some(map)))),
+        None => light_as_uploaded(gpu_light),
+    };
     let shader_view = R::view(view, &gpu_view, scene);
-    Ok(ViewState { shader_view, lights: lights.gpu_lights().iter().zip(lights.sources()).map(light).collect(), camera })
+    let (gpu_lights, by_layer) = lights.gpu_lights().split_at(lights.light_count());
+    Ok(ViewState {
+        shader_view,
+        lights: gpu_lights.iter().zip(lights.sources()).map(light).collect(),
+        lights_by_layer: by_layer.iter().zip(lights.layer_sources()).map(of_layer).collect(),
+        camera,
+    })
 }
 
+/// A pass, with the targets whose mip levels it leaves out of date.
+///
 /// # Errors
 /// If the process cannot be drawn by this backend.
 fn software_pass<R: Precision>(
     request: &FrameRequest<'_>,
-    pass: Pass,
+    (pass, outdated_mip_levels): (Pass, Vec<SoftwareTarget<R>>),
     shader: &CpuShader,
     targets: &SoftwareTargets<R>,
 ) -> Result<SoftwarePass<R>, BackendError> {
@@ -159,7 +179,7 @@ fn software_pass<R: Precision>(
     }
     let attachments = attachments(request, pass, targets)?;
     attachments.check(&process)?;
-    Ok(SoftwarePass { pass, process, draws, attachments })
+    Ok(SoftwarePass { pass, process, draws, attachments, outdated_mip_levels })
 }
 
 /// # Errors
@@ -187,11 +207,14 @@ fn attachments<R: Precision>(
         Ok(DepthAttachment { target: of_view(name)?, clears, is_writable, tests_equal })
     };
     let sampled = declaration.accesses.iter().filter_map(|(name, access)| match access {
-        Access::Sample | Access::SamplePrevious => Some(of_view(name)),
-        Access::SampleView(kind, index) => {
-            let found = request.sampled_views.find(pass, *index).and_then(|view| targets.find(view, name).cloned());
-            let placeholder = || targets.find_placeholder(request.plan.sampled_target(*kind, name)?);
-            Some(found.or_else(placeholder).ok_or_else(|| missing(name)))
+        Access::Sample | Access::SamplePrevious => Some(of_view(name).map(|target| vec![target])),
+        Access::SampleView(kind, index) | Access::SampleViewPrevious(kind, index) => {
+            let layer = |view: &Option<usize>| {
+                let found = view.and_then(|view| targets.find(view, name).cloned());
+                let placeholder = || targets.find_placeholder(request.plan.sampled_target(*kind, name)?);
+                found.or_else(placeholder).ok_or_else(|| missing(name))
+            };
+            Some(request.sampled_views.find(pass, *index).iter().map(layer).collect())
         }
         Access::SampleLayers(kind) => Some(layered(*kind, name)),
         _ => None,

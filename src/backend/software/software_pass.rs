@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::attachments::Attachments;
 use super::precision::Precision;
+use super::targets::SoftwareTarget;
 use crate::process::{DeclaredAttribute, FaceCulling, FullScreenCpuShader, LightCpuShader, ObjectCpuShader, Pass};
 use crate::scene::Blend;
 
@@ -15,6 +16,8 @@ pub(super) struct SoftwarePass<R: Precision> {
     pub(super) process: String,
     pub(super) draws: SoftwareDraws<R>,
     pub(super) attachments: Attachments<R>,
+    /// The targets whose mip levels the pass leaves out of date.
+    pub(super) outdated_mip_levels: Vec<SoftwareTarget<R>>,
 }
 
 /// What a pass draws.

@@ -5,15 +5,17 @@ use std::sync::Arc;
 
 use parking_lot::RwLock;
 
+use super::executor::Executor;
 use super::pixel_formats::append_bytes;
 use super::precision::Precision;
 use super::submission::ReadTargets;
+use super::target_mip_levels::{MipLevel, generate};
 use super::tiles::{Tile, Tiling};
-use crate::backend::kept_views::kept_views;
-use crate::backend::{BackendError, Picture};
+use crate::backend::{BackendError, Picture, kept_views};
 use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 use crate::scene::ViewKind;
+use crate::task::JobPanic;
 use crate::view::RenderView;
 
 /// The greatest width and height of a picture, in pixels.
@@ -26,6 +28,8 @@ pub(super) struct TiledTexture<R> {
     layers: usize,
     /// Layer after layer.
     pub(super) tiles: RwLock<Vec<Tile<R>>>,
+    /// Its mip levels from level 1 on, of a target that has some, and so has one layer.
+    pub(super) mip_levels: RwLock<Vec<MipLevel<R>>>,
 }
 
 /// A target of one view: a layer of a texture.
@@ -62,17 +66,19 @@ impl<R> SoftwareTargets<R> {
         self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
     }
 
-    /// Copies what processes of later frames read of this one.
-    pub(super) fn copy_histories(&self)
+    /// Copies what processes of later frames read of the views that this one draws.
+    pub(super) fn copy_histories(&self, is_drawn: impl Fn(usize) -> bool)
     where
         R: Precision,
     {
-        for (view, targets) in self.views.iter().enumerate() {
+        for (view, targets) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
             for copy in targets {
                 let source = copy.texture.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
                 if let Some(source) = source {
-                    let (mut copied, source) = (copy.texture.tiles.write(), source.texture.tiles.read());
-                    copied.iter_mut().zip(&*source).for_each(|(copy, tile)| copy.clone_from(tile));
+                    let (copy, source) = (&copy.texture, &source.texture);
+                    let (mut copied, tiles) = (copy.tiles.write(), source.tiles.read());
+                    copied.iter_mut().zip(&*tiles).for_each(|(copy, tile)| copy.clone_from(tile));
+                    copy.mip_levels.write().clone_from(&source.mip_levels.read());
                 }
             }
         }
@@ -84,10 +90,11 @@ impl<R> SoftwareTargets<R> {
         found.map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 
-    /// A target that all views of a kind share, from its first layer on.
-    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<SoftwareTarget<R>> {
+    /// The layers of a target that all views of a kind share.
+    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<Vec<SoftwareTarget<R>>> {
         let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
-        self.layered.iter().find(is_wanted).map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
+        let found = self.layered.iter().find(is_wanted)?;
+        Some((0..found.layers).map(|layer| SoftwareTarget { texture: Arc::clone(found), layer }).collect())
     }
 }
 
@@ -154,7 +161,7 @@ impl<R: Precision> TargetCache<R> {
             next.views.push(targets);
         }
         for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
-            let Access::SampleView(views, _) = *access else { continue };
+            let (Access::SampleView(views, _) | Access::SampleViewPrevious(views, _)) = *access else { continue };
             if let Some(planned) = plan.sampled_target(views, target)
                 && next.find_placeholder(planned).is_none()
             {
@@ -186,7 +193,21 @@ impl<R: Precision> TiledTexture<R> {
         for _ in 0..count {
             tiles.push(Tile::new(planned.format.channels()).ok_or_else(out_of_memory)?);
         }
-        Ok(Self { planned: planned.clone(), tiling, layers, tiles: RwLock::new(tiles) })
+        let mip_levels = if planned.mipmapped {
+            MipLevel::chain(size, planned.format.channels()).ok_or_else(out_of_memory)?
+        } else {
+            Vec::new()
+        };
+        let (tiles, mip_levels) = (RwLock::new(tiles), RwLock::new(mip_levels));
+        Ok(Self { planned: planned.clone(), tiling, layers, tiles, mip_levels })
+    }
+
+    /// Generates its mip levels from level 0.
+    ///
+    /// # Errors
+    /// If a job panics. This is a bug in Drawloom.
+    pub(super) fn generate_mip_levels(&self, executor: &Executor) -> Result<(), JobPanic> {
+        generate(executor, self.planned.format, (self.tiling, &self.tiles.read()), &mut self.mip_levels.write())
     }
 
     fn is_for(&self, planned: &PlannedTarget, size: [u32; 2]) -> bool {
@@ -219,48 +240,81 @@ impl<R: Precision> SoftwareTarget<R> {
     fn visit(&self, mut visit: impl FnMut(Vector4<R>)) {
         // No deadlock: a writer of these tiles waits for no reader.
         let tiles = self.texture.tiles.read();
-        let sampled = self.sampled(&tiles);
+        let sampled = TargetReader::new(vec![self.layer_reader(&tiles, &[])]);
         let [width, height] = self.texture.tiling.size();
         for y in 0..height {
             (0..width).for_each(|x| visit(sampled.load([x, y], 0)));
         }
     }
 
-    /// What CPU shaders read.
-    pub(super) fn sampled<'a>(&self, tiles: &'a [Tile<R>]) -> TargetReader<'a, R> {
-        let TiledTexture { planned, tiling, layers, .. } = &*self.texture;
-        TargetReader { tiles, tiling: *tiling, channels: planned.format.channels(), first: self.layer, layers: *layers }
+    /// What CPU shaders read, as one layer. `tiles` and `mip_levels` are those of the texture.
+    pub(super) fn layer_reader<'a>(&self, tiles: &'a [Tile<R>], mip_levels: &'a [MipLevel<R>]) -> LayerReader<'a, R> {
+        let TiledTexture { planned, tiling, .. } = &*self.texture;
+        LayerReader { tiles: &tiles[self.tiles()], mip_levels, tiling: *tiling, channels: planned.format.channels() }
     }
+}
+
+/// A layer of a target that a CPU shader samples.
+pub(super) struct LayerReader<'a, R> {
+    tiles: &'a [Tile<R>],
+    /// From level 1 on.
+    mip_levels: &'a [MipLevel<R>],
+    tiling: Tiling,
+    channels: usize,
 }
 
 /// A target that a CPU shader samples.
 pub(super) struct TargetReader<'a, R> {
-    tiles: &'a [Tile<R>],
-    tiling: Tiling,
-    channels: usize,
-    /// The texture's layer that the CPU shader sees as layer 0.
-    first: usize,
-    layers: usize,
+    layers: Vec<LayerReader<'a, R>>,
+    size: [usize; 2],
+    level_count: usize,
+}
+
+impl<'a, R> TargetReader<'a, R> {
+    /// The reader of these layers, at least one. Those of views that the frame does not have are pixels of zeros; all others have one size.
+    pub(super) fn new(layers: Vec<LayerReader<'a, R>>) -> Self {
+        let larger = |one: [usize; 2], other: [usize; 2]| [one[0].max(other[0]), one[1].max(other[1])];
+        let size = layers.iter().map(|layer| layer.tiling.size()).fold([1, 1], larger);
+        let level_count = layers.iter().map(|layer| 1 + layer.mip_levels.len()).max().unwrap_or(1);
+        Self { layers, size, level_count }
+    }
 }
 
 impl<R: Precision> SampledTexture<R> for TargetReader<'_, R> {
     fn size(&self) -> [usize; 2] {
-        self.tiling.size()
+        self.size
     }
 
     fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R> {
-        let layer = (self.first + layer).min(self.layers - 1);
-        let (tile, pixel) = self.tiling.find(coordinates);
-        // Channels that the format lacks are those of opaque black.
-        let (zero, one) = (R::zero(), R::one());
-        Vector(match *self.tiles[layer * self.tiling.count() + tile].pixel(pixel, self.channels) {
-            [red] => [red, zero, zero, one],
-            [red, green] => [red, green, zero, one],
-            [red, green, blue] => [red, green, blue, one],
-            [red, green, blue, alpha, ..] => [red, green, blue, alpha],
-            [] => [zero, zero, zero, one],
-        })
+        let LayerReader { tiles, tiling, channels, .. } = &self.layers[layer.min(self.layers.len() - 1)];
+        let (tile, pixel) = tiling.find(if tiling.size() == self.size { coordinates } else { [0, 0] });
+        four_channels(tiles[tile].pixel(pixel, *channels))
     }
+
+    fn level_count(&self) -> usize {
+        self.level_count
+    }
+
+    fn load_level(&self, coordinates: [usize; 2], layer: usize, level: usize) -> Vector4<R> {
+        let LayerReader { mip_levels, channels, .. } = &self.layers[layer.min(self.layers.len() - 1)];
+        // A view that the frame does not have has level 0 only.
+        match level.checked_sub(1).and_then(|level| mip_levels.get(level)) {
+            Some(level) => four_channels(level.pixel(coordinates, *channels)),
+            None => self.load(coordinates, layer),
+        }
+    }
+}
+
+/// Channels that the format lacks are those of opaque black.
+fn four_channels<R: Precision>(pixel: &[R]) -> Vector4<R> {
+    let (zero, one) = (R::zero(), R::one());
+    Vector(match *pixel {
+        [red] => [red, zero, zero, one],
+        [red, green] => [red, green, zero, one],
+        [red, green, blue] => [red, green, blue, one],
+        [red, green, blue, alpha, ..] => [red, green, blue, alpha],
+        [] => [zero, zero, zero, one],
+    })
 }
 
 impl<R: Precision> ReadTargets for SoftwareTargets<R> {

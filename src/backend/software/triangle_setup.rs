@@ -26,11 +26,16 @@ pub(super) struct TriangleRange {
 }
 
 impl TriangleRange {
+    /// The level of detail of the mesh that is drawn.
+    fn level(&self) -> u32 {
+        self.batch.state.level_of_detail()
+    }
+
     /// Calls `visit` with the vertex indices of each triangle.
     fn each_triangle(&self, mut visit: impl FnMut([u32; 3])) {
         match &self.remaining {
             Some(indices) => indices.as_chunks().0[self.triangles.clone()].iter().copied().for_each(visit),
-            None => self.mesh.triangles_in(self.triangles.clone()).for_each(&mut visit),
+            None => self.mesh.triangles_in(self.level(), self.triangles.clone()).for_each(&mut visit),
         }
     }
 }
@@ -54,7 +59,7 @@ pub(super) fn setup_chunks<E>(
         let mesh = mesh_of(batch)?;
         let all = match remaining {
             Some(remaining) => remaining.start as usize / 3..remaining.end as usize / 3,
-            None => 0..mesh.triangle_count(),
+            None => 0..mesh.triangle_count_of(batch.state.level_of_detail()),
         };
         for &object in &commands.objects[batch.first as usize..][..batch.count as usize] {
             let mut start = all.start;

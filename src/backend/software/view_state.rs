@@ -8,5 +8,7 @@ pub(super) struct ViewState<R> {
     pub(super) shader_view: ShaderView<R>,
     /// The lights that reach it.
     pub(super) lights: Vec<ShaderLight<R>>,
+    /// See [`PassInputs::lights_by_layer`](crate::process::PassInputs::lights_by_layer).
+    pub(super) lights_by_layer: Vec<ShaderLight<R>>,
     pub(super) camera: CameraPosition,
 }

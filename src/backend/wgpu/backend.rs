@@ -157,7 +157,8 @@ impl WgpuBackend {
     }
 
     /// Lets the targets of a frame share textures. A target's life begins with the first pass that uses it and ends with the last one, of
-    /// any view. Targets whose lives do not overlap and that are alike in format, size, samples and use share one texture. Pictures stay the
+    /// any view. Targets whose lives do not overlap and that are alike in format, size, samples, mip levels and use share one texture. Other targets
+    /// of up to 64 × 64 pixels are layers of shared textures, so that thousands of views need few. Pictures stay the
     /// same; what the targets of all views need is often little more than what one view needs.
     /// [`WgpuBackend::resources`] and [`FrameStatistics::targets`](crate::FrameStatistics::targets) tell how much is saved.
     ///
@@ -167,7 +168,7 @@ impl WgpuBackend {
     ///
     /// - outputs: name what is read back with [`RendererBuilder::output`](crate::RendererBuilder::output),
     /// - imported ones, and those whose history a process reads,
-    /// - all targets of shadow views, and all that are drawn in layers.
+    /// - those that are drawn in layers, and all of views that [not every frame draws](crate::scene::Redraw).
     ///
     /// What a target holds before it is first drawn into is undefined. So a raw pass that [writes](crate::process::Declare::writes) a target
     /// must write each of its pixels, and it must not keep the texture for later frames.
@@ -183,7 +184,7 @@ impl WgpuBackend {
     /// The texture must be a 2D texture with one layer and one sample per pixel, of the target's size. Its format must be the target's,
     /// or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must contain the target's. Its usages
     /// must include `RENDER_ATTACHMENT` if processes draw into it, `TEXTURE_BINDING` if they sample it, and `COPY_SRC` if they read its
-    /// history or it is read back. Targets that are multisampled, drawn in layers or the history of another one cannot be imported. If
+    /// history or it is read back. Targets that are multisampled, have mip levels, are drawn in layers or are the history of another one cannot be imported. If
     /// something does not fit, the frame returns [`BackendError::InvalidImport`].
     ///
     /// A second import of the same target replaces the first. Frames after the next one draw into the crate's own target again, also if
@@ -215,7 +216,7 @@ impl WgpuBackend {
 
     /// Has the device write timestamps at the begin and end of each pass: see
     /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a
-    /// timeline's log. [Raw passes](crate::process::RawPass) are timed only if the device has
+    /// timeline's log. The [mip levels](crate::process::Declare::mipmapped) that are generated after a pass are not part of its time. [Raw passes](crate::process::RawPass) are timed only if the device has
     /// `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
     ///
     /// # Errors
@@ -244,13 +245,15 @@ impl WgpuBackend {
     pub fn resources(&self) -> WgpuResources {
         let pipelines = self.pipelines.lock().pipeline_count();
         let TargetMemory { textures, bytes, dedicated_bytes } = self.targets.lock().current().memory();
-        let buffer_bytes = self.buffers.bytes() + self.storage_buffers.lock().size();
+        let mut buffer_sizes = self.buffers.sizes();
+        buffer_sizes.extend(self.storage_buffers.lock().sizes());
         WgpuResources {
             pipelines,
             targets: textures,
             target_bytes: bytes,
             dedicated_target_bytes: dedicated_bytes,
-            buffer_bytes,
+            buffers: buffer_sizes.iter().filter(|size| **size > 0).count(),
+            buffer_bytes: buffer_sizes.iter().sum(),
         }
     }
 
@@ -292,7 +295,9 @@ pub struct WgpuResources {
     pub target_bytes: u64,
     /// What their size would be without [transient targets](WgpuBackend::transient_targets).
     pub dedicated_target_bytes: u64,
-    /// The size in bytes of all buffers that processes share, and of those for objects, views, lights, parameters and triangles that no
-    /// frame in flight uses.
+    /// The number of all buffers that processes share, and of those for objects, views, lights, parameters and triangles that no frame in
+    /// flight uses.
+    pub buffers: usize,
+    /// The size of these buffers in bytes.
     pub buffer_bytes: u64,
 }

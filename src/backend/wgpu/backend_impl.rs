@@ -8,8 +8,8 @@ use std::sync::atomic::Ordering;
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
-use super::pipelines::PipelineVariant;
-use super::recording::{cached_bundle, encode_pass, encode_segment, record_bundle};
+use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
+use super::recording::{cached_bundle, encode_after_segments, encode_pass, encode_segment, record_bundle};
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, TargetMemory, ViewQueue};
@@ -41,11 +41,26 @@ impl Backend for WgpuBackend {
         states: &[Vec<DrawState>],
         quality: &Quality,
     ) -> Result<(), BackendError> {
-        let processes = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
-        for (pipelines, states) in processes.iter().zip(states) {
-            let variants = states.iter().map(|state| PipelineVariant::of_arenas(*state));
-            let create = || pipelines.create_missing(&self.device, variants);
-            pipelines.insert(with_error_scope(&self.device, pipelines.name(), create).flatten()?);
+        for ((planned, draws), states) in plan.processes().iter().zip(draws).zip(states) {
+            let variants = || states.iter().map(|state| PipelineVariant::of_arenas(*state));
+            let label = shader_label(&planned.name);
+            let found = self.pipelines.lock().find(plan, planned, draws, quality).cloned();
+            // No lock is held while the driver compiles, so that frames go on meanwhile.
+            match found {
+                Some(pipelines) => {
+                    let create = || pipelines.create_missing(&self.device, variants());
+                    pipelines.insert(with_error_scope(&self.device, &label, create).flatten()?);
+                }
+                None => {
+                    let create = || {
+                        let made = ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws, quality)?;
+                        made.insert(made.create_missing(&self.device, variants())?);
+                        Ok(made)
+                    };
+                    let made = with_error_scope(&self.device, &label, create).flatten()?;
+                    self.pipelines.lock().add_prepared(plan, planned, draws, quality, made);
+                }
+            }
         }
         Ok(())
     }
@@ -60,6 +75,10 @@ impl Backend for WgpuBackend {
 
     fn discard_frame(&self) {
         self.imports.lock().clear();
+    }
+
+    fn imports_targets_of(&self, view: &str) -> bool {
+        self.imports.lock().iter().any(|import| import.view == view)
     }
 
     fn objects_epoch(&self, frame: &WgpuFrame) -> u64 {
@@ -163,10 +182,15 @@ impl Backend for WgpuBackend {
         parts: &mut Vec<WgpuPart>,
     ) -> Result<WgpuCommands, BackendError> {
         self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        let pass = frame.pass(index);
         if matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_)))) {
+            if frame.generates_mip_levels(index) {
+                let encode = || encode_after_segments(&self.device, frame, request, index);
+                let last = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, encode)).flatten();
+                parts.push(WgpuPart(last.inspect_err(|_| self.buffers.clear())?));
+            }
             return Ok(WgpuCommands(PassCommands::Parts(std::mem::take(parts))));
         }
-        let pass = frame.pass(index);
         let finish = || {
             let encoder = encode_pass(&self.device, frame, request, index, list, parts)?;
             Ok(match pass.strategy.encoding {
@@ -185,8 +209,10 @@ impl Backend for WgpuBackend {
             return None;
         }
         let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
-        let named =
-            |(strategy, nanoseconds): (&PassStrategy, _)| TuningAlternative { name: strategy.name(), nanoseconds };
+        let named = |(strategy, nanoseconds): (&PassStrategy, _)| TuningAlternative {
+            name: strategy.name().into(),
+            nanoseconds,
+        };
         let alternatives = pipelines
             .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
         Some(TuningChoice {

@@ -9,6 +9,7 @@ use super::frame::{BundleKey, WgpuFrame};
 use super::pass_bind_groups::update_bind_groups;
 use super::resources::{LightMeshes, ResolvedImport, StorageBuffers, SubdividedMesh};
 use super::strategy::RecordingStrategy;
+use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
@@ -63,6 +64,7 @@ impl WgpuBackend {
                 light_meshes,
                 targets,
                 storage_buffers,
+                mip_schedule: MipSchedule::new(request.plan, request.views, (request.passes, request.sampled_views)),
                 background,
                 read_backs,
                 buffers,

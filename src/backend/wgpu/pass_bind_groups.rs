@@ -25,10 +25,10 @@ pub(super) fn update_bind_groups(
     let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
     let sampled = |(name, access): &(String, Access)| match access {
         Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.sampled),
-        Access::SampleView(kind, index) => {
-            let sampled = request.sampled_views.find(pass.pass, *index);
-            let target = sampled.and_then(|sampled| targets.find(sampled, name)).map(|target| &target.sampled);
-            target.or_else(|| targets.find_placeholder(request.plan.sampled_target(*kind, name)?))
+        Access::SampleView(kind, index) | Access::SampleViewPrevious(kind, index) => {
+            let views = request.sampled_views.find(pass.pass, *index);
+            let planned = request.plan.sampled_target(*kind, name)?;
+            targets.find_sampled(views, planned, declaration.sampled_views[*index].shape)
         }
         Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
         _ => None,

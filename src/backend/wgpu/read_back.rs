@@ -156,7 +156,7 @@ pub(crate) fn new_read_back(
 ) -> Result<(WgpuReadBack, ReadBackCopy), BackendError> {
     let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
     let found = targets.find(view, target).ok_or_else(unknown)?.clone();
-    if found.is_transient {
+    if found.is_transient() {
         return Err(BackendError::TransientTarget { view, target: target.to_owned() });
     }
     let (whole, format) = ([found.texture.width(), found.texture.height()], found.format());

@@ -39,11 +39,12 @@ impl WgpuSubmission {
         timestamps.read(&self.device)
     }
 
-    /// The texture of a view's target, to present or to copy; for a shared target, the texture array of all views. The next frame
-    /// draws into the same texture. `None` if there is no such target, or it is
+    /// The texture of a view's target, to present or to copy, and the layer that is the target's: 0 but where views have targets that are
+    /// layers of one texture. The next frame draws into the same texture. `None` if there is no such target, or it is
     /// [transient](super::WgpuBackend::transient_targets).
-    pub fn texture(&self, view: usize, target: &str) -> Option<&wgpu::Texture> {
-        self.targets.find(view, target).filter(|target| !target.is_transient).map(|target| &target.texture)
+    pub fn texture(&self, view: usize, target: &str) -> Option<(&wgpu::Texture, u32)> {
+        let found = self.targets.find(view, target).filter(|target| !target.is_transient())?;
+        Some((&found.texture, found.layer))
     }
 
     /// Waits until the device has drawn the frame.

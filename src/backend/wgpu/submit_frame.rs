@@ -1,5 +1,6 @@
 //! The submission of a frame.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -20,6 +21,8 @@ impl WgpuBackend {
         frame: &mut WgpuFrame,
         queues: Vec<ViewQueue<WgpuCommands>>,
     ) -> Result<WgpuSubmission, BackendError> {
+        let has_histories = frame.targets.have_histories();
+        let drawn: HashSet<_> = queues.iter().filter(|_| has_histories).map(|queue| queue.view).collect();
         let mut finished = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
         for (index, (_, WgpuCommands(commands))) in queues.into_iter().flat_map(|queue| queue.passes).enumerate() {
             match commands {
@@ -45,11 +48,11 @@ impl WgpuBackend {
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copy, readback) = readback.unzip();
             frame.buffers.objects().unmap();
-            let copies = (frame.targets.have_histories() || !frame.read_backs.is_empty()).then(|| {
+            let copies = (has_histories || !frame.read_backs.is_empty()).then(|| {
                 let descriptor = wgpu::CommandEncoderDescriptor { label: Some("copies of targets") };
                 let mut encoder = self.device.create_command_encoder(&descriptor);
                 frame.read_backs.iter().for_each(|copy| copy.encode(&mut encoder));
-                frame.targets.copy_histories(&mut encoder);
+                frame.targets.copy_histories(&mut encoder, |view| drawn.contains(&view));
                 encoder.finish()
             });
             let index = self.queue().submit(finished.into_iter().chain(copies).chain(copy));

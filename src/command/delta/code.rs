@@ -3,7 +3,7 @@
 use crate::command::{DrawState, RenderCommand, SortKey};
 
 /// The maximum length of a coded command: its first byte, key, object, second byte, mesh, material and state.
-pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 1;
+pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 2;
 
 /// The number of bytes that [`Coder::encode`] needs after the longest command, because it writes whole words.
 pub(super) const SLACK: usize = 8;
@@ -92,7 +92,7 @@ impl Coder {
             put(u64::from(length(mesh) | length(material) << 3 | state), 1);
             put(mesh, length(mesh));
             put(material, length(material));
-            put(u64::from(command.state.byte()), state >> 6);
+            put(u64::from(command.state.bits()), state >> 5);
         }
         bytes[start] = first;
         *self = Self { last: *command, step };
@@ -128,7 +128,7 @@ impl Coder {
             mesh = mesh.wrapping_add(unfold(take(rest, at_most_4(second & 7)?)?));
             material = material.wrapping_add(unfold(take(rest, at_most_4(second >> 3 & 7)?)?));
             if second & STATE != 0 {
-                state = DrawState::from_byte(take(rest, 1)? as u8);
+                state = DrawState::from_bits(take(rest, 2)? as u16).ok_or(Fault::Malformed)?;
             }
         }
         let command = RenderCommand { key, object, mesh, material, state };

@@ -15,19 +15,21 @@ fn any_command() -> impl Strategy<Value = RenderCommand> {
         any::<u32>().prop_map(|depth| SortKey::blended(depth).bits()),
     ];
     let slot = || prop_oneof![any::<u32>(), 0..300_u32, Just(u32::MAX), 0xffff_0000..=u32::MAX];
-    (key, slot(), slot(), slot(), any::<u8>()).prop_map(|(bits, object, mesh, material, byte)| RenderCommand {
-        key: SortKey::from_bits(bits),
-        object,
-        mesh,
-        material,
-        state: DrawState::from_byte(byte),
+    (key, slot(), slot(), slot(), 0..DrawState::COUNT as u16).prop_map(|(bits, object, mesh, material, state)| {
+        RenderCommand {
+            key: SortKey::from_bits(bits),
+            object,
+            mesh,
+            material,
+            state: DrawState::from_bits(state).unwrap(),
+        }
     })
 }
 
 /// Sorted commands like those of frames.
 fn typical_commands(max: usize) -> impl Strategy<Value = Vec<RenderCommand>> {
-    let command = (0..200_u32, 0..30_u32, 0.1..100.0_f32, 0..10_u8).prop_map(|(mesh, material, depth, kind)| {
-        let state = DrawState::from_byte(kind % 3);
+    let command = (0..200_u32, 0..30_u32, 0.1..100.0_f32, 0..10_u16).prop_map(|(mesh, material, depth, kind)| {
+        let state = DrawState::from_bits(kind % 3).unwrap();
         let key = match kind {
             0 => SortKey::blended(depth.to_bits() << 1),
             _ => SortKey::opaque(state, mesh, depth.to_bits() << 1),
@@ -147,14 +149,16 @@ proptest! {
         let coded = DeltaCommands::encode(&commands);
         let opaque = commands.iter().filter(|command| command.key < SortKey::blended(u32::MAX)).count();
         // An opaque command takes up to 12 bytes: the first byte, 7 for the key, 2 for the object, the second byte, and 1 for the
-        // material. A blended one also has mesh and state.
-        prop_assert!(coded.bytes().len() <= HEADER + opaque * 12 + (commands.len() - opaque) * 14);
+        // material. A blended one also has mesh and state. The first command of each of the three states has a key of 8 bytes, and
+        // so has the first blended one, which takes 17.
+        let firsts = 3 + 2;
+        prop_assert!(coded.bytes().len() <= HEADER + opaque * 12 + (commands.len() - opaque) * 15 + firsts);
     }
 }
 
 #[test]
 fn the_checksum_of_no_commands_is_the_crc_of_eight_zeros() {
-    assert_eq!(DeltaCommands::new().bytes(), b"DLC2\x69\xdf\x22\x65\0\0\0\0\0\0\0\0");
+    assert_eq!(DeltaCommands::new().bytes(), b"DLC3\x69\xdf\x22\x65\0\0\0\0\0\0\0\0");
 }
 
 #[test]
@@ -167,7 +171,16 @@ fn a_huge_count_takes_no_memory_and_no_time() {
 
 #[test]
 fn invalid_lengths_are_detected() {
-    for body in [&[0x0e][..], &[0x0f], &[0x60], &[0x70], &[0xd0, 0x05], &[0xd0, 5 << 3], &[0xd0, 0x80]] {
+    for body in [
+        &[0x0e][..],
+        &[0x0f],
+        &[0x60],
+        &[0x70],
+        &[0xd0, 0x05],
+        &[0xd0, 5 << 3],
+        &[0xd0, 0x80],
+        &[0xd0, 0x40, 0xff, 0xff],
+    ] {
         let mut bytes = DeltaCommands::new().into_bytes();
         bytes[8] = 1;
         // Enough bytes for any length.

@@ -158,7 +158,8 @@ fn the_point_light_reaches_the_scene_at_every_size() {
     for_sizes_and_positions(|size, position| {
         let scene = scene_of(&[(cube(Vec3::ZERO, false), Vec3::splat(size))], position);
         let camera = camera(scene.as_scene_ref());
-        let [_, _, Light::Point { position: light, intensity, range }] = lights(scene.as_scene_ref(), &camera) else {
+        let [_, _, Light::Point { position: light, intensity, range, .. }] = lights(scene.as_scene_ref(), &camera)
+        else {
             panic!("no point light");
         };
         let distance = light.distance(position);

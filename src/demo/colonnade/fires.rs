@@ -49,6 +49,7 @@ impl Site {
                 position: (mouth + Vec3::Y * 0.45).as_dvec3(),
                 intensity: Vec3::new(2.6, 1.05, 0.28),
                 range: 5.0,
+                casts_shadow: false,
             });
         }
         // In front of the box's back wall, which is bright enough that subtraction is visible.

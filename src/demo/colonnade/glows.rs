@@ -103,7 +103,7 @@ impl Site {
         range: f32,
     ) -> Result<(), SceneError> {
         self.add_upright(self.assets.ball, material, position, size)?;
-        self.scene.lights.push(Light::Point { position: position.as_dvec3(), intensity, range });
+        self.scene.lights.push(Light::Point { position: position.as_dvec3(), intensity, range, casts_shadow: false });
         Ok(())
     }
 }

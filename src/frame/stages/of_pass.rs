@@ -8,7 +8,7 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::{DrawList, instance, sort};
-use crate::view::{self, ObjectFilter};
+use crate::view::{self, SelectionFilter};
 
 /// Makes a command for each visible object (M 10.3).
 pub(super) struct Fill {
@@ -43,7 +43,8 @@ impl<B: Backend> Stage<B> for Fill {
             view: &frame.request.views[view_index],
             visible: &frame.tables.visibility[view_index].set,
             selection,
-            filter: ObjectFilter::new(&frame.tables.objects, frame.request.scene, selection),
+            filter: SelectionFilter::new(&frame.tables.objects, frame.request.scene, selection),
+            levels: frame.levels_of_detail(view_index),
             scene: frame.request.scene,
             quality: frame.request.quality,
         };
@@ -194,12 +195,19 @@ impl<B: Backend> Stage<B> for Bin {
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let (table, objects) = (&frame.tables.passes[self.pass], &frame.tables.objects);
-        let visible = &frame.tables.visibility[frame.view_index_of(self.pass)].set;
+        let view_index = frame.view_index_of(self.pass);
+        let (visible, levels) = (&frame.tables.visibility[view_index].set, frame.levels_of_detail(view_index));
         let selection = table.selection.unwrap_or_default();
-        let filter = ObjectFilter::new(objects, frame.request.scene, selection);
+        let filter = SelectionFilter::new(objects, frame.request.scene, selection);
         for index in job.items {
             let part = (index, frame.segment_count(self.pass));
-            view::bin_visible(objects, visible, selection, filter, part, &mut table.segments[index].write());
+            let mut segment = table.segments[index].write();
+            view::bin_visible(objects, visible, selection, filter, part, &mut segment);
+            if let Some(levels) = levels {
+                let bins = objects.bins();
+                let has_levels = |bin| frame.tables.mesh_levels.contains(bins.get(bin).mesh);
+                segment.divide_by_level(has_levels, |object| levels.get(object as usize));
+            }
         }
         Ok(())
     }

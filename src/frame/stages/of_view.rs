@@ -6,7 +6,7 @@ use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::Selection;
 use crate::scene::Blend;
-use crate::view::{Frustum, ObjectFilter};
+use crate::view::{Frustum, SelectionFilter};
 
 /// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
 pub(super) struct Visibility {
@@ -37,6 +37,40 @@ impl<B: Backend> Stage<B> for Visibility {
     }
 }
 
+/// Chooses the levels of detail of the objects in the view's frustum. An item is a word of objects.
+pub(super) struct Levels {
+    pub(super) view: usize,
+}
+
+impl<B: Backend> Stage<B> for Levels {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "levels",
+            after: &["visibility"],
+            group: StageGroup::Visibility,
+            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
+            cost_kind: "levels",
+            depends_on_occlusion: false,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.chooses_levels
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        let tables = frame.tables;
+        tables.levels[self.view].word_count(&tables.visibility[self.view], &tables.objects)
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let tables = frame.tables;
+        let inputs = (frame.request.scene, &tables.objects, &tables.mesh_levels);
+        tables.levels[self.view].choose(job.items, inputs, &tables.visibility[self.view]);
+        Ok(())
+    }
+}
+
 /// Chooses the visible objects that may occlude others.
 pub(super) struct Occluders {
     pub(super) view: usize,
@@ -46,7 +80,7 @@ impl<B: Backend> Stage<B> for Occluders {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "occluders",
-            after: &["visibility"],
+            after: &["levels", "visibility"],
             group: StageGroup::Visibility,
             chunking: Chunking::PerItem,
             cost_kind: "occluders",
@@ -75,9 +109,11 @@ impl<B: Backend> Stage<B> for Occluders {
                 let blend = draw.state.blend();
                 let is_drawn = |selection: &Selection| {
                     selection.contains(blend, draw.material)
-                        && ObjectFilter::new(&tables.objects, scene, *selection).passes(object)
+                        && SelectionFilter::new(&tables.objects, scene, *selection).passes(object)
                 };
-                blend == Blend::None && selections.iter().any(is_drawn)
+                // Only the mesh itself is known to cover its convex parts.
+                let is_whole = frame.levels_of_detail(self.view).is_none_or(|levels| levels.get(object) == 0);
+                blend == Blend::None && is_whole && selections.iter().any(is_drawn)
             },
         );
         Ok(())
@@ -159,7 +195,7 @@ impl<B: Backend> Stage<B> for Compact {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "compact",
-            after: &["occlusion", "visibility"],
+            after: &["occlusion", "levels", "visibility"],
             group: StageGroup::Visibility,
             chunking: Chunking::PerItem,
             cost_kind: "compact",
@@ -168,7 +204,11 @@ impl<B: Backend> Stage<B> for Compact {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        frame.tables.visibility[self.view].compact(frame.tables.version(self.view));
+        let version = frame.tables.version(self.view);
+        frame.tables.visibility[self.view].compact(version);
+        if let Some(levels) = frame.levels_of_detail(self.view) {
+            levels.complete(version);
+        }
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use bytemuck::Pod;
 
+use super::level_sampling::{bilinear, trilinear};
 use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, ColumnLayout, LightKind, MaterialType, MaterialValues, ObjectColumn, Projection};
 
@@ -52,6 +53,9 @@ pub struct PassInputs<'a, R: Real> {
     pub view: &'a ShaderView<R>,
     /// The lights that reach the view.
     pub lights: &'a [ShaderLight<R>],
+    /// By layer of the shadow maps, the light that the layer belongs to, as that map shows it; empty unless a light has several
+    /// maps.
+    pub lights_by_layer: &'a [ShaderLight<R>],
     /// Materials and their textures.
     pub materials: &'a dyn Materials<R>,
     /// The targets that the process samples, in the order declared.
@@ -109,6 +113,56 @@ pub trait SampledTexture<R: Real>: Sync {
     /// `textureLoad`: a pixel, of one layer if views share the target as layers. Depth is the first number. The
     /// coordinates are inside the texture.
     fn load(&self, coordinates: [usize; 2], layer: usize) -> Vector4<R>;
+
+    /// `textureNumLevels`: 1, and more for a target with [mip levels](crate::process::Declare::mipmapped).
+    fn level_count(&self) -> usize {
+        1
+    }
+
+    /// `textureDimensions` of a mip level.
+    fn size_of_level(&self, level: usize) -> [usize; 2] {
+        self.size().map(|pixels| (pixels >> level).max(1))
+    }
+
+    /// `textureLoad` of a mip level, which the texture has. The coordinates are inside that level.
+    fn load_level(&self, coordinates: [usize; 2], layer: usize, _level: usize) -> Vector4<R> {
+        self.load(coordinates, layer)
+    }
+
+    /// `textureSampleLevel` with the `target_sampler`: between the pixels of a level, from (0, 0) at the picture's upper left to (1, 1) at
+    /// its lower right, and between levels. Beyond the edges it is as on them.
+    fn sample_level(&self, uv: Vector2<R>, layer: usize, level: R) -> Vector4<R> {
+        trilinear(self.level_count(), level, |level| {
+            bilinear(self.size_of_level(level), uv, |pixel| self.load_level(pixel, layer, level))
+        })
+    }
+
+    /// The pixel of a cube map that lies in a direction of the world, of any length but 0.
+    fn load_cube(&self, direction: Vector3<R>) -> Vector4<R> {
+        self.load_cube_level(direction, 0)
+    }
+
+    /// The pixel of a cube map's mip level, which the texture has, that lies in a direction of the world, of any length but 0.
+    fn load_cube_level(&self, direction: Vector3<R>, level: usize) -> Vector4<R> {
+        let [x, y, z] = direction.0;
+        let zero = R::zero();
+        // The face, the distance along its axis, and the position to the right and down: see `Camera::cube_faces`.
+        let (face, along, across, down) = if x.abs() >= y.abs() && x.abs() >= z.abs() {
+            if x >= zero { (0, x, z, -y) } else { (1, -x, -z, -y) }
+        } else if y.abs() >= z.abs() {
+            if y >= zero { (2, y, x, -z) } else { (3, -y, x, z) }
+        } else if z < zero {
+            (4, -z, x, -y)
+        } else {
+            (5, z, -x, -y)
+        };
+        let side = self.size_of_level(level)[0];
+        let coordinate = |offset: R| {
+            let share = (offset / along + R::one()) * R::of(0.5) * R::of(side as f64);
+            (share.as_f64().max(0.0) as usize).min(side - 1)
+        };
+        self.load_level([coordinate(across), coordinate(down)], face, level)
+    }
 }
 
 /// A view: `View` in `drawloom.wgsl`, without the camera's position, which every other position is already relative to.
@@ -200,9 +254,9 @@ pub struct ShaderLight<R> {
     pub cone_begin: R,
     /// The cosine at which a spot light has faded out.
     pub cone_end: R,
-    /// The layer of its shadow map, if it has one.
+    /// The layer of its shadow map, if it has one; the first layer if it has several.
     pub shadow_layer: Option<usize>,
-    /// Half the width of its shadow map: at 1 m for a spot light, in metres for a directional one.
+    /// Half the width of its shadow map: at 1 m for a spot or point light, in metres for a directional one.
     pub shadow_half: R,
     /// Where the shadow map begins, in metres.
     pub shadow_near: R,

@@ -1,13 +1,14 @@
 //! CPU shaders: Rust versions of the WGSL shaders, which the software backend runs in their place.
 //!
 //! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`,
-//! `built_in` those of WGSL itself, and
-//! `deformation` what moves vertices before a shader gets them.
+//! `built_in` those of WGSL itself, `level_sampling` how mip levels are sampled, and `deformation` what moves vertices before a
+//! shader gets them.
 
 pub(super) mod built_in;
 mod deformation;
 mod inputs;
 mod interface;
+mod level_sampling;
 mod prelude;
 #[cfg(all(test, not(drawloom_loom)))]
 pub(super) mod test_inputs;

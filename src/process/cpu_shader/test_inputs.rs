@@ -139,5 +139,5 @@ pub(in crate::process) fn pass<'a, R: Real>(
     materials: &'a dyn Materials<R>,
     sampled: &'a [&'a dyn SampledTexture<R>],
 ) -> PassInputs<'a, R> {
-    PassInputs { view, lights: &[], materials, sampled, columns: ShaderColumns::default() }
+    PassInputs { view, lights: &[], lights_by_layer: &[], materials, sampled, columns: ShaderColumns::default() }
 }

@@ -144,9 +144,9 @@ pub(super) fn undeformed(
     if excluded == LayerMask::NONE { process } else { Arc::new(Undeformed { process, excluded }) }
 }
 
-/// Whether a process of this name draws the objects of a deformation.
-pub(super) fn is_process_of(deformation: &dyn Deformation, name: &str) -> bool {
-    name.starts_with(&prefix_of(deformation))
+/// The name of the process that a process of this name is for the objects of a deformation; `None` if it is not for these.
+pub(super) fn undeformed_name<'a>(deformation: &dyn Deformation, name: &'a str) -> Option<&'a str> {
+    name.strip_prefix(&prefix_of(deformation))
 }
 
 /// What the names of a deformation's processes begin with.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::deformation::{Deformation, is_process_of, split_by_deformation, undeformed};
+use super::deformation::{Deformation, split_by_deformation, undeformed, undeformed_name};
 use super::{
     DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters, Transparency,
 };
@@ -42,6 +42,7 @@ pub struct Deferred {
     post: Vec<Arc<dyn PostStep>>,
     replaced: Vec<(String, Arc<dyn RenderProcess>)>,
     left_out: Vec<String>,
+    kept: Vec<String>,
     deformations: Vec<Arc<dyn Deformation>>,
 }
 
@@ -56,6 +57,7 @@ impl Deferred {
             post: Vec::new(),
             replaced: Vec::new(),
             left_out: Vec::new(),
+            kept: Vec::new(),
             deformations: Vec::new(),
         }
     }
@@ -128,6 +130,14 @@ impl Deferred {
         self
     }
 
+    /// Keeps the process called `name` in every frame, whether the scene requires it or not. The picture is the same to the byte, and
+    /// frames whose scene does not require the process pay for its passes: an engine does so to keep a change of the scene from
+    /// changing the plan and making pipelines. A process that is left out stays out.
+    pub fn keep(mut self, name: impl Into<String>) -> Self {
+        self.kept.push(name.into());
+        self
+    }
+
     /// Adds vertex code of the engine's own for the objects of some layers.
     pub fn deformation(mut self, deformation: impl Deformation + 'static) -> Self {
         self.deformations.push(Arc::new(deformation));
@@ -154,6 +164,17 @@ impl Deferred {
         self.post.iter().filter(|step| !self.left_out.iter().any(|name| name == step.process("", "").name()))
     }
 
+    /// What frames have processes for whatever their scene.
+    pub(crate) fn kept_requirements(&self) -> Requirements {
+        Requirements::of_processes(|name| {
+            self.kept.iter().any(|kept| {
+                let deformed =
+                    || self.deformations.iter().filter_map(|deformation| undeformed_name(&**deformation, kept));
+                kept == name || deformed().any(|undeformed| undeformed == name)
+            })
+        })
+    }
+
     /// The processes that draw a scene, each in its slot. Empty slots mark the places for an engine's processes.
     pub(crate) fn chain(&self, requirements: &Requirements) -> Vec<ChainSlot> {
         let mut built: Vec<_> = self.build(requirements).into_iter().flatten().collect();
@@ -162,21 +183,23 @@ impl Deferred {
             let replacement =
                 self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, process)| Arc::clone(process));
             // A replacement of a process that draws deformed objects draws these.
-            let is_deformed = self.deformations.iter().any(|deformation| is_process_of(&**deformation, &name));
+            let is_deformed =
+                self.deformations.iter().any(|deformation| undeformed_name(&**deformation, &name).is_some());
             let excluded = if is_deformed { &[][..] } else { &self.deformations };
             let replacement = replacement.map(|process| undeformed(process, excluded));
             let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
-            ChainSlot { process: process.filter(|_| !self.left_out.contains(&name)), name }
+            let process = process.filter(|_| !self.left_out.contains(&name));
+            ChainSlot { process, keep: self.kept.contains(&name), name }
         };
         let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, Place)| {
             let names = processes.into_iter().map(|process| process.name().to_owned());
             names.chain(place.slots().map(str::to_owned)).collect::<Vec<_>>()
         };
-        self.build(&Requirements::all()).into_iter().zip(PLACES).flat_map(with_place).map(slot).collect()
+        self.build(&Requirements::all()).into_iter().zip(Place::ALL).flat_map(with_place).map(slot).collect()
     }
 
     /// # Errors
-    /// If a setting is invalid, or the pipeline has no process of a name that is to be replaced or left out.
+    /// If a setting is invalid, or the pipeline has no process of a name that is to be replaced, left out or kept.
     pub(crate) fn check(&self) -> Result<(), PlanError> {
         if let Some((target, format)) = self.formats.first_unsuitable() {
             let process = String::from("geometry buffer");
@@ -187,15 +210,15 @@ impl Deferred {
         }
         let complete = Self { left_out: Vec::new(), ..self.clone() };
         let names = complete.names();
-        let mut overridden = self.replaced.iter().map(|(name, _)| name).chain(&self.left_out);
-        match overridden.find(|name| !names.contains(name)) {
+        let mut named = self.replaced.iter().map(|(name, _)| name).chain(self.left_out.iter().chain(&self.kept));
+        match named.find(|name| !names.contains(name)) {
             Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
             None => Ok(()),
         }
     }
 
-    /// The shipped processes that a scene requires, in order: those before each of [`PLACES`].
-    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; PLACES.len()] {
+    /// The shipped processes that a scene requires, in order: those before each of [`Place::ALL`].
+    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; Place::ALL.len()] {
         [
             self.shadows(requirements),
             self.geometry(),
@@ -207,7 +230,7 @@ impl Deferred {
 
     /// How shadow maps are drawn, if a scene requires them.
     fn required_maps(&self, requirements: &Requirements) -> Option<&ShadowMaps> {
-        self.maps().filter(|_| requirements.shadows())
+        self.maps().filter(|_| requirements.shadow_maps())
     }
 
     fn shadows(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
@@ -279,15 +302,6 @@ impl Default for Deferred {
         Self::new()
     }
 }
-
-/// The places for an engine's processes, in order.
-const PLACES: [Place; 5] = [
-    Place::BeforeGeometry,
-    Place::AfterGeometry,
-    Place::AfterLighting,
-    Place::AfterTransparency,
-    Place::AfterPostProcessing,
-];
 
 const RADIANCE: &str = "radiance";
 const PICTURE: &str = "picture";

@@ -28,6 +28,20 @@ pub enum Place {
 }
 
 impl Place {
+    /// In order.
+    pub(super) const ALL: [Self; 5] = [
+        Self::BeforeGeometry,
+        Self::AfterGeometry,
+        Self::AfterLighting,
+        Self::AfterTransparency,
+        Self::AfterPostProcessing,
+    ];
+
+    /// Whether a slot of this name marks a place.
+    pub(in crate::process) fn is_slot(name: &str) -> bool {
+        Self::ALL.into_iter().any(|place| place.slots().contains(&name))
+    }
+
     /// The names of the empty slots at the beginning and at the end of the place: what is there comes between them.
     pub(in crate::process) fn slots(self) -> [&'static str; 2] {
         match self {

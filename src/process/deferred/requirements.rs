@@ -1,6 +1,7 @@
 //! Which processes a scene requires.
 
-use crate::scene::{Blend, Camera, Light, LightKind, Material, SceneRef, ViewKind};
+use super::{LightVolumes, ShadowCasters, Transparency};
+use crate::scene::{Blend, Camera, Light, Material, SceneRef, ViewKind};
 use crate::view::LightClass;
 
 /// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what the scene
@@ -13,6 +14,8 @@ pub struct Requirements {
     transparency: bool,
     /// Whether a camera draws a reflection.
     reflections: bool,
+    /// Whether shadow maps are drawn even if no light casts shadows.
+    shadow_maps: bool,
 }
 
 const _: () = assert!(LightClass::COUNT <= 8);
@@ -25,7 +28,8 @@ impl Requirements {
         for light in lights {
             requirements.lights |= 1 << LightClass::of(light, shadows).index();
         }
-        requirements
+        // A light that casts shadows requires the maps, so that equal plans have equal requirements.
+        Self { shadow_maps: requirements.shadows(), ..requirements }
     }
 
     /// Whether objects with this material need transparency: it is blended, and of no material type. Objects with a material type
@@ -41,17 +45,36 @@ impl Requirements {
 
     /// All that a scene can require.
     pub fn all() -> Self {
-        let mut requirements = Self { lights: 0, transparency: true, reflections: true };
-        // Point lights cast no shadows.
-        for class in LightClass::all().filter(|class| !class.shadowed || class.kind != LightKind::Point) {
-            requirements.lights |= 1 << class.index();
-        }
+        let mut requirements = Self { lights: 0, transparency: true, reflections: true, shadow_maps: true };
+        LightClass::all().for_each(|class| requirements.lights |= 1 << class.index());
         requirements
     }
 
     /// The same for a scene with these cameras.
     pub fn with_cameras(self, cameras: &[Camera]) -> Self {
         Self { reflections: cameras.iter().any(|camera| camera.kind == ViewKind::Reflection), ..self }
+    }
+
+    /// The requirements of a scene that needs exactly those optional processes whose names satisfy `is_kept`.
+    pub(super) fn of_processes(is_kept: impl Fn(&str) -> bool) -> Self {
+        let (transparency, shadow_maps) = (is_kept(Transparency::NAME), is_kept(ShadowCasters::NAME));
+        let mut requirements = Self { transparency, shadow_maps, ..Self::default() };
+        for class in LightClass::all().filter(|class| is_kept(&LightVolumes::name_of(*class))) {
+            requirements.lights |= 1 << class.index();
+        }
+        requirements
+    }
+
+    /// What either of two scenes requires. Each set of requirements is one value, so that it has one plan.
+    pub(crate) fn union(self, other: Self) -> Self {
+        let lights = self.lights | other.lights;
+        let shadow_maps = self.shadow_maps() || other.shadow_maps();
+        Self {
+            lights,
+            transparency: self.transparency || other.transparency,
+            reflections: self.reflections || other.reflections,
+            shadow_maps,
+        }
     }
 
     /// Whether the scene has views of kind [`ViewKind::Reflection`].
@@ -67,6 +90,11 @@ impl Requirements {
     /// Whether a light of the scene casts shadows.
     pub fn shadows(&self) -> bool {
         LightClass::all().any(|class| class.shadowed && self.lights(class))
+    }
+
+    /// Whether shadow maps are drawn: a light of the scene casts shadows, or the pipeline [keeps](super::Deferred::keep) their process.
+    pub fn shadow_maps(&self) -> bool {
+        self.shadow_maps || self.shadows()
     }
 
     /// Whether an object needs transparency.

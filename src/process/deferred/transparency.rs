@@ -27,6 +27,8 @@ pub struct Transparency {
 }
 
 impl Transparency {
+    pub(super) const NAME: &str = "transparency";
+
     /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
         let shader = [
@@ -41,7 +43,7 @@ impl Transparency {
 
 impl RenderProcess for Transparency {
     fn name(&self) -> &str {
-        "transparency"
+        Self::NAME
     }
 
     fn declare(&self, declare: &mut Declare) {

@@ -11,4 +11,6 @@ pub struct ChainSlot {
     pub name: String,
     /// The process in the slot; `None` if the frame has none there.
     pub process: Option<Arc<dyn RenderProcess>>,
+    /// Whether the process stays although no output depends on it.
+    pub keep: bool,
 }

@@ -76,6 +76,20 @@ pub enum PlanError {
         /// What it reads.
         target: String,
     },
+    /// A process samples a target of several views as layers of one texture, which it cannot be.
+    #[error(
+        "process {process:?} cannot sample target {target:?} of the views {view:?} as layers of one texture: {problem}"
+    )]
+    SampledLayers {
+        /// The process.
+        process: String,
+        /// What the names of the views begin with.
+        view: String,
+        /// The target.
+        target: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
     /// A target is used as depth with a format that holds colour, or the other way round.
     #[error("process {process:?} uses target {target:?} in a way that its format {format:?} does not allow")]
     WrongFormat {
@@ -105,6 +119,17 @@ pub enum PlanError {
     /// A target that cannot be multisampled is declared so, or is used as no multisampled target can be.
     #[error("process {process:?} cannot use target {target:?} as a multisampled one: {problem}")]
     Multisampling {
+        /// The process.
+        process: String,
+        /// The target.
+        target: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// A target that cannot have [mip levels](crate::process::Declare::mipmapped) is declared to have them, or processes disagree whether it
+    /// has them.
+    #[error("process {process:?} declares the mip levels of target {target:?} wrongly: {problem}")]
+    MipLevels {
         /// The process.
         process: String,
         /// The target.
@@ -202,8 +227,8 @@ pub enum PlanError {
         /// What is wrong with them.
         problem: &'static str,
     },
-    /// A process is to be replaced or left out that the pipeline never has.
-    #[error("there is no process {name:?} to replace or leave out, only: {known}")]
+    /// A process is to be replaced, left out or kept that the pipeline never has.
+    #[error("there is no process {name:?} to replace, leave out or keep, only: {known}")]
     NoSuchProcess {
         /// The name.
         name: String,

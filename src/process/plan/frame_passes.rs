@@ -3,10 +3,9 @@
 use std::collections::{HashMap, HashSet};
 use std::fmt::{self, Display, Formatter};
 
-use super::{Pass, PlannedProcess};
+use super::{Pass, PlannedProcess, SampledViews};
 use crate::graph::{FrameGraph, GraphProblem, NodeId};
-use crate::process::Access;
-use crate::scene::{ViewKind, child_name};
+use crate::scene::ViewKind;
 use crate::view::RenderView;
 
 /// The passes of a frame, in the order in which they are submitted, and the views that they sample.
@@ -15,13 +14,6 @@ pub(crate) struct FramePasses {
     /// In submission order.
     pub(crate) passes: Vec<Pass>,
     pub(crate) sampled_views: SampledViews,
-}
-
-/// The views that passes sample: those with a process that [samples other views](crate::process::Declare::samples_view).
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct SampledViews {
-    /// Of each such pass, by its process's [sampled views](crate::process::Declaration::sampled_views): the view's index.
-    of_pass: HashMap<Pass, Vec<Option<usize>>>,
 }
 
 impl FramePasses {
@@ -37,7 +29,7 @@ impl FramePasses {
         parts: Vec<Vec<Pass>>,
     ) -> Result<Self, GraphProblem> {
         let sampled_views = SampledViews::new(processes, views, parts.iter().flatten());
-        if sampled_views.of_pass.is_empty() {
+        if sampled_views.is_unordered() {
             return Ok(Self { passes: parts.concat(), sampled_views });
         }
         let mut graph = FrameGraph::new();
@@ -60,9 +52,9 @@ impl FramePasses {
             }
         }
         for (part, node) in parts.iter().zip(&nodes) {
-            let sampled = part.iter().filter_map(|pass| sampled_views.of_pass.get(pass)).flatten().flatten();
+            let sampled = part.iter().flat_map(|pass| sampled_views.views_before(*pass));
             // A view that is cached has no part, as it is complete.
-            for before in sampled.filter_map(|view| nodes_of_view.get(view)).flatten() {
+            for before in sampled.filter_map(|view| nodes_of_view.get(&view)).flatten() {
                 graph.order(*before, *node);
             }
         }
@@ -125,44 +117,5 @@ fn part_name(part: &[Pass], processes: &[PlannedProcess], views: &[RenderView]) 
         }
         _ if named.len() > 1 => format!("{name}, process by process"),
         _ => name,
-    }
-}
-
-impl SampledViews {
-    fn new<'a>(processes: &[PlannedProcess], views: &[RenderView], passes: impl Iterator<Item = &'a Pass>) -> Self {
-        let mut of_pass = HashMap::new();
-        if processes.iter().all(|planned| planned.declaration.sampled_views.is_empty()) {
-            return Self { of_pass };
-        }
-        let mut by_name: HashMap<(ViewKind, &str), usize> = HashMap::new();
-        for (index, view) in views.iter().enumerate() {
-            by_name.entry((view.kind(), view.name())).or_insert(index);
-        }
-        for pass in passes {
-            let declaration = &processes[pass.process_index].declaration;
-            let reader = views[pass.view_index].name();
-            let sampled: Vec<_> = declaration
-                .accesses
-                .iter()
-                .filter_map(|(_, access)| {
-                    let Access::SampleView(kind, index) = *access else { return None };
-                    let view = declaration.sampled_views[index].as_str();
-                    let child = child_name(reader, view);
-                    let found = by_name.get(&(kind, child.as_str())).or_else(|| by_name.get(&(kind, view))).copied();
-                    // A view has no picture of itself yet.
-                    Some(found.filter(|found| *found != pass.view_index))
-                })
-                .collect();
-            if !sampled.is_empty() {
-                of_pass.insert(*pass, sampled);
-            }
-        }
-        Self { of_pass }
-    }
-
-    /// The index of the view that a pass samples, by its index among the process's
-    /// [sampled views](crate::process::Declaration::sampled_views); `None` if the frame does not have it.
-    pub fn find(&self, pass: Pass, index: usize) -> Option<usize> {
-        self.of_pass.get(&pass).and_then(|views| views.get(index).copied().flatten())
     }
 }

@@ -1,9 +1,9 @@
 //! From a list of processes to what a frame does, in order.
 
-use std::sync::Arc;
 #[cfg(feature = "wgpu")]
 use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use super::attributes::attributes_of;
 use super::buffers::buffers_of;
@@ -17,7 +17,7 @@ use super::view_group::view_groups;
 use super::{
     AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
 };
-use crate::graph::GraphProblem;
+use crate::graph::{GraphProblem, Schedule};
 use crate::process::{
     Access, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
 };
@@ -40,8 +40,10 @@ pub struct FramePlan {
     buffers: Vec<BufferLayout>,
     /// Of each process.
     attachments: Vec<Attachments>,
-    dropped: Vec<String>,
-    dot: String,
+    /// The graph of the processes, whose nodes are the indices of the processes before they were ordered.
+    schedule: Schedule<usize>,
+    /// Written on first use.
+    dot: OnceLock<String>,
 }
 
 impl FramePlan {
@@ -77,7 +79,9 @@ impl FramePlan {
         let mut added: Vec<(Option<usize>, PlannedProcess)> = Vec::new();
         for (index, slot) in chain.into_iter().enumerate() {
             let Some(process) = slot.process else { continue };
-            let of_kinds = PlannedProcess::of_each_kind(&process, with_main, is_present)?;
+            let mut of_kinds = PlannedProcess::of_each_kind(&process, with_main, is_present)?;
+            let own = of_kinds.iter_mut().filter(|planned| planned.is_of_own_kind);
+            own.for_each(|planned| planned.declaration.keep |= slot.keep);
             added.extend(of_kinds.into_iter().map(|planned| (Some(index), planned)));
         }
         for process in &processes {
@@ -87,24 +91,20 @@ impl FramePlan {
         added.sort_by_key(|(_, planned)| planned.declaration.views);
         let placeholder = placeholder_shadow_map(&slot_names, &added);
         let schedule = compile(&slot_names, &added, placeholder.as_ref(), outputs)?;
-        let declarations: Vec<_> = schedule.nodes().map(|(_, planned)| &planned.declaration).collect();
-        let dot =
-            schedule.to_labelled_dot(|before, after| passed_on_resources(declarations[before], declarations[after]));
-        let dropped = schedule.dropped().to_vec();
         let shipped = added.iter().filter(|(_, planned)| slot_names.contains(&planned.name));
         let shipped: Vec<_> = shipped.map(|(_, planned)| node_name(&added, planned)).collect();
-        for process in dropped.iter().filter(|name| !shipped.contains(name)) {
+        for process in schedule.dropped().iter().filter(|name| !shipped.contains(name)) {
             tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
         }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
-        let processes: Vec<_> = schedule.into_nodes().map(|(_, process)| process).collect();
+        let processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
         if processes.is_empty() {
             return Err(PlanError::Empty);
         }
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes, outputs)?;
-        targets.extend(placeholder);
+        targets.extend(placeholder.filter(|_| processes.iter().any(reads_shadow_map)));
         check_sampled_views(&processes, &targets)?;
         let (columns, material_types) = (columns_of(&processes)?, material_types_of(&processes)?);
         let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
@@ -123,8 +123,8 @@ impl FramePlan {
             attributes,
             buffers,
             attachments,
-            dropped,
-            dot,
+            schedule,
+            dot: OnceLock::new(),
         })
     }
 
@@ -162,7 +162,8 @@ impl FramePlan {
     }
 
     /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such views, it is
-    /// the target of this name in views of another kind: its pixel has the same format.
+    /// the target of this name in views of another kind: its pixel has the same format. Where a history has no copy for that reason, it is
+    /// the target that it would be copied from.
     pub fn sampled_target(&self, views: ViewKind, name: &str) -> Option<&PlannedTarget> {
         sampled_target(&self.targets, views, name)
     }
@@ -228,15 +229,24 @@ impl FramePlan {
         check_material_types(&self.processes, draws, material_types)
     }
 
+    /// Whether a raw pass uses the target.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn has_raw_access(&self, target: &PlannedTarget) -> bool {
+        super::sampled_views::has_raw_access(&self.processes, target)
+    }
+
     /// The names of the processes that were dropped because no output depends on them.
     pub fn dropped(&self) -> &[String] {
-        &self.dropped
+        self.schedule.dropped()
     }
 
     /// The processes as a graph in the DOT language; edges are labelled with the targets that one process leaves to the
     /// next.
     pub fn to_dot(&self) -> &str {
-        &self.dot
+        self.dot.get_or_init(|| {
+            let declaration = |index: usize| &self.processes[index].declaration;
+            self.schedule.to_labelled_dot(|before, after| passed_on_resources(declaration(before), declaration(after)))
+        })
     }
 }
 
@@ -245,11 +255,7 @@ static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 /// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
 /// texture to bind.
 fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, PlannedProcess)]) -> Option<PlannedTarget> {
-    let is_map = |(target, access): &(String, Access)| {
-        target == ShadowCasters::TARGET
-            && matches!(access, Access::SampleLayers(ViewKind::Shadow) | Access::SampleView(ViewKind::Shadow, _))
-    };
-    let is_read = added.iter().any(|(_, other)| other.declaration.accesses.iter().any(is_map));
+    let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
     let is_drawn = added.iter().any(|(_, other)| {
         other.declaration.views == ViewKind::Shadow
             && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
@@ -263,8 +269,16 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, Planne
         layered: true,
         size: TargetSize::Picture,
         multisampled: false,
+        mipmapped: false,
         output: false,
         copy_of: None,
+    })
+}
+
+fn reads_shadow_map(planned: &PlannedProcess) -> bool {
+    planned.declaration.accesses.iter().any(|(target, access)| {
+        target == ShadowCasters::TARGET
+            && matches!(access, Access::SampleLayers(ViewKind::Shadow) | Access::SampleView(ViewKind::Shadow, _))
     })
 }
 

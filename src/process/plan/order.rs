@@ -2,16 +2,16 @@
 
 use super::PlanError;
 use crate::graph::NodeId;
-use crate::process::Declaration;
+use crate::process::{Declaration, Place};
 use crate::scene::ViewKind;
 
 /// A process that was added to the graph.
-pub(super) struct AddedProcess {
+pub(super) struct AddedProcess<'a> {
     /// Its slot in the chain, if it is in the chain.
     pub(super) chain_slot: Option<usize>,
-    pub(super) name: String,
+    pub(super) name: &'a str,
     pub(super) id: NodeId,
-    pub(super) declaration: Declaration,
+    pub(super) declaration: &'a Declaration,
 }
 
 /// The pairs (before, after) that follow from the chain and from what processes declare with `after` and `before`.
@@ -20,11 +20,11 @@ pub(super) struct AddedProcess {
 /// If a process names one that there is not.
 pub(super) fn order_constraints(
     slot_names: &[String],
-    added: &[AddedProcess],
+    added: &[AddedProcess<'_>],
 ) -> Result<Vec<(NodeId, NodeId)>, PlanError> {
     let mut orders = Vec::new();
     for earlier in added {
-        let follows = |later: &&AddedProcess| {
+        let follows = |later: &&AddedProcess<'_>| {
             later.chain_slot.is_some() && earlier.chain_slot.is_some() && later.chain_slot > earlier.chain_slot
         };
         for later in added.iter().filter(follows) {
@@ -49,15 +49,22 @@ pub(super) fn order_constraints(
     // Order is transitive through an empty slot too: what goes before it goes before what comes after it.
     let empty_slot = |name: &String| {
         let slot = slot_names.iter().position(|slot_name| slot_name == name)?;
-        added.iter().all(|other| other.chain_slot != Some(slot) && other.name != *name).then_some(slot)
+        added.iter().all(|other| other.chain_slot != Some(slot) && other.name != name.as_str()).then_some(slot)
     };
     for earlier in added {
-        let Some(before) = earlier.declaration.before.iter().filter_map(empty_slot).min() else { continue };
-        let comes_after =
-            |later: &&AddedProcess| later.declaration.after.iter().filter_map(empty_slot).any(|after| before <= after);
-        let later = added.iter().filter(|later| later.id != earlier.id && is_for(added, earlier, later));
-        let later = later.filter(comes_after);
-        orders.extend(later.map(|later| (earlier.id, later.id)));
+        let before: Vec<_> = earlier.declaration.before.iter().filter(|name| empty_slot(name).is_some()).collect();
+        if before.is_empty() {
+            continue;
+        }
+        for later in added.iter().filter(|later| later.id != earlier.id && is_for(added, earlier, later)) {
+            // An empty slot of a place orders only processes that draw in views of one kind.
+            let share_places = earlier.declaration.views == later.declaration.views;
+            let slot = |name: &String| empty_slot(name).filter(|_| share_places || !Place::is_slot(name));
+            let Some(before) = before.iter().copied().filter_map(slot).min() else { continue };
+            if later.declaration.after.iter().filter_map(slot).any(|after| before <= after) {
+                orders.push((earlier.id, later.id));
+            }
+        }
     }
     Ok(orders)
 }
@@ -69,8 +76,8 @@ pub(super) fn order_constraints(
 /// If neither a process nor a slot has this name.
 fn find(
     slot_names: &[String],
-    added: &[AddedProcess],
-    (own, name): (&AddedProcess, &str),
+    added: &[AddedProcess<'_>],
+    (own, name): (&AddedProcess<'_>, &str),
     is_on_side: impl Fn(usize, usize) -> bool,
 ) -> Result<Option<NodeId>, UnknownName> {
     if added.iter().any(|other| other.name == name) {
@@ -85,8 +92,8 @@ fn find(
 }
 
 /// Whether `own` can refer to this process: not if one of the two also draws in the other one's views.
-fn is_for(added: &[AddedProcess], own: &AddedProcess, other: &AddedProcess) -> bool {
-    let draws_in_views_of = |process: &AddedProcess, views: ViewKind| {
+fn is_for(added: &[AddedProcess<'_>], own: &AddedProcess<'_>, other: &AddedProcess<'_>) -> bool {
+    let draws_in_views_of = |process: &AddedProcess<'_>, views: ViewKind| {
         added.iter().any(|same| same.name == process.name && same.declaration.views == views)
     };
     let (own_views, other_views) = (own.declaration.views, other.declaration.views);
@@ -97,7 +104,7 @@ fn is_for(added: &[AddedProcess], own: &AddedProcess, other: &AddedProcess) -> b
 struct UnknownName;
 
 impl UnknownName {
-    fn in_process(self, process: &AddedProcess, other: &str) -> PlanError {
-        PlanError::UnknownProcess { process: process.name.clone(), other: other.to_owned() }
+    fn in_process(self, process: &AddedProcess<'_>, other: &str) -> PlanError {
+        PlanError::UnknownProcess { process: process.name.to_owned(), other: other.to_owned() }
     }
 }

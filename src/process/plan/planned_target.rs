@@ -1,5 +1,6 @@
 //! The targets that a plan's processes use.
 
+use super::mip_levels::{check_mip_levels, mip_levels_error};
 use super::resource_names::views_of_output;
 use super::{PlanError, PlannedProcess, ProcessError};
 use crate::process::{Access, BlendEquation, Declaration, Draws, Format, TargetSize, previous_name};
@@ -22,6 +23,8 @@ pub struct PlannedTarget {
     pub size: TargetSize,
     /// Whether it is [multisampled](crate::process::Declare::multisampled).
     pub multisampled: bool,
+    /// Whether it has [mip levels](crate::process::Declare::mipmapped).
+    pub mipmapped: bool,
     /// Whether it is an output of the frame: of a pipeline, or [named](crate::RendererBuilder::output) by the engine. Targets of reflections
     /// are none where main views have the same one.
     pub output: bool,
@@ -47,9 +50,9 @@ impl AttachmentExtent {
 /// are the names of the frame's outputs.
 ///
 /// # Errors
-/// If processes disagree about a target's format, layers or size, use depth as colour or colour as depth, draw into targets of
-/// different sizes or numbers of samples, resolve one that cannot be resolved, or read the history of a target that is not written, is
-/// multisampled or is drawn in layers.
+/// If processes disagree about a target's format, layers, size or mip levels, give mip levels to one that cannot have them, use depth as
+/// colour or colour as depth, draw into targets of different sizes or numbers of samples, resolve one that cannot be resolved, or read the
+/// history of a target that is not written, is multisampled or is drawn in layers.
 pub(super) fn targets_of(processes: &[PlannedProcess], outputs: &[String]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut targets = written_targets(processes)?;
     for (planned, name, access) in accesses(processes) {
@@ -90,6 +93,7 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
     for planned in processes {
         check_sizes(planned)?;
         check_multisampling(planned)?;
+        check_mip_levels(planned)?;
     }
     for (planned, name, access) in accesses(processes) {
         let Some(format) = access.format() else { continue };
@@ -97,6 +101,7 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
         let layered = matches!(access, Access::ClearDepthLayer(_));
         let size = size_of(&planned.declaration, name);
         let multisampled = planned.declaration.multisampled.contains(name);
+        let mipmapped = planned.declaration.mipmapped.contains(name);
         match targets.iter().find(|known| known.name == *name && known.views == views) {
             Some(known) if known.format != format => {
                 return Err(PlanError::ConflictingFormats {
@@ -111,6 +116,14 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
             Some(known) if known.multisampled != multisampled => {
                 let problem = "another process creates it with another number of samples";
                 return Err(multisampling_error(planned, name, problem));
+            }
+            Some(known) if known.mipmapped != mipmapped => {
+                let problem = if mipmapped {
+                    "another process creates it without them"
+                } else {
+                    "another process creates it with them"
+                };
+                return Err(mip_levels_error(planned, name, problem));
             }
             Some(known) if known.size != size => {
                 return Err(PlanError::ConflictingSizes { target: name.clone(), first: known.size, second: size });
@@ -127,6 +140,7 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
                     layered,
                     size,
                     multisampled,
+                    mipmapped,
                     output,
                     copy_of,
                 });
@@ -319,7 +333,10 @@ fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
             let history = previous_name(target);
             let uses = |(name, access): &(String, Access)| {
                 (name == target || *name == history)
-                    && !matches!(access, Access::SampleLayers(_) | Access::SampleView(..))
+                    && !matches!(
+                        access,
+                        Access::SampleLayers(_) | Access::SampleView(..) | Access::SampleViewPrevious(..)
+                    )
             };
             let draws_in_each = |other: &&PlannedProcess| {
                 other.declaration.views == planned.declaration.views && !other.declaration.once_a_frame
@@ -334,25 +351,35 @@ fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// The copies of targets whose content of the frame before is read.
+/// The copies of targets whose content of the frame before is read, in the same view or in others.
+///
+/// # Errors
+/// If a target cannot have a history. What a process samples of other views may be missing: [`check_sampled_views`] reports it.
+///
+/// [`check_sampled_views`]: super::sampled_views::check_sampled_views
 fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut copies: Vec<PlannedTarget> = Vec::new();
-    for (planned, name, access) in accesses(processes) {
-        let views = planned.declaration.views;
-        let is_known = copies.iter().any(|known| known.name == *name && known.views == views);
-        if access != Access::SamplePrevious || is_known {
+    for (planned, name, access) in accesses(processes).filter(|(.., access)| access.is_previous()) {
+        let views = access.views(planned.declaration.views);
+        if copies.iter().any(|known| known.name == *name && known.views == views) {
             continue;
         }
-        let mut written = targets.iter().filter(|known| known.views == views && !known.layered);
+        let is_of_other_view = matches!(access, Access::SampleViewPrevious(..));
+        let mut written = targets.iter().filter(|known| known.views == views);
         match written.find(|known| previous_name(&known.name) == *name) {
+            Some(source) if source.layered && is_of_other_view => {
+                let (process, target) = (planned.name.clone(), source.name.clone());
+                return Err(PlanError::LayeringMismatch { process, target });
+            }
             Some(source) if source.multisampled => {
                 return Err(multisampling_error(planned, &source.name, "a multisampled target has no history"));
             }
-            None => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
-            Some(source) => {
+            Some(source) if !source.layered => {
                 let (name, copy_of) = (name.clone(), Some(source.name.clone()));
                 copies.push(PlannedTarget { name, copy_of, stored: false, output: false, ..source.clone() });
             }
+            _ if is_of_other_view => {}
+            _ => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
         }
     }
     Ok(copies)

@@ -8,11 +8,10 @@ use crate::process::{Access, BufferAccess, previous_name};
 use crate::scene::ViewKind;
 
 /// Orders the processes by what they read and write, and drops those on which no output depends. `added` are the processes in
-/// descending priority, each with its slot in the chain if it has one.
+/// descending priority, each with its slot in the chain if it has one. The nodes of the schedule are their indices.
 ///
 /// What a process samples of other views is an output of those: which view that is, and the order of views, depends on the scene. So
-/// targets that the remaining processes sample are added to the outputs until none is missing, and so are histories that they read in
-/// further kinds of views.
+/// targets that the remaining processes sample are added to the outputs until none is missing, and so are those whose history they read.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -21,20 +20,19 @@ pub(super) fn compile(
     added: &[(Option<usize>, PlannedProcess)],
     imported: Option<&PlannedTarget>,
     outputs: &[String],
-) -> Result<Schedule<PlannedProcess>, PlanError> {
+) -> Result<Schedule<usize>, PlanError> {
     let mut sampled: Vec<(ViewKind, String)> = Vec::new();
     loop {
         let graph = process_graph(slot_names, added, imported, (outputs, &sampled))?;
         let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
         let mut missing = Vec::new();
-        for (_, planned) in schedule.nodes() {
+        for (_, index) in schedule.nodes() {
+            let (_, planned) = &added[*index];
             for (target, access) in &planned.declaration.accesses {
                 let (views, is_wanted): (_, &dyn Fn(&str) -> bool) = match *access {
                     Access::SampleView(views, _) => (views, &|written| written == target),
-                    // In the kind that the process declares, it is an output from the start.
-                    Access::SamplePrevious if !planned.is_of_own_kind => {
-                        (planned.declaration.views, &|written| previous_name(written) == *target)
-                    }
+                    Access::SampleViewPrevious(views, _) => (views, &|written| previous_name(written) == *target),
+                    Access::SamplePrevious => (planned.declaration.views, &|written| previous_name(written) == *target),
                     _ => continue,
                 };
                 let of_views = added.iter().filter(|(_, other)| other.declaration.views == views);
@@ -58,17 +56,14 @@ fn process_graph(
     added: &[(Option<usize>, PlannedProcess)],
     imported: Option<&PlannedTarget>,
     (outputs, sampled): (&[String], &[(ViewKind, String)]),
-) -> Result<FrameGraph<PlannedProcess>, PlanError> {
+) -> Result<FrameGraph<usize>, PlanError> {
     let mut graph = FrameGraph::new();
-    let (mut nodes, mut histories): (Vec<AddedProcess>, Vec<_>) = (Vec::new(), Vec::new());
-    for (chain_slot, planned) in added {
+    let mut nodes: Vec<AddedProcess<'_>> = Vec::new();
+    for (index, (chain_slot, planned)) in added.iter().enumerate() {
         let PlannedProcess { name, declaration, .. } = planned;
-        let id = graph.add(node_name(added, planned), planned.clone());
+        let id = graph.add(node_name(added, planned), index);
         for (target, access) in &declaration.accesses {
-            if *access == Access::SamplePrevious {
-                if planned.is_of_own_kind {
-                    histories.push((declaration.views, target.clone()));
-                }
+            if access.is_previous() {
                 continue;
             }
             let resource = graph.resource(resource_name(access.views(declaration.views), target));
@@ -91,7 +86,7 @@ fn process_graph(
         if declaration.keep {
             graph.keep(id);
         }
-        nodes.push(AddedProcess { chain_slot: *chain_slot, name: name.clone(), id, declaration: declaration.clone() });
+        nodes.push(AddedProcess { chain_slot: *chain_slot, name, id, declaration });
     }
     if let Some(target) = imported {
         let resource = graph.resource(resource_name(target.views, &target.name));
@@ -109,15 +104,6 @@ fn process_graph(
     for (views, target) in sampled {
         let resource = graph.resource(resource_name(*views, target));
         graph.output(resource);
-    }
-    // A target whose history is read is an output of its frame.
-    for node in &nodes {
-        let declaration = &node.declaration;
-        let is_read = |target: &str| histories.contains(&(declaration.views, previous_name(target)));
-        for target in declaration.written().filter(|target| is_read(target)) {
-            let resource = graph.resource(resource_name(declaration.views, target));
-            graph.output(resource);
-        }
     }
     Ok(graph)
 }

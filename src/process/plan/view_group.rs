@@ -29,7 +29,7 @@ impl ViewGroup {
     /// none.
     pub(super) fn parts(&self, processes: &[PlannedProcess], views: &[RenderView]) -> Vec<Vec<Pass>> {
         let (mut parts, mut is_begun): (Vec<Vec<Pass>>, _) = (Vec::new(), [false; ViewKind::COUNT]);
-        let drawn = |(_, view): &(usize, &RenderView)| self.kinds.contains(&view.kind()) && !view.is_cached;
+        let drawn = |(_, view): &(usize, &RenderView)| self.kinds.contains(&view.kind()) && !view.is_cached();
         for (view_index, kind) in views.iter().enumerate().filter(drawn).map(|(index, view)| (index, view.kind())) {
             let is_first = !std::mem::replace(&mut is_begun[kind as usize], true);
             let mut passes_of = |once_a_frame: bool| {

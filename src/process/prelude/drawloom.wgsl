@@ -71,8 +71,9 @@ struct Light {
     // Spot: the light fades from this cosine to `cone_end`.
     cone_begin: f32,
     cone_end: f32,
+    // The first layer, if it has several maps.
     shadow_layer: u32,
-    // Half the width of its shadow map: at 1 m for a spot light, in metres for a directional one.
+    // Half the width of its shadow map: at 1 m for a spot or point light, in metres for a directional one.
     shadow_half: f32,
     shadow_near: f32,
     // From the axes of the shadow map's camera to the world's.
@@ -99,6 +100,8 @@ const ALPHA: u32 = 1u;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
 // The object of each instance, in batch order.
 @group(0) @binding(2) var<storage, read> drawn: array<u32>;
+// `view.light_count` lights. If a light has several shadow maps, one more follows for each layer of the maps: the light that the
+// layer belongs to, as that map shows it.
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 
 @group(1) @binding(0) var<storage, read> materials: array<Material>;
@@ -184,6 +187,11 @@ fn world_normal(object: Object, normal: vec3<f32>) -> vec3<f32> {
     let turned = rotate(object.orientation, mirrored * cofactors * normal);
     let length_squared = dot(turned, turned);
     return select(vec3<f32>(0.0), turned * inverseSqrt(length_squared), length_squared > 0.0);
+}
+
+// Where a cube map of `Camera::cube_faces` is to be sampled for what lies in a direction of the world.
+fn cube_direction(direction: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(direction.xy, -direction.z);
 }
 
 // A pixel's position relative to the camera, along the world's axes, from its depth.

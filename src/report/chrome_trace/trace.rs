@@ -145,7 +145,7 @@ impl<W: io::Write> TraceWriter<'_, W> {
         let slice = slice.object("args", |mut arguments| {
             for (key, label) in [("process", &labels.process), ("stage", &labels.stage), ("view", &labels.view)] {
                 if let Some(label) = label {
-                    arguments = arguments.value(key, label)?;
+                    arguments = arguments.value(key, &**label)?;
                 }
             }
             arguments = arguments.value("items", format!("{:?}", chunk.items))?;

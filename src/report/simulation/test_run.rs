@@ -71,7 +71,7 @@ impl TestRun {
                 name: format!("p{index}"),
                 dependencies: node.dependencies.clone(),
                 pinned: node.pinned,
-                labels: Labels { process: node.cost_kind.clone(), ..Labels::default() },
+                labels: Labels { process: node.cost_kind.as_deref().map(Into::into), ..Labels::default() },
                 chunked_by_cost: node.cost_kind.is_some(),
             });
             let opened = now;

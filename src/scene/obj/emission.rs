@@ -47,6 +47,6 @@ pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, s
         }
     } else {
         let intensity = intensity(area / 4.0);
-        Light::Point { position: center, intensity, range: range(intensity) }
+        Light::Point { position: center, intensity, range: range(intensity), casts_shadow: false }
     })
 }

@@ -47,9 +47,8 @@ impl Kind {
         let direction = random.direction().as_vec3().normalize();
         let (intensity, range, casts_shadow) = (Vec3::ONE, 1e5, true);
         let maps = ShadowMaps::default();
-        let map_camera = |maps: ShadowMaps, light: Light, cameras: &[Camera]| {
-            maps.camera("map".to_owned(), &light, cameras).expect("a light that casts a shadow")
-        };
+        let map_camera =
+            |maps: ShadowMaps, light: Light, cameras: &[Camera]| maps.cameras("map", &light, cameras).swap_remove(0);
         match self {
             Self::Perspective { degrees, size } => {
                 let field_of_view = degrees.to_radians() as f32;

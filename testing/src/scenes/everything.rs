@@ -4,7 +4,9 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Blend, Camera, Light, LightKind, Material, Mesh, RenderObject, Scene, Topology};
+use drawloom::scene::{
+    Blend, Camera, ClipPlane, LayerMask, Light, LightKind, Material, Mesh, RenderObject, Scene, Topology,
+};
 use drawloom::view::LightClass;
 
 use super::{cube, sized, square};
@@ -42,7 +44,7 @@ pub fn everything() -> Scene {
         let glass = scene.add(Material { diffuse, blend, opacity: 0.6, ..Material::default() }).unwrap();
         add(&mut scene, list, glass, DVec3::new(x, 1.2, 2.5), Vec3::splat(0.8), Quat::IDENTITY);
     }
-    scene.lights = LightClass::all().filter_map(light_of).collect();
+    scene.lights = LightClass::all().map(light_of).collect();
     scene.ambient = Vec3::splat(0.05);
     scene.background = Vec3::new(0.1, 0.15, 0.3);
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 3.0, 8.0), DVec3::Y), SIZE)];
@@ -60,17 +62,21 @@ fn add(
     scene.add_object(RenderObject { scale, orientation, ..RenderObject::new(mesh, material, position) }).unwrap();
 }
 
-/// A light of a class. `None` for shadowed point lights, which do not exist.
-fn light_of(class: LightClass) -> Option<Light> {
+/// A light of a class.
+fn light_of(class: LightClass) -> Light {
     let casts_shadow = class.shadowed;
     let side = if casts_shadow { 1.0 } else { -1.0 };
     let position = DVec3::new(f64::from(side) * 3.0, 5.0, 4.0);
     let direction = (Vec3::new(0.0, 0.0, -1.0) - position.as_vec3()).normalize();
     let color = Vec3::new(0.9, 0.7 + 0.2 * side, 0.7);
-    Some(match class.kind {
+    match class.kind {
         LightKind::Directional => Light::Directional { direction, illuminance: color * 0.8, casts_shadow },
-        LightKind::Point if casts_shadow => return None,
-        LightKind::Point => Light::Point { position: DVec3::new(0.0, 2.0, 0.5), intensity: color * 2.0, range: 8.0 },
+        LightKind::Point => Light::Point {
+            position: DVec3::new(0.0, 2.0, 0.5 * f64::from(-side)),
+            intensity: color * 2.0,
+            range: 8.0,
+            casts_shadow,
+        },
         LightKind::Spot => Light::Spot {
             position,
             direction,
@@ -88,7 +94,7 @@ fn light_of(class: LightClass) -> Option<Light> {
             casts_shadow,
         },
         other => unreachable!("no light of kind {other:?}"),
-    })
+    }
 }
 
 /// The class of a light of the scene, if shadows are enabled.
@@ -99,6 +105,7 @@ pub fn class_of(light: &Light) -> LightClass {
 /// The same light without a shadow.
 pub fn without_shadow(mut light: Light) -> Light {
     if let Light::Directional { casts_shadow, .. }
+    | Light::Point { casts_shadow, .. }
     | Light::Spot { casts_shadow, .. }
     | Light::Hemispherical { casts_shadow, .. } = &mut light
     {
@@ -126,4 +133,30 @@ pub fn glasses(scene: &Scene) -> Vec<(Handle<Material>, Material)> {
         .filter(|(_, material)| material.blend != Blend::None)
         .map(|(handle, glass)| (handle, glass.clone()))
         .collect()
+}
+
+/// The objects of [`everything_with_mirror`] but the mirror.
+pub const WORLD: LayerMask = LayerMask::layer(0);
+
+/// The scene with a mirror above the boxes, an object of the layer `mirror`, and with the camera that draws what it reflects: the view
+/// `mirror` of the camera. In the picture of that camera nothing transparent is in front of the mirror.
+pub fn everything_with_mirror(mirror: LayerMask) -> Scene {
+    let mut scene = everything();
+    for handle in scene.objects().collect::<Vec<_>>() {
+        let object = scene.object(handle).unwrap();
+        scene.replace_object(handle, RenderObject { layers: WORLD, ..object }).unwrap();
+    }
+    let (point, orientation) = (DVec3::new(0.0, 3.2, -3.0), Quat::from_rotation_x(0.4));
+    let mesh = scene.add(square(Topology::TriangleList)).unwrap();
+    let material = scene.add(Material { diffuse: Vec3::ZERO, ..Material::default() }).unwrap();
+    let (scale, object) = (Vec3::splat(2.2), RenderObject::new(mesh, material, point));
+    scene.add_object(RenderObject { layers: mirror, orientation, scale, ..object }).unwrap();
+    // The panes have one visible side, which the camera sees. The mirror sees that of one more.
+    let (glass, _) = glasses(&scene)[0];
+    let (back, behind) = (Quat::from_rotation_y(PI), DVec3::new(0.6, 1.4, -0.8));
+    let pane = RenderObject::new(mesh, glass, behind);
+    scene.add_object(RenderObject { layers: WORLD, orientation: back, scale: Vec3::splat(0.8), ..pane }).unwrap();
+    let camera = scene.cameras[0].reflected("mirror", ClipPlane { point, normal: orientation * Vec3::Z });
+    scene.cameras.push(Camera { layers: WORLD, ..camera });
+    scene
 }

@@ -108,7 +108,7 @@ impl Contender for Drawloom {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        let texture = self.last.as_ref().and_then(|submission| submission.texture(camera, "picture"));
+        let texture = self.last.as_ref().and_then(|submission| Some(submission.texture(camera, "picture")?.0));
         let backend = self.renderer.backend();
         pictures::read(backend.device(), backend.queue(), texture.ok_or("no frame was drawn")?)
     }

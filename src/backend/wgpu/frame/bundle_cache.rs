@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes};
+use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes, subdivision_of};
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::resources::{MeshSnapshot, SubdividedMesh};
 use crate::command::Batch;
@@ -118,5 +118,5 @@ fn drawn_subdivisions<'a>(
     subdivided: &'a SubdividedMeshes<SubdividedMesh>,
 ) -> impl Iterator<Item = &'a Arc<CachedSubdivision<SubdividedMesh>>> {
     let subdivided_batches = batches.iter().filter(|batch| batch.state.subdivision_level() > 0);
-    subdivided_batches.filter_map(|batch| subdivided.get(&(batch.mesh, batch.state.subdivision_level())))
+    subdivided_batches.filter_map(|batch| subdivided.get(&subdivision_of(batch)))
 }

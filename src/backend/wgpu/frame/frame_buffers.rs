@@ -53,18 +53,17 @@ impl BufferPool {
         Self { free: Mutex::default(), maps_memory }
     }
 
-    /// The size of all pooled buffers in bytes.
-    pub(crate) fn bytes(&self) -> u64 {
-        let index_bytes =
-            |buffers: &Buffers| buffers.passes.iter().map(|pass| pass.partial_indices.read().size()).sum::<u64>();
-        let total = |buffers: &Buffers| {
-            buffers.all().map(GrowingBuffer::size).iter().sum::<u64>()
-                + buffers.objects.size()
-                + buffers.bytes.size()
-                + buffers.materials.size()
-                + index_bytes(buffers)
-        };
-        self.free.lock().buffers.iter().map(|buffers| total(buffers)).sum()
+    /// The sizes of all pooled buffers in bytes; 0 for one that the device does not have yet.
+    pub(crate) fn sizes(&self) -> Vec<u64> {
+        let mut sizes = Vec::new();
+        for buffers in &self.free.lock().buffers {
+            sizes.extend(buffers.all().map(GrowingBuffer::size));
+            sizes.extend(buffers.objects.sizes());
+            sizes.extend(buffers.bytes.sizes());
+            sizes.push(buffers.materials.size());
+            sizes.extend(buffers.passes.iter().map(|pass| pass.partial_indices.read().size()));
+        }
+        sizes
     }
 
     /// Drops all buffers, and those of frames in flight when these end, because a device error may have left them unusable.
@@ -434,7 +433,7 @@ fn bytes_of_process<'a>(
 /// If a camera is out of reach.
 fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
     for (view, lights) in request.views.iter().zip(request.light_tables) {
-        let record = GpuView::new(view, request.scene, lights.gpu_lights().len())
+        let record = GpuView::new(view, request.scene, lights.light_count())
             .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
         append_aligned(bytes, bytemuck::bytes_of(&record));
     }

@@ -25,9 +25,9 @@ impl ObjectBuffers {
         Self { gpu_objects, columns: Vec::new(), maps_memory, max_binding: 0 }
     }
 
-    /// Their size in bytes.
-    pub(crate) fn size(&self) -> u64 {
-        self.all().map(|buffer| buffer.on_device().size()).sum()
+    /// Their sizes in bytes.
+    pub(crate) fn sizes(&self) -> impl Iterator<Item = u64> {
+        self.all().map(|buffer| buffer.on_device().size())
     }
 
     /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated, and lost its

@@ -62,9 +62,9 @@ impl ResourceBytes {
         buffers.filter_map(|(buffer, length)| buffer.on_device.binding(0, *length))
     }
 
-    /// Their size in bytes.
-    pub(crate) fn size(&self) -> u64 {
-        self.buffers.iter().map(|(buffer, _)| buffer.on_device.size()).sum()
+    /// Their sizes in bytes.
+    pub(crate) fn sizes(&self) -> impl Iterator<Item = u64> {
+        self.buffers.iter().map(|(buffer, _)| buffer.on_device.size())
     }
 }
 

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use super::frame_buffers::FrameBuffers;
 use super::pass_state::WgpuPassState;
-use crate::backend::BackendError;
+use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
-use crate::backend::wgpu::resources::{BindGroupLayouts, LightMeshes, MeshSnapshot, StorageBuffers, WgpuTargets};
+use crate::backend::wgpu::resources::{
+    BindGroupLayouts, LightMeshes, MeshSnapshot, StorageBuffers, ViewTarget, WgpuTargets,
+};
+use crate::backend::{BackendError, FrameRequest};
 use crate::process::Pass;
 
 /// A frame in flight through the wgpu backend.
@@ -21,6 +24,8 @@ pub struct WgpuFrame {
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) storage_buffers: Arc<StorageBuffers>,
+    /// After which passes mip levels are generated.
+    pub(crate) mip_schedule: MipSchedule,
     pub(crate) background: [f64; 3],
     /// What is read back of it.
     pub(crate) read_backs: Vec<ReadBackCopy>,
@@ -43,6 +48,26 @@ impl WgpuFrame {
         let (read_back, copy) = new_read_back(device, &self.targets, view, target, rectangle)?;
         self.read_backs.push(copy);
         Ok(read_back)
+    }
+
+    /// Whether mip levels are generated after a pass, by index in the frame.
+    pub(crate) fn generates_mip_levels(&self, pass: usize) -> bool {
+        !self.mip_schedule.after(pass).is_empty()
+    }
+
+    /// Generates the mip levels that a pass, by index in the frame, leaves out of date.
+    pub(crate) fn generate_mip_levels(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        request: &FrameRequest<'_>,
+        pass: usize,
+    ) {
+        for &(view, target) in self.mip_schedule.after(pass) {
+            let target = self.targets.find(view, &request.plan.targets()[target].name);
+            if let Some(levels) = target.and_then(ViewTarget::mip_levels) {
+                levels.generate(encoder);
+            }
+        }
     }
 
     /// The state of a pass, by index in the frame.

@@ -1,6 +1,6 @@
 //! The attachments of a process's passes, as its pipelines and bundles see them.
 
-use crate::backend::wgpu::resources::{SampledTarget, sample_count, texture_format};
+use crate::backend::wgpu::resources::{SampledTarget, sample_count, shape_dimension, texture_format};
 use crate::process::{
     Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Declaration, Format, FramePlan, Stencil,
     StencilOperation,
@@ -52,15 +52,17 @@ impl AttachmentFormats {
             Access::Sample | Access::SamplePrevious => {
                 let format = format_of(declaration.views, target);
                 let multisampled = planned(declaration.views, target).is_some_and(|planned| planned.multisampled);
-                Some(SampledTarget { format, layered: false, multisampled })
+                Some(SampledTarget { format, dimension: wgpu::TextureViewDimension::D2, multisampled })
             }
-            Access::SampleView(views, _) => {
+            Access::SampleView(views, index) | Access::SampleViewPrevious(views, index) => {
                 let planned = plan.sampled_target(*views, target)?;
                 let (format, multisampled) = (planned.format, planned.multisampled);
-                Some(SampledTarget { format, layered: false, multisampled })
+                let dimension = shape_dimension(declaration.sampled_views[*index].shape);
+                Some(SampledTarget { format, dimension, multisampled })
             }
             Access::SampleLayers(views) => {
-                Some(SampledTarget { format: format_of(*views, target), layered: true, multisampled: false })
+                let dimension = wgpu::TextureViewDimension::D2Array;
+                Some(SampledTarget { format: format_of(*views, target), dimension, multisampled: false })
             }
             _ => None,
         });

@@ -9,7 +9,7 @@ mod process_pipelines;
 mod unused_bindings;
 mod vertex_buffers;
 
-pub(crate) use pipeline_cache::PipelineCache;
+pub(crate) use pipeline_cache::{PipelineCache, shader_label};
 pub(crate) use pipeline_key::fixed_state;
 pub(crate) use pipeline_variant::PipelineVariant;
 pub(crate) use process_pipelines::ProcessPipelines;

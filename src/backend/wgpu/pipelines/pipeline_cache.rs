@@ -8,7 +8,7 @@ use super::process_pipelines::ProcessPipelines;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
-use crate::process::{Draws, FramePlan};
+use crate::process::{Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
 
 /// Keeps the pipelines of all plans. Plans share pipelines where they can.
@@ -20,6 +20,8 @@ pub(crate) struct PipelineCache {
     keeps_working_shaders: bool,
     /// The latest pipelines of each process by its name, if processes keep them.
     working: HashMap<String, Arc<ProcessPipelines>>,
+    /// What was [prepared](Self::add_prepared) and no plan uses yet, each with the plan that it was made for.
+    prepared: Vec<(Weak<()>, Arc<ProcessPipelines>)>,
     /// The latest shader of each process that did not compile, and why.
     failed: HashMap<String, (PipelineKey<'static>, BackendError)>,
 }
@@ -69,11 +71,11 @@ impl PipelineCache {
                 self.failed.remove(&planned.name);
                 continue;
             }
-            let fitting = all_of(&self.plans).find(|pipelines| pipelines.fits(plan, planned, draws, quality)).cloned();
+            let fitting = self.find(plan, planned, draws, quality).cloned();
             let pipelines = match fitting {
                 Some(fitting) => fitting,
                 None => {
-                    let label = format!("the shader of {:?}", planned.name.as_str());
+                    let label = shader_label(&planned.name);
                     let working = self.working.get(&planned.name).cloned();
                     let working = working.filter(|old| old.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
@@ -119,19 +121,96 @@ impl PipelineCache {
         let processes: Arc<[_]> = processes.into();
         let cached = PlanPipelines { plan: plan.alive(), processes: Arc::clone(&processes) };
         self.plans.insert(plan.identity(), cached);
+        self.prepared.retain(|(plan, pipelines)| {
+            plan.strong_count() > 0 && processes.iter().all(|used| !Arc::ptr_eq(used, pipelines))
+        });
         Ok(processes)
+    }
+
+    /// Pipelines that a process can use, of whatever plan.
+    pub(crate) fn find(
+        &self,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> Option<&Arc<ProcessPipelines>> {
+        self.all().find(|pipelines| pipelines.fits(plan, planned, draws, quality))
+    }
+
+    /// Adds complete pipelines that were made for a process of a plan without a lock on the cache, unless a frame has made them meanwhile. They
+    /// take the place of those that were prepared for it before.
+    pub(crate) fn add_prepared(
+        &mut self,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+        pipelines: ProcessPipelines,
+    ) {
+        let of_plan = plan.alive();
+        let is_replaced = |before: &(Weak<()>, Arc<ProcessPipelines>)| {
+            before.0.ptr_eq(&of_plan) && before.1.fits_declaration(plan, planned)
+        };
+        if self.find(plan, planned, draws, quality).is_none() {
+            self.prepared.retain(|before| !is_replaced(before));
+            self.prepared.push((of_plan, Arc::new(pipelines)));
+        }
     }
 
     /// The number of pipelines.
     pub(crate) fn pipeline_count(&self) -> usize {
-        let mut distinct: Vec<_> = self.plans.values().flat_map(|cached| cached.processes.iter()).collect();
+        let mut distinct: Vec<_> = self.all().collect();
         distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
         distinct.into_iter().map(|pipelines| pipelines.variants().len()).sum()
     }
+
+    /// The pipelines of the processes of all plans, and those that no plan uses yet.
+    fn all(&self) -> impl Iterator<Item = &Arc<ProcessPipelines>> {
+        let of_plans = self.plans.values().flat_map(|cached| cached.processes.iter());
+        of_plans.chain(self.prepared.iter().map(|(_, pipelines)| pipelines))
+    }
 }
 
-/// The pipelines of the processes of all plans.
-fn all_of(plans: &HashMap<u64, PlanPipelines>) -> impl Iterator<Item = &Arc<ProcessPipelines>> {
-    plans.values().flat_map(|cached| cached.processes.iter())
+/// What errors call the shader of a process.
+pub(crate) fn shader_label(process: &str) -> String {
+    format!("the shader of {process:?}")
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::process::{GeometryBuffer, GeometryFormats};
+
+    #[test]
+    fn pipelines_that_are_prepared_twice_or_for_another_quality_are_there_once() {
+        let (device, _) = noop_device();
+        let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
+        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let (planned, draws) = (&plan.processes()[0], plan.draws().unwrap());
+        let layouts = BindGroupLayouts::new(&device);
+        let mut cache = PipelineCache::new(false);
+        let prepare = |cache: &mut PipelineCache, quality: &Quality| {
+            let made = ProcessPipelines::new(&device, &layouts, &plan, planned, &draws[0], quality).unwrap();
+            cache.add_prepared(&plan, planned, &draws[0], quality, made);
+        };
+        let [other, quality] = [Quality::exact(), Quality::fast()];
+        assert!(PipelineKey::new(&draws[0], &other) != PipelineKey::new(&draws[0], &quality));
+        for quality in [&other, &quality, &quality] {
+            prepare(&mut cache, quality);
+            assert_eq!(cache.prepared.len(), 1);
+        }
+        // A frame takes what is prepared, and what comes late is dropped.
+        let prepared = Arc::clone(&cache.prepared[0].1);
+        let used = cache.update(&device, &layouts, &plan, &draws, &quality).unwrap();
+        assert!(Arc::ptr_eq(&used[0], &prepared) && cache.prepared.is_empty());
+        prepare(&mut cache, &quality);
+        assert!(cache.prepared.is_empty());
+        // What is prepared for another quality does not change what frames use.
+        prepare(&mut cache, &other);
+        let used = cache.update(&device, &layouts, &plan, &draws, &quality).unwrap();
+        assert!(Arc::ptr_eq(&used[0], &prepared));
+    }
 }

@@ -1,6 +1,6 @@
 //! The pipelines of a render process, one for each draw state.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
@@ -129,7 +129,7 @@ impl ProcessPipelines {
     }
 
     /// Whether these pipelines still fit what a process of this plan declares.
-    fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
+    pub(crate) fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
             && self.array_count == array_count(&planned.declaration)
             && self.attributes == planned.declaration.attributes
@@ -165,12 +165,12 @@ impl ProcessPipelines {
         device: &wgpu::Device,
         variants: impl Iterator<Item = PipelineVariant>,
     ) -> Result<HashMap<PipelineVariant, wgpu::RenderPipeline>, BackendError> {
+        let is_missing = |variant: &PipelineVariant| !self.variants().contains_key(variant);
+        // No lock is held while the driver compiles, so that frames go on meanwhile.
+        let missing: HashSet<_> = variants.filter(is_missing).collect();
         let mut created = HashMap::new();
-        let known = self.variants();
-        for variant in variants {
-            if !known.contains_key(&variant) && !created.contains_key(&variant) {
-                created.extend(self.create(device, variant)?);
-            }
+        for variant in missing {
+            created.extend(self.create(device, variant)?);
         }
         Ok(created)
     }
@@ -366,6 +366,7 @@ mod tests {
 
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
+    use crate::command::DrawState;
     use crate::process::{GeometryBuffer, GeometryFormats};
 
     #[test]
@@ -390,5 +391,36 @@ mod tests {
             drop(recording);
             inserted.unwrap();
         });
+    }
+
+    #[test]
+    fn frames_add_pipelines_while_others_are_created() {
+        let (device, _) = noop_device();
+        let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
+        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let draws = plan.draws().unwrap();
+        let layouts = BindGroupLayouts::new(&device);
+        let quality = Quality::balanced();
+        let pipelines =
+            ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
+
+        let [first, second] = [Cull::Back, Cull::Nothing]
+            .map(|cull| PipelineVariant::of_arenas(DrawState::new(Topology::TriangleList, cull, Blend::None)));
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let of_frame = || {
+                let created = pipelines.create_missing(&device, std::iter::once(second.clone())).unwrap();
+                pipelines.insert(created);
+                sender.send(()).unwrap();
+            };
+            let mut is_added = true;
+            let prepared = [first].into_iter().inspect(|_| {
+                scope.spawn(of_frame);
+                is_added = receiver.recv_timeout(Duration::from_secs(10)).is_ok();
+            });
+            pipelines.insert(pipelines.create_missing(&device, prepared).unwrap());
+            assert!(is_added, "the frame waits");
+        });
+        assert_eq!(pipelines.variants().len(), 2);
     }
 }

@@ -8,7 +8,7 @@ use wgpu::util::RenderEncoder;
 
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
-use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error};
+use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
 use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
 use crate::backend::wgpu::pipelines::PipelineVariant;
 use crate::backend::wgpu::resources::{SubdividedMesh, attribute_of};
@@ -116,7 +116,7 @@ impl<'a> BatchRecorder<'a> {
 
     fn draw_subdivided(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         for batch in run {
-            let mesh = self.subdivided.get(&(batch.mesh, batch.state.subdivision_level()));
+            let mesh = self.subdivided.get(&subdivision_of(batch));
             let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
             let mesh = &mesh.geometry;
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));

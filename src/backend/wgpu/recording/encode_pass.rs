@@ -9,7 +9,8 @@ use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::Draws;
 
-/// Encodes a whole pass in one encoder: replays its bundles, or records it without bundles.
+/// Encodes a whole pass in one encoder: replays its bundles, or records it without bundles. Then it generates the mip levels that the pass
+/// leaves out of date.
 ///
 /// # Errors
 /// If a resource of the pass is missing, or a raw pass fails.
@@ -25,7 +26,7 @@ pub(crate) fn encode_pass(
     let WgpuPassState { pass, strategy, timed_pass_index, .. } = *frame.pass(index);
     let accesses = &request.plan.processes()[pass.process_index].declaration.accesses;
     let clears = accesses.iter().any(|(_, access)| access.writes() && !access.reads());
-    encode(device, frame, index, |encoder| match (&request.draws[pass.process_index], strategy.recording) {
+    let record = |encoder: &mut wgpu::CommandEncoder| match (&request.draws[pass.process_index], strategy.recording) {
         (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
         // A pass that would only load and store its targets.
         (Draws::Commands(_), _) if list.batches.is_empty() && timed_pass_index.is_none() && !clears => Ok(()),
@@ -42,7 +43,29 @@ pub(crate) fn encode_pass(
             Ok(())
         }
         _ => record_without_commands(encoder, frame, request, index),
+    };
+    encode(device, frame, index, |encoder| {
+        record(encoder)?;
+        frame.generate_mip_levels(encoder, request, index);
+        Ok(())
     })
+}
+
+/// Encodes what follows the segments of a pass that is split over several encoders: the mip levels that it leaves out of date.
+///
+/// # Errors
+/// As [`encode_pass`].
+pub(crate) fn encode_after_segments(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    index: usize,
+) -> Result<RecordedPart, BackendError> {
+    let encoder = encode(device, frame, index, |encoder| {
+        frame.generate_mip_levels(encoder, request, index);
+        Ok(())
+    })?;
+    Ok(RecordedPart::Encoder(encoder.finish()))
 }
 
 /// Encodes one segment of a pass that is split over several encoders.

@@ -51,8 +51,8 @@ impl BindGroupLayouts {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SampledTarget {
     pub(crate) format: Format,
-    /// Whether it is the texture array that all views of a kind share.
-    pub(crate) layered: bool,
+    /// Whether it is one texture, an array or a cube map.
+    pub(crate) dimension: wgpu::TextureViewDimension,
     /// Whether it is multisampled.
     pub(crate) multisampled: bool,
 }
@@ -80,9 +80,7 @@ pub(crate) fn process_layout(
         } else {
             wgpu::TextureSampleType::Float { filterable: sampled.format.is_filterable() && !sampled.multisampled }
         };
-        let view_dimension =
-            if sampled.layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
-        let multisampled = sampled.multisampled;
+        let SampledTarget { dimension: view_dimension, multisampled, .. } = *sampled;
         let texture = wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
         entries.push(entry(binding, fragment, texture));
     }

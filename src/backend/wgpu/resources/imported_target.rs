@@ -40,6 +40,13 @@ impl ImportedTarget {
         let found = named.find_map(|(index, view)| Some((index, view, target_in(view)?)));
         let (view_index, view, planned) = found.ok_or_else(|| self.refused("the view has no such target"))?;
         self.check(plan, planned, planned.size.in_view(view.camera.size))?;
+        let is_planned = |target: usize| std::ptr::eq(&plan.targets()[target], planned);
+        let mut arrays = plan.view_arrays(views).into_iter().filter(|array| is_planned(array.target_index));
+        if arrays.any(|array| array.view_indices.contains(&Some(view_index))) {
+            return Err(
+                self.refused("that target cannot be imported, because a process samples it as a layer of an array")
+            );
+        }
         Ok(ResolvedImport { view_index, planned, texture: self.texture.clone() })
     }
 
@@ -57,6 +64,7 @@ impl ImportedTarget {
             (planned.layered, "all views of its kind share it"),
             (planned.copy_of.is_some(), "it is the history of another one"),
             (planned.multisampled, "it is multisampled"),
+            (planned.mipmapped, "it has mip levels"),
         ];
         if let Some((_, reason)) = unfit.into_iter().find(|(is_unfit, _)| *is_unfit) {
             return Err(self.refused(format!("that target cannot be imported, because {reason}")));

@@ -1,5 +1,7 @@
 //! The cache of meshes on the device.
 
+use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::arena::Arena;
@@ -13,7 +15,7 @@ use crate::backend::subdivision_cache::missing_mesh_error;
 use crate::command::Batch;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
-use crate::scene::{Assets, AttributeLayout, Mesh};
+use crate::scene::{Assets, AttributeLayout, LevelOfDetail, Mesh};
 use crate::view::UsedMeshes;
 
 /// The meshes of a frame. It stays valid while meshes change for later frames.
@@ -23,6 +25,7 @@ pub(crate) struct MeshSnapshot {
     attributes: AttributeBuffers,
     /// By mesh slot.
     meshes: Vec<Option<MeshRange>>,
+    coarser_levels: CoarserLevels,
     /// Those that are not in the arenas, but in buffers of the engine's own.
     pub(crate) imported_meshes: ImportedMeshes,
 }
@@ -33,13 +36,20 @@ impl MeshSnapshot {
     /// # Errors
     /// If there is no such mesh. This is a bug in Drawloom.
     pub(crate) fn mesh_range(&self, batch: &Batch) -> Result<MeshRange, BackendError> {
-        let mesh = self.meshes.get(batch.mesh as usize).copied().flatten();
-        mesh.ok_or_else(missing_mesh_error)
+        let mesh = self.meshes.get(batch.mesh as usize).copied().flatten().ok_or_else(missing_mesh_error)?;
+        match batch.state.level_of_detail() as usize {
+            0 => Ok(mesh),
+            level => {
+                let levels = self.coarser_levels.get(&batch.mesh);
+                let indices = levels.and_then(|levels| levels.get(level - 1)).ok_or_else(missing_mesh_error)?;
+                Ok(MeshRange { first_index: indices.start, index_count: indices.end - indices.start, ..mesh })
+            }
+        }
     }
 
     /// Whether one pipeline of each process draws both batches.
     pub(crate) fn share_pipeline(&self, one: &Batch, other: &Batch) -> bool {
-        one.state == other.state
+        one.state.with_level_of_detail(0) == other.state.with_level_of_detail(0)
             && (self.imported_meshes.is_empty() || self.imported_meshes.have_equal_layouts(one.mesh, other.mesh))
     }
 
@@ -73,6 +83,9 @@ pub(crate) struct MeshRange {
     revision: u64,
 }
 
+/// Of each mesh with coarser levels of detail, by slot: where the indices of these are in the arena.
+type CoarserLevels = HashMap<u32, Vec<Range<u32>>>;
+
 /// Keeps the meshes that objects use on the device, and uploads those that changed, or became used, since the last frame.
 pub(crate) struct MeshCache {
     vertices: Arena,
@@ -81,6 +94,7 @@ pub(crate) struct MeshCache {
     indices: Arena,
     attributes: AttributeArenas,
     meshes: Vec<Option<MeshRange>>,
+    coarser_levels: CoarserLevels,
     imported_meshes: ImportedMeshes,
     /// What the snapshot is of.
     current: Option<MeshVersion>,
@@ -105,6 +119,7 @@ impl Default for MeshCache {
             indices: Arena::new("indices", wgpu::BufferUsages::INDEX),
             attributes: AttributeArenas::default(),
             meshes: Vec::new(),
+            coarser_levels: CoarserLevels::default(),
             imported_meshes: ImportedMeshes::default(),
             current: None,
             snapshot: None,
@@ -160,10 +175,10 @@ impl MeshCache {
         if self.format != vertices {
             // `base_vertex` counts in vertices, so all vertices in an arena have one size.
             (self.vertices, self.format) = (new_vertex_arena(), vertices);
-            self.meshes.clear();
+            self.clear_meshes();
         }
         if self.current.is_none_or(|current| current.identity != identity) {
-            self.meshes.clear();
+            self.clear_meshes();
         }
         // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
         self.current = None;
@@ -178,11 +193,17 @@ impl MeshCache {
             indices: indices.clone(),
             attributes: self.attributes.buffers().clone(),
             meshes: self.meshes.clone(),
+            coarser_levels: self.coarser_levels.clone(),
             imported_meshes: self.imported_meshes.clone(),
         });
         self.current = Some(requested);
         self.snapshot = Some(Arc::clone(&snapshot));
         Ok(snapshot)
+    }
+
+    fn clear_meshes(&mut self) {
+        self.meshes.clear();
+        self.coarser_levels.clear();
     }
 
     fn update_meshes(
@@ -208,6 +229,7 @@ impl MeshCache {
                 *range = None;
             }
         }
+        self.coarser_levels.retain(|slot, _| self.meshes[*slot as usize].is_some());
         let format = self.format;
         let bytes = changed.iter().map(|(_, _, mesh)| bytes_of(mesh, format));
         let (vertex_bytes, index_bytes) = bytes.fold((0, 0), |sum, bytes| (sum.0 + bytes.0, sum.1 + bytes.1));
@@ -224,6 +246,14 @@ impl MeshCache {
             let vertices = with_vertex_bytes(mesh, format, |bytes| self.vertices.append(uploads, bytes));
             let indices = self.indices.append(uploads, bytemuck::cast_slice(mesh.indices()));
             self.attributes.write(uploads, mesh, vertices / vertex_stride(format));
+            self.coarser_levels.remove(&(slot as u32));
+            if !mesh.levels().is_empty() {
+                let append = |level: &LevelOfDetail| {
+                    let first = (self.indices.append(uploads, bytemuck::cast_slice(level.indices())) / 4) as u32;
+                    first..first + level.indices().len() as u32
+                };
+                self.coarser_levels.insert(slot as u32, mesh.levels().iter().map(append).collect());
+            }
             self.meshes[slot] = Some(MeshRange {
                 base_vertex: (vertices / vertex_stride(format)) as i32,
                 first_index: (indices / 4) as u32,
@@ -240,5 +270,7 @@ fn new_vertex_arena() -> Arena {
 }
 
 fn bytes_of(mesh: &Mesh, format: VertexFormat) -> (u64, u64) {
-    (mesh.vertices().len() as u64 * vertex_stride(format), size_of_val(mesh.indices()) as u64)
+    let levels = mesh.levels().iter().map(|level| size_of_val(level.indices()));
+    let indices = size_of_val(mesh.indices()) + levels.sum::<usize>();
+    (mesh.vertices().len() as u64 * vertex_stride(format), indices as u64)
 }

@@ -45,8 +45,8 @@ impl StorageBuffers {
         self.buffers.iter().find(|(known, _)| *known == layout).map(|(_, buffer)| buffer)
     }
 
-    /// Their size in bytes.
-    pub(crate) fn size(&self) -> u64 {
-        self.buffers.iter().map(|(layout, _)| layout.bytes).sum()
+    /// Their sizes in bytes.
+    pub(crate) fn sizes(&self) -> impl Iterator<Item = u64> {
+        self.buffers.iter().map(|(layout, _)| layout.bytes)
     }
 }

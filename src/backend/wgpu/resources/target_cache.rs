@@ -1,14 +1,17 @@
 //! The cache of the views' targets.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::Arc;
 
-use super::bind_group_layouts::texture_format;
 use super::imported_target::ResolvedImport;
-use super::transient_targets::{TextureKind, TransientTargets, uses_transient};
-use crate::backend::kept_views::{KeptView, kept_views};
-use crate::backend::{BackendError, FrameRequest, TargetMemory};
-use crate::process::{Access, Format, FramePlan, Pass, PlannedTarget, SampledViews};
+use super::placeholder_targets::PlaceholderTargets;
+use super::small_targets::{SmallTarget, SmallTargets};
+use super::target_mip_levels::{MipGenerator, MipPipelines};
+use super::target_texture::{TextureKind, new_texture, new_views, texture_bytes};
+use super::transient_targets::{TransientTargets, uses_transient};
+use super::view_array::{ViewArrayTexture, layer_descriptor};
+use crate::backend::{BackendError, FrameRequest, KeptView, TargetMemory, kept_views};
+use crate::process::{Format, Pass, PlannedTarget, SampledShape, SampledViews};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
@@ -21,9 +24,12 @@ pub(crate) struct WgpuTargets {
     layered: Vec<LayeredTarget>,
     /// Those that transient targets share.
     transient: Vec<TransientSlot>,
+    /// Those whose layers are targets of several views.
+    arrays: Vec<ViewArrayTexture>,
+    small: SmallTargets,
     memory: TargetMemory,
-    /// For passes that sample a view that the frame does not have: a pixel of zeros for each format and number of samples.
-    placeholder: Vec<(Format, bool, wgpu::TextureView)>,
+    /// For passes that sample views that the frame does not have.
+    placeholders: PlaceholderTargets,
 }
 
 /// A target as one view draws into it.
@@ -31,13 +37,25 @@ pub(crate) struct WgpuTargets {
 pub(crate) struct ViewTarget {
     planned: Arc<PlannedTarget>,
     pub(crate) texture: wgpu::Texture,
-    /// Of the view's layer only.
+    /// Of the view's layer only, and of mip level 0.
     pub(crate) view: wgpu::TextureView,
-    /// The same as shaders sample it: depth without the stencil.
+    /// The same as shaders sample it: depth without the stencil, and all mip levels.
     pub(crate) sampled: wgpu::TextureView,
     pub(crate) layer: u32,
-    /// Whether other targets of the frame may have the same texture.
-    pub(crate) is_transient: bool,
+    /// For a target with mip levels that processes write.
+    mip_levels: Option<Arc<MipGenerator>>,
+    storage: TargetStorage,
+}
+
+/// Whose texture a target has.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum TargetStorage {
+    /// Its own.
+    Own,
+    /// One that other targets of the frame may have too.
+    Transient,
+    /// A layer of a texture array.
+    Layer,
 }
 
 /// A texture that transient targets share.
@@ -47,6 +65,7 @@ struct TransientSlot {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
     sampled: wgpu::TextureView,
+    mip_levels: Option<Arc<MipGenerator>>,
 }
 
 /// A texture array in which each view of a kind has a layer.
@@ -60,6 +79,16 @@ struct LayeredTarget {
 impl ViewTarget {
     pub(crate) fn format(&self) -> Format {
         self.planned.format
+    }
+
+    /// What generates its mip levels; `None` if it has none, or they are copied.
+    pub(crate) fn mip_levels(&self) -> Option<&MipGenerator> {
+        self.mip_levels.as_deref()
+    }
+
+    /// Whether other targets of the frame may have the same texture.
+    pub(crate) fn is_transient(&self) -> bool {
+        self.storage == TargetStorage::Transient
     }
 }
 
@@ -75,21 +104,33 @@ impl WgpuTargets {
         found.map(|target| (&target.texture, &target.array))
     }
 
-    /// A pixel of zeros in place of a target of a view that the frame does not have.
-    pub(crate) fn find_placeholder(&self, planned: &PlannedTarget) -> Option<&wgpu::TextureView> {
-        let is_wanted =
-            |placeholder: &&(Format, bool, _)| (placeholder.0, placeholder.1) == (planned.format, planned.multisampled);
-        self.placeholder.iter().find(is_wanted).map(|(.., texture)| texture)
+    /// A target of one or several views, one for each layer, as a shader samples it. Zeros in place of views that the frame does not have.
+    pub(crate) fn find_sampled(
+        &self,
+        views: &[Option<usize>],
+        planned: &PlannedTarget,
+        shape: SampledShape,
+    ) -> Option<&wgpu::TextureView> {
+        let found = views.iter().flatten().find_map(|view| match shape {
+            SampledShape::Picture => self.find(*view, &planned.name).map(|target| &target.sampled),
+            _ => self.arrays.iter().find_map(|array| array.find(*view, &planned.name, shape)),
+        });
+        found.or_else(|| self.placeholders.find(planned, shape))
     }
 
-    /// Copies what processes of later frames read of this one.
-    pub(crate) fn copy_histories(&self, encoder: &mut wgpu::CommandEncoder) {
-        for (view, (_, targets)) in self.views.iter().enumerate() {
+    /// Copies what processes of later frames read of the views that this one draws.
+    pub(crate) fn copy_histories(&self, encoder: &mut wgpu::CommandEncoder, is_drawn: impl Fn(usize) -> bool) {
+        for (view, (_, targets)) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
             for copy in targets {
                 let source = copy.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
                 let Some(source) = source else { continue };
-                let (from, to) = (source.texture.as_image_copy(), copy.texture.as_image_copy());
-                encoder.copy_texture_to_texture(from, to, copy.texture.size());
+                let origin = wgpu::Origin3d { z: source.layer, ..wgpu::Origin3d::ZERO };
+                for mip_level in 0..copy.texture.mip_level_count() {
+                    let from = wgpu::TexelCopyTextureInfo { origin, mip_level, ..source.texture.as_image_copy() };
+                    let to = wgpu::TexelCopyTextureInfo { mip_level, ..copy.texture.as_image_copy() };
+                    let size = copy.texture.size().mip_level_size(mip_level, wgpu::TextureDimension::D2);
+                    encoder.copy_texture_to_texture(from, to, size);
+                }
             }
         }
     }
@@ -107,15 +148,19 @@ impl WgpuTargets {
     /// Computes the memory of these targets, none of which is imported.
     fn computed_memory(&self) -> TargetMemory {
         let mut memory = TargetMemory::default();
-        for target in self.views.iter().flat_map(|(_, targets)| targets).filter(|target| !target.planned.layered) {
+        let of_views = self.views.iter().flat_map(|(_, targets)| targets);
+        for target in of_views.filter(|target| target.storage != TargetStorage::Layer) {
             let bytes = texture_bytes(target.planned.format, &target.texture);
             memory.dedicated_bytes += bytes;
-            if !target.is_transient {
+            if !target.is_transient() {
                 memory.add_texture(bytes);
             }
         }
-        for target in &self.layered {
-            let bytes = texture_bytes(target.planned.format, &target.texture);
+        let layered = self.layered.iter().map(|target| (&target.planned, &target.texture));
+        let arrays = self.arrays.iter().map(|array| (&array.planned, &array.texture));
+        let arrays = layered.chain(arrays).map(|(planned, texture)| (planned.format, texture));
+        for (format, texture) in arrays.chain(self.small.textures().map(|(kind, texture)| (kind.format, texture))) {
+            let bytes = texture_bytes(format, texture);
             memory.dedicated_bytes += bytes;
             memory.add_texture(bytes);
         }
@@ -129,13 +174,16 @@ impl WgpuTargets {
 #[derive(Default)]
 pub(crate) struct TargetCache {
     current: Arc<WgpuTargets>,
-    /// The key of the current targets, beside the views' names: the plan's identity, and kind, size and layer of each view.
+    /// The key of the current targets, beside the views' names: the plan's identity, and of each view its kind, its size, its layer, and
+    /// whether it may be cached.
     plan: Option<u64>,
-    views: Vec<(ViewKind, [u32; 2], u32)>,
+    views: Vec<(ViewKind, [u32; 2], u32, bool)>,
     /// The targets that are not among the current ones because they were imported: the view's index, and the name.
     imported: Vec<(usize, String)>,
     /// What decides which targets share textures, beside the above: see [`uses_transient`]. `None` if none may.
     order: Option<(Vec<Pass>, SampledViews)>,
+    /// Created when a plan has a target with mip levels for the first time.
+    mip_pipelines: Option<MipPipelines>,
 }
 
 impl TargetCache {
@@ -161,7 +209,15 @@ impl TargetCache {
             let (planned, texture) = (Arc::new(PlannedTarget::clone(planned)), texture.clone());
             let (view, sampled) = new_views(&texture, planned.format, &import.view_descriptor());
             let (_, targets) = &mut with_imports.views[*view_index];
-            targets.push(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: false });
+            targets.push(ViewTarget {
+                planned,
+                texture,
+                view,
+                sampled,
+                layer: 0,
+                mip_levels: None,
+                storage: TargetStorage::Own,
+            });
         }
         Ok(Arc::new(with_imports))
     }
@@ -178,7 +234,8 @@ impl TargetCache {
         imports: &[ResolvedImport<'_>],
         transient: bool,
     ) -> Result<(), BackendError> {
-        let requested = || views.iter().map(|view| (view.kind(), view.camera.size, view.layer));
+        let key = |view: &RenderView| (view.kind(), view.camera.size, view.layer, !view.camera.redraw.is_every_frame());
+        let requested = || views.iter().map(key);
         let names = self.current.views.iter().map(|(name, _)| name.as_str());
         let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
         let imported = || imports.iter().map(|import| (import.view_index, import.planned.name.as_str()));
@@ -204,34 +261,89 @@ impl TargetCache {
             let using = passes.iter().filter(|pass| uses_transient(plan, views, **pass));
             (using.copied().collect::<Vec<_>>(), sampled_views.clone())
         });
+        let planned: Vec<_> = plan.targets().iter().map(|planned| Arc::new(planned.clone())).collect();
+        // By the indices of view and target, those that are layers of a texture: it, and the layer.
+        let mut layers: HashMap<(usize, usize), (wgpu::Texture, u32)> = HashMap::new();
+        for array in plan.view_arrays(views) {
+            let target = array.target_index;
+            let array = ViewArrayTexture::new(device, &planned[target], array, views, &self.current.arrays)?;
+            let position = |(view, layer)| ((view, target), (array.texture.clone(), layer));
+            layers.extend(array.layers().map(position));
+            next.arrays.push(array);
+        }
         let shared = order.as_ref().map_or_else(TransientTargets::default, |(passes, sampled_views)| {
-            TransientTargets::new(plan, views, (passes, sampled_views), is_imported)
+            let is_left_out = |view: usize, target: usize| {
+                layers.contains_key(&(view, target)) || is_imported(view, &plan.targets()[target].name)
+            };
+            TransientTargets::new(plan, views, (passes, sampled_views), is_left_out)
         });
         next.transient = self.transient_slots(device, shared.textures())?;
-        let planned: Vec<_> = plan.targets().iter().map(|planned| Arc::new(planned.clone())).collect();
+        for slot in next.transient.iter_mut().filter(|slot| slot.kind.mipmapped && slot.mip_levels.is_none()) {
+            let pipelines = self.mip_pipelines.get_or_insert_with(|| MipPipelines::new(device));
+            slot.mip_levels =
+                Some(Arc::new(MipGenerator::new(device, pipelines, (&slot.texture, 0), slot.kind.format)));
+        }
         let kinds_and_names =
             self.views.iter().zip(&self.current.views).map(|((kind, ..), (name, _))| (*kind, name.as_str()));
         let kept = kept_views(kinds_and_names, views);
+        if transient {
+            let (mut wanted, mut positions) = (Vec::new(), Vec::new());
+            for (index, view) in views.iter().enumerate() {
+                let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
+                for (target_index, planned) in of_kind.filter(|(_, planned)| !is_imported(index, &planned.name)) {
+                    let (position, kind) = ((index, target_index), TextureKind::of(planned, view.camera.size));
+                    let has_storage =
+                        layers.contains_key(&position) || shared.texture_of(index, target_index).is_some();
+                    if !has_storage && SmallTargets::accepts(plan, planned, kind) {
+                        let kept = kept[index].and_then(|kept| self.current.find(kept.index, &planned.name));
+                        wanted.push(SmallTarget { kind, kept: kept.map(|kept| (kept.texture.clone(), kept.layer)) });
+                        positions.push(position);
+                    }
+                }
+            }
+            let (small, assigned) = self.current.small.assign(device, &wanted)?;
+            next.small = small;
+            layers.extend(positions.into_iter().zip(assigned));
+        }
         for (index, view) in views.iter().enumerate() {
             let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
             let own = of_kind.filter(|(_, planned)| !is_imported(index, &planned.name));
             let targets = own.map(|(target_index, planned)| {
                 if let Some(slot) = shared.texture_of(index, target_index).and_then(|slot| next.transient.get(slot)) {
-                    let TransientSlot { texture, view, sampled, .. } = slot.clone();
+                    let TransientSlot { texture, view, sampled, mip_levels, .. } = slot.clone();
                     let planned = Arc::clone(planned);
-                    return Ok(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: true });
+                    return Ok(ViewTarget {
+                        planned,
+                        texture,
+                        view,
+                        sampled,
+                        layer: 0,
+                        mip_levels,
+                        storage: TargetStorage::Transient,
+                    });
+                }
+                if let Some((texture, layer)) = layers.get(&(index, target_index)) {
+                    return Ok(self.layer_target((planned, texture), kept[index], *layer));
                 }
                 if !planned.layered {
                     return self.own_target(device, planned, kept[index], view);
                 }
                 let layered = next.layered.iter().find(|layered| *layered.planned == **planned);
                 let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
-                Ok(self.layer_target(layered.ok_or_else(missing)?, kept[index], view.layer))
+                let layered = layered.ok_or_else(missing)?;
+                Ok(self.layer_target((&layered.planned, &layered.texture), kept[index], view.layer))
             });
             let targets = targets.collect::<Result<_, _>>()?;
             next.views.push((view.name().to_owned(), targets));
         }
-        next.placeholder = self.placeholder_targets(device, plan)?;
+        let written = next.views.iter_mut().flat_map(|(_, targets)| targets);
+        let mipmapped = written.filter(|target| target.planned.mipmapped && target.planned.copy_of.is_none());
+        for target in mipmapped.filter(|target| target.mip_levels.is_none()) {
+            let pipelines = self.mip_pipelines.get_or_insert_with(|| MipPipelines::new(device));
+            let texture = (&target.texture, target.layer);
+            target.mip_levels = Some(Arc::new(MipGenerator::new(device, pipelines, texture, target.planned.format)));
+        }
+        next.placeholders = self.current.placeholders.updated(device, plan)?;
         next.memory = next.computed_memory();
         self.current = Arc::new(next);
         self.plan = Some(plan.identity());
@@ -259,7 +371,7 @@ impl TargetCache {
             }
             let texture = new_texture(device, "transient targets", kind, 1)?;
             let (view, sampled) = new_views(&texture, kind.format, &wgpu::TextureViewDescriptor::default());
-            Ok(TransientSlot { kind, texture, view, sampled })
+            Ok(TransientSlot { kind, texture, view, sampled, mip_levels: None })
         });
         slots.collect()
     }
@@ -283,57 +395,28 @@ impl TargetCache {
         let kept = kept.filter(|kept| kept.is_same || planned.copy_of.is_none());
         let cached = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
         let mut cached = cached.filter(|cached| cached.planned == *planned && cached.texture.size() == extent);
-        if let Some(cached) = cached.take_if(|cached| !cached.is_transient) {
+        if let Some(cached) = cached.take_if(|cached| cached.storage == TargetStorage::Own) {
             return Ok(cached.clone());
         }
         let texture = new_texture(device, &planned.name, kind, 1)?;
         let (view, sampled) = new_views(&texture, planned.format, &wgpu::TextureViewDescriptor::default());
         let planned = Arc::clone(planned);
-        Ok(ViewTarget { planned, texture, view, sampled, layer: 0, is_transient: false })
+        Ok(ViewTarget { planned, texture, view, sampled, layer: 0, mip_levels: None, storage: TargetStorage::Own })
     }
 
-    fn placeholder_targets(
+    fn layer_target(
         &self,
-        device: &wgpu::Device,
-        plan: &FramePlan,
-    ) -> Result<Vec<(Format, bool, wgpu::TextureView)>, BackendError> {
-        let mut placeholder: Vec<(Format, bool, wgpu::TextureView)> = Vec::new();
-        let accesses = plan.processes().iter().flat_map(|planned| &planned.declaration.accesses);
-        for (target, access) in accesses {
-            let Access::SampleView(views, _) = *access else { continue };
-            let Some(planned) = plan.sampled_target(views, target) else { continue };
-            let (format, multisampled) = (planned.format, planned.multisampled);
-            if placeholder.iter().any(|(known, samples, _)| (*known, *samples) == (format, multisampled)) {
-                continue;
-            }
-            let sampled = match self.current.find_placeholder(planned) {
-                Some(cached) => cached.clone(),
-                // wgpu clears a texture before it is first read.
-                None => {
-                    let kind = TextureKind { size: [1, 1], ..TextureKind::of(planned, [1, 1]) };
-                    let texture = new_texture(device, target, kind, 1)?;
-                    new_views(&texture, format, &wgpu::TextureViewDescriptor::default()).1
-                }
-            };
-            placeholder.push((format, multisampled, sampled));
-        }
-        Ok(placeholder)
-    }
-
-    fn layer_target(&self, shared: &LayeredTarget, kept: Option<KeptView>, layer: u32) -> ViewTarget {
-        let cached = kept.and_then(|kept| self.current.find(kept.index, &shared.planned.name));
-        if let Some(cached) = cached.filter(|cached| cached.texture == shared.texture && cached.layer == layer) {
+        (planned, texture): (&Arc<PlannedTarget>, &wgpu::Texture),
+        kept: Option<KeptView>,
+        layer: u32,
+    ) -> ViewTarget {
+        let cached = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
+        if let Some(cached) = cached.filter(|cached| cached.texture == *texture && cached.layer == layer) {
             return cached.clone();
         }
-        let descriptor = wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2),
-            base_array_layer: layer,
-            array_layer_count: Some(1),
-            ..wgpu::TextureViewDescriptor::default()
-        };
-        let (view, sampled) = new_views(&shared.texture, shared.planned.format, &descriptor);
-        let (planned, texture) = (Arc::clone(&shared.planned), shared.texture.clone());
-        ViewTarget { planned, texture, view, sampled, layer, is_transient: false }
+        let (view, sampled) = new_views(texture, planned.format, &layer_descriptor(layer));
+        let (planned, texture) = (Arc::clone(planned), texture.clone());
+        ViewTarget { planned, texture, view, sampled, layer, mip_levels: None, storage: TargetStorage::Layer }
     }
 
     fn layered_target(
@@ -357,6 +440,16 @@ impl TargetCache {
         if let Some(cached) = cached.find(|cached| fits(cached.texture.size())) {
             return Ok(cached.clone());
         }
+        let allowed = device.limits().max_texture_array_layers;
+        if layers > allowed {
+            let lights: HashSet<_> = sharing_views().filter_map(|view| view.valid_light).collect();
+            return Err(BackendError::TooManyLayers {
+                target: planned.name.clone(),
+                views: u64::from(layers),
+                lights: lights.len() as u64,
+                allowed: u64::from(allowed),
+            });
+        }
         let kind = TextureKind { size: [width, height], ..TextureKind::of(planned, [width, height]) };
         let texture = new_texture(device, &planned.name, kind, layers)?;
         let dimension = Some(wgpu::TextureViewDimension::D2Array);
@@ -364,68 +457,4 @@ impl TargetCache {
         let (_, array) = new_views(&texture, planned.format, &descriptor);
         Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
     }
-}
-
-/// The number of samples of the pixels of a target.
-pub(crate) fn sample_count(multisampled: bool) -> u32 {
-    // The only number beside 1 that every device has.
-    if multisampled { 4 } else { 1 }
-}
-
-/// The size of a texture in bytes.
-fn texture_bytes(format: Format, texture: &wgpu::Texture) -> u64 {
-    let size = texture.size();
-    let pixels = u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
-    pixels * format.bytes() as u64 * u64::from(texture.sample_count())
-}
-
-/// A view to draw into, and one that shaders sample.
-fn new_views(
-    texture: &wgpu::Texture,
-    format: Format,
-    descriptor: &wgpu::TextureViewDescriptor<'_>,
-) -> (wgpu::TextureView, wgpu::TextureView) {
-    let view = texture.create_view(descriptor);
-    let sampled = if format.has_depth() && format.has_stencil() {
-        let aspect = wgpu::TextureAspect::DepthOnly;
-        texture.create_view(&wgpu::TextureViewDescriptor { aspect, ..descriptor.clone() })
-    } else {
-        view.clone()
-    };
-    (view, sampled)
-}
-
-fn new_texture(
-    device: &wgpu::Device,
-    label: &str,
-    kind: TextureKind,
-    layers: u32,
-) -> Result<wgpu::Texture, BackendError> {
-    let TextureKind { format, multisampled, stored, size: [width, height] } = kind;
-    let missing = texture_format(format).required_features() - device.features();
-    if !missing.is_empty() {
-        return Err(BackendError::MissingFeature { missing: missing.to_string() });
-    }
-    let limits = device.limits();
-    for (limit, allowed, needed) in [
-        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, width.max(height)),
-        ("max_texture_array_layers", limits.max_texture_array_layers, layers),
-    ] {
-        if needed > allowed {
-            return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
-        }
-    }
-    let sampled = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-    let copied = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
-    let usage = if multisampled { sampled } else { sampled | copied };
-    Ok(device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
-        mip_level_count: 1,
-        sample_count: sample_count(multisampled),
-        dimension: wgpu::TextureDimension::D2,
-        format: texture_format(format),
-        usage: if stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },
-        view_formats: &[],
-    }))
 }

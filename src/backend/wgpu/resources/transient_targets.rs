@@ -3,8 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-use crate::process::{Access, Format, FramePlan, Pass, PlannedTarget, SampledViews};
-use crate::scene::ViewKind;
+use super::target_texture::TextureKind;
+use crate::process::{Access, FramePlan, Pass, PlannedTarget, SampledViews};
 use crate::view::RenderView;
 
 /// Which targets of a frame are transient, and the textures that they share.
@@ -21,15 +21,6 @@ pub(crate) struct TransientTargets {
     textures: Vec<TextureKind>,
 }
 
-/// What a texture for a target is like. Only targets that are alike in all of it share one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct TextureKind {
-    pub(crate) format: Format,
-    pub(crate) multisampled: bool,
-    pub(crate) stored: bool,
-    pub(crate) size: [u32; 2],
-}
-
 /// The passes of a frame that use a view's target, by index in submission order.
 #[derive(Clone, Copy)]
 struct Life {
@@ -41,23 +32,23 @@ struct Life {
 
 impl TransientTargets {
     /// Assigns textures to the targets of these views. `passes` are at least those that [use transient targets](uses_transient). Targets for
-    /// which `is_imported` is true, by the view's index and the target's name, are left out.
+    /// which `is_left_out` is true, by the indices of view and target, have textures of their own or of the engine's.
     pub(crate) fn new(
         plan: &FramePlan,
         views: &[RenderView],
         (passes, sampled_views): (&[Pass], &SampledViews),
-        is_imported: impl Fn(usize, &str) -> bool,
+        is_left_out: impl Fn(usize, usize) -> bool,
     ) -> Self {
         let targets = plan.targets();
         let lives = lives(plan, views, passes, sampled_views);
         let can_be_transient: Vec<_> = targets.iter().map(|planned| can_be_transient(plan, planned)).collect();
         let mut transient: Vec<(usize, Option<Life>, TextureKind)> = Vec::new();
-        for (view_index, view) in views.iter().enumerate().filter(|(_, view)| !view.is_cached) {
+        for (view_index, view) in views.iter().enumerate().filter(|(_, view)| view.camera.redraw.is_every_frame()) {
             let own = targets.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
             for (target_index, planned) in own.filter(|(index, _)| can_be_transient[*index]) {
                 let index = view_index * targets.len() + target_index;
                 let life = lives[index];
-                if life.is_some_and(|life| !life.is_overwritten) || is_imported(view_index, &planned.name) {
+                if life.is_some_and(|life| !life.is_overwritten) || is_left_out(view_index, target_index) {
                     continue;
                 }
                 transient.push((index, life, TextureKind::of(planned, view.camera.size)));
@@ -97,19 +88,12 @@ impl TransientTargets {
     }
 }
 
-impl TextureKind {
-    /// The texture for a target in a view with a picture of this size.
-    pub(crate) fn of(planned: &PlannedTarget, picture: [u32; 2]) -> Self {
-        let PlannedTarget { format, multisampled, stored, size, .. } = *planned;
-        Self { format, multisampled, stored, size: size.in_view(picture) }
-    }
-}
-
-/// Whether a pass may use transient targets. The others may come and go, as shadow views are cached, without a change of the textures that
-/// targets have.
+/// Whether a pass may use transient targets. The others may come and go, as views are cached, without a change of the textures that targets
+/// have.
 pub(crate) fn uses_transient(plan: &FramePlan, views: &[RenderView], pass: Pass) -> bool {
     let declaration = &plan.processes()[pass.process_index].declaration;
-    views[pass.view_index].kind() != ViewKind::Shadow || !declaration.sampled_views.is_empty()
+    let samples_view = |(_, access): &(String, Access)| matches!(access, Access::SampleView(..));
+    views[pass.view_index].camera.redraw.is_every_frame() || declaration.accesses.iter().any(samples_view)
 }
 
 /// Whether nothing outside of a frame uses the target.
@@ -119,9 +103,7 @@ fn can_be_transient(plan: &FramePlan, planned: &PlannedTarget) -> bool {
         .targets()
         .iter()
         .any(|copy| copy.views == planned.views && copy.copy_of.as_deref() == Some(planned.name.as_str()));
-    // Shadow views may be cached, and then the next frame reads their targets.
-    let may_be_cached = planned.views == ViewKind::Shadow;
-    !(planned.output || planned.layered || planned.copy_of.is_some() || has_history || may_be_cached)
+    !(planned.output || planned.layered || planned.copy_of.is_some() || has_history)
 }
 
 /// The life of each of the plan's targets in each view; `None` for those that no pass uses.
@@ -132,19 +114,20 @@ fn lives(plan: &FramePlan, views: &[RenderView], passes: &[Pass], sampled_views:
     let mut lives: Vec<Option<Life>> = vec![None; views.len() * targets.len()];
     for (pass_index, pass) in passes.iter().enumerate() {
         for (name, access) in &plan.processes()[pass.process_index].declaration.accesses {
-            let view_index = match *access {
+            let sampled = match *access {
                 Access::SampleView(_, index) => sampled_views.find(*pass, index),
-                // An array, which is not transient.
-                Access::SampleLayers(_) => None,
-                _ => Some(pass.view_index),
+                // An array and a history, which are not transient.
+                Access::SampleLayers(_) | Access::SampleViewPrevious(..) => &[],
+                _ => &[Some(pass.view_index)],
             };
-            let Some(view_index) = view_index else { continue };
-            let Some(target_index) = indices.get(&(views[view_index].kind(), name.as_str())) else { continue };
-            let overwrites = access.format().is_some();
-            let life = &mut lives[view_index * targets.len() + target_index];
-            let life = life.get_or_insert(Life { first: pass_index, last: pass_index, is_overwritten: overwrites });
-            life.last = pass_index;
-            life.is_overwritten &= overwrites || pass_index > life.first;
+            for view_index in sampled.iter().flatten() {
+                let Some(target_index) = indices.get(&(views[*view_index].kind(), name.as_str())) else { continue };
+                let overwrites = access.format().is_some();
+                let life = &mut lives[view_index * targets.len() + target_index];
+                let life = life.get_or_insert(Life { first: pass_index, last: pass_index, is_overwritten: overwrites });
+                life.last = pass_index;
+                life.is_overwritten &= overwrites || pass_index > life.first;
+            }
         }
     }
     lives
@@ -159,8 +142,8 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::process::{ClearColor, Declare, Draws, FullScreen, RenderProcess, TargetSize};
-    use crate::scene::Camera;
+    use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
+    use crate::scene::{Camera, Redraw, ViewKind};
 
     /// A process that reads and writes at random.
     #[derive(Default)]
@@ -172,7 +155,8 @@ mod tests {
         writes: Vec<(String, bool, bool, bool)>,
         samples: Vec<String>,
         samples_previous: Vec<String>,
-        samples_views: Vec<(ViewKind, &'static str, String)>,
+        /// Each with whether it is what the view held in the frame before.
+        samples_views: Vec<(ViewKind, &'static str, String, bool)>,
         after: Option<String>,
     }
 
@@ -191,13 +175,22 @@ mod tests {
                     (false, false) => declare.draws_over(target),
                     (false, true) => declare.changes(target),
                 }
+                if *is_overwritten && target.ends_with('1') {
+                    declare.mipmapped(target);
+                }
                 if *is_overwritten && *is_small {
                     declare.size(target, TargetSize::Divided(2));
                 }
             }
             self.samples.iter().for_each(|target| declare.samples(target));
             self.samples_previous.iter().for_each(|target| declare.samples_previous(target));
-            self.samples_views.iter().for_each(|(kind, view, target)| declare.samples_view(*kind, view, target));
+            for (kind, view, target, is_previous) in &self.samples_views {
+                if *is_previous {
+                    declare.samples_view_previous(*kind, view, target);
+                } else {
+                    declare.samples_view(*kind, view, target);
+                }
+            }
             if self.once_a_frame {
                 declare.once_a_frame();
             }
@@ -261,7 +254,8 @@ mod tests {
             };
             for target in created.get(&sampled).into_iter().flatten().filter(|_| !names[0].is_empty()) {
                 if random.usize(0..3) == 0 {
-                    process.samples_views.push((sampled, names[random.usize(0..2)], target.clone()));
+                    let is_previous = random.usize(0..4) == 0;
+                    process.samples_views.push((sampled, names[random.usize(0..2)], target.clone(), is_previous));
                 }
             }
             for kind in &process.kinds {
@@ -290,9 +284,10 @@ mod tests {
                 _ => ViewKind::Reflection,
             };
             let size = [[64, 32], [64, 32], [17, 90]][random.usize(0..3)];
-            let camera = Camera { kind, size, ..Camera::looking_at(names[index], DVec3::Z, DVec3::ZERO) };
-            let is_cached = kind == ViewKind::Shadow && random.bool();
-            RenderView { is_cached, ..RenderView::new(&camera) }
+            let redraw = if random.u8(0..4) == 0 { Redraw::Interval(2) } else { Redraw::EveryFrame };
+            let camera = Camera { kind, size, redraw, ..Camera::looking_at(names[index], DVec3::Z, DVec3::ZERO) };
+            let age = if redraw.is_every_frame() { 0 } else { random.u32(0..2) };
+            RenderView { age, ..RenderView::new(&camera) }
         };
         (0..count).map(view).collect()
     }
@@ -336,7 +331,8 @@ mod tests {
                 let some = own.filter(|_| random.usize(0..12) == 0);
                 imported.extend(some.map(|target| (index, target.name.clone())));
             }
-            let is_imported = |view: usize, target: &str| imported.contains(&(view, target.to_owned()));
+            let is_imported =
+                |view: usize, target: usize| imported.contains(&(view, plan.targets()[target].name.clone()));
             let used: Vec<_> = passes.iter().copied().filter(|pass| uses_transient(&plan, &views, *pass)).collect();
             let transient = TransientTargets::new(&plan, &views, (&used, &sampled_views), is_imported);
             Some(Self { plan, views, passes, sampled_views, imported, transient })
@@ -366,9 +362,9 @@ mod tests {
                     }
                     Access::Sample | Access::SamplePrevious => reads.push(found(own)),
                     // No process may draw in that kind of view.
-                    Access::SampleView(_, index) => {
-                        let sampled = self.sampled_views.find(pass, *index);
-                        reads.extend(sampled.and_then(|view| Some((view, self.target(view, name)?))));
+                    Access::SampleView(_, index) | Access::SampleViewPrevious(_, index) => {
+                        let sampled = self.sampled_views.find(pass, *index).iter().flatten();
+                        reads.extend(sampled.filter_map(|view| Some((*view, self.target(*view, name)?))));
                     }
                     other => panic!("{other:?} is not among the random accesses"),
                 }
@@ -388,7 +384,7 @@ mod tests {
                     for (view, target) in reads {
                         let storage = self.storage(view, target);
                         let content = contents.get(&storage).copied();
-                        // A history, a cached shadow map, or what is drawn in one view only.
+                        // A history, a cached view, or what is drawn in one view only.
                         let is_empty = content.is_none() && matches!(storage, Storage::Own(..));
                         assert!(content == Some((view, target)) || is_empty, "{pass:?} reads {content:?}");
                     }
@@ -427,9 +423,11 @@ mod tests {
                 sharing.entry(texture).or_default().push((view, target));
                 let kind = self.transient.textures()[texture];
                 let [width, height] = planned.size.in_view(self.views[view].camera.size);
-                assert_eq!((kind.format, kind.stored, kind.size), (planned.format, planned.stored, [width, height]));
+                assert_eq!((kind.format, kind.size), (planned.format, [width, height]));
+                assert_eq!((kind.stored, kind.mipmapped), (planned.stored, planned.mipmapped));
                 assert!(!self.imported.contains(&(view, planned.name.clone())), "an imported target is transient");
-                assert!(!planned.output && planned.copy_of.is_none() && planned.views != ViewKind::Shadow);
+                assert!(!planned.output && planned.copy_of.is_none());
+                assert!(self.views[view].camera.redraw.is_every_frame(), "the target of a cached view is transient");
             }
             assert_eq!(sharing.len(), self.transient.textures().len(), "a texture is not used");
             for kind in self.transient.textures() {

@@ -41,7 +41,8 @@ impl<R: Real> LightCpuShader<R> for LightVolumesCpuShader {
             return false;
         }
         if let Some(shadows) = self.shadows {
-            illuminance = illuminance * shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, position, normal);
+            let (maps, by_layer) = (pass.sampled[SHADOW_MAPS], pass.lights_by_layer);
+            illuminance = illuminance * shadows.light_visibility(maps, light, by_layer, position, normal);
         }
         let reflected = rgb(stored(DIFFUSE)).map(|value| value / R::of(PI)) * illuminance;
         // Above 65,504 a half float would become infinite, and later NaN.
@@ -79,7 +80,7 @@ mod tests {
     }
 
     fn light(position: DVec3) -> Light {
-        Light::Point { position, intensity: Vec3::new(3.0, 5.0, 7.0), range: 40.0 }
+        Light::Point { position, intensity: Vec3::new(3.0, 5.0, 7.0), range: 40.0, casts_shadow: false }
     }
 
     proptest! {
@@ -175,7 +176,7 @@ mod tests {
             outer_angle: 0.5,
             casts_shadow: true,
         };
-        let map = RenderView { layer: 1, ..RenderView::new(&maps.camera("map".into(), &spot, &[]).unwrap()) };
+        let map = RenderView { layer: 1, ..RenderView::new(&maps.cameras("map", &spot, &[])[0]) };
         let light = light_values(&spot, Some(&map));
         let targets = [plain([view.near / 4.0, 0.0, 0.0, 0.0]), plain([0.0; 4]), plain([1.0; 4])];
         let [depth, normal, diffuse] = &targets;

@@ -9,9 +9,11 @@ pub(in crate::process::deferred) fn shadow_shader(maps: Option<(u32, &ShadowMaps
         Some((binding, maps)) => format!(
             "@group(2) @binding({binding}) var shadow_maps: texture_depth_2d_array;\n\
              const SHADOW_BIAS: f32 = {:?};\n\
-             const SHADOW_FILTER: i32 = {};\n{}",
+             const SHADOW_FILTER: i32 = {};\n\
+             const SHADOW_CASCADES: u32 = {};\n{}",
             maps.bias,
             maps.filter,
+            maps.cascades,
             include_str!("shadow.wgsl")
         ),
     }

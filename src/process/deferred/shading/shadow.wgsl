@@ -12,6 +12,49 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
     if light.shadow_layer == NO_SHADOW_MAP {
         return 1.0;
     }
+    if light.kind == POINT {
+        let face = shadow_map_of_layer(light.shadow_layer + cube_face(position - light.position));
+        return filtered_visibility(face.shadow_layer, biased_point(face, position, normal));
+    }
+    var map = light;
+    if light.kind == DIRECTIONAL {
+        // The finest cascade in which the filter reads no pixel outside of the map.
+        let side = f32(textureDimensions(shadow_maps).x);
+        let extent = 1.0 - f32(2 * SHADOW_FILTER + 1) / side;
+        for (var cascade = 1u; cascade < SHADOW_CASCADES; cascade++) {
+            let found = biased_point(map, position, normal);
+            if all(abs(found.clip) < vec2<f32>(extent)) && found.depth > 0.0 && found.depth < 1.0 {
+                return filtered_visibility(map.shadow_layer, found);
+            }
+            map = shadow_map_of_layer(light.shadow_layer + cascade);
+        }
+    }
+    let found = biased_point(map, position, normal);
+    if any(abs(found.clip) >= vec2<f32>(1.0)) || found.depth <= 0.0 {
+        return 1.0;
+    }
+    return filtered_visibility(map.shadow_layer, found);
+}
+
+// A light that has several maps, as one of them shows it.
+fn shadow_map_of_layer(layer: u32) -> Light {
+    return lights[view.light_count + layer];
+}
+
+// The face of a cube around the origin that a position is seen through: 0 for +X, 1 for -X, and so on.
+fn cube_face(position: vec3<f32>) -> u32 {
+    let distance = abs(position);
+    if distance.x >= distance.y && distance.x >= distance.z {
+        return select(0u, 1u, position.x < 0.0);
+    }
+    if distance.y >= distance.z {
+        return select(2u, 3u, position.y < 0.0);
+    }
+    return select(4u, 5u, position.z < 0.0);
+}
+
+// The point of a light's map at which a position is looked up: that of the position, moved towards the light by the bias.
+fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>) -> ShadowMapPoint {
     var towards = -light.direction;
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - position);
@@ -20,11 +63,7 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
     let offset = SHADOW_BIAS * shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
 
     // An offset towards the light does not change where in the map the position is.
-    let moved = shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
-    if any(abs(moved.clip) >= vec2<f32>(1.0)) || moved.depth <= 0.0 {
-        return 1.0;
-    }
-    return filtered_visibility(light.shadow_layer, moved);
+    return shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
 }
 
 // The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in
@@ -50,7 +89,7 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     let local = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
     switch light.kind {
-        case SPOT: {
+        case SPOT, POINT: {
             let half = light.shadow_half * max(-local.z, light.shadow_near);
             return ShadowMapPoint(local.xy / half, light.shadow_near / max(-local.z, light.shadow_near), 2.0 * half / side);
         }

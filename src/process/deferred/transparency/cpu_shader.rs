@@ -42,7 +42,8 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
             let unobstructed = illuminance_from(light, position, normal);
             if unobstructed.0.iter().any(|&value| value > R::zero()) {
                 let visibility = self.shadows.map_or(R::one(), |shadows| {
-                    shadows.light_visibility(pass.sampled[SHADOW_MAPS], light, position, normal)
+                    let maps = pass.sampled[SHADOW_MAPS];
+                    shadows.light_visibility(maps, light, pass.lights_by_layer, position, normal)
                 });
                 illuminance = illuminance + unobstructed * visibility;
             }
@@ -118,7 +119,7 @@ mod tests {
         let sun = |direction: Vec3| Light::Directional { direction, illuminance: Vec3::splat(4.0), casts_shadow: true };
         let maps = ShadowMaps::default();
         let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
-        let map = RenderView::new(&maps.camera("map".into(), &sun(Vec3::NEG_Z), &[main]).unwrap());
+        let map = RenderView::new(&maps.cameras("map", &sun(Vec3::NEG_Z), &[main])[0]);
         let shadowed = light_values(&sun(Vec3::NEG_Z), Some(&map));
         let [before, behind] = [Vec3::NEG_Z, Vec3::Z].map(|direction| light_values(&sun(direction), None));
         let none = drawn(Blend::Alpha, &[behind], None);

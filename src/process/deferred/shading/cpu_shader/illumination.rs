@@ -59,7 +59,7 @@ mod tests {
         let (intensity, casts_shadow) = (INTENSITY, false);
         [
             Light::Directional { direction, illuminance: intensity, casts_shadow },
-            Light::Point { position, intensity, range },
+            Light::Point { position, intensity, range, casts_shadow: false },
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
             Light::Hemispherical { position, direction, intensity, range, casts_shadow },
         ]
@@ -129,7 +129,7 @@ mod tests {
         #[test]
         fn the_window_subtracts_little_within_the_range_for_an_intensity(share in 1e-3..1.0_f64, intensity in 0.1..1e3_f32) {
             let range = Light::range_for(Vec3::splat(intensity));
-            let light = Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range };
+            let light = Light::Point { position: DVec3::ZERO, intensity: Vec3::splat(intensity), range, casts_shadow: false };
             let distance = share * f64::from(range);
             let position = Vector([0.0, 0.0, distance]);
             let found = illuminance_from(&light_values(&light, None), position, Vector([0.0, 0.0, -1.0]))[0];

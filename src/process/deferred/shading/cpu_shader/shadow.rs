@@ -11,28 +11,65 @@ use crate::view::ShadowMaps;
 pub(in crate::process::deferred) struct ShadowFilter {
     bias: f32,
     filter: u32,
+    cascades: u32,
 }
 
 impl ShadowFilter {
     /// With the settings of these maps.
     pub(in crate::process::deferred) fn new(maps: &ShadowMaps) -> Self {
-        Self { bias: maps.bias, filter: maps.filter }
+        Self { bias: maps.bias, filter: maps.filter, cascades: maps.cascades }
     }
 
-    /// The fraction of a light that reaches a position, from 0 to 1.
+    /// The fraction of a light that reaches a position, from 0 to 1. `by_layer` are the lights by layer.
     pub(in crate::process::deferred) fn light_visibility<R: Real>(
         self,
         maps: &dyn SampledTexture<R>,
         light: &ShaderLight<R>,
+        by_layer: &[ShaderLight<R>],
         position: Vector3<R>,
         normal: Vector3<R>,
     ) -> R {
         let Some(layer) = light.shadow_layer else { return R::one() };
+        let side = maps.size()[0];
+        let (mut map, mut map_layer) = (light, layer);
+        if light.kind == LightKind::Point {
+            map_layer = layer + cube_face(position - light.position);
+            map = &by_layer[map_layer];
+            return self.filtered_visibility(maps, map_layer, &self.biased_point(side, map, position, normal));
+        }
+        if light.kind == LightKind::Directional {
+            // The finest cascade in which the filter reads no pixel outside of the map.
+            let extent = R::one() - R::of(f64::from(2 * self.filter + 1)) / R::of(side as f64);
+            for cascade in 1..self.cascades as usize {
+                let found = self.biased_point(side, map, position, normal);
+                let is_inside = found.clip.0.iter().all(|value| value.abs() < extent);
+                if is_inside && found.depth > R::zero() && found.depth < R::one() {
+                    return self.filtered_visibility(maps, map_layer, &found);
+                }
+                map_layer = layer + cascade;
+                map = &by_layer[map_layer];
+            }
+        }
+        let found = self.biased_point(side, map, position, normal);
+        if found.clip.0.iter().any(|value| value.abs() >= R::one()) || found.depth <= R::zero() {
+            return R::one();
+        }
+        self.filtered_visibility(maps, map_layer, &found)
+    }
+
+    /// The point of a light's map at which a position is looked up: that of the position, moved towards the light by the
+    /// bias.
+    fn biased_point<R: Real>(
+        self,
+        side: usize,
+        light: &ShaderLight<R>,
+        position: Vector3<R>,
+        normal: Vector3<R>,
+    ) -> ShadowMapPoint<R> {
         let towards = match light.kind {
             LightKind::Directional => -light.direction,
             _ => normalize(light.position - position),
         };
-        let side = maps.size()[0];
         // Slope times this, in pixels' widths, is an upper bound of the depth change within the filter.
         let reach = R::of(f64::from(self.filter + 1));
         let offset = R::of(f64::from(self.bias))
@@ -40,12 +77,7 @@ impl ShadowFilter {
             * (R::of(0.1) + reach * shadow_slope(light, normal, towards));
 
         // An offset towards the light does not change where in the map the position is.
-        let moved =
-            shadow_map_point(side, light, position + towards * offset.min((light.position - position).length()));
-        if moved.clip.0.iter().any(|value| value.abs() >= R::one()) || moved.depth <= R::zero() {
-            return R::one();
-        }
-        self.filtered_visibility(maps, layer, &moved)
+        shadow_map_point(side, light, position + towards * offset.min((light.position - position).length()))
     }
 
     /// The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are
@@ -83,6 +115,19 @@ impl ShadowFilter {
     }
 }
 
+/// The face of a cube around the origin that a position is seen through: 0 for +X, 1 for −X, and so on.
+fn cube_face<R: Real>(position: Vector3<R>) -> usize {
+    let Vector([x, y, z]) = position.map(|value| value.abs());
+    let axis = if x >= y && x >= z {
+        0
+    } else if y >= z {
+        1
+    } else {
+        2
+    };
+    2 * axis + usize::from(position[axis] < R::zero())
+}
+
 /// A point of a light's shadow map.
 struct ShadowMapPoint<R> {
     /// From (-1, -1) at the map's lower left to (1, 1) at its upper right.
@@ -98,7 +143,7 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
     let Vector([x, y, z]) = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
     match light.kind {
-        LightKind::Spot => {
+        LightKind::Spot | LightKind::Point => {
             let distance = (-z).max(light.shadow_near);
             let half = light.shadow_half * distance;
             ShadowMapPoint {
@@ -156,22 +201,43 @@ mod tests {
 
     const SIDE: usize = 64;
 
-    /// A light of each kind that casts shadows, with the view that draws its map.
-    fn shadowed() -> [(Light, RenderView); 3] {
+    /// A light of each kind that casts shadows, with the view that draws its first map.
+    fn shadowed() -> [(Light, RenderView); 4] {
         let (position, direction) = (DVec3::new(1.0, 2.0, -3.0), Vec3::new(0.48, -0.6, 0.64));
         let (intensity, range, casts_shadow) = (Vec3::ONE, 8.0, true);
         let [inner_angle, outer_angle] = [0.3, 0.7];
-        let maps = ShadowMaps { side: SIDE as u32, max_distance: 10.0, ..ShadowMaps::default() };
-        let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
         [
             Light::Directional { direction, illuminance: intensity, casts_shadow },
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow },
             Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+            Light::Point { position, intensity, range, casts_shadow },
         ]
         .map(|light| {
-            let camera = maps.camera("map".into(), &light, std::slice::from_ref(&main)).unwrap();
-            (light, RenderView { layer: 2, ..RenderView::new(&camera) })
+            let [first, ..] = &maps_of(&light)[..] else { unreachable!("it casts shadows") };
+            (light, first.clone())
         })
+    }
+
+    /// The views that draw a light's maps, from layer 2 on.
+    fn maps_of(light: &Light) -> Vec<RenderView> {
+        let maps = ShadowMaps { side: SIDE as u32, max_distance: 10.0, ..ShadowMaps::default() };
+        let main = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
+        let cameras = maps.cameras("map", light, &[main]);
+        (2..).zip(&cameras).map(|(layer, camera)| RenderView { layer, ..RenderView::new(camera) }).collect()
+    }
+
+    /// The fraction of a light of [`shadowed`] that reaches a position.
+    fn visibility<R: Real>(
+        filter: ShadowFilter,
+        maps: &dyn SampledTexture<R>,
+        light: &Light,
+        position: Vector3<R>,
+        normal: Vector3<R>,
+    ) -> R {
+        let of_maps = maps_of(light);
+        let views = [&of_maps[0]; 2].into_iter().chain(&of_maps);
+        let by_layer: Vec<_> = views.map(|map| light_values(light, Some(map))).collect();
+        filter.light_visibility(maps, &by_layer[2], &by_layer, position, normal)
     }
 
     fn shadow_filter(bias: f32, filter: u32) -> ShadowFilter {
@@ -207,6 +273,27 @@ mod tests {
             }
         }
 
+        /// The filter reads no pixel outside of a cube's face, and the face is where a position was drawn.
+        #[test]
+        fn a_cubes_face_contains_the_filter_of_what_is_seen_through_it(
+            way in direction(),
+            filter in 0..=ShadowMaps::MAX_FILTER,
+            side in 16..2048_u32,
+        ) {
+            let [.., (light, _)] = shadowed();
+            let Light::Point { position, .. } = light else { unreachable!() };
+            let face = cube_face(Vector3::<f64>::of(way));
+            let maps = ShadowMaps { side, filter, ..ShadowMaps::default() };
+            let map = RenderView::new(&maps.cameras("map", &light, &[])[face]);
+            let [x, y, _, w] = view_values::<f64>(&map).clip_position(Vector3::of(way)).0;
+            prop_assert!(w > 0.0);
+            let values = light_values(&light, Some(&map));
+            let found = shadow_map_point(side as usize, &values, Vector3::<f64>::of(position + way));
+            prop_assert!((found.clip[0] - x / w).abs() + (found.clip[1] - y / w).abs() < 1e-4, "{:?}", found.clip);
+            let pixels = found.clip.map(|value| (1.0 - value.abs()) * f64::from(side) / 2.0);
+            prop_assert!(pixels.0.iter().all(|pixels| *pixels > f64::from(filter) + 0.99), "{pixels:?}");
+        }
+
         /// A step of a pixel's width across the map leads to the next pixel. On a flat map that is exact; on a
         /// paraboloid, whose scale changes by its own size from the middle to the rim, it is to the first order in the
         /// pixel's angle, 4/side.
@@ -237,16 +324,14 @@ mod tests {
             filter in 0..=ShadowMaps::MAX_FILTER,
         ) {
             for (light, map) in shadowed() {
-                let light = light_values::<f32>(&light, Some(&map));
                 let position = Vector3::of(position_in_map(&map, across, distance));
-                let share = |depth: f64| shadow_filter(1.0, filter).light_visibility(&plain::<f32>([depth, 0.0, 0.0, 0.0]), &light, position, Vector3::of(normal));
+                let share = |depth: f64| visibility(shadow_filter(1.0, filter), &plain::<f32>([depth, 0.0, 0.0, 0.0]), &light, position, Vector3::of(normal));
                 prop_assert!((f64::from(share(0.0)) - 1.0).abs() <= 102.0 * UNIT);
                 let moved = share(1.0);
                 // A position that the offset moves to the light itself, or out of the map, is lit.
                 prop_assert!(moved == 0.0 || (moved - 1.0).abs() < 1e-5);
-                let mut without = light;
-                without.shadow_layer = None;
-                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, position, Vector3::of(normal)), 1.0);
+                let without = light_values(&light, None);
+                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, &[], position, Vector3::of(normal)), 1.0);
             }
         }
 
@@ -260,15 +345,14 @@ mod tests {
             filter in 0..=ShadowMaps::MAX_FILTER,
         ) {
             let (light, map) = &shadowed()[1];
-            let light = light_values::<f64>(light, Some(map));
             let position = Vector3::of(position_in_map(map, [across, row], 0.5));
             let facing = Vector3::<f64>::of_single(-map.picture_axes()[2]);
             let shade = |[column, _]: [usize; 2], layer| {
                 assert_eq!(layer, 2);
                 Vector::splat(if column < edge { 1.0 } else { 0.0 })
             };
-            let share = shadow_filter(0.0, filter).light_visibility(&FunctionTexture { size: [SIDE; 2], color: shade }, &light, position, facing);
-            let column = (shadow_map_point(SIDE, &light, position).clip[0] + 1.0) / 2.0 * SIDE as f64;
+            let share = visibility(shadow_filter(0.0, filter), &FunctionTexture { size: [SIDE; 2], color: shade }, light, position, facing);
+            let column = (shadow_map_point(SIDE, &light_values(light, Some(map)), position).clip[0] + 1.0) / 2.0 * SIDE as f64;
             let wide = f64::from(2 * filter + 1);
             let beyond = (column + wide / 2.0 - edge as f64).clamp(0.0, wide) / wide;
             prop_assert!((share - beyond).abs() < 1e-9, "{share} {beyond}");
@@ -282,7 +366,6 @@ mod tests {
             filter in 0..=2_u32,
         ) {
             for (light, map) in shadowed() {
-                let values = light_values::<f64>(&light, Some(&map));
                 let [right, up, forward] = map.picture_axes().map(|axis| axis.as_dvec3().normalize());
                 let normal = (right * tilt[0] + up * tilt[1] - forward).normalize();
                 let middle = position_in_map(&map, [0.0; 2], 0.5);
@@ -313,9 +396,9 @@ mod tests {
                     };
                     start + way * ((middle - start).dot(normal) / way.dot(normal))
                 };
-                let share = shadow_filter(1.0, filter)
-                    .light_visibility(&FunctionTexture { size: [SIDE; 2], color: depth_of }, &values, Vector3::of(position), Vector3::of(normal));
-                prop_assert!(share > 1.0 - 1e-9, "{:?} {share} {tilt:?} {across:?}", values.kind);
+                let drawn = FunctionTexture { size: [SIDE; 2], color: depth_of };
+                let share = visibility(shadow_filter(1.0, filter), &drawn, &light, Vector3::of(position), Vector3::of(normal));
+                prop_assert!(share > 1.0 - 1e-9, "{light:?} {share} {tilt:?} {across:?}");
             }
         }
     }
@@ -323,12 +406,12 @@ mod tests {
     #[test]
     fn an_occluder_blocks_the_light() {
         for (light, map) in shadowed() {
-            let light = light_values::<f64>(&light, Some(&map));
+            let values = light_values::<f64>(&light, Some(&map));
             let towards = Vector3::of_single(-map.picture_axes()[2]);
             let share = |distance: f64, wall: f64| {
-                let depth = shadow_map_point(SIDE, &light, Vector3::of(position_in_map(&map, [0.0; 2], wall))).depth;
+                let depth = shadow_map_point(SIDE, &values, Vector3::of(position_in_map(&map, [0.0; 2], wall))).depth;
                 let position = Vector3::of(position_in_map(&map, [0.0; 2], distance));
-                shadow_filter(1.0, 1).light_visibility(&plain([depth, 0.0, 0.0, 0.0]), &light, position, towards)
+                visibility(shadow_filter(1.0, 1), &plain::<f64>([depth, 0.0, 0.0, 0.0]), &light, position, towards)
             };
             assert!((share(0.4, 0.5) - 1.0).abs() < 1e-12, "before the wall");
             assert_eq!(share(0.6, 0.5), 0.0, "behind it");
@@ -338,17 +421,18 @@ mod tests {
     #[test]
     fn positions_outside_of_a_map_are_lit() {
         let shade = plain::<f64>([1.0; 4]);
-        for (light, map) in shadowed() {
-            let light = light_values::<f64>(&light, Some(&map));
+        // A cube sees everything.
+        let [directional, spot, hemisphere, _] = shadowed();
+        for (light, map) in [directional, spot, hemisphere] {
             let [right, _, forward] = map.picture_axes().map(Vec3::as_dvec3);
             let far = f64::from(map.camera.far);
             let share = |way: DVec3| {
-                let is_sun = light.kind == LightKind::Directional;
+                let is_sun = light.kind() == LightKind::Directional;
                 let facing = if is_sun { -forward } else { -way.normalize() };
                 let position = Vector3::of(map.camera.position + way);
-                shadow_filter(1.0, 1).light_visibility(&shade, &light, position, Vector3::of(facing))
+                visibility(shadow_filter(1.0, 1), &shade, &light, position, Vector3::of(facing))
             };
-            assert_eq!(share(forward * far * 1.1), if light.kind == LightKind::Spot { 0.0 } else { 1.0 });
+            assert_eq!(share(forward * far * 1.1), if light.kind() == LightKind::Spot { 0.0 } else { 1.0 });
             assert_eq!(share(right.normalize() * far * 1.1 + forward * 0.1), 1.0);
         }
     }

@@ -7,7 +7,7 @@ use crate::scene::{LayerMask, Material, MaterialLayout, SceneRef};
 
 /// Which objects a process draws by their layers and material types.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ObjectFilter<'a> {
+pub(crate) struct SelectionFilter<'a> {
     /// Of each object; empty if all have the same answer.
     layers: &'a [LayerMask],
     drawn: LayerMask,
@@ -20,7 +20,7 @@ pub(crate) struct ObjectFilter<'a> {
     drawn_types: MaterialTypeFilter,
 }
 
-impl<'a> ObjectFilter<'a> {
+impl<'a> SelectionFilter<'a> {
     pub(crate) fn new(table: &'a ObjectTable, scene: &SceneRef<'a>, selection: Selection) -> Self {
         let (drawn, excluded, visible) = (selection.layers, selection.excluded_layers, selection.visible_layers);
         let is_of_all = (drawn, excluded, visible) == (LayerMask::ALL, LayerMask::NONE, LayerMask::ALL);

@@ -1,0 +1,167 @@
+//! The views of a budget, and the forms in which they may be drawn.
+
+use std::borrow::Cow;
+
+use super::BudgetError;
+use crate::scene::{Camera, Redraw};
+
+/// A view whose cost a [`ViewBudget`](super::ViewBudget) may reduce.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BudgetedView {
+    /// Identifies the view from frame to frame, and names it in reports.
+    pub name: String,
+    /// Views of lower priority are shed first. Of equal ones, the last is.
+    pub priority: i32,
+    /// The view at its best: one camera, or several that are shed together, such as the sides of a cube map, a mirror and the mirrors in it,
+    /// or the samples of antialiasing. Their names are unique among all views of the budget.
+    pub cameras: Vec<Camera>,
+    /// Forms that cost less, each less than the one before: rung 1, rung 2, and so on. Rung 0 is the view at its best. Only the last one may
+    /// be [`Rung::LeftOut`].
+    pub ladder: Vec<Rung>,
+}
+
+/// A form in which a view is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Rung {
+    /// It is drawn in a cheaper form.
+    Drawn(ViewForm),
+    /// The frame leaves the view out. Processes that sample it read zeros.
+    LeftOut,
+}
+
+/// A cheaper form of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewForm {
+    /// The view is drawn every so many frames, at least 1: see [`Redraw::Interval`]. At 1, its cameras say how often. It makes no difference
+    /// to a camera with [`Redraw::OnCameraChange`].
+    pub interval: u32,
+    /// The width and height of the picture, as a share of those of the cameras: above 0 and up to 1.
+    pub size: f32,
+    /// The factor by which [`Camera::level_of_detail_scale`] is larger, at least 1: the error of coarser meshes, in pixels.
+    pub level_of_detail_scale: f32,
+    /// Cameras beyond this number are left out, at least 1.
+    pub max_cameras: usize,
+}
+
+impl ViewForm {
+    /// The view at its best.
+    pub const BEST: Self = Self { interval: 1, size: 1.0, level_of_detail_scale: 1.0, max_cameras: usize::MAX };
+
+    /// The cameras of the view in this form.
+    fn cameras(self, cameras: &[Camera]) -> impl Iterator<Item = Camera> {
+        cameras.iter().take(self.max_cameras).map(move |camera| Camera {
+            // An empty picture stays empty, so that its error names it.
+            size: camera.size.map(|pixels| ((pixels as f32 * self.size).round() as u32).max(pixels.min(1))),
+            redraw: self.redraw(camera),
+            level_of_detail_scale: camera.level_of_detail_scale * self.level_of_detail_scale,
+            ..camera.clone()
+        })
+    }
+
+    /// How often a camera of the view is drawn in this form.
+    fn redraw(self, camera: &Camera) -> Redraw {
+        match camera.redraw {
+            Redraw::EveryFrame if self.interval > 1 => Redraw::Interval(self.interval),
+            Redraw::Interval(interval) => Redraw::Interval(interval.max(self.interval)),
+            redraw => redraw,
+        }
+    }
+
+    fn problem(self) -> Option<&'static str> {
+        if self.interval == 0 {
+            Some("an interval of 0 frames")
+        } else if !(self.size > 0.0 && self.size <= 1.0) {
+            Some("a size that is not above 0 and up to 1")
+        } else if !(self.level_of_detail_scale >= 1.0 && self.level_of_detail_scale.is_finite()) {
+            Some("a level of detail that is not coarser by a factor of 1 or more")
+        } else if self.max_cameras == 0 {
+            Some("no camera")
+        } else {
+            None
+        }
+    }
+}
+
+impl Rung {
+    /// The view at its best.
+    pub(super) const BEST: Self = Self::Drawn(ViewForm::BEST);
+
+    /// The cameras of the view on this rung.
+    pub(super) fn cameras(self, cameras: &[Camera]) -> impl Iterator<Item = Camera> {
+        let form = match self {
+            Self::Drawn(form) => Some(form),
+            Self::LeftOut => None,
+        };
+        form.into_iter().flat_map(move |form| form.cameras(cameras))
+    }
+
+    /// The share of a view's cameras that a frame draws, on average, in cameras.
+    pub(super) fn draws_per_frame(self, cameras: &[Camera]) -> f32 {
+        let Self::Drawn(form) = self else { return 0.0 };
+        let draws = |camera: &Camera| match form.redraw(camera) {
+            Redraw::Interval(interval) => 1.0 / interval as f32,
+            Redraw::EveryFrame | Redraw::OnCameraChange => 1.0,
+        };
+        // `sum` of nothing is −0.
+        cameras.iter().take(form.max_cameras).map(draws).fold(0.0, |sum, draws| sum + draws)
+    }
+
+    /// What drawing a camera costs before it was measured, as a share of what it costs at its best: proportional to the pixels.
+    pub(super) fn expected_share(self) -> f32 {
+        match self {
+            Self::Drawn(form) => form.size * form.size,
+            Self::LeftOut => 0.0,
+        }
+    }
+
+    /// Whether drawing a camera costs the same on both rungs.
+    pub(super) fn draws_like(self, other: Self) -> bool {
+        let (Self::Drawn(one), Self::Drawn(other)) = (self, other) else { return false };
+        (one.size, one.level_of_detail_scale) == (other.size, other.level_of_detail_scale)
+    }
+
+    /// Its name in reports.
+    pub(super) fn name(self) -> Cow<'static, str> {
+        let Self::Drawn(form) = self else { return "left out".into() };
+        let mut parts = Vec::new();
+        if form.interval > 1 {
+            parts.push(format!("every {} frames", form.interval));
+        }
+        if form.size < 1.0 {
+            parts.push(format!("{}% of the size", (form.size * 100.0).round()));
+        }
+        if form.level_of_detail_scale > 1.0 {
+            parts.push(format!("meshes coarser by {}", form.level_of_detail_scale));
+        }
+        if form.max_cameras < usize::MAX {
+            parts.push(format!("{} cameras", form.max_cameras));
+        }
+        if parts.is_empty() { "at its best".into() } else { parts.join(", ").into() }
+    }
+}
+
+impl BudgetedView {
+    /// All rungs, rung 0 first.
+    pub(super) fn rungs(&self) -> impl Iterator<Item = Rung> {
+        std::iter::once(Rung::BEST).chain(self.ladder.iter().copied())
+    }
+
+    /// # Errors
+    /// If a rung is invalid, or comes after the one that leaves the view out.
+    pub(super) fn check(&self) -> Result<(), BudgetError> {
+        if let Some(left_out) =
+            self.rungs().position(|rung| rung == Rung::LeftOut).filter(|rung| *rung < self.ladder.len())
+        {
+            return Err(BudgetError::RungAfterLeftOut { view: self.name.clone(), rung: left_out + 1 });
+        }
+        for (rung, form) in self.rungs().enumerate() {
+            if let Rung::Drawn(form) = form
+                && let Some(problem) = form.problem()
+            {
+                return Err(BudgetError::InvalidRung { view: self.name.clone(), rung, problem });
+            }
+        }
+        Ok(())
+    }
+}

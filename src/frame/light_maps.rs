@@ -1,0 +1,48 @@
+//! The shadow maps of lights in the [view cache](super::view_cache).
+
+use std::mem::discriminant;
+
+use super::views::FrameViews;
+use crate::scene::{Light, Projection};
+use crate::view::RenderView;
+
+/// Whether lights of the same kinds request maps in the same order, wherever the lights are.
+pub(super) fn have_same_maps(before: &FrameViews, requested: &FrameViews) -> bool {
+    fn maps(frame: &FrameViews) -> impl Iterator<Item = (&str, usize, Option<std::mem::Discriminant<Light>>)> {
+        // Shadow cameras of the engine's own have no light.
+        let with_light = frame.views.iter().filter_map(|view| Some((view, view.valid_light?)));
+        with_light.map(|(view, light)| (view.name(), light, frame.lights.get(light).map(discriminant)))
+    }
+    maps(before).eq(maps(requested))
+}
+
+/// Whether a directional light's map, which covers what main cameras see, still covers most of that. Other maps move with their
+/// lights.
+pub(super) fn covers(cached: &RenderView, requested: &RenderView) -> bool {
+    let (Projection::Orthographic { height }, Projection::Orthographic { height: requested_height }) =
+        (cached.camera.projection, requested.camera.projection)
+    else {
+        return true;
+    };
+    // The centre of the ball that a map covers: see `ShadowMaps::cameras`.
+    let center = |view: &RenderView| {
+        let [_, _, forward] = view.picture_axes();
+        view.camera.position + forward.as_dvec3() * f64::from(view.camera.far - view.camera.near)
+    };
+    // The size may grow by a quarter, and the centre may move by a quarter of the radius.
+    requested_height <= height * 1.25 && center(cached).distance(center(requested)) <= f64::from(height) * 0.125
+}
+
+/// A cached light with its current brightness.
+pub(super) fn with_brightness_of(mut cached: Light, light: &Light) -> Light {
+    let (Light::Directional { illuminance: before, .. }
+    | Light::Point { intensity: before, .. }
+    | Light::Spot { intensity: before, .. }
+    | Light::Hemispherical { intensity: before, .. }) = &mut cached;
+    let (Light::Directional { illuminance: now, .. }
+    | Light::Point { intensity: now, .. }
+    | Light::Spot { intensity: now, .. }
+    | Light::Hemispherical { intensity: now, .. }) = light;
+    *before = *now;
+    cached
+}

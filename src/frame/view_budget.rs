@@ -1,0 +1,435 @@
+//! The controller that keeps the cost of a frame's views within a budget.
+//!
+//! **What it predicts.** A frame costs what its views cost and a rest, which no view's form changes. A view costs what drawing one of its
+//! cameras costs on its rung, times the cameras that a frame draws on average. Both are measured, and [`ViewCost`] predicts the rungs on which
+//! the view is not. So the cost of any assignment of rungs is a sum, known without trying it.
+//!
+//! **How it chooses.** If the predicted cost exceeds the budget for [`OVER_FRAMES`] frames, it sheds: from the lowest priority on, each view
+//! descends its ladder until the prediction fits, all in one frame, as each frame over the budget is late. A view that would save next to
+//! nothing is passed over. If not even the last rungs fit, all views take these, and the budget is
+//! [exhausted](ViewBudget::is_exhausted). If there is room, it restores in the opposite order, one rung of one view at a time, and waits
+//! [`SETTLE_FRAMES`] for what that costs. While that view waits, no other view is restored, because it would take the room that the first one
+//! waits for.
+//!
+//! **Why it does not flap.** A rung is restored only if the prediction leaves room for a rise by [`HYSTERESIS`]. A restoration that is undone
+//! soon had a wrong prediction, so the view's pause before the next one doubles, up to [`MAX_PAUSE`].
+//!
+//! **How it finds out that it is wrong.** What a view that is left out costs is remembered, but cannot be measured, and the ratio of two rungs is
+//! wrong if the scene changed while it was measured. So a rung that is predicted not to fit is tried after [`TRIAL_PAUSES`] pauses, if there is
+//! room at all. The same doubling makes such trials rare where they fail.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::budgeted_view::{BudgetedView, Rung};
+use super::view_cost::ViewCost;
+use super::{BudgetError, FrameStatistics};
+#[cfg(feature = "wgpu")]
+use crate::backend::DevicePassTimes;
+use crate::scene::Camera;
+use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
+use crate::tuning::{Estimate, Filter, Hysteresis};
+
+/// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best again when there is
+/// room (M 10.4: reflections are left out on slow hardware).
+///
+/// The cost of a frame is thread time, summed over workers, or the device's time. Views are assumed to cost the same from frame to frame, so a
+/// view with [`Redraw::OnCameraChange`](crate::scene::Redraw::OnCameraChange) counts as if it were drawn in every frame.
+///
+/// ```
+/// # use std::sync::Arc;
+/// # use drawloom::backend::NullBackend;
+/// # use drawloom::glam::DVec3;
+/// # use drawloom::process::Deferred;
+/// # use drawloom::task::Scheduler;
+/// use drawloom::scene::{Camera, Scene, SceneRef};
+/// use drawloom::{BudgetedView, Renderer, Rung, ViewBudget, ViewForm};
+///
+/// # let scheduler = Arc::new(Scheduler::new(2)?);
+/// # let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// # let scene = Scene::new();
+/// let mut budget = ViewBudget::new(4.0)?;
+/// for _frame in 0..3 {
+///     let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+///     let map = Camera::looking_at("map", DVec3::Y * 50.0, DVec3::ZERO);
+///     let views = [
+///         BudgetedView { name: "main".into(), priority: 1, cameras: vec![main], ladder: vec![] },
+///         BudgetedView {
+///             name: "map".into(),
+///             priority: 0,
+///             cameras: vec![map],
+///             ladder: vec![
+///                 Rung::Drawn(ViewForm { interval: 2, ..ViewForm::BEST }),
+///                 Rung::Drawn(ViewForm { interval: 4, size: 0.5, ..ViewForm::BEST }),
+///                 Rung::LeftOut,
+///             ],
+///         },
+///     ];
+///     let cameras = budget.cameras(&views)?;
+///     renderer.add_choices(budget.choices());
+///     let recorded = renderer.record(SceneRef { cameras: &cameras, ..scene.as_scene_ref() })?;
+///     budget.update(&submitter.submit(recorded)?.statistics);
+/// }
+/// assert_eq!(budget.rung("map"), Some(0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ViewBudget {
+    /// In nanoseconds a frame.
+    budget: f32,
+    /// What a frame costs beside the views of the budget, in nanoseconds.
+    rest: Estimate,
+    views: Vec<ViewState>,
+    /// The number of calls of [`Self::cameras`].
+    frame: u64,
+    /// The frame of the latest change of a rung.
+    changed: u64,
+    /// How many frames in a row were predicted to exceed the budget.
+    over: u32,
+    /// How many frames in a row reported no rung of a view that has a ladder.
+    without_rungs: u32,
+}
+
+/// A view, and the rung it is on.
+#[derive(Debug)]
+struct ViewState {
+    priority: i32,
+    rungs: Vec<Rung>,
+    /// The names of the rungs, for reports.
+    names: Vec<Cow<'static, str>>,
+    labels: Arc<Labels>,
+    /// By rung: the cameras that a frame draws on average.
+    draws: Vec<f32>,
+    /// The names of all cameras.
+    cameras: Vec<String>,
+    rung: usize,
+    is_trial: bool,
+    cost: ViewCost,
+    /// The frames in which it was last shed, restored and requested.
+    shed: u64,
+    restored: Option<u64>,
+    requested: u64,
+    /// The frames between being shed and being restored.
+    pause: u64,
+}
+
+/// A rung is restored if the prediction is below the budget by this factor.
+const HYSTERESIS: Hysteresis = Hysteresis::new(1.15);
+
+/// The frames in a row over the budget before views are shed: a frame that is disturbed raises an average for fewer.
+const OVER_FRAMES: u32 = 4;
+
+/// The frames between two restorations: enough samples of what the first one costs.
+const SETTLE_FRAMES: u64 = 8;
+
+/// A restoration that is undone within this number of frames was wrong.
+const RETRY_FRAMES: u64 = 64;
+
+/// After this many frames in a row that report no rung, the budget warns: a frame in flight may have had other views.
+const WARNING_FRAMES: u32 = 8;
+
+const MIN_PAUSE: u64 = 16;
+const MAX_PAUSE: u64 = 1024;
+
+/// How many pauses pass before a rung is tried although it is predicted not to fit.
+const TRIAL_PAUSES: u64 = 8;
+
+/// What a view must save to be shed, as a share of the budget, unless the budget is exhausted.
+const MIN_SAVING: f32 = 0.005;
+
+/// What is known of a view is forgotten when it was not requested for this number of frames.
+const MEMORY_FRAMES: u64 = 256;
+
+const FILTER: Filter = Filter::limiting_outliers(8.0);
+
+impl ViewBudget {
+    /// A budget of so many milliseconds a frame.
+    ///
+    /// # Errors
+    /// If that is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`].
+    pub fn new(milliseconds: f64) -> Result<Self, BudgetError> {
+        let (rest, views) = (Estimate::default(), Vec::new());
+        let mut budget = Self { budget: 0.0, rest, views, frame: 0, changed: 0, over: 0, without_rungs: 0 };
+        budget.set_milliseconds(milliseconds)?;
+        Ok(budget)
+    }
+
+    /// Sets the budget from the next frame on.
+    ///
+    /// # Errors
+    /// If it is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`]; then it stays as it is.
+    pub fn set_milliseconds(&mut self, milliseconds: f64) -> Result<(), BudgetError> {
+        if !(BudgetError::MIN_MILLISECONDS..=BudgetError::MAX_MILLISECONDS).contains(&milliseconds) {
+            return Err(BudgetError::InvalidBudget { milliseconds });
+        }
+        self.budget = (milliseconds * 1e6) as f32;
+        Ok(())
+    }
+
+    /// The cameras of the next frame, in the order of the views, each view in the form of its rung. The cameras of views that the budget may
+    /// not reduce may be among them, as views without a ladder, or be added by the engine.
+    ///
+    /// Give [`Self::choices`] to [`Renderer::add_choices`](super::Renderer::add_choices) before the frame of these cameras is recorded, as the
+    /// [example](ViewBudget) does. The frame reports its rungs only then, and without them the budget learns no view's cost. It warns of
+    /// frames that report none.
+    ///
+    /// # Errors
+    /// If a rung is invalid or comes after [`Rung::LeftOut`], or if two views or two of their cameras have the same name.
+    pub fn cameras(&mut self, views: &[BudgetedView]) -> Result<Vec<Camera>, BudgetError> {
+        views.iter().try_for_each(BudgetedView::check)?;
+        let mut names: Vec<_> = views.iter().map(|view| view.name.as_str()).collect();
+        names.sort_unstable();
+        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(BudgetError::DuplicateView { view: pair[0].to_owned() });
+        }
+        check_camera_names(views)?;
+        self.frame += 1;
+        let frame = self.frame;
+        let mut before: HashMap<_, _> = self.views.drain(..).map(|state| (state.name().to_owned(), state)).collect();
+        let mut cameras = Vec::new();
+        for view in views {
+            let known = before.remove(&view.name).filter(|state| state.rungs.iter().copied().eq(view.rungs()));
+            let mut state = known.unwrap_or_else(|| ViewState::new(view));
+            state.request(view, frame);
+            cameras.extend(state.rungs[state.rung].cameras(&view.cameras));
+            self.views.push(state);
+        }
+        let mut absent: Vec<_> = before.into_values().filter(|state| frame - state.requested < MEMORY_FRAMES).collect();
+        // Not in the order of a hash map: that of equal priorities is the order here.
+        absent.sort_by(|one, other| one.name().cmp(other.name()));
+        self.views.append(&mut absent);
+        Ok(cameras)
+    }
+
+    /// The rungs of the next frame, and what each costs a frame: for [`Renderer::add_choices`](super::Renderer::add_choices). Then they are in the
+    /// [statistics](FrameStatistics::tuning), the timeline and the report of the frame, and [`Self::update`] finds them there.
+    pub fn choices(&self) -> impl Iterator<Item = TuningChoice> + '_ {
+        self.requested().filter(|view| view.rungs.len() > 1).map(|view| {
+            let alternative = |(rung, name): (usize, &Cow<'static, str>)| TuningAlternative {
+                name: name.clone(),
+                nanoseconds: view.cost.on(rung).map(|cost| cost * view.draws[rung]),
+            };
+            TuningChoice {
+                subject: TuningSubject::Rung,
+                labels: Arc::clone(&view.labels),
+                alternatives: view.names.iter().enumerate().map(alternative).collect(),
+                chosen: view.rung,
+                is_trial: view.is_trial,
+            }
+        })
+    }
+
+    /// Chooses rungs by the thread time of a frame that was submitted.
+    pub fn update(&mut self, statistics: &FrameStatistics) {
+        let FrameStatistics { views, view_times, stages, .. } = statistics;
+        let attributed = view_times.iter().sum::<Duration>().as_secs_f32();
+        // Submission belongs to no view: it is divided as the stages are.
+        let factor = if attributed > 0.0 { 1.0 + stages.submit.as_secs_f32() / attributed } else { 1.0 };
+        let drawn = views.iter().zip(view_times).filter(|(view, _)| view.age == 0);
+        let costs = drawn.map(|(view, time)| (view.name.as_str(), time.as_secs_f32() * 1e9 * factor)).collect();
+        self.add_frame(statistics, stages.total().as_secs_f32() * 1e9, &costs);
+    }
+
+    /// Chooses rungs by the device's time for a frame, with the statistics of that same frame. A budget is kept by this or by
+    /// [`Self::update`], not by both.
+    #[cfg(feature = "wgpu")]
+    pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
+        let mut costs: HashMap<&str, f32> = HashMap::new();
+        for pass in &times.passes {
+            *costs.entry(pass.view.as_str()).or_default() += pass.ended.saturating_sub(pass.began).as_secs_f32() * 1e9;
+        }
+        self.add_frame(statistics, costs.values().sum(), &costs);
+    }
+
+    /// The rung on which the next frame draws a view; `None` if [`Self::cameras`] was not given it.
+    pub fn rung(&self, view: &str) -> Option<usize> {
+        self.requested().find(|state| state.name() == view).map(|state| state.rung)
+    }
+
+    /// The predicted cost of the next frame, in milliseconds. It is 0 before the first frames were measured.
+    pub fn predicted_milliseconds(&self) -> f64 {
+        f64::from(self.predicted()) * 1e-6
+    }
+
+    /// Whether the budget is predicted to be exceeded although all views are on their last rungs.
+    pub fn is_exhausted(&self) -> bool {
+        self.predicted() > self.budget && self.requested().all(|view| view.rung + 1 == view.rungs.len())
+    }
+
+    /// Adds what a frame cost, all of it and each camera that it drew, in nanoseconds, and chooses.
+    fn add_frame(&mut self, statistics: &FrameStatistics, total: f32, costs: &HashMap<&str, f32>) {
+        let rungs: HashMap<_, _> = statistics.rungs().collect();
+        self.warn_without_rungs(&rungs);
+        let mut of_views = 0.0;
+        for view in self.views.iter_mut().filter(|view| view.requested == self.frame) {
+            let drawn = || view.cameras.iter().filter_map(|camera| costs.get(camera.as_str()));
+            let (cost, count) = (drawn().sum::<f32>(), drawn().count());
+            of_views += cost;
+            // A frame that was recorded before a rung changed says nothing about the rung.
+            let is_current = view.rungs.len() == 1 || rungs.get(view.name()) == Some(&view.rung);
+            if count > 0 && is_current {
+                view.cost.add(cost / count as f32);
+            }
+        }
+        self.rest.add((total - of_views).max(f32::MIN_POSITIVE), FILTER);
+        self.choose();
+    }
+
+    /// Warns once of frames that do not report the rungs of these views.
+    fn warn_without_rungs(&mut self, rungs: &HashMap<&str, usize>) {
+        let with_ladder = || self.requested().filter(|view| view.rungs.len() > 1);
+        let is_missing = with_ladder().count() > 0 && !with_ladder().any(|view| rungs.contains_key(view.name()));
+        self.without_rungs = if is_missing { self.without_rungs.saturating_add(1) } else { 0 };
+        if self.without_rungs == WARNING_FRAMES {
+            tracing::warn!(
+                target: "drawloom",
+                "frames report no rung of a view budget: give ViewBudget::choices to Renderer::add_choices before each"
+            );
+        }
+    }
+
+    fn choose(&mut self) {
+        if !self.rest.is_settled() {
+            return;
+        }
+        self.over = if self.predicted() > self.budget { self.over + 1 } else { 0 };
+        if self.over >= OVER_FRAMES {
+            self.over = 0;
+            self.shed();
+        } else if self.over == 0 {
+            self.restore();
+        }
+    }
+
+    /// Takes views down their ladders until the prediction fits.
+    fn shed(&mut self) {
+        let order = self.shedding_order();
+        for is_exhausted in [false, true] {
+            for &index in &order {
+                let mut rung = self.views[index].rung;
+                let others = self.predicted() - self.views[index].cost_on(rung);
+                let view = &self.views[index];
+                let least = (rung..view.rungs.len()).map(|rung| view.cost_on(rung)).fold(f32::INFINITY, f32::min);
+                let saves = view.cost_on(rung) - least >= MIN_SAVING * self.budget;
+                let is_last = |rung| rung + 1 == view.rungs.len();
+                while (saves || is_exhausted) && !is_last(rung) && others + view.cost_on(rung) > self.budget {
+                    rung += 1;
+                }
+                if rung != view.rung {
+                    self.views[index].shed_to(rung, self.frame);
+                    self.changed = self.frame;
+                }
+            }
+        }
+    }
+
+    /// Takes the view that was shed last up by one rung if that fits, or if its turn has come to be measured.
+    fn restore(&mut self) {
+        let order = self.shedding_order();
+        let Some(&index) = order.iter().rev().find(|index| self.views[**index].rung > 0) else { return };
+        let (view, now) = (&self.views[index], self.predicted());
+        let waited = self.frame - view.shed;
+        // A view that is drawn seldom may not have been measured since it was restored.
+        let is_measured = view.rungs[view.rung] == Rung::LeftOut || view.cost.on(view.rung).is_some();
+        if self.frame - self.changed < SETTLE_FRAMES || waited < view.pause || !is_measured {
+            return;
+        }
+        let has_room = |predicted: f32| predicted * HYSTERESIS.factor() <= self.budget;
+        let restored = now - view.cost_on(view.rung) + view.cost_on(view.rung - 1);
+        let is_trial = !has_room(restored);
+        if !is_trial || has_room(now) && waited >= TRIAL_PAUSES * view.pause {
+            self.views[index].restore(is_trial, self.frame);
+            self.changed = self.frame;
+        }
+    }
+
+    /// The indices of the requested views, the first to be shed first.
+    fn shedding_order(&self) -> Vec<usize> {
+        let mut order: Vec<_> =
+            (0..self.views.len()).rev().filter(|index| self.views[*index].requested == self.frame).collect();
+        order.sort_by_key(|index| self.views[*index].priority);
+        order
+    }
+
+    fn requested(&self) -> impl Iterator<Item = &ViewState> {
+        self.views.iter().filter(|view| view.requested == self.frame)
+    }
+
+    /// In nanoseconds.
+    fn predicted(&self) -> f32 {
+        self.rest.get().unwrap_or(0.0) + self.requested().map(|view| view.cost_on(view.rung)).sum::<f32>()
+    }
+}
+
+impl ViewState {
+    fn new(view: &BudgetedView) -> Self {
+        let rungs: Vec<_> = view.rungs().collect();
+        Self {
+            priority: view.priority,
+            names: rungs.iter().map(|rung| rung.name()).collect(),
+            labels: Arc::new(Labels { view: Some(view.name.as_str().into()), ..Labels::default() }),
+            draws: Vec::new(),
+            cameras: Vec::new(),
+            rung: 0,
+            is_trial: false,
+            cost: ViewCost::new(&rungs),
+            rungs,
+            shed: 0,
+            restored: None,
+            requested: 0,
+            pause: MIN_PAUSE,
+        }
+    }
+
+    fn name(&self) -> &str {
+        self.labels.view.as_deref().unwrap_or_default()
+    }
+
+    fn request(&mut self, view: &BudgetedView, frame: u64) {
+        (self.priority, self.requested) = (view.priority, frame);
+        self.draws = self.rungs.iter().map(|rung| rung.draws_per_frame(&view.cameras)).collect();
+        self.cameras = view.cameras.iter().map(|camera| camera.name.clone()).collect();
+    }
+
+    /// The predicted cost on a rung, in nanoseconds a frame; 0 before it was measured.
+    fn cost_on(&self, rung: usize) -> f32 {
+        self.cost.on(rung).unwrap_or(0.0) * self.draws[rung]
+    }
+
+    fn shed_to(&mut self, rung: usize, frame: u64) {
+        let was_restored = self.restored.take().is_some_and(|restored| frame - restored < RETRY_FRAMES);
+        self.pause = if was_restored { (2 * self.pause).min(MAX_PAUSE) } else { MIN_PAUSE };
+        (self.rung, self.shed, self.is_trial) = (rung, frame, false);
+        self.cost.move_to(rung, &self.rungs);
+    }
+
+    fn restore(&mut self, is_trial: bool, frame: u64) {
+        let was_left_out = self.rungs[self.rung] == Rung::LeftOut;
+        (self.rung, self.restored, self.is_trial) = (self.rung - 1, Some(frame), is_trial);
+        if is_trial {
+            self.cost.measure_on(self.rung, was_left_out);
+        } else {
+            self.cost.move_to(self.rung, &self.rungs);
+        }
+    }
+}
+
+/// # Errors
+/// If two cameras have the same name: what drawing them costs is told apart by it.
+fn check_camera_names(views: &[BudgetedView]) -> Result<(), BudgetError> {
+    let mut view_of: HashMap<&str, &str> = HashMap::new();
+    for view in views {
+        for camera in &view.cameras {
+            if let Some(other) = view_of.insert(&camera.name, &view.name) {
+                let views = [other, &view.name].map(str::to_owned);
+                return Err(BudgetError::DuplicateCamera { camera: camera.name.clone(), views });
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests;

@@ -1,0 +1,463 @@
+//! The controller with costs of simulated frames.
+
+use fastrand::Rng;
+use glam::DVec3;
+
+use super::*;
+use crate::ViewStatistics;
+use crate::frame::{StageTimes, ViewForm};
+use crate::raster::CulledTriangles;
+use crate::scene::{Redraw, ViewKind};
+use crate::timeline::FrameTuning;
+
+const SMALL: f32 = 0.5;
+
+/// A view as the simulation knows it.
+#[derive(Clone)]
+struct Simulated {
+    view: BudgetedView,
+    /// What drawing each of its cameras at its best takes, in milliseconds.
+    cost: f64,
+    /// What drawing a camera takes on a rung with a smaller picture, as a share of that.
+    share_of_small: f64,
+}
+
+/// Frames of a controller, whose costs are known.
+struct Simulation {
+    budget: ViewBudget,
+    views: Vec<Simulated>,
+    /// What a frame costs beside its views, in milliseconds.
+    rest: f64,
+    /// The range of a cost's samples, as a share of it.
+    noise: f64,
+    random: Rng,
+    frame: u32,
+    /// How often the rung of a view changed.
+    changes: usize,
+}
+
+fn every(interval: u32) -> Rung {
+    Rung::Drawn(ViewForm { interval, ..ViewForm::BEST })
+}
+
+fn small() -> Rung {
+    Rung::Drawn(ViewForm { size: SMALL, ..ViewForm::BEST })
+}
+
+fn view(name: &str, priority: i32, cost: f64, ladder: &[Rung]) -> Simulated {
+    with_cameras(name, priority, cost, 1, ladder)
+}
+
+fn with_cameras(name: &str, priority: i32, cost: f64, cameras: usize, ladder: &[Rung]) -> Simulated {
+    let camera = |index| Camera::looking_at(format!("{name} {index}"), DVec3::Z, DVec3::ZERO);
+    let (name, cameras, ladder) = (name.to_owned(), (0..cameras).map(camera).collect(), ladder.to_vec());
+    let view = BudgetedView { name, priority, cameras, ladder };
+    Simulated { view, cost, share_of_small: f64::from(SMALL * SMALL) }
+}
+
+impl Simulation {
+    fn new(milliseconds: f64, rest: f64, views: &[Simulated]) -> Self {
+        let budget = ViewBudget::new(milliseconds).unwrap();
+        let (views, random) = (views.to_vec(), Rng::with_seed(3));
+        Self { budget, views, rest, noise: 0.0, random, frame: 0, changes: 0 }
+    }
+
+    fn rungs(&self) -> Vec<usize> {
+        self.views.iter().map(|simulated| self.budget.rung(&simulated.view.name).unwrap()).collect()
+    }
+
+    fn is_at_best(&self) -> bool {
+        self.rungs().iter().all(|rung| *rung == 0)
+    }
+
+    fn is_at_last(&self) -> bool {
+        self.rungs().iter().zip(&self.views).all(|(rung, simulated)| *rung == simulated.view.ladder.len())
+    }
+
+    fn sample(&mut self, milliseconds: f64) -> Duration {
+        Duration::from_secs_f64(milliseconds * (1.0 + self.noise * (2.0 * self.random.f64() - 1.0)) * 1e-3)
+    }
+
+    /// Draws a frame, and returns its statistics, before the controller is told of them.
+    fn draw(&mut self) -> FrameStatistics {
+        let views: Vec<_> = self.views.iter().map(|simulated| simulated.view.clone()).collect();
+        let cameras = self.budget.cameras(&views).unwrap();
+        let mut statistics = FrameStatistics {
+            tuning: FrameTuning { choices: self.budget.choices().collect(), ..FrameTuning::default() },
+            ..FrameStatistics::default()
+        };
+        let mut total = self.sample(self.rest);
+        for (index, camera) in (0..).zip(cameras) {
+            let is_drawn = match camera.redraw {
+                Redraw::Interval(interval) => (self.frame + index).is_multiple_of(interval),
+                _ => true,
+            };
+            let simulated = self.views.iter().find(|simulated| camera.name.starts_with(&simulated.view.name)).unwrap();
+            let is_small = camera.size != simulated.view.cameras[0].size;
+            let cost = simulated.cost * if is_small { simulated.share_of_small } else { 1.0 };
+            let time = if is_drawn { self.sample(cost) } else { Duration::ZERO };
+            total += time;
+            statistics.view_times.push(time);
+            statistics.views.push(ViewStatistics {
+                name: camera.name,
+                kind: ViewKind::Main,
+                age: u32::from(!is_drawn),
+                visible: 0,
+                occluded: 0,
+                lights: 0,
+                commands: 0,
+                batches: 0,
+                bundles: 0,
+                culled_triangles: CulledTriangles::default(),
+                levels_of_detail: None,
+            });
+        }
+        statistics.stages = StageTimes { record: total, ..StageTimes::default() };
+        self.frame += 1;
+        statistics
+    }
+
+    fn run(&mut self, frames: usize) {
+        for _ in 0..frames {
+            let statistics = self.draw();
+            let before = self.rungs();
+            self.budget.update(&statistics);
+            self.changes += before.iter().zip(self.rungs()).filter(|(before, after)| **before != *after).count();
+        }
+    }
+
+    /// What a frame costs on average on the current rungs, in milliseconds: a sum over what each rung says.
+    fn true_cost(&self) -> f64 {
+        let cost = |(rung, simulated): (usize, &Simulated)| {
+            let count = simulated.view.cameras.len();
+            match rung.checked_sub(1).map(|index| simulated.view.ladder[index]) {
+                None => simulated.cost * count as f64,
+                Some(Rung::LeftOut) => 0.0,
+                Some(Rung::Drawn(form)) => {
+                    let share = if form.size < 1.0 { simulated.share_of_small } else { 1.0 };
+                    simulated.cost * count.min(form.max_cameras) as f64 * share / f64::from(form.interval)
+                }
+            }
+        };
+        self.rest + self.rungs().into_iter().zip(&self.views).map(cost).sum::<f64>()
+    }
+
+    fn scale_costs(&mut self, factor: f64) {
+        self.rest *= factor;
+        self.views.iter_mut().for_each(|simulated| simulated.cost *= factor);
+    }
+}
+
+/// A picture that is always drawn, a mirror, a cube map, and antialiasing; 8 ms of views and 1 ms of rest.
+fn usual() -> Vec<Simulated> {
+    let fewer = |max_cameras| Rung::Drawn(ViewForm { max_cameras, ..ViewForm::BEST });
+    vec![
+        view("main", 9, 2.0, &[]),
+        view("mirror", 3, 2.0, &[every(2), small(), Rung::LeftOut]),
+        with_cameras("cube", 2, 0.25, 6, &[every(2), every(6), Rung::LeftOut]),
+        with_cameras("samples", 1, 0.5, 5, &[fewer(2), fewer(1)]),
+    ]
+}
+
+#[test]
+fn a_time_that_is_no_budget_is_an_error() {
+    for milliseconds in [0.0, -1.0, f64::NAN, f64::INFINITY, -f64::INFINITY, 1e-60, 0.9e-6, 1.1e12] {
+        let error = ViewBudget::new(milliseconds).unwrap_err();
+        assert!(matches!(error, BudgetError::InvalidBudget { .. }));
+        let message = format!("a budget of {milliseconds} ms a frame is not from 0.000001 to 1000000000000 ms");
+        assert_eq!(error.to_string(), message);
+    }
+    for milliseconds in [BudgetError::MIN_MILLISECONDS, BudgetError::MAX_MILLISECONDS] {
+        assert!(ViewBudget::new(milliseconds).is_ok());
+    }
+    let mut budget = ViewBudget::new(2.0).unwrap();
+    assert!(budget.set_milliseconds(0.0).is_err() && budget.set_milliseconds(3.0).is_ok());
+}
+
+#[test]
+fn what_is_wrong_with_views_is_named() {
+    let mut budget = ViewBudget::new(2.0).unwrap();
+    let mut refused = |views: &[Simulated]| {
+        let views: Vec<_> = views.iter().map(|simulated| simulated.view.clone()).collect();
+        budget.cameras(&views).unwrap_err().to_string()
+    };
+    assert!(refused(&[view("a", 0, 1.0, &[]), view("b", 0, 1.0, &[]), view("a", 1, 1.0, &[])]).contains("\"a\""));
+    for form in [
+        ViewForm { interval: 0, ..ViewForm::BEST },
+        ViewForm { size: 0.0, ..ViewForm::BEST },
+        ViewForm { size: 1.5, ..ViewForm::BEST },
+        ViewForm { size: f32::NAN, ..ViewForm::BEST },
+        ViewForm { level_of_detail_scale: 0.5, ..ViewForm::BEST },
+        ViewForm { level_of_detail_scale: f32::NAN, ..ViewForm::BEST },
+        ViewForm { max_cameras: 0, ..ViewForm::BEST },
+    ] {
+        let error = refused(&[view("mirror", 0, 1.0, &[every(2), Rung::Drawn(form)])]);
+        assert!(error.contains("rung 2 of view \"mirror\""), "{error}");
+    }
+    for after in [every(2), Rung::LeftOut] {
+        let error = refused(&[view("mirror", 0, 1.0, &[small(), Rung::LeftOut, after])]);
+        assert!(error.contains("rung 3 of view \"mirror\""), "{error}");
+    }
+    let named = |name: &str, cameras: &[&str]| {
+        let mut simulated = with_cameras(name, 0, 1.0, cameras.len(), &[]);
+        let cameras = simulated.view.cameras.iter_mut().zip(cameras);
+        cameras.for_each(|(camera, name)| camera.name = (*name).to_owned());
+        simulated
+    };
+    let error = refused(&[named("a", &["one", "two"]), named("b", &["three", "one"])]);
+    assert_eq!(error, r#"the budget has two cameras named "one": in view "a" and in view "b""#);
+    let error = refused(&[named("a", &["one", "two", "two"])]);
+    assert_eq!(error, r#"the budget has two cameras named "two": in view "a" and in view "a""#);
+}
+
+#[test]
+fn each_rung_has_its_cameras() {
+    let form = ViewForm { interval: 4, size: 0.25, level_of_detail_scale: 2.0, max_cameras: 2 };
+    let mut simulated = with_cameras("view", 0, 1.0, 3, &[every(2), Rung::Drawn(form), Rung::LeftOut]);
+    simulated.view.cameras[1].redraw = Redraw::Interval(3);
+    simulated.view.cameras[1].level_of_detail_scale = 3.0;
+    let mut budget = ViewBudget::new(1.0).unwrap();
+    let mut cameras_on = |rung: usize| {
+        let views = [simulated.view.clone()];
+        budget.cameras(&views).unwrap();
+        budget.views[0].rung = rung;
+        let cameras = budget.cameras(&views).unwrap();
+        let of_camera = |camera: &Camera| (camera.size, camera.redraw, camera.level_of_detail_scale);
+        cameras.iter().map(of_camera).collect::<Vec<_>>()
+    };
+    let best = [960, 540];
+    use Redraw::{EveryFrame, Interval};
+    assert_eq!(cameras_on(0), [(best, EveryFrame, 1.0), (best, Interval(3), 3.0), (best, EveryFrame, 1.0)]);
+    assert_eq!(cameras_on(1), [(best, Interval(2), 1.0), (best, Interval(3), 3.0), (best, Interval(2), 1.0)]);
+    assert_eq!(cameras_on(2), [([240, 135], Interval(4), 2.0), ([240, 135], Interval(4), 6.0)]);
+    assert_eq!(cameras_on(3), []);
+}
+
+#[test]
+fn views_are_shed_when_the_load_rises_and_all_are_back_when_it_falls() {
+    for noise in [0.0, 0.2] {
+        for factor in [1.2, 1.5, 2.0, 2.5, 3.0] {
+            let mut simulation = Simulation::new(11.0, 1.0, &usual());
+            simulation.noise = noise;
+            simulation.run(100);
+            assert!(simulation.is_at_best() && simulation.changes == 0, "{:?}", simulation.rungs());
+            simulation.scale_costs(factor);
+            simulation.run(30);
+            let cost = simulation.true_cost();
+            assert!(cost <= 12.1, "{cost} ms with noise of {noise} after a rise by {factor}: {:?}", simulation.rungs());
+            simulation.run(200);
+            let cost = simulation.true_cost();
+            assert!((6.0..=12.1).contains(&cost), "{cost} ms after a rise by {factor}: {:?}", simulation.rungs());
+            simulation.scale_costs(1.0 / factor);
+            simulation.run(400);
+            assert!(simulation.is_at_best(), "after {factor}: {:?}", simulation.rungs());
+        }
+    }
+}
+
+#[test]
+fn a_steady_load_with_noise_changes_hardly_a_rung() {
+    for seed in 0..2 {
+        for budget in 3..=12 {
+            let mut simulation = Simulation::new(f64::from(budget), 1.0, &usual());
+            (simulation.noise, simulation.random) = (0.2, Rng::with_seed(seed));
+            simulation.run(200);
+            let settled = simulation.changes;
+            simulation.run(1000);
+            let (changes, cost) = (simulation.changes - settled, simulation.true_cost());
+            assert!(changes <= 8, "{changes} changes with a budget of {budget} ms and a cost of {cost} ms");
+        }
+    }
+}
+
+#[test]
+fn lower_priorities_are_shed_first_and_restored_last() {
+    let ladder = [every(2), Rung::LeftOut];
+    let views = [("a", 2), ("b", 1), ("c", 3), ("d", 1)].map(|(name, priority)| view(name, priority, 2.0, &ladder));
+    let mut simulation = Simulation::new(20.0, 1.0, &views);
+    simulation.run(20);
+    let mut seen = Vec::new();
+    // The budget falls by half a view at a time, and comes back at once.
+    for step in 0..=8 {
+        simulation.budget.set_milliseconds(9.1 - f64::from(step)).unwrap();
+        simulation.run(30);
+        seen.push(simulation.rungs());
+    }
+    let down = [
+        [0, 0, 0, 0],
+        [0, 0, 0, 1],
+        [0, 0, 0, 2],
+        [0, 1, 0, 2],
+        [0, 2, 0, 2],
+        [1, 2, 0, 2],
+        [2, 2, 0, 2],
+        [2, 2, 1, 2],
+        [2, 2, 2, 2],
+    ];
+    assert_eq!(seen, down);
+    simulation.budget.set_milliseconds(20.0).unwrap();
+    let mut up = vec![simulation.rungs()];
+    for _ in 0..400 {
+        simulation.run(1);
+        if up.last() != Some(&simulation.rungs()) {
+            up.push(simulation.rungs());
+        }
+    }
+    assert!(up.iter().eq(down.map(Vec::from).iter().rev()), "{up:?}");
+}
+
+#[test]
+fn a_view_that_costs_nothing_is_not_shed() {
+    let views = [view("free", 0, 0.0, &[every(2), Rung::LeftOut]), view("dear", 1, 5.0, &[every(2), every(4)])];
+    let mut simulation = Simulation::new(4.0, 1.0, &views);
+    simulation.run(50);
+    assert_eq!(simulation.rungs(), [0, 1]);
+    assert!(!simulation.budget.is_exhausted());
+}
+
+#[test]
+fn an_impossible_budget_is_reported_with_every_view_on_its_last_rung() {
+    for noise in [0.0, 0.2] {
+        let mut simulation = Simulation::new(0.5, 1.0, &usual());
+        simulation.noise = noise;
+        simulation.run(50);
+        assert!(simulation.is_at_last() && simulation.budget.is_exhausted());
+        let changes = simulation.changes;
+        simulation.run(1000);
+        assert!(simulation.is_at_last() && simulation.budget.is_exhausted());
+        assert_eq!(simulation.changes, changes);
+    }
+}
+
+#[test]
+fn a_rung_that_saves_less_than_expected_is_passed_over_and_does_not_flap() {
+    for share in [1.0, 0.9, 0.05] {
+        let mut views = usual();
+        views[1] = view("mirror", 0, 4.0, &[small(), every(4), Rung::LeftOut]);
+        views[1].share_of_small = share;
+        let mut simulation = Simulation::new(8.0, 1.0, &views);
+        simulation.noise = 0.1;
+        simulation.run(200);
+        let (cost, changes) = (simulation.true_cost(), simulation.changes);
+        assert!(cost <= 8.8, "{cost} ms: {:?}", simulation.rungs());
+        simulation.run(1000);
+        assert!(simulation.changes - changes <= 6, "{} changes", simulation.changes - changes);
+    }
+}
+
+#[test]
+fn a_view_that_is_left_out_is_measured_now_and_then() {
+    let mut simulation =
+        Simulation::new(4.0, 1.0, &[view("main", 1, 1.0, &[]), view("mirror", 0, 9.0, &[Rung::LeftOut])]);
+    simulation.run(50);
+    assert_eq!(simulation.rungs(), [0, 1]);
+    simulation.run(4000);
+    let trials = simulation.changes / 2;
+    assert!((3..=6).contains(&trials), "{trials} trials that failed");
+    // It becomes cheap while nobody sees it.
+    simulation.views[1].cost = 0.5;
+    simulation.run(2 * (TRIAL_PAUSES * MAX_PAUSE) as usize);
+    assert_eq!(simulation.rungs(), [0, 0]);
+}
+
+#[test]
+fn frames_that_were_recorded_before_a_rung_changed_do_not_count_for_it() {
+    let mut simulation = Simulation::new(4.0, 1.0, &[view("mirror", 0, 5.0, &[small()])]);
+    let old = simulation.draw();
+    while simulation.rungs() == [0] {
+        simulation.run(1);
+    }
+    let predicted = simulation.budget.predicted_milliseconds();
+    simulation.draw();
+    (0..3).for_each(|_| simulation.budget.update(&old));
+    assert!((simulation.budget.predicted_milliseconds() - predicted).abs() < 0.01);
+}
+
+#[test]
+fn random_ladders_fit_or_are_at_their_ends_and_come_back() {
+    let mut random = Rng::with_seed(11);
+    for case in 0..100 {
+        let views: Vec<_> = (0..random.usize(1..6))
+            .map(|index| {
+                let mut ladder = Vec::new();
+                for interval in [2, 4, 8] {
+                    if random.bool() {
+                        let size = if interval == 8 { SMALL } else { 1.0 };
+                        ladder.push(Rung::Drawn(ViewForm { interval, size, ..ViewForm::BEST }));
+                    }
+                }
+                if random.bool() {
+                    ladder.push(Rung::LeftOut);
+                }
+                let name = format!("view {index}");
+                let (priority, cameras) = (random.i32(0..3), random.usize(1..4));
+                let mut simulated = with_cameras(&name, priority, 3.0 * random.f64(), cameras, &ladder);
+                simulated.share_of_small = 0.1 + 0.9 * random.f64();
+                simulated
+            })
+            .collect();
+        let milliseconds = 1.0 + 10.0 * random.f64();
+        let mut simulation = Simulation::new(milliseconds, 0.8 * random.f64(), &views);
+        simulation.run(150);
+        // Now and then a rung is tried that does not fit.
+        let mut late = 0;
+        for _ in 0..100 {
+            simulation.run(1);
+            late += usize::from(simulation.true_cost() > milliseconds * 1.001 && !simulation.is_at_last());
+        }
+        assert!(late <= 30, "case {case}: {late} frames, {:?}", simulation.rungs());
+        simulation.scale_costs(0.01);
+        simulation.run(1500);
+        assert!(simulation.is_at_best(), "case {case}: {:?}", simulation.rungs());
+    }
+}
+
+#[test]
+fn views_that_come_and_go_keep_what_was_learned_of_them() {
+    let mut simulation = Simulation::new(4.0, 1.0, &[view("main", 1, 1.0, &[]), view("mirror", 0, 9.0, &[every(8)])]);
+    simulation.run(60);
+    assert_eq!(simulation.rungs(), [0, 1]);
+    let mirror = simulation.views.pop().unwrap();
+    simulation.run(40);
+    assert_eq!(simulation.budget.rung("mirror"), None);
+    simulation.views.push(mirror.clone());
+    simulation.run(1);
+    assert_eq!(simulation.rungs(), [0, 1]);
+    simulation.views.pop();
+    simulation.run(MEMORY_FRAMES as usize);
+    simulation.views.push(mirror);
+    simulation.run(1);
+    assert_eq!(simulation.rungs(), [0, 0]);
+}
+
+#[test]
+fn a_view_that_is_drawn_seldom_is_measured_before_it_is_restored_further() {
+    let heavy = view("heavy", 0, 60.0, &[every(8), every(16), Rung::LeftOut]);
+    let mut simulation = Simulation::new(4.0, 1.0, &[view("main", 1, 1.0, &[]), heavy]);
+    simulation.run(100);
+    for frame in 100..1500 {
+        simulation.run(1);
+        assert!(simulation.rungs()[1] >= 2, "frame {frame}: {:?}", simulation.rungs());
+    }
+}
+
+#[test]
+fn the_smallest_size_has_a_finite_prediction() {
+    let tiny = Rung::Drawn(ViewForm { size: 1e-23, ..ViewForm::BEST });
+    let mut simulation = Simulation::new(4.0, 1.0, &[view("mirror", 0, 60.0, &[tiny, Rung::LeftOut])]);
+    let mut seen = [false; 3];
+    for _ in 0..3000 {
+        simulation.run(1);
+        assert!(simulation.budget.predicted_milliseconds().is_finite(), "{:?}", simulation.rungs());
+        seen[simulation.rungs()[0]] = true;
+    }
+    assert_eq!(seen, [true; 3]);
+}
+
+#[test]
+fn an_empty_picture_stays_empty() {
+    let mut empty = view("minimised", 0, 1.0, &[small()]).view;
+    empty.cameras[0].size = [0, 540];
+    let cameras = ViewBudget::new(4.0).unwrap().cameras(&[empty]).unwrap();
+    assert_eq!(cameras[0].size, [0, 540]);
+}

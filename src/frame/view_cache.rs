@@ -1,0 +1,187 @@
+//! The view cache: views that are drawn once for several frames.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::light_maps::{covers, have_same_maps, with_brightness_of};
+use super::views::FrameViews;
+use crate::backend::{KeptView, kept_views};
+use crate::process::{FramePlan, ViewArray};
+use crate::scene::{Camera, Redraw, ViewKind};
+use crate::view::RenderView;
+
+/// The views of the latest frame, for the next one to read: see [`Redraw`].
+#[derive(Default)]
+pub(super) struct ViewCache {
+    /// `None` where the next frame must draw all of its views.
+    latest: Option<DrawnViews>,
+    /// Whether a recorded frame was dropped before it was submitted, so that its views were never drawn.
+    lost: Arc<AtomicBool>,
+    /// The number of frames so far.
+    frames: u64,
+}
+
+/// The views of a frame, each as it was drawn.
+struct DrawnViews {
+    /// The plan's identity.
+    plan: u64,
+    views: FrameViews,
+}
+
+/// A recorded frame that is not submitted yet. If it is dropped, the views that it draws are lost.
+pub(super) struct InFlight {
+    lost: Option<Arc<AtomicBool>>,
+}
+
+impl ViewCache {
+    /// Decides which of the requested views a frame draws. The others become those that were drawn: of a light's shadow map also the light,
+    /// because the map is valid only with that one. The brightness of a light is always the requested one.
+    ///
+    /// `is_imported` says whether the frame draws a view of this name into a texture of the engine's own.
+    pub(super) fn resolve(
+        &mut self,
+        plan: &FramePlan,
+        mut requested: FrameViews,
+        is_imported: impl Fn(&str) -> bool,
+    ) -> FrameViews {
+        let latest = self.latest.take().filter(|latest| latest.plan == plan.identity());
+        let was_lost = self.lost.swap(false, Ordering::Relaxed);
+        let mut turns = Turns { frame: self.frames, counts: Vec::new(), latest_light: None };
+        self.frames += 1;
+        for view in requested.views.iter_mut().filter(|view| !view.camera.redraw.is_every_frame()) {
+            // The texture is only one frame's.
+            if is_imported(view.name()) {
+                view.camera.redraw = Redraw::EveryFrame;
+            }
+        }
+        let Some(DrawnViews { views: drawn, .. }) = latest.filter(|_| !was_lost && requested.may_be_cached()) else {
+            return requested;
+        };
+        let keeps_layers = kinds_with_same_layers(plan, &drawn.views, &requested.views);
+        let keeps_light_maps = have_same_maps(&drawn, &requested);
+        let names = drawn.views.iter().map(|view| (view.kind(), view.name()));
+        let kept = kept_views(names, &requested.views);
+        let loses_layer = views_without_their_layers(&drawn, &requested);
+        let FrameViews { views, lights, .. } = &mut requested;
+        let mut cached: Vec<Option<usize>> = Vec::with_capacity(views.len());
+        for ((index, view), kept) in views.iter().enumerate().zip(kept) {
+            let is_turn = turns.take(view);
+            let Some(KeptView { index: kept, is_same: true }) = kept else {
+                cached.push(None);
+                continue;
+            };
+            let before = &drawn.views[kept];
+            let is_needed = match view.camera.redraw {
+                Redraw::EveryFrame => true,
+                Redraw::Interval(interval) => is_turn || before.age + 1 >= interval,
+                Redraw::OnCameraChange => before.camera != view.camera,
+            };
+            let keeps_targets = !before.camera.redraw.is_every_frame()
+                && before.camera.size == view.camera.size
+                && keeps_layers[view.kind() as usize]
+                && !loses_layer.contains(&index);
+            let is_light_map = view.valid_light.is_some();
+            let is_valid = !is_light_map || keeps_light_maps && covers(before, view);
+            cached.push((!is_needed && keeps_targets && is_valid).then_some(kept));
+        }
+        // The maps of a light are drawn together: where faces or cascades meet, different ages would show.
+        let is_drawn = |(view, cached): (&RenderView, &Option<usize>)| view.valid_light.filter(|_| cached.is_none());
+        let drawn_lights: HashSet<usize> = views.iter().zip(&cached).filter_map(is_drawn).collect();
+        for (view, cached) in views.iter_mut().zip(cached) {
+            let Some(index) = cached.filter(|_| !view.valid_light.is_some_and(|light| drawn_lights.contains(&light)))
+            else {
+                continue;
+            };
+            let before = &drawn.views[index];
+            if let (Some(light), Some(drawn_with)) = (view.valid_light, before.valid_light) {
+                lights[light] = with_brightness_of(drawn.lights[drawn_with], &lights[light]);
+            }
+            let camera = Camera { redraw: view.camera.redraw, ..before.camera.clone() };
+            let (valid_light, layer, age) = (view.valid_light, view.layer, before.age.saturating_add(1));
+            *view = RenderView { camera, frustum: before.frustum.clone(), valid_light, layer, age };
+        }
+        requested
+    }
+
+    /// Stores the views of a frame that was recorded.
+    pub(super) fn store(&mut self, plan: &FramePlan, views: FrameViews) -> InFlight {
+        self.latest = views.may_be_cached().then(|| DrawnViews { plan: plan.identity(), views });
+        InFlight { lost: self.latest.is_some().then(|| Arc::clone(&self.lost)) }
+    }
+
+    /// Makes the next frame draw all of its views.
+    pub(super) fn invalidate(&mut self) {
+        self.latest = None;
+    }
+}
+
+impl InFlight {
+    /// The frame was submitted.
+    pub(super) fn submitted(mut self) {
+        self.lost = None;
+    }
+}
+
+impl Drop for InFlight {
+    fn drop(&mut self) {
+        if let Some(lost) = &self.lost {
+            lost.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Whose turn it is among the views of each interval.
+struct Turns {
+    /// The frame's number.
+    frame: u64,
+    /// How many views of each interval had their turn so far. The maps of a light count as one.
+    counts: Vec<(u32, u64)>,
+    /// The light of the view before, and whether it was its turn.
+    latest_light: Option<(usize, bool)>,
+}
+
+impl Turns {
+    /// Views of one interval are drawn in at most this many of its frames: each set of drawn views is a stage graph of its own.
+    const MAX_GROUPS: u32 = 8;
+
+    /// Whether it is the turn of the next view, if that has an interval.
+    fn take(&mut self, view: &RenderView) -> bool {
+        let Redraw::Interval(interval) = view.camera.redraw else { return false };
+        if let Some((_, is_turn)) = self.latest_light.filter(|(light, _)| view.valid_light == Some(*light)) {
+            return is_turn;
+        }
+        let known = self.counts.iter().position(|(known, _)| *known == interval).unwrap_or_else(|| {
+            self.counts.push((interval, 0));
+            self.counts.len() - 1
+        });
+        let (_, count) = &mut self.counts[known];
+        let groups = u64::from(interval.min(Self::MAX_GROUPS));
+        let offset = *count % groups * u64::from(interval) / groups;
+        *count += 1;
+        let is_turn = (self.frame + offset).is_multiple_of(u64::from(interval));
+        self.latest_light = view.valid_light.map(|light| (light, is_turn));
+        is_turn
+    }
+}
+
+/// By kind of views, whether the views have the same layers of the targets that they share.
+fn kinds_with_same_layers(plan: &FramePlan, before: &[RenderView], views: &[RenderView]) -> [bool; ViewKind::COUNT] {
+    let mut are_same = [true; ViewKind::COUNT];
+    for kind in plan.targets().iter().filter(|target| target.layered).map(|target| target.views) {
+        let [before, after] =
+            [before, views].map(|views| views.iter().filter(move |view| view.kind() == kind).map(RenderView::name));
+        are_same[kind as usize] = before.eq(after);
+    }
+    are_same
+}
+
+/// The indices of the views whose targets are layers of a texture that cannot be that of the frame before.
+fn views_without_their_layers(before: &FrameViews, requested: &FrameViews) -> HashSet<usize> {
+    let keeps_texture = |array: &&ViewArray| {
+        let mut of_target = before.arrays.iter().filter(|before| before.target_index == array.target_index);
+        of_target.any(|before| array.keeps_texture_of(before))
+    };
+    let lost = requested.arrays.iter().filter(|array| !keeps_texture(array));
+    lost.flat_map(|array| array.view_indices.iter().flatten().copied()).collect()
+}

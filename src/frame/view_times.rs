@@ -1,0 +1,29 @@
+//! The thread time of each view.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Sums up the thread time of each view's stages while jobs run. It keeps its memory from frame to frame.
+#[derive(Debug, Default)]
+pub(super) struct ViewTimes {
+    /// By view index.
+    nanoseconds: Vec<AtomicU64>,
+}
+
+impl ViewTimes {
+    /// Begins a frame of this many views.
+    pub(super) fn reset(&mut self, views: usize) {
+        self.nanoseconds.clear();
+        self.nanoseconds.resize_with(views, AtomicU64::default);
+    }
+
+    /// Adds the time of a job of one of a view's stages.
+    pub(super) fn add(&self, view: usize, took: Duration) {
+        // Relaxed: a sum, read after the run.
+        self.nanoseconds[view].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    pub(super) fn times(&self) -> impl Iterator<Item = Duration> {
+        self.nanoseconds.iter().map(|view| Duration::from_nanos(view.load(Ordering::Relaxed)))
+    }
+}

@@ -1,0 +1,148 @@
+//! Sets of a scene's objects.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A set of a scene's objects, by index: what an [`ObjectFilter`](super::ObjectFilter) lists. A clone shares its memory, which is 16 bytes
+/// for each 64 indices of the scene among which one is in the set.
+///
+/// An index is that of an entry in the slices of a [`SceneRef`](super::SceneRef), in every frame anew. If an object moves to another
+/// index, the set contains whichever object is at the index now, so an engine then makes the set again.
+/// [`Scene::object_set`](super::Scene::object_set) makes one of handles.
+///
+/// ```
+/// use drawloom::scene::ObjectSet;
+///
+/// let head = ObjectSet::new([7, 3, 7]);
+/// assert!(head.contains(3) && !head.contains(4));
+/// assert_eq!(head.iter().collect::<Vec<_>>(), [3, 7]);
+/// assert_eq!(head, (3..8).step_by(4).collect());
+/// ```
+#[derive(Clone, Default, PartialEq, Eq)]
+pub struct ObjectSet {
+    /// Ascending by word; no mask is 0.
+    words: Arc<[SetWord]>,
+}
+
+/// Objects of a set among 64: bit `b` of the mask is object `word × 64 + b`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct SetWord {
+    word: u32,
+    mask: u64,
+}
+
+impl ObjectSet {
+    /// The set of the objects at these indices, in any order, repeated or not.
+    pub fn new(indices: impl IntoIterator<Item = u32>) -> Self {
+        let mut indices: Vec<_> = indices.into_iter().collect();
+        indices.sort_unstable();
+        let in_same_word = |one: &u32, next: &u32| one / WORD == next / WORD;
+        let word = |indices: &[u32]| SetWord {
+            word: indices[0] / WORD,
+            mask: indices.iter().fold(0, |mask, index| mask | 1 << (index % WORD)),
+        };
+        Self { words: indices.chunk_by(in_same_word).map(word).collect() }
+    }
+
+    /// Whether it contains the object at an index.
+    pub fn contains(&self, object: usize) -> bool {
+        self.mask(object / WORD as usize) >> (object % WORD as usize) & 1 == 1
+    }
+
+    /// The number of objects.
+    pub fn len(&self) -> usize {
+        self.words.iter().map(|word| word.mask.count_ones() as usize).sum()
+    }
+
+    /// Whether it contains no object.
+    pub fn is_empty(&self) -> bool {
+        self.words.is_empty()
+    }
+
+    /// The indices of its objects, in ascending order.
+    pub fn iter(&self) -> impl Iterator<Item = u32> {
+        self.iter_from(0)
+    }
+
+    /// The indices from `first` on.
+    pub(crate) fn iter_from(&self, first: usize) -> impl Iterator<Item = u32> {
+        let words = &self.words[self.position(first / WORD as usize)..];
+        let indices = words.iter().flat_map(|&SetWord { word, mask }| {
+            (0..WORD).filter(move |bit| mask >> bit & 1 == 1).map(move |bit| word * WORD + bit)
+        });
+        indices.filter(move |index| *index as usize >= first)
+    }
+
+    /// A mask of its objects among the 64 from `word` × 64 on.
+    pub(crate) fn mask(&self, word: usize) -> u64 {
+        let found = self.words.get(self.position(word));
+        found.filter(|found| found.word as usize == word).map_or(0, |found| found.mask)
+    }
+
+    /// The words of a range that have objects, in order, each with its mask.
+    pub(crate) fn masks(&self, words: Range<usize>) -> impl Iterator<Item = (usize, u64)> {
+        let found = &self.words[self.position(words.start)..];
+        found.iter().map(|found| (found.word as usize, found.mask)).take_while(move |(word, _)| *word < words.end)
+    }
+
+    /// The number of words below one.
+    fn position(&self, word: usize) -> usize {
+        self.words.partition_point(|known| (known.word as usize) < word)
+    }
+}
+
+impl FromIterator<u32> for ObjectSet {
+    fn from_iter<I: IntoIterator<Item = u32>>(indices: I) -> Self {
+        Self::new(indices)
+    }
+}
+
+impl fmt::Debug for ObjectSet {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_set().entries(self.iter()).finish()
+    }
+}
+
+/// The number of objects in a word.
+const WORD: u32 = u64::BITS;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_set_contains_what_it_was_made_of(
+            indices in prop::collection::vec(prop_oneof![0_u32..400, Just(u32::MAX), Just(u32::MAX - 64)], 0..60),
+            words in (0_usize..8, 0_usize..8),
+            first in 0_usize..500,
+        ) {
+            let expected: BTreeSet<u32> = indices.iter().copied().collect();
+            let set = ObjectSet::new(indices.iter().rev().copied());
+            prop_assert_eq!(set.iter().collect::<Vec<_>>(), expected.iter().copied().collect::<Vec<_>>());
+            prop_assert_eq!((set.len(), set.is_empty()), (expected.len(), expected.is_empty()));
+            prop_assert!((0..500).all(|index| set.contains(index) == expected.contains(&(index as u32))));
+            prop_assert_eq!(set.iter_from(first).count(), expected.range(first as u32..).count());
+            for word in 0..8 {
+                let bits = expected.range(word * 64..(word + 1) * 64).fold(0, |mask, index| mask | 1 << (index % 64));
+                prop_assert_eq!(set.mask(word as usize), bits);
+            }
+            let masks: Vec<_> = set.masks(words.0..words.1).collect();
+            let filled = (words.0..words.1).filter(|word| set.mask(*word) != 0).map(|word| (word, set.mask(word)));
+            prop_assert_eq!(masks, filled.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn sets_of_the_same_objects_are_equal() {
+        assert_eq!(ObjectSet::new([3, 900, 3]), ObjectSet::new([900, 3]));
+        assert_ne!(ObjectSet::new([3]), ObjectSet::new([4]));
+        assert_eq!(ObjectSet::new([]), ObjectSet::default());
+        assert_eq!(format!("{:?}", ObjectSet::new([70, 3])), "{3, 70}");
+    }
+}

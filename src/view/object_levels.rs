@@ -1,0 +1,77 @@
+//! The levels of detail of a view's objects.
+
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+use parking_lot::RwLock;
+
+use super::level_errors::MeshLevels;
+use super::level_selector::LevelSelector;
+use super::{ObjectTable, VisibleSet, set_bits};
+use crate::command::Version;
+use crate::scene::SceneRef;
+
+/// The level of detail of each object that a view sees. It is kept from frame to frame, because a level depends on the one before.
+#[derive(Debug, Default)]
+pub(crate) struct ObjectLevels {
+    /// By object. An object that the view does not see keeps the level that it had.
+    levels: Vec<AtomicU8>,
+    /// Whether a level changed since the latest [`ObjectLevels::complete`].
+    has_changed: AtomicBool,
+    version: RwLock<Version>,
+}
+
+/// Coarser than any level: of an object that has none yet.
+const UNCHOSEN: u8 = u8::MAX;
+
+impl ObjectLevels {
+    /// Makes room for so many objects.
+    pub(crate) fn resize(&mut self, objects: usize) {
+        self.levels.resize_with(objects, || AtomicU8::new(UNCHOSEN));
+    }
+
+    /// Chooses the levels of the `visible` objects of a word. Jobs that choose at the same time must have different words.
+    pub(crate) fn choose(
+        &self,
+        selector: &LevelSelector,
+        (scene, table, meshes): (&SceneRef<'_>, &ObjectTable, &MeshLevels),
+        word: usize,
+        visible: u64,
+    ) {
+        if visible == 0 {
+            return;
+        }
+        let first = word * VisibleSet::OBJECTS_PER_WORD;
+        let block = table.block(first / ObjectTable::BLOCK_SIZE);
+        for object in set_bits(visible).map(|bit| first + bit) {
+            let entry = object % ObjectTable::BLOCK_SIZE;
+            // Relaxed, here and below: jobs that read the levels depend on this job.
+            let before = self.levels[object].load(Ordering::Relaxed);
+            let level = meshes.get(block.draws[entry].mesh).map_or(0, |errors| {
+                let scale = scene.scales[object].abs().max_element();
+                selector.level(block.spheres.get(entry), scale, errors, before.into()) as u8
+            });
+            if level != before {
+                self.levels[object].store(level, Ordering::Relaxed);
+                self.has_changed.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Call it once, after all levels have been chosen. If they differ from those before, they get `version`, which no others have.
+    pub(crate) fn complete(&self, version: Version) {
+        if self.has_changed.swap(false, Ordering::Relaxed) {
+            *self.version.write() = version;
+        }
+    }
+
+    /// The version that the latest different levels got.
+    pub(crate) fn version(&self) -> Version {
+        *self.version.read()
+    }
+
+    /// The level of an object that the view sees.
+    #[inline]
+    pub(crate) fn get(&self, object: usize) -> u32 {
+        self.levels[object].load(Ordering::Relaxed).into()
+    }
+}
