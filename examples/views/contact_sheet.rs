@@ -1,16 +1,16 @@
 //! The contact sheet: a view that is composed of other views' pictures.
 
 use drawloom::backend::Picture;
-use drawloom::demo;
 use drawloom::process::{
     ClearColor, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader, FullScreenPixel, PassInputs,
     RenderProcess, ShadowCasters,
 };
 use drawloom::raster::{Real, Vector, Vector4};
-use drawloom::scene::ViewKind;
+use drawloom::scene::{Light, ViewKind};
 use font8x8::UnicodeFonts;
 
 use crate::gallery::{self, Gallery};
+use crate::{impostor, mirror_ball, smoke};
 
 /// The sheet's view, and its target.
 pub const TARGET: &str = "sheet";
@@ -18,60 +18,175 @@ pub const TARGET: &str = "sheet";
 /// The height of a label, in pixels.
 const LABEL: u32 = 22;
 const COLUMNS: u32 = 3;
-const ROWS: u32 = 3;
+const ROWS: u32 = 5;
 
 /// The pixels of the sheet.
 pub const SIZE: [u32; 2] = [COLUMNS * gallery::SIZE[0], ROWS * (gallery::SIZE[1] + LABEL)];
 
-/// The pictures in the cells, row by row, and their labels. The seventh is a shadow map; the last is the mean of tiles.
-const CELLS: [(ViewKind, &str, &str); 8] = [
-    (ViewKind::Main, "main", "main: pool, portals and a screen"),
-    (ViewKind::Main, "guest", "guest: a second player"),
-    (ViewKind::Reflection, "main/pool", "main/pool: mirrored, clipped at the water"),
-    (ViewKind::Reflection, "main/portal", "main/portal: from the exit's side"),
-    (ViewKind::Reflection, "main/portal/portal", "main/portal/portal: the portal in itself"),
-    (ViewKind::Reflection, "screen", "screen: one camera for every viewer"),
-    (ViewKind::Shadow, "", "a light's shadow map"),
-    (ViewKind::Main, "detail", "detail: one camera"),
-];
-const LABEL_OF_TILES: &str = "detail: the mean of 2 x 2 tiles";
-
-/// Draws the sheet.
-#[derive(Clone)]
-pub struct ContactSheet {
-    shadow_map: String,
+/// What is in a cell of the sheet.
+#[derive(Clone, Copy, PartialEq)]
+enum Cell {
+    /// A target of a view.
+    Picture(ViewKind, &'static str, &'static str),
+    /// The shadow maps of a light, three to a row.
+    ShadowMaps(ShadowedLight),
+    /// The mean of the tiles of a camera.
+    Tiles(&'static str),
+    /// The faces of a cube map, in two rows of three.
+    Cube(&'static str),
 }
 
-impl ContactSheet {
-    pub fn new() -> Self {
-        let lights = demo::colonnade().map(|scene| scene.lights).unwrap_or_default();
-        let light = Gallery::light_of_shadow_map(&lights).unwrap_or(0);
-        Self { shadow_map: format!("shadow of light {light}") }
+/// A light whose shadow maps are on the sheet.
+#[derive(Clone, Copy, PartialEq)]
+enum ShadowedLight {
+    /// The first that shines into a half space.
+    Hemispherical,
+    /// The first directional one.
+    Sun,
+    /// The first that shines in all directions.
+    Lamp,
+}
+
+impl ShadowedLight {
+    /// What the names of its maps' views end with.
+    fn maps(self) -> &'static [&'static str] {
+        match self {
+            Self::Hemispherical => &[""],
+            Self::Sun => &[", cascade 1", ", cascade 2", ", cascade 3"],
+            Self::Lamp => &[", +X", ", -X", ", +Y", ", -Y", ", +Z", ", -Z"],
+        }
+    }
+
+    /// The width of a map on the sheet.
+    fn side(self) -> u32 {
+        let [width, height] = gallery::SIZE;
+        match self {
+            Self::Hemispherical => height,
+            Self::Sun => width / 3,
+            Self::Lamp => height / 2,
+        }
+    }
+
+    /// The name of the views of its maps, without their ends.
+    fn name(self, lights: &[Light]) -> String {
+        let is_wanted = |light: &Light| match light {
+            Light::Hemispherical { .. } => self == Self::Hemispherical,
+            Light::Directional { .. } => self == Self::Sun,
+            Light::Point { .. } => self == Self::Lamp,
+            _ => false,
+        };
+        let index = lights.iter().position(|light| light.casts_shadow() && is_wanted(light));
+        format!("shadow of light {}", index.unwrap_or(0))
+    }
+
+    /// How bright a depth is on the sheet, the nearer the brighter. `shadow_map` in `contact_sheet.wgsl` is the same.
+    fn brightness<R: Real>(self, depth: R) -> R {
+        match self {
+            // Depth is linear, and most of what it sees is close to it compared with its range.
+            Self::Hemispherical => depth * depth * depth * depth,
+            // Depth is linear, and reaches far towards the light.
+            Self::Sun => (depth * R::of(6.0)).min(R::one()),
+            // The near plane is at 1e-5 of the range.
+            Self::Lamp => (R::one() - R::of(1e-5) / depth.max(R::of(1e-9))).max(R::zero()),
+        }
     }
 }
 
-impl RenderProcess for ContactSheet {
+/// The cells, row by row, and their labels.
+const CELLS: [(Cell, &str); 15] = [
+    (Cell::Picture(ViewKind::Main, "main", "picture"), "main: pool, portals, screen, ball, tree, smoke"),
+    (Cell::Picture(ViewKind::Main, "guest", "picture"), "guest: a second player"),
+    (Cell::Picture(ViewKind::Main, "plan", "picture"), "plan: from above, without perspective"),
+    (Cell::Picture(ViewKind::Reflection, "main/pool", "picture"), "main/pool: mirrored, clipped at the water"),
+    (Cell::Picture(ViewKind::Reflection, "main/portal", "picture"), "main/portal: from the exit's side"),
+    (Cell::Picture(ViewKind::Reflection, "main/portal/portal", "picture"), "main/portal/portal: the portal in itself"),
+    (Cell::Picture(ViewKind::Reflection, "screen", "picture"), "screen: one camera for every viewer"),
+    (Cell::Cube(mirror_ball::PROBE), "probe: the cube map of the ball"),
+    (Cell::Picture(ViewKind::Reflection, impostor::VIEW, "picture"), "impostor: the tree, for its square"),
+    (Cell::Picture(ViewKind::Main, "main", smoke::TARGET), "main: smoke, with a quarter of the pixels"),
+    (Cell::Picture(ViewKind::Main, "detail", "picture"), "detail: one camera"),
+    (Cell::Tiles("detail"), "detail: the mean of 2 x 2 tiles"),
+    (Cell::ShadowMaps(ShadowedLight::Hemispherical), "the shadow map of a ceiling light: a paraboloid"),
+    (Cell::ShadowMaps(ShadowedLight::Sun), "the sun's shadow maps: three cascades"),
+    (Cell::ShadowMaps(ShadowedLight::Lamp), "a lamp's shadow maps: the faces of a cube"),
+];
+
+/// Draws a row of the sheet: not every device lets a shader sample as many textures as there are cells.
+#[derive(Clone)]
+pub struct ContactSheetRow {
+    row: usize,
+    name: String,
+    /// What the names of the views of the shadow maps begin with.
+    shadow_maps: [String; 3],
+    shader: String,
+}
+
+impl ContactSheetRow {
+    pub fn all() -> impl Iterator<Item = Self> {
+        let lights = Gallery::lights().unwrap_or_default();
+        let lights =
+            [ShadowedLight::Hemispherical, ShadowedLight::Sun, ShadowedLight::Lamp].map(|light| light.name(&lights));
+        (0..ROWS as usize).map(move |row| Self {
+            row,
+            name: name_of(row),
+            shadow_maps: lights.clone(),
+            shader: shader(row),
+        })
+    }
+}
+
+fn name_of(row: usize) -> String {
+    format!("contact sheet, row {row}")
+}
+
+impl Cell {
+    /// How many textures it samples.
+    fn texture_count(self) -> usize {
+        match self {
+            Self::ShadowMaps(light) => light.maps().len(),
+            _ => 1,
+        }
+    }
+}
+
+/// The cells of a row.
+fn cells_of(row: usize) -> impl Iterator<Item = Cell> {
+    CELLS.into_iter().map(|(cell, _)| cell).skip(row * COLUMNS as usize).take(COLUMNS as usize)
+}
+
+impl RenderProcess for ContactSheetRow {
     fn name(&self) -> &str {
-        "contact sheet"
+        &self.name
     }
 
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Post);
-        for (kind, view, _) in CELLS {
-            match kind {
-                ViewKind::Shadow => declare.samples_view(kind, &self.shadow_map, ShadowCasters::TARGET),
-                _ => declare.samples_view(kind, view, "picture"),
+        for cell in cells_of(self.row) {
+            match cell {
+                Cell::Picture(kind, view, target) => declare.samples_view(kind, view, target),
+                Cell::ShadowMaps(light) => {
+                    for map in light.maps() {
+                        let view = format!("{}{map}", self.shadow_maps[light as usize]);
+                        declare.samples_view(ViewKind::Shadow, &view, ShadowCasters::TARGET);
+                    }
+                }
+                Cell::Tiles(view) => {
+                    declare.samples_view_layers(ViewKind::Main, view, "picture", gallery::TILES * gallery::TILES);
+                }
+                Cell::Cube(view) => declare.samples_view_layers(ViewKind::Reflection, view, "picture", 6),
             }
         }
-        for tile in 0..gallery::TILES * gallery::TILES {
-            let name = format!("detail, tile {} {}", tile % gallery::TILES, tile / gallery::TILES);
-            declare.samples_view(ViewKind::Main, &name, "picture");
+        match self.row.checked_sub(1) {
+            None => declare.clears_color(TARGET, Format::Rgba8Srgb, ClearColor::Value([0.0, 0.0, 0.0, 1.0])),
+            Some(above) => {
+                declare.draws_over(TARGET);
+                declare.after(&name_of(above));
+            }
         }
-        declare.clears_color(TARGET, Format::Rgba8Srgb, ClearColor::Value([0.0, 0.0, 0.0, 1.0]));
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen { shader: include_str!("contact_sheet.wgsl"), ..FullScreen::default() })
+        Draws::FullScreen(FullScreen { shader: &self.shader, ..FullScreen::default() })
     }
 
     fn cpu_shader(&self) -> Option<CpuShader> {
@@ -79,35 +194,59 @@ impl RenderProcess for ContactSheet {
     }
 }
 
-impl<R: Real> FullScreenCpuShader<R> for ContactSheet {
+impl<R: Real> FullScreenCpuShader<R> for ContactSheetRow {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let [width, height] = gallery::SIZE.map(|side| side as usize);
         let [x, y] = pixel.coordinates;
-        let (cell, x, y) = (x / width + y / (height + LABEL as usize) * 3, x % width, y % (height + LABEL as usize));
-        let Some(y) = y.checked_sub(LABEL as usize) else { return false };
-        let load = |texture: usize, x: usize, y: usize| {
-            let [width, height] = pass.sampled[texture].size();
-            pass.sampled[texture].load([x.min(width - 1), y.min(height - 1)], 0)
+        let (row, y) = (y / (height + LABEL as usize), y % (height + LABEL as usize));
+        let (column, x) = (x / width, x % width);
+        let Some(y) = y.checked_sub(LABEL as usize).filter(|_| row == self.row) else { return false };
+        let Some(cell) = cells_of(row).nth(column) else { return false };
+        let textures = &pass.sampled[cells_of(row).take(column).map(Cell::texture_count).sum()..];
+        let shown = textures[0];
+        let load = |[x, y]: [usize; 2], layer: usize| {
+            let [width, height] = shown.size();
+            shown.load([x.min(width - 1), y.min(height - 1)], layer)
         };
-        let color = match CELLS.get(cell) {
-            Some((ViewKind::Shadow, ..)) => {
-                let [side, _] = pass.sampled[cell].size();
-                let Some(x) = x.checked_sub((width - height) / 2).filter(|x| *x < height) else { return false };
-                let depth = load(cell, x * side / height, y * side / height)[0];
-                // Most of what a lamp sees is close to it compared with its range.
-                let depth = depth * depth * depth * depth;
-                Vector([depth, depth, depth, R::one()])
+        // The number of the square in which a pixel is, three to a row, and where in the square, as pixels of a texture of this size.
+        let square = |side: usize, count: usize, pixels: usize| {
+            let columns = count.min(3);
+            let x = x.checked_sub((width - columns * side) / 2).filter(|x| *x < columns * side)?;
+            let index = Some(x / side + y / side * 3).filter(|index| *index < count)?;
+            Some((index, [x % side * pixels / side, y % side * pixels / side]))
+        };
+        // Stretched to the height of the cell.
+        let fitted = |[x, y]: [usize; 2]| {
+            let [shown_width, shown_height] = shown.size();
+            let across = height * shown_width / shown_height;
+            let x = x.checked_sub((width - across.min(width)) / 2).filter(|x| *x < across)?;
+            Some([x * shown_height / height, y * shown_height / height])
+        };
+        let color = match cell {
+            Cell::ShadowMaps(light) => {
+                let [pixels, _] = shown.size();
+                let found = square(light.side() as usize, light.maps().len(), pixels);
+                let Some((map, [x, y])) = found else { return false };
+                let last = textures[map].size()[0] - 1;
+                let brightness = light.brightness(textures[map].load([x.min(last), y.min(last)], 0)[0]);
+                Vector([brightness, brightness, brightness, R::one()])
             }
-            Some(_) => load(cell, x, y),
-            None => {
+            Cell::Picture(..) => {
+                let Some(at) = fitted([x, y]) else { return false };
+                load(at, 0)
+            }
+            Cell::Tiles(_) => {
                 // Two pixels of the tiles in each direction are one of the picture.
                 let mut sum = Vector::zero();
                 for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let (x, y) = (2 * x + dx, 2 * y + dy);
-                    let tile = CELLS.len() + x / width + y / height * 2;
-                    sum = sum + load(tile, x % width, y % height);
+                    sum = sum + load([x % width, y % height], x / width + y / height * gallery::TILES as usize);
                 }
                 sum * R::of(0.25)
+            }
+            Cell::Cube(_) => {
+                let Some((face, at)) = square(height / 2, 6, shown.size()[0]) else { return false };
+                load(at, face)
             }
         };
         targets[0] = Vector([color[0], color[1], color[2], R::one()]);
@@ -115,10 +254,46 @@ impl<R: Real> FullScreenCpuShader<R> for ContactSheet {
     }
 }
 
+/// The shader of a row, with the bindings of its cells and a case for each of them.
+fn shader(row: usize) -> String {
+    let (mut bindings, mut cases, mut binding) = (String::new(), String::new(), 1);
+    let mut bind = |texture: &str| {
+        bindings += &format!("@group(2) @binding({binding}) var shown_{binding}: {texture};\n");
+        binding += 1;
+        format!("shown_{}", binding - 1)
+    };
+    for (column, cell) in cells_of(row).enumerate() {
+        let color = match cell {
+            Cell::Picture(..) => format!("picture({}, at)", bind("texture_2d<f32>")),
+            Cell::Tiles(_) => format!("tiles({}, at)", bind("texture_2d_array<f32>")),
+            Cell::Cube(_) => format!("cube({}, at)", bind("texture_2d_array<f32>")),
+            Cell::ShadowMaps(light) => {
+                // Squares are apart, so all but one of them add nothing.
+                let map = |map: usize| {
+                    let (texture, count, side) = (bind("texture_depth_2d"), light.maps().len(), light.side());
+                    format!("shadow_map({texture}, at, {map}, {count}, {side}, {})", light as usize)
+                };
+                (0..light.maps().len()).map(map).collect::<Vec<_>>().join(" + ")
+            }
+        };
+        cases += &format!("        case {column}: {{ return {color}; }}\n");
+    }
+    let color_of = format!(
+        "const ROW: i32 = {row};
+
+fn color_of(column: i32, at: vec2<i32>) -> vec3<f32> {{
+    switch column {{
+{cases}        default: {{ return vec3<f32>(0.0); }}
+    }}
+}}
+"
+    );
+    [&bindings, &color_of, include_str!("contact_sheet.wgsl")].concat()
+}
+
 /// Writes the labels above the pictures.
 pub fn draw_labels(sheet: &mut Picture) {
-    let labels = CELLS.iter().map(|(.., label)| *label).chain([LABEL_OF_TILES]);
-    for (cell, label) in (0..).zip(labels) {
+    for (cell, (_, label)) in (0..).zip(CELLS) {
         let left = cell % COLUMNS * gallery::SIZE[0] + 6;
         let top = cell / COLUMNS * (gallery::SIZE[1] + LABEL) + 7;
         for (letter, character) in (0..).zip(label.chars()) {

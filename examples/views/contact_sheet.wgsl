@@ -1,46 +1,69 @@
-// The pictures of other views, in three rows of three.
-
-@group(2) @binding(1) var main_view: texture_2d<f32>;
-@group(2) @binding(2) var guest: texture_2d<f32>;
-@group(2) @binding(3) var pool: texture_2d<f32>;
-@group(2) @binding(4) var portal: texture_2d<f32>;
-@group(2) @binding(5) var inner_portal: texture_2d<f32>;
-@group(2) @binding(6) var screen: texture_2d<f32>;
-@group(2) @binding(7) var shadow_map: texture_depth_2d;
-@group(2) @binding(8) var detail: texture_2d<f32>;
-@group(2) @binding(9) var tile_upper_left: texture_2d<f32>;
-@group(2) @binding(10) var tile_upper_right: texture_2d<f32>;
-@group(2) @binding(11) var tile_lower_left: texture_2d<f32>;
-@group(2) @binding(12) var tile_lower_right: texture_2d<f32>;
+// What the cells of the sheet have in common. The bindings, `const ROW: i32` and
+// `fn color_of(column: i32, at: vec2<i32>) -> vec3<f32>` go before it.
 
 const PICTURE: vec2<i32> = vec2<i32>(480, 270);
 const LABEL: i32 = 22;
 
-// Outside of a texture, as in that of a view that the frame does not have, it is black.
-fn load(source: texture_2d<f32>, at: vec2<i32>) -> vec3<f32> {
-    return textureLoad(source, at, 0).rgb;
+// The pixel of something of this size that is stretched to the height of the cell; negative beside it.
+fn fitted(at: vec2<i32>, size: vec2<u32>) -> vec2<i32> {
+    let shown = vec2<i32>(size);
+    let across = PICTURE.y * shown.x / shown.y;
+    let x = at.x - (PICTURE.x - across) / 2;
+    if x < 0 || x >= across {
+        return vec2<i32>(-1);
+    }
+    return vec2<i32>(x, at.y) * shown.y / PICTURE.y;
 }
 
-fn shadow_at(at: vec2<i32>) -> vec3<f32> {
-    let across = at - vec2<i32>((PICTURE.x - PICTURE.y) / 2, 0);
-    if across.x < 0 || across.x >= PICTURE.y {
+fn picture(shown: texture_2d<f32>, at: vec2<i32>) -> vec3<f32> {
+    let pixel = fitted(at, textureDimensions(shown));
+    return select(vec3<f32>(0.0), textureLoad(shown, max(pixel, vec2<i32>(0)), 0).rgb, pixel.x >= 0);
+}
+
+// The number of the square of this side in which a pixel is, three to a row, and where in the square; the number is negative beside the
+// squares.
+fn square_of(at: vec2<i32>, count: i32, side: i32) -> vec3<i32> {
+    let columns = min(count, 3);
+    let x = at.x - (PICTURE.x - columns * side) / 2;
+    let index = x / side + at.y / side * 3;
+    if x < 0 || x >= columns * side || index >= count {
+        return vec3<i32>(0, 0, -1);
+    }
+    return vec3<i32>(x % side, at.y % side, index);
+}
+
+// One of the shadow maps of a light, black outside of its square. `light` is a number of `ShadowedLight`.
+fn shadow_map(shown: texture_depth_2d, at: vec2<i32>, map: i32, count: i32, side: i32, light: i32) -> vec3<f32> {
+    let square = square_of(at, count, side);
+    if square.z != map {
         return vec3<f32>(0.0);
     }
-    let side = i32(textureDimensions(shadow_map).x);
-    let depth = textureLoad(shadow_map, across * side / PICTURE.y, 0);
-    // Most of what a lamp sees is close to it compared with its range.
-    return vec3<f32>(depth * depth * depth * depth);
+    let depth = textureLoad(shown, square.xy * i32(textureDimensions(shown).x) / side, 0);
+    switch light {
+        case 0: { return vec3<f32>(depth * depth * depth * depth); }
+        case 1: { return vec3<f32>(min(depth * 6.0, 1.0)); }
+        default: { return vec3<f32>(max(1.0 - 1e-5 / max(depth, 1e-9), 0.0)); }
+    }
 }
 
-fn tile_at(at: vec2<i32>) -> vec3<f32> {
-    let tile = at / PICTURE;
-    let within = at % PICTURE;
-    switch tile.x + 2 * tile.y {
-        case 0: { return load(tile_upper_left, within); }
-        case 1: { return load(tile_upper_right, within); }
-        case 2: { return load(tile_lower_left, within); }
-        default: { return load(tile_lower_right, within); }
+// Two pixels of the tiles in each direction are one of the picture.
+fn tiles(shown: texture_2d_array<f32>, at: vec2<i32>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var corner = 0; corner < 4; corner++) {
+        let pixel = 2 * at + vec2<i32>(corner & 1, corner >> 1u);
+        let tile = pixel / PICTURE;
+        sum += textureLoad(shown, pixel % PICTURE, tile.x + 2 * tile.y, 0).rgb;
     }
+    return 0.25 * sum;
+}
+
+fn cube(shown: texture_2d_array<f32>, at: vec2<i32>) -> vec3<f32> {
+    let side = PICTURE.y / 2;
+    let square = square_of(at, 6, side);
+    if square.z < 0 {
+        return vec3<f32>(0.0);
+    }
+    return textureLoad(shown, square.xy * i32(textureDimensions(shown).x) / side, square.z, 0).rgb;
 }
 
 @fragment
@@ -48,25 +71,8 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let pixel = vec2<i32>(in.position.xy);
     let cell = pixel / vec2<i32>(PICTURE.x, PICTURE.y + LABEL);
     let at = pixel % vec2<i32>(PICTURE.x, PICTURE.y + LABEL) - vec2<i32>(0, LABEL);
-    if at.y < 0 {
+    if at.y < 0 || cell.y != ROW {
         discard;
     }
-    var color: vec3<f32>;
-    switch cell.x + 3 * cell.y {
-        case 0: { color = load(main_view, at); }
-        case 1: { color = load(guest, at); }
-        case 2: { color = load(pool, at); }
-        case 3: { color = load(portal, at); }
-        case 4: { color = load(inner_portal, at); }
-        case 5: { color = load(screen, at); }
-        case 6: { color = shadow_at(at); }
-        case 7: { color = load(detail, at); }
-        default: {
-            let first = 2 * at;
-            let upper = tile_at(first) + tile_at(first + vec2<i32>(1, 0));
-            let lower = tile_at(first + vec2<i32>(0, 1)) + tile_at(first + vec2<i32>(1, 1));
-            color = 0.25 * (upper + lower);
-        }
-    }
-    return vec4<f32>(color, 1.0);
+    return vec4<f32>(color_of(cell.x, at), 1.0);
 }

@@ -30,6 +30,8 @@ pub struct ViewCost {
     /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted sooner. Only of
     /// views that may be left out.
     saves_ms: Option<f64>,
+    /// Its rung at the end of the frames with a budget: 0 at its best, and without a budget.
+    rung: usize,
 }
 
 /// How many frames [`measure`] draws.
@@ -100,19 +102,28 @@ pub fn measure<B: Backend>(
             commands: view.commands,
             ms: times.get(view.name.as_str()).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
             saves_ms: saved.get(&view.name).copied(),
+            rung: 0,
             name: view.name,
         }
     };
     Ok((views.into_iter().map(cost_of).collect(), targets))
 }
 
+/// Sets the rungs of views, by name.
+pub fn set_rungs(views: &mut [ViewCost], rungs: &HashMap<String, usize>) {
+    for view in views {
+        view.rung = rungs.get(&view.name).copied().unwrap_or(0);
+    }
+}
+
 /// Prints a line for each view, and the memory of all.
 pub fn print(views: &[ViewCost], targets: TargetMemory) {
-    println!("{:<28} {:<10} {:>8} {:>9} {:>8} {:>9}", "view", "kind", "objects", "commands", "ms", "saves ms");
+    let line = format!("{:<28} {:<10} {:>8} {:>9}", "view", "kind", "objects", "commands");
+    println!("{line} {:>8} {:>9} {:>4}", "ms", "saves ms", "rung");
     for view in views {
         let saves = view.saves_ms.map_or_else(|| "-".to_owned(), |saves| format!("{saves:.3}"));
-        let ViewCost { name, kind, objects, commands, ms, .. } = view;
-        println!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9}");
+        let ViewCost { name, kind, objects, commands, ms, rung, .. } = view;
+        println!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9} {rung:>4}");
     }
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let TargetMemory { textures, bytes, dedicated_bytes, .. } = targets;

@@ -7,8 +7,8 @@ use drawloom::scene::{
     Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Topology, Vertex, ViewKind,
 };
 
-use crate::contact_sheet;
 use crate::surface::Surface;
+use crate::{contact_sheet, impostor, mirror_ball, smoke};
 
 /// The pixels of a view.
 pub const SIZE: [u32; 2] = [480, 270];
@@ -45,6 +45,15 @@ impl Gallery {
             }
         }
         scene.cameras = cameras();
+        scene.lights = Self::lights()?;
+        let ball = scene.add(ball()?)?;
+        let mut mirror_ball = RenderObject::new(ball, surface, mirror_ball::POSITION);
+        (mirror_ball.scale, mirror_ball.layers) = (Vec3::splat(mirror_ball::RADIUS), mirror_ball::LAYER);
+        scene.add_object(mirror_ball)?;
+        smoke::add_smoke(&mut scene, ball)?;
+        if let Some(camera) = scene.cameras.iter().find(|camera| camera.name == impostor::VIEW).cloned() {
+            impostor::add_tree(&mut scene, ball, square, &camera)?;
+        }
         Ok(Self { scene })
     }
 
@@ -68,9 +77,15 @@ impl Gallery {
             .filter(|name| !["main", contact_sheet::TARGET].contains(name))
     }
 
-    /// The light whose shadow map is on the sheet: the first that casts a shadow.
-    pub fn light_of_shadow_map(lights: &[Light]) -> Option<usize> {
-        lights.iter().position(Light::casts_shadow)
+    /// The colonnade's lights, and a lamp over the pool.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn lights() -> Result<Vec<Light>, SceneError> {
+        let mut lights = demo::colonnade()?.lights;
+        let (position, intensity) = (DVec3::new(0.4, 1.9, 5.6), Vec3::new(2.4, 1.5, 0.8));
+        lights.push(Light::Point { position, intensity, range: 9.0, casts_shadow: true });
+        Ok(lights)
     }
 }
 
@@ -156,6 +171,9 @@ fn cameras() -> Vec<Camera> {
     let portal = main.through_portal("portal", entry, exit);
     let inner = portal.through_portal("portal", entry, exit);
     let [width, height] = contact_sheet::SIZE;
+    // From above, without perspective.
+    let plan = Camera::looking_at("plan", DVec3::new(0.0, 30.0, 2.0), DVec3::new(0.0, 0.0, 2.0));
+    let plan = Camera { projection: Projection::Orthographic { height: 16.0 }, far: 60.0, size: SIZE, ..plan };
     let mut cameras = vec![
         main.reflected("pool", pool()),
         guest.reflected("pool", pool()),
@@ -163,8 +181,16 @@ fn cameras() -> Vec<Camera> {
         portal,
         Camera { kind: ViewKind::Reflection, ..screen },
     ];
-    cameras.extend((0..TILES * TILES).map(|tile| detail.tile([tile % TILES, tile / TILES], TILES)));
-    cameras.extend([detail, guest, main]);
+    cameras.extend((0..TILES * TILES).map(|tile| {
+        let camera = detail.tile([tile % TILES, tile / TILES], TILES);
+        Camera { name: format!("detail/{tile}"), ..camera }
+    }));
+    cameras.extend(mirror_ball::cameras());
+    cameras.extend(impostor::camera(&main, None));
+    cameras.extend([detail, guest, main, plan]);
+    for camera in &mut cameras {
+        impostor::choose_layers(camera);
+    }
     let sheet = camera(contact_sheet::TARGET, DVec3::ZERO, DVec3::NEG_Z, 60.0);
     cameras.push(Camera { kind: ViewKind::Post, size: [width, height], ..sheet });
     cameras
@@ -176,4 +202,25 @@ fn square() -> Result<Mesh, SceneError> {
         |x: f32, y: f32| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [x * 0.5 + 0.5, 0.5 - y * 0.5] };
     let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
     Mesh::new("square", Topology::TriangleList, corners, vec![0, 1, 2, 2, 3, 0])
+}
+
+/// A ball of radius 1.
+fn ball() -> Result<Mesh, SceneError> {
+    const RINGS: u32 = 20;
+    const SEGMENTS: u32 = 40;
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+    for ring in 0..=RINGS {
+        for segment in 0..=SEGMENTS {
+            let [u, v] = [segment as f32 / SEGMENTS as f32, ring as f32 / RINGS as f32];
+            let (turn, down) = (u * std::f32::consts::TAU, v * std::f32::consts::PI);
+            let normal = Vec3::new(down.sin() * turn.sin(), down.cos(), down.sin() * turn.cos()).to_array();
+            vertices.push(Vertex { position: normal, normal, uv: [u, v] });
+            if ring < RINGS && segment < SEGMENTS {
+                let first = ring * (SEGMENTS + 1) + segment;
+                let below = first + SEGMENTS + 1;
+                indices.extend([first, below, below + 1, first, below + 1, first + 1]);
+            }
+        }
+    }
+    Mesh::new("ball", Topology::TriangleList, vertices, indices)
 }

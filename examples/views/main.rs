@@ -1,13 +1,19 @@
-//! Everything is a camera (M 10.1): draws a scene with a mirror, portals, a screen, two players and tiles, each as views that other views
+//! Everything is a camera (M 10.1): draws a scene with mirrors, portals, a screen, an impostor, two players and tiles, each as views that other views
 //! sample, and puts all of them on one contact sheet. Prints what each view costs the processor, and what leaving it out would save. Without
 //! a graphics adapter the software backend draws it.
 //!
 //!     cargo run --release --example views
 //!     cargo run --release --example views -- --frames 100 --report views.json --out sheet.png
+//!     cargo run --release --example views -- --budget-ms 4
 
+mod budget;
 mod contact_sheet;
 mod costs;
 mod gallery;
+mod impostor;
+mod mirror_ball;
+mod processes;
+mod smoke;
 mod surface;
 
 use std::error::Error;
@@ -16,16 +22,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
-use drawloom::backend::{Backend, BackendError, Picture, SoftwareBackend, TargetMemory, WgpuBackend};
-use drawloom::process::{Deferred, ToneMapping};
+use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, RendererBuilder, Submitter};
+use drawloom::{Renderer, Submitter};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use contact_sheet::ContactSheet;
 use gallery::Gallery;
-use surface::Surface;
 
 /// Draws every kind of view on one contact sheet.
 #[derive(Parser)]
@@ -42,6 +45,10 @@ struct Arguments {
     /// The frames that are measured of the whole gallery, and without each view.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
+
+    /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are left.
+    #[arg(long, value_name = "MS")]
+    budget_ms: Option<f64>,
 
     /// Draws in software although there is an adapter.
     #[arg(long)]
@@ -60,23 +67,21 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let scheduler = Arc::new(Scheduler::builder().build()?);
-    let device = if arguments.software { Err("it is asked for".into()) } else { adapter::device() };
-    match device {
-        Ok((device, queue)) => {
-            let backend = WgpuBackend::new(device, queue)?;
-            println!("drawn by {}", backend.adapter_name());
-            let (renderer, submitter) = with_processes(Renderer::builder(backend)).build(scheduler)?;
-            draw(arguments, renderer, submitter, |submission, view| submission.read(view, contact_sheet::TARGET))?;
-        }
-        Err(reason) => {
-            println!("drawn in software: {reason}");
-            let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-            let (renderer, submitter) = with_processes(Renderer::builder(backend)).build(scheduler)?;
-            draw(arguments, renderer, submitter, |submission, view| submission.read(view, contact_sheet::TARGET))?;
-        }
+    let mut gallery = Gallery::new()?;
+    let (mut renderer, submitter) = measured_renderer()?;
+    let (mut views, targets) = {
+        let progress = ProgressBar::new(costs::frames_to_draw(&gallery, arguments.frames));
+        progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
+        let measured = costs::measure(&gallery, &mut renderer, &submitter, arguments.frames, || progress.inc(1))?;
+        progress.finish_and_clear();
+        measured
+    };
+    if let Some(milliseconds) = arguments.budget_ms {
+        let chosen = budget::choose(milliseconds, &gallery, &mut renderer, &submitter)?;
+        costs::set_rungs(&mut views, &chosen.rungs);
+        gallery.scene.cameras = chosen.cameras;
     }
-    let (views, targets) = measured_costs(arguments)?;
+    draw(arguments, &gallery)?;
     costs::print(&views, targets);
     match &arguments.report {
         Some(path) => costs::write(&views, path),
@@ -84,39 +89,37 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn with_processes<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
-    let deferred = Deferred::new().post(ToneMapping::default());
-    let builder = Surface::all().into_iter().fold(builder.deferred(deferred), RendererBuilder::process);
-    builder.process(ContactSheet::new()).output(contact_sheet::TARGET)
+/// A renderer on a device that draws nothing, so that only the processor's work counts.
+fn measured_renderer() -> Result<(Renderer<WgpuBackend>, Submitter<WgpuBackend>), Box<dyn Error>> {
+    let (device, queue) = adapter::noop_device()?;
+    let scheduler = Arc::new(Scheduler::builder().timeline_capacity(1 << 16).build()?);
+    let builder = processes::add_to(Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets()));
+    Ok(builder.build(scheduler)?)
 }
 
-/// Draws the gallery once, and writes the contact sheet.
-fn draw<B: Backend>(
-    arguments: &Arguments,
-    mut renderer: Renderer<B>,
-    submitter: Submitter<B>,
-    read: impl Fn(&B::Submission, usize) -> Result<Picture, BackendError>,
-) -> Result<(), Box<dyn Error>> {
-    let gallery = Gallery::new()?;
-    let submitted = submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?;
-    let mut sheet = read(&submitted.submission, gallery.sheet_view())?;
+/// Draws the gallery, and writes the contact sheet.
+fn draw(arguments: &Arguments, gallery: &Gallery) -> Result<(), Box<dyn Error>> {
+    let scheduler = Arc::new(Scheduler::builder().build()?);
+    let device = if arguments.software { Err("it is asked for".into()) } else { adapter::device() };
+    let mut sheet = match device {
+        Ok((device, queue)) => {
+            let backend = WgpuBackend::new(device, queue)?;
+            println!("drawn by {}", backend.adapter_name());
+            let (mut renderer, submitter) = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
+            let submitted = submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?;
+            submitted.submission.read(gallery.sheet_view(), contact_sheet::TARGET)?
+        }
+        Err(reason) => {
+            println!("drawn in software: {reason}");
+            let backend = SoftwareBackend::new(Arc::clone(&scheduler));
+            let (mut renderer, submitter) = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
+            let submitted = submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?;
+            submitted.submission.read(gallery.sheet_view(), contact_sheet::TARGET)?
+        }
+    };
     contact_sheet::draw_labels(&mut sheet);
     image::save_buffer(&arguments.out, &sheet.bytes, sheet.width, sheet.height, image::ColorType::Rgba8)
         .map_err(|error| format!("{} could not be written: {error}", arguments.out.display()))?;
     println!("{} written", arguments.out.display());
     Ok(())
-}
-
-/// Measures on a device that draws nothing, so that only the processor's work counts.
-fn measured_costs(arguments: &Arguments) -> Result<(Vec<costs::ViewCost>, TargetMemory), Box<dyn Error>> {
-    let gallery = Gallery::new()?;
-    let (device, queue) = adapter::noop_device()?;
-    let scheduler = Arc::new(Scheduler::builder().timeline_capacity(1 << 16).build()?);
-    let builder = with_processes(Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets()));
-    let (mut renderer, submitter) = builder.build(scheduler)?;
-    let progress = ProgressBar::new(costs::frames_to_draw(&gallery, arguments.frames));
-    progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
-    let measured = costs::measure(&gallery, &mut renderer, &submitter, arguments.frames, || progress.inc(1))?;
-    progress.finish_and_clear();
-    Ok(measured)
 }

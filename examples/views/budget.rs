@@ -1,0 +1,91 @@
+//! A budget for the gallery: which views are drawn in cheaper forms, and which are left out.
+
+use std::collections::HashMap;
+use std::error::Error;
+
+use drawloom::backend::Backend;
+use drawloom::scene::{Camera, SceneRef};
+use drawloom::{BudgetedView, Renderer, Rung, Submitter, ViewBudget, ViewForm};
+
+use crate::gallery::Gallery;
+use crate::{contact_sheet, mirror_ball};
+
+/// Enough for the first measurements, to shed, and to try a rung that is left.
+const FRAMES: u32 = 90;
+
+/// What the budget leaves of the gallery.
+pub struct Chosen {
+    /// The cameras of the last frame.
+    pub cameras: Vec<Camera>,
+    /// The rung of each camera, by name.
+    pub rungs: HashMap<String, usize>,
+}
+
+/// Draws frames within a budget of so many milliseconds of thread time. Prints a line whenever the rung of a view changes.
+///
+/// # Errors
+/// If the budget is no time, or a frame fails.
+pub fn choose<B: Backend>(
+    milliseconds: f64,
+    gallery: &Gallery,
+    renderer: &mut Renderer<B>,
+    submitter: &Submitter<B>,
+) -> Result<Chosen, Box<dyn Error>> {
+    let (views, mut budget) = (views(gallery), ViewBudget::new(milliseconds)?);
+    let rungs_of = |budget: &ViewBudget| {
+        let of = |view: &BudgetedView| {
+            let rung = budget.rung(&view.name).unwrap_or(0);
+            view.cameras.iter().map(|camera| (camera.name.clone(), rung)).collect::<Vec<_>>()
+        };
+        views.iter().flat_map(of).collect::<HashMap<_, _>>()
+    };
+    let mut frame = 0;
+    loop {
+        let cameras = budget.cameras(&views)?;
+        renderer.add_choices(budget.choices());
+        let rungs = rungs_of(&budget);
+        let scene = SceneRef { cameras: &cameras, ..gallery.scene.as_scene_ref() };
+        let submitted = submitter.submit(renderer.record(scene)?)?;
+        let took = submitted.statistics.stages.total().as_secs_f64() * 1e3;
+        frame += 1;
+        if frame == FRAMES {
+            let left = if budget.is_exhausted() { ", and every view is on its last rung" } else { "" };
+            println!("frame {frame:>3}: {took:.2} ms of {milliseconds} ms{left}");
+            return Ok(Chosen { cameras, rungs });
+        }
+        budget.update(&submitted.statistics);
+        let after = rungs_of(&budget);
+        for view in &views {
+            let [before, rung] = [&rungs, &after].map(|rungs| rungs.get(&view.cameras[0].name).copied().unwrap_or(0));
+            if before != rung {
+                println!("frame {frame:>3}: {took:.2} ms, {} goes from rung {before} to {rung}", view.name);
+            }
+        }
+    }
+}
+
+/// The gallery's cameras. The sheet and its main view are always drawn; the portal goes together with the one in it.
+fn views(gallery: &Gallery) -> Vec<BudgetedView> {
+    let every = |interval| Rung::Drawn(ViewForm { interval, ..ViewForm::BEST });
+    let mirror = vec![every(2), every(4), Rung::LeftOut];
+    let mut views: Vec<BudgetedView> = Vec::new();
+    for camera in &gallery.scene.cameras {
+        let (group, priority, ladder) = match camera.name.as_str() {
+            "main" | contact_sheet::TARGET => (camera.name.as_str(), 9, Vec::new()),
+            "main/portal/portal" | "main/portal" => ("main/portal", 4, mirror.clone()),
+            "main/pool" => ("main/pool", 3, mirror.clone()),
+            "guest" | "detail" => (camera.name.as_str(), 2, vec![every(2), every(4)]),
+            name if name.starts_with("detail/") => ("tiles of detail", 0, vec![every(4), Rung::LeftOut]),
+            name if name.starts_with(mirror_ball::PROBE) => (mirror_ball::PROBE, 1, vec![every(6), Rung::LeftOut]),
+            name => (name, 1, mirror.clone()),
+        };
+        match views.iter_mut().find(|view| view.name == group) {
+            Some(view) => view.cameras.push(Camera::clone(camera)),
+            None => {
+                let (name, cameras) = (group.to_owned(), vec![camera.clone()]);
+                views.push(BudgetedView { name, priority, cameras, ladder });
+            }
+        }
+    }
+    views
+}
