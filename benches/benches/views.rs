@@ -5,16 +5,20 @@
 //!
 //! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is compared in a row is
 //! drawn in turn, and the table has the medians. All cameras move in every frame. `target/drawloom/views.json` has the same.
+//!
+//! The second table has the memory of many small views with transient targets, each number of views in a process of its own.
 
+use std::env;
 use std::error::Error;
+use std::fs;
+use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Parser;
 use drawloom::backend::WgpuBackend;
-use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Place, RenderProcess};
+use drawloom::process::Deferred;
 use drawloom::scene::{
     Camera, Changes, ClipPlane, LayerMask, Material, Mesh, Projection, RenderObject, Scene, SceneRef, ViewKind,
 };
@@ -22,13 +26,24 @@ use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::{Harness, Rounds, WARM_UP, progress_bar};
+use drawloom_benches::mirror::{self, Mirror};
 use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::stopwatch::timed_frame;
 use drawloom_benches::table::Table;
 use drawloom_testing::adapter;
+use drawloom_testing::scenes::field;
 use indicatif::ProgressBar;
 use serde::Serialize;
+
+#[derive(Parser)]
+struct ViewsArguments {
+    #[command(flatten)]
+    extent: ExtentArguments,
+    /// Draw so many views, and print the memory that they need in KiB.
+    #[arg(long)]
+    views: Option<usize>,
+}
 
 /// Two ways to draw a frame.
 #[derive(Serialize)]
@@ -40,7 +55,11 @@ struct Row {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let arguments = ViewsArguments::parse();
+    if let Some(views) = arguments.views {
+        return print_memory(views);
+    }
+    let quick = arguments.extent.is_quick();
     let (rounds, side) = if quick { (3, 20) } else { (1001, 100) };
     let progress = progress_bar("frames");
     let rows = [mirror(side, rounds, &progress)?, many_views(side, rounds, &progress)?];
@@ -53,10 +72,63 @@ fn main() -> Result<(), Box<dyn Error>> {
         table.row([(*compared).to_owned(), seen, format!("{first:.1}"), format!("{second:.1}"), difference, ratio]);
     }
     table.print();
+
+    let counts = if quick { [5, 20] } else { [500, 2_000] };
+    let memory = counts.map(|views| memory_of(views).map(|mebibytes| Memory { views, mebibytes }));
+    let [few, many] = memory;
+    let memory = [few?, many?];
+    let mut table = Table::new(&["views", "MiB", "ratio"]);
+    for Memory { views, mebibytes } in &memory {
+        let ratio = mebibytes / memory[0].mebibytes;
+        table.row([views.to_string(), format!("{mebibytes:.1}"), format!("{ratio:.2}")]);
+    }
+    table.print();
     if !quick {
-        results::write_json("views.json", &rows)?;
+        results::write_json("views.json", &(rows, memory))?;
     }
     Ok(())
+}
+
+/// What a process with many views needs.
+#[derive(Serialize)]
+struct Memory {
+    views: usize,
+    /// Of the process, in RAM, without what it has before it draws.
+    mebibytes: f64,
+}
+
+/// Measures the memory of so many views in another process.
+fn memory_of(views: usize) -> Result<f64, Box<dyn Error>> {
+    let output = Command::new(env::current_exe()?).arg("--views").arg(views.to_string()).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into());
+    }
+    let kibibytes: f64 = String::from_utf8(output.stdout)?.trim().parse()?;
+    Ok(kibibytes / 1024.0)
+}
+
+/// Draws so many views of 8 × 8 pixels of 500 objects, and prints by how many KiB the process has grown.
+fn print_memory(views: usize) -> Result<(), Box<dyn Error>> {
+    let (device, queue) = adapter::noop_device()?;
+    let builder = Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets());
+    let (mut renderer, submitter) = builder.deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
+    let mut scene = field(500);
+    let camera = Camera { size: [8, 8], ..scene.cameras[0].clone() };
+    scene.cameras = (0..views).map(|view| Camera { name: format!("view {view}"), ..camera.clone() }).collect();
+    let before = resident_kib()?;
+    for _ in 0..3 {
+        submitter.submit(renderer.record(scene.as_scene_ref())?)?;
+    }
+    println!("{}", resident_kib()?.saturating_sub(before));
+    Ok(())
+}
+
+/// The memory of this process that is in RAM, in KiB, on Linux.
+fn resident_kib() -> Result<usize, Box<dyn Error>> {
+    let status = fs::read_to_string("/proc/self/status")?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let number = line.and_then(|line| line.split_whitespace().next());
+    Ok(number.ok_or("the system does not tell how much memory a process has")?.parse()?)
 }
 
 /// A frame without a mirror and with one, on one worker.
@@ -104,7 +176,7 @@ fn grid(side: usize) -> Result<Scene, Box<dyn Error>> {
         scene.add_object(RenderObject { layers: WORLD, ..object })?;
     }
     let mirror = RenderObject::new(mesh, material, DVec3::new(side as f64, 1.0, side as f64));
-    scene.add_object(RenderObject { layers: MIRROR, ..mirror })?;
+    scene.add_object(RenderObject { layers: mirror::LAYER, ..mirror })?;
     Ok(scene)
 }
 
@@ -117,40 +189,6 @@ fn overhead(name: &str, along: f64, across: u32) -> Camera {
 }
 
 const WORLD: LayerMask = LayerMask::layer(0);
-const MIRROR: LayerMask = LayerMask::layer(1);
-
-/// Draws the mirror.
-struct Mirror;
-
-impl RenderProcess for Mirror {
-    fn name(&self) -> &str {
-        "mirror"
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
-        declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
-        declare.draws_over("radiance");
-        declare.matches_depth("depth");
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        let shader = "
-            @group(2) @binding(1) var mirrored: texture_2d<f32>;
-
-            @vertex
-            fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
-                return clip_position(relative_position(drawn_object(in.instance), in.position));
-            }
-
-            @fragment
-            fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-                return textureLoad(mirrored, vec2<i32>(position.xy), 0);
-            }
-        ";
-        Draws::Commands(CommandDraws { shader, selection: Selection::ALL.in_layers(MIRROR), ..CommandDraws::default() })
-    }
-}
 
 struct Runner {
     renderer: Renderer<WgpuBackend>,
@@ -171,7 +209,7 @@ impl Runner {
         let mut cameras = vec![main.clone()];
         if mirrors {
             let plane = ClipPlane { point: DVec3::Y, normal: Vec3::Y };
-            let mirrored = Camera { name: main.child_name("mirror"), ..overhead("", 70.0, 14) };
+            let mirrored = Camera { name: main.child_name(mirror::VIEW), ..overhead("", 70.0, 14) };
             cameras.push(Camera { clip_plane: Some(plane), kind: ViewKind::Reflection, layers: WORLD, ..mirrored });
         }
         Ok(Self { renderer, submitter, cameras, frames: 0 })

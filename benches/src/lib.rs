@@ -12,6 +12,7 @@ pub mod chart;
 pub mod city;
 pub mod clouds;
 pub mod harness;
+pub mod mirror;
 pub mod moving;
 pub mod results;
 pub mod statistics;

@@ -1,0 +1,209 @@
+//! What a change of what the scene requires costs: the longest frames when lights, glass and a mirror come and go.
+//!
+//!     cargo bench -p drawloom-benches --bench requirements
+//!     cargo bench -p drawloom-benches --bench requirements -- --quick --backend noop
+//!
+//! Boxes, panes, and a light of every class. Fifty times a class of lights, the glass or the mirror comes or goes, in a random order, and then
+//! some frames are drawn without a change. All cameras move in every frame. A frame is timed from the hand-over of the scene to the return
+//! of submit; on an adapter until the device is idle. *At rest* are the frames of a third contender in which nothing comes or goes: what is
+//! beyond the ratio of their longest frame to their median is due to the changes.
+//!
+//! The second table has the colonnade drawn by a pipeline that keeps all of its processes, and by one that has what the scene requires.
+//! `target/drawloom/requirements.json` has the same.
+
+mod unneeded;
+mod world;
+
+use std::error::Error;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use drawloom::backend::WgpuBackend;
+use drawloom::process::Deferred;
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, Submitter};
+use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::harness::progress_bar;
+use drawloom_benches::mirror::Mirror;
+use drawloom_benches::results;
+use drawloom_benches::statistics::median_duration;
+use drawloom_benches::table::Table;
+use drawloom_testing::random::Random;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use world::World;
+
+/// The changes of what the scene requires.
+const CHANGES: usize = 50;
+/// The frames from one change to the next.
+const FRAMES_PER_CHANGE: usize = 20;
+/// The frames before the first change.
+const WARM_UP: usize = 60;
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(flatten)]
+    backend: BackendArguments,
+}
+
+/// How a renderer prepares for what scenes may require.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Preparation {
+    /// Everything is made in the first frame that needs it.
+    None,
+    /// [`Renderer::prepare_pipelines`] is called once, before the first frame.
+    Prepared,
+    /// As `Prepared`, and nothing comes or goes.
+    AtRest,
+}
+
+/// The frames of one renderer.
+#[derive(Serialize)]
+struct Row {
+    backend: BackendName,
+    preparation: Preparation,
+    median_us: f64,
+    longest_us: f64,
+    /// The longest frame divided by the median.
+    longest_by_median: f64,
+    /// The median over the changes of the first frame after one.
+    changed_us: f64,
+    /// The largest quotient of a frame and the median of the frames until the next change.
+    longest_by_own_median: f64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse().backend;
+    let quick = arguments.is_quick();
+    let changes = if quick { 4 } else { CHANGES };
+    let progress = progress_bar("frames");
+    let mut rows = Vec::new();
+    for backend in arguments.backends() {
+        // The processor draws the pixels of software drivers.
+        let (boxes, size) =
+            if quick { (100, [32, 32]) } else { backend.of([(10_000, [480, 270]), (1_000, [160, 90])]) };
+        rows.extend(measure(backend, changes, boxes, size, &progress)?);
+    }
+    let mut unneeded = Vec::new();
+    for backend in arguments.backends() {
+        let (rounds, size) = if quick { (2, [32, 32]) } else { (101, [480, 270]) };
+        unneeded.extend(unneeded::measure(backend, rounds, size, &progress)?);
+    }
+    progress.finish_and_clear();
+
+    let headings =
+        ["backend", "preparation", "median, µs", "longest, µs", "ratio", "ratio to own", "after a change, µs"];
+    let mut table = Table::new(&headings);
+    for row in &rows {
+        table.row([
+            row.backend.name().to_owned(),
+            format!("{:?}", row.preparation),
+            format!("{:.0}", row.median_us),
+            format!("{:.0}", row.longest_us),
+            format!("{:.2}", row.longest_by_median),
+            format!("{:.2}", row.longest_by_own_median),
+            format!("{:.0}", row.changed_us),
+        ]);
+    }
+    table.print();
+    unneeded::print(&unneeded);
+    if !quick {
+        results::write_json("requirements.json", &(rows, unneeded))?;
+    }
+    Ok(())
+}
+
+fn measure(
+    backend: BackendName,
+    changes: usize,
+    boxes: usize,
+    size: [u32; 2],
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
+    let preparations = [Preparation::None, Preparation::Prepared, Preparation::AtRest];
+    let mut runners = Vec::new();
+    // One for all, because the workers of others would wait beside it.
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    for preparation in preparations {
+        runners.push(Runner::new((backend, &scheduler), preparation, boxes, size)?);
+    }
+    progress.inc_length(((WARM_UP + changes * FRAMES_PER_CHANGE) * runners.len()) as u64);
+    let mut times = vec![Vec::new(); runners.len()];
+    for _ in 0..WARM_UP {
+        for runner in &mut runners {
+            runner.frame()?;
+            progress.inc(1);
+        }
+    }
+    let mut random = Random::new();
+    for _ in 0..changes {
+        let feature = random.below(World::FEATURES);
+        for runner in &mut runners {
+            if runner.preparation != Preparation::AtRest {
+                runner.world.toggle(feature)?;
+            }
+        }
+        for _ in 0..FRAMES_PER_CHANGE {
+            for (runner, times) in runners.iter_mut().zip(&mut times) {
+                times.push(runner.frame()?);
+                progress.inc(1);
+            }
+        }
+    }
+    Ok(preparations.iter().zip(&times).map(|(preparation, times)| row(backend, *preparation, times)).collect())
+}
+
+fn row(backend: BackendName, preparation: Preparation, times: &[Duration]) -> Row {
+    let microseconds = |time: Duration| time.as_secs_f64() * 1e6;
+    let longest = |times: &[Duration]| microseconds(times.iter().copied().max().unwrap_or_default());
+    let median = |times: &[Duration]| microseconds(median_duration(times.iter().copied()));
+    let intervals = || times.chunks(FRAMES_PER_CHANGE);
+    let first = intervals().filter_map(|interval| interval.first().copied());
+    Row {
+        backend,
+        preparation,
+        median_us: median(times),
+        longest_us: longest(times),
+        longest_by_median: longest(times) / median(times),
+        changed_us: microseconds(median_duration(first)),
+        longest_by_own_median: intervals().map(|frames| longest(frames) / median(frames)).fold(0.0, f64::max),
+    }
+}
+
+struct Runner {
+    preparation: Preparation,
+    renderer: Renderer<WgpuBackend>,
+    submitter: Submitter<WgpuBackend>,
+    world: World,
+    waits: bool,
+}
+
+impl Runner {
+    fn new(
+        (backend, scheduler): (BackendName, &Arc<Scheduler>),
+        preparation: Preparation,
+        boxes: usize,
+        size: [u32; 2],
+    ) -> Result<Self, Box<dyn Error>> {
+        let builder = Renderer::builder(backend.open()?).deferred(Deferred::to_picture()).process(Mirror);
+        let (mut renderer, submitter) = builder.build(Arc::clone(scheduler))?;
+        let mut world = World::new(boxes, size)?;
+        if preparation != Preparation::None {
+            renderer.prepare_pipelines(world.frame())?;
+        }
+        Ok(Self { preparation, renderer, submitter, world, waits: backend == BackendName::Adapter })
+    }
+
+    fn frame(&mut self) -> Result<Duration, Box<dyn Error>> {
+        let start = Instant::now();
+        let submitted = self.submitter.submit(self.renderer.record(self.world.frame())?)?;
+        if self.waits {
+            submitted.submission.wait()?;
+        }
+        Ok(start.elapsed())
+    }
+}
