@@ -21,7 +21,7 @@ use crate::timeline::{Labels, TuningChoice};
 ///
 /// 1. `begin`.
 /// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and
-///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`. If
+///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
 ///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
 /// 4. Later, on the device thread, `submit`.
@@ -149,6 +149,32 @@ pub trait Backend: Send + Sync + 'static {
         pass: &PassRequest<'_>,
         parts: &mut Vec<Self::Part>,
     ) -> Result<Self::Commands, BackendError>;
+
+    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission order. Constant
+    /// throughout a frame; by default every pass is finished alone. At most 16 passes are finished together.
+    fn continues_previous_pass(&self, frame: &Self::Frame, pass: usize) -> bool {
+        let _ = (frame, pass);
+        false
+    }
+
+    /// Finishes passes that follow each other in submission order, each as [`Backend::finish`] does, and calls `emit` with the commands
+    /// of each, in order. `parts` has those of each pass; the caller drops what the backend leaves.
+    ///
+    /// # Errors
+    /// If the device refuses one of the passes. The error names that one.
+    fn finish_together(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<Self::Part>],
+        emit: &mut dyn FnMut(Self::Commands),
+    ) -> Result<(), BackendError> {
+        for (pass, parts) in passes.iter().zip(parts) {
+            emit(self.finish(worker, frame, pass, parts)?);
+        }
+        Ok(())
+    }
 
     /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or made none by
     /// measured cost. `labels` are those of the pass.

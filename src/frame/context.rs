@@ -5,6 +5,7 @@ use super::granularity::Granularity;
 use super::list_inputs::{ListInputs, OrderInputs};
 use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
+use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
 use super::tables::FrameTables;
 use crate::backend::{Backend, FrameRequest, PassRequest};
@@ -27,6 +28,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) backend_frame: &'a B::Frame,
     /// One for each pass.
     pub(super) recordings: &'a [PassRecording<B>],
+    pub(super) pass_runs: &'a PassRuns,
     pub(super) clock: &'a StageClock,
     pub(super) costs: &'a CostModel,
     /// One for each view.

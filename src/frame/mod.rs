@@ -16,6 +16,7 @@ mod list_inputs;
 mod occluders;
 mod occlusion_control;
 mod pass_recording;
+mod pass_runs;
 mod plan_cache;
 mod recorded;
 mod renderer;

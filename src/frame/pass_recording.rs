@@ -1,6 +1,6 @@
 //! What the jobs of one pass record.
 
-use parking_lot::Mutex;
+use parking_lot::{Mutex, MutexGuard};
 
 use crate::backend::{Backend, BackendError};
 
@@ -34,14 +34,11 @@ impl<B: Backend> PassRecording<B> {
         }
     }
 
-    /// Finishes the pass with `finish`, which takes all parts in order.
+    /// All parts in order, to finish the pass with.
     ///
     /// # Errors
-    /// If a part is missing, or `finish` fails.
-    pub(super) fn finish(
-        &self,
-        finish: impl FnOnce(&mut Vec<B::Part>) -> Result<B::Commands, BackendError>,
-    ) -> Result<(), BackendError> {
+    /// If a part is missing.
+    pub(super) fn ordered_parts(&self) -> Result<MutexGuard<'_, Vec<B::Part>>, BackendError> {
         let (mut parts, mut ordered_parts) = (self.parts.lock(), self.ordered_parts.lock());
         let count = parts.len();
         ordered_parts.extend(parts.drain(..).flatten());
@@ -50,8 +47,18 @@ impl<B: Backend> PassRecording<B> {
                 rule: "every part is recorded before its pass is finished".to_owned(),
             });
         }
-        *self.finished.lock() = Some(finish(&mut ordered_parts)?);
-        Ok(())
+        Ok(ordered_parts)
+    }
+
+    /// Keeps the memory of parts that were taken out, for the next frame.
+    pub(super) fn keep_memory(&self, mut parts: Vec<B::Part>) {
+        parts.clear();
+        *self.ordered_parts.lock() = parts;
+    }
+
+    /// Stores the finished pass.
+    pub(super) fn put_finished(&self, commands: B::Commands) {
+        *self.finished.lock() = Some(commands);
     }
 
     /// Takes the finished pass, if there is one, and drops what an unfinished frame has left.

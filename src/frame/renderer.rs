@@ -7,11 +7,12 @@ use parking_lot::RwLockReadGuard;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::pass_recording::PassRecording;
+use super::pass_runs::{PassFailure, PassRuns};
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::Recorded;
 use super::scene_check::check_scene;
 use super::stage_clock::{StageClock, StageGroup};
-use super::stage_graph::{StageGraphCache, StageOptions};
+use super::stage_graph::{StageGraph, StageGraphCache, StageOptions};
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
 use super::view_cache::ViewCache;
@@ -21,6 +22,7 @@ use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
 use crate::command::DrawList;
+use crate::graph::RunError;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
@@ -71,6 +73,7 @@ pub struct Renderer<B: Backend> {
     view_cache: ViewCache,
     /// One for each pass of the latest frame.
     recordings: Vec<PassRecording<B>>,
+    pass_runs: PassRuns,
     /// What the engine chose for the next frame.
     choices: Vec<TuningChoice>,
     warnings: Warnings,
@@ -98,6 +101,7 @@ impl<B: Backend> Renderer<B> {
             tables: FrameTables::default(),
             view_cache: ViewCache::default(),
             recordings: Vec::new(),
+            pass_runs: PassRuns::default(),
             choices: Vec::new(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
@@ -256,6 +260,7 @@ impl<B: Backend> Renderer<B> {
         let uploaded_before = self.backend.uploaded_bytes();
         let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0?;
         reset_recordings(&mut self.recordings, request.passes.len());
+        self.pass_runs.begin_frame(request.passes.len(), |pass| self.backend.continues_previous_pass(&frame, pass));
 
         // Objects → visibility → fill → sort → instance → record, on all workers: `stages.rs` lists the stages.
         let context = FrameContext {
@@ -266,6 +271,7 @@ impl<B: Backend> Renderer<B> {
             backend: &*self.backend,
             backend_frame: &frame,
             recordings: &self.recordings,
+            pass_runs: &self.pass_runs,
             clock: &clock,
             costs: &graph.tuning.costs,
             occlusion: &graph.tuning.occlusion,
@@ -275,7 +281,7 @@ impl<B: Backend> Renderer<B> {
         };
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
             graph.tuning.costs.discard_frame();
-            return Err(error.into());
+            return Err(error_of_pass(error, graph, self.pass_runs.failures(), &views).into());
         }
         if cfg!(debug_assertions) {
             let objects = &self.tables.objects;
@@ -388,6 +394,23 @@ impl<B: Backend> Renderer<B> {
 fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
     recordings.resize_with(passes, PassRecording::default);
     recordings.iter_mut().for_each(|recording| drop(recording.take()));
+}
+
+/// The error of a run. One that a job of another pass met names the pass that failed.
+fn error_of_pass<B: Backend>(
+    error: RunError,
+    graph: &StageGraph<B>,
+    failures: &[PassFailure],
+    views: &[RenderView],
+) -> RunError {
+    let name_of = |pass| graph.node_name("finish", pass, views);
+    match error {
+        RunError::Failed { node, source } => {
+            let failure = failures.iter().find(|failure| name_of(failure.job_of) == node);
+            RunError::Failed { node: failure.map_or(node, |failure| name_of(failure.failed)), source }
+        }
+        other => other,
+    }
 }
 
 /// One queue for each view, its passes in the order of the plan.

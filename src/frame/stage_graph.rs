@@ -235,6 +235,13 @@ impl<B: Backend> StageGraph<B> {
         })
     }
 
+    /// The name of a stage's node, of a pass in these views.
+    pub(super) fn node_name(&self, stage: &str, pass: usize, views: &[RenderView]) -> String {
+        let Pass { process_index: process, view_index: view } = self.passes[pass];
+        let scope = Scope::default().of_view(view, &views[view], false);
+        scope.of_process(process, &self.plan.processes()[process].name).name_of(stage)
+    }
+
     /// Begins a frame of these views in the tables. The object table has begun it already.
     ///
     /// # Errors

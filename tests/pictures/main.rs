@@ -55,6 +55,7 @@ mod shadow_casters;
 mod shadow_interval;
 mod shadow_scenes;
 mod shadows;
+mod shared_encoders;
 mod software;
 mod stencil;
 mod strategies;
@@ -119,6 +120,7 @@ fn main() {
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (stencil::CASES, Needs::Adapter),
+        (shared_encoders::CASES, Needs::Adapter),
         (strategies::CASES, Needs::Adapter),
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),

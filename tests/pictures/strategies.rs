@@ -396,7 +396,7 @@ fn subdivided_again() -> Result<(), Failed> {
 }
 
 /// A process that samples the target that it draws into.
-struct Ouroboros;
+pub struct Ouroboros;
 
 impl RenderProcess for Ouroboros {
     fn name(&self) -> &str {
@@ -421,7 +421,7 @@ impl RenderProcess for Ouroboros {
 }
 
 /// Draws the target that [`Ouroboros`] samples.
-struct Head;
+pub struct Head;
 
 impl RenderProcess for Head {
     fn name(&self) -> &str {

@@ -4,12 +4,15 @@ use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
-use super::recording::{cached_bundle, encode_after_segments, encode_pass, encode_segment, record_bundle};
+use super::recording::{
+    cached_bundle, encode_after_segments, encode_pass, encode_passes, encode_segment, record_bundle,
+};
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
 use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, TargetMemory, ViewQueue};
@@ -178,21 +181,22 @@ impl Backend for WgpuBackend {
         &self,
         worker: &Worker,
         frame: &WgpuFrame,
-        &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
+        request: &PassRequest<'_>,
         parts: &mut Vec<WgpuPart>,
     ) -> Result<WgpuCommands, BackendError> {
         self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        let index = request.index;
         let pass = frame.pass(index);
-        if matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_)))) {
+        if is_split(parts) {
             if frame.generates_mip_levels(index) {
-                let encode = || encode_after_segments(&self.device, frame, request, index);
+                let encode = || encode_after_segments(&self.device, frame, request.frame, index);
                 let last = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, encode)).flatten();
                 parts.push(WgpuPart(last.inspect_err(|_| self.buffers.clear())?));
             }
             return Ok(WgpuCommands(PassCommands::Parts(std::mem::take(parts))));
         }
         let finish = || {
-            let encoder = encode_pass(&self.device, frame, request, index, list, parts)?;
+            let encoder = encode_pass(&self.device, frame, request, parts)?;
             Ok(match pass.strategy.encoding {
                 EncodingStrategy::OnSubmit => PassCommands::Open(encoder),
                 EncodingStrategy::PerPass | EncodingStrategy::Split => PassCommands::Finished(encoder.finish()),
@@ -200,6 +204,42 @@ impl Backend for WgpuBackend {
         };
         let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
+    }
+
+    fn continues_previous_pass(&self, frame: &WgpuFrame, pass: usize) -> bool {
+        frame.pass(pass).continues_previous
+    }
+
+    fn finish_together(
+        &self,
+        worker: &Worker,
+        frame: &WgpuFrame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<WgpuPart>],
+        emit: &mut dyn FnMut(WgpuCommands),
+    ) -> Result<(), BackendError> {
+        // One of them may have grown since the frame before.
+        if !parts.iter().any(|parts| is_split(parts)) {
+            let start = Instant::now();
+            let label = &frame.pass(passes[0].index).label;
+            let encode = || Ok(encode_passes(&self.device, frame, passes, parts)?.finish());
+            let encoded = with_error_scope(&self.device, label, || catch_wgpu_panic(label, encode));
+            if let Ok(commands) = encoded.flatten().flatten() {
+                divide_time(frame, passes, start.elapsed());
+                emit(WgpuCommands(PassCommands::Finished(commands)));
+                for pass in &passes[1..] {
+                    frame.pass(pass.index).is_in_previous_encoder.store(true, Ordering::Relaxed);
+                    emit(WgpuCommands(PassCommands::InEarlierPass));
+                }
+                return Ok(());
+            }
+        }
+        // Alone, the pass that the device refuses is found.
+        for (pass, parts) in passes.iter().zip(parts) {
+            let label = &frame.pass(pass.index).label;
+            emit(catch_wgpu_panic(label, || self.finish(worker, frame, pass, parts)).flatten()?);
+        }
+        Ok(())
     }
 
     fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
@@ -237,5 +277,21 @@ impl Backend for WgpuBackend {
         })?;
         frame.buffers.keep_objects();
         Ok(submission)
+    }
+}
+
+/// Whether the parts of a pass are its encoders.
+fn is_split(parts: &[WgpuPart]) -> bool {
+    matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_))))
+}
+
+/// Divides the time that one encoder of several passes took among them, by their batches: wgpu encodes all of them when the encoder is
+/// finished.
+fn divide_time(frame: &WgpuFrame, passes: &[PassRequest<'_>], time: Duration) {
+    // A pass costs something without batches too.
+    let weight_of = |pass: &PassRequest<'_>| 1 + pass.list.batches.len() as u64;
+    let all: u64 = passes.iter().map(weight_of).sum();
+    for pass in passes {
+        frame.pass(pass.index).timing.add_serial(time.as_nanos() as u64 * weight_of(pass) / all);
     }
 }

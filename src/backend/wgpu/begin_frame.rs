@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
-use super::frame::{BundleKey, WgpuFrame};
+use super::frame::{BundleKey, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
 use super::resources::{LightMeshes, ResolvedImport, StorageBuffers, SubdividedMesh};
-use super::strategy::RecordingStrategy;
+use super::strategy::{EncodingStrategy, RecordingStrategy};
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -125,6 +125,8 @@ impl WgpuBackend {
                     .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
             }
             pass.set_strategy(strategies[index], index, is_trial);
+            pass.can_share_encoder =
+                pass.strategy.encoding != EncodingStrategy::OnSubmit && pass.is_small(&request.draws[process]);
             let caches_bundles =
                 pass.command_pass_index.is_some() && pass.strategy.recording == RecordingStrategy::CachedBundles;
             let shared = pass.frame_bind_group.as_ref().zip(resources.materials_bind_group);
@@ -139,6 +141,7 @@ impl WgpuBackend {
                 });
             }
         }
+        share_encoders(buffers.passes_mut().0);
         Ok(())
     }
 
@@ -176,5 +179,30 @@ impl WgpuBackend {
             *meshes = Some(Arc::new(with_error_scope(&self.device, "light volumes", create)??));
         }
         Ok(meshes.clone())
+    }
+}
+
+/// Decides which passes continue the encoder of the pass before: those of one view that can share one, and in frames of many small views
+/// those of several.
+fn share_encoders(passes: &mut [WgpuPassState]) {
+    /// A frame of many small views has at least so many encoders, for workers to share.
+    const MIN_ENCODERS: usize = 16;
+    let max_across_views = passes.iter().filter(|pass| pass.can_share_encoder).count() / MIN_ENCODERS;
+    // The passes in the run so far; 0 if the next pass cannot continue it.
+    let mut run = 0;
+    let are_together = |one: &WgpuPassState, next: &WgpuPassState| {
+        one.can_share_encoder && next.can_share_encoder && one.pass.view_index == next.pass.view_index
+    };
+    for passes in passes.chunk_by_mut(are_together) {
+        let (count, can_share) = (passes.len(), passes[0].can_share_encoder);
+        let continues = can_share && run > 0 && run + count <= max_across_views;
+        for (index, pass) in passes.iter_mut().enumerate() {
+            pass.continues_previous = index > 0 || continues;
+        }
+        run = match (can_share, continues) {
+            (false, _) => 0,
+            (true, false) => count,
+            (true, true) => run + count,
+        };
     }
 }

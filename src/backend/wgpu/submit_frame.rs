@@ -27,6 +27,7 @@ impl WgpuBackend {
         for (index, (_, WgpuCommands(commands))) in queues.into_iter().flat_map(|queue| queue.passes).enumerate() {
             match commands {
                 PassCommands::Finished(commands) => finished.push(commands),
+                PassCommands::InEarlierPass => {}
                 PassCommands::Parts(parts) => {
                     finished.extend(parts.into_iter().filter_map(|WgpuPart(part)| match part {
                         RecordedPart::Encoder(commands) => Some(commands),

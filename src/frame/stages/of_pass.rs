@@ -1,13 +1,16 @@
 //! The stages of a pass: from visible objects to finished commands.
 
 use std::array;
+use std::mem;
 use std::ops::Range;
 
 use super::super::context::FrameContext;
+use super::super::pass_runs::{PassFailure, PassRuns};
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::{DrawList, instance, sort};
+use crate::task::Worker;
 use crate::view::{self, SelectionFilter};
 
 /// Makes a command for each visible object (M 10.3).
@@ -348,7 +351,8 @@ impl<B: Backend> Stage<B> for Record {
     }
 }
 
-/// Finishes the pass: its commands are ready to submit.
+/// Finishes the pass, or the whole run of passes that are finished together if this one is the last to be ready: their commands are ready
+/// to submit.
 pub(super) struct Finish {
     pub(super) pass: usize,
 }
@@ -371,9 +375,54 @@ impl<B: Backend> Stage<B> for Finish {
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let list = frame.tables.passes[self.pass].list.read();
-        let request = frame.pass_request(self.pass, &list);
-        frame.recordings[self.pass]
-            .finish(|parts| frame.backend.finish(job.worker, frame.backend_frame, &request, parts))
+        match frame.pass_runs.complete(self.pass) {
+            None => Ok(()),
+            Some(passes) if passes.len() == 1 => finish_pass(frame, job.worker, self.pass),
+            Some(passes) => finish_together(frame, job.worker, passes, self.pass),
+        }
     }
+}
+
+fn finish_pass<B: Backend>(frame: &FrameContext<'_, B>, worker: &Worker, pass: usize) -> Result<(), BackendError> {
+    let list = frame.tables.passes[pass].list.read();
+    let mut parts = frame.recordings[pass].ordered_parts()?;
+    let request = frame.pass_request(pass, &list);
+    let commands = frame.backend.finish(worker, frame.backend_frame, &request, &mut parts)?;
+    frame.recordings[pass].put_finished(commands);
+    Ok(())
+}
+
+fn finish_together<B: Backend>(
+    frame: &FrameContext<'_, B>,
+    worker: &Worker,
+    passes: Range<usize>,
+    job_of: usize,
+) -> Result<(), BackendError> {
+    // Arrays, so that no frame allocates for them.
+    let (first, count, empty) = (passes.start, passes.len(), DrawList::default());
+    let lists: [_; PassRuns::MAX_PASSES] =
+        array::from_fn(|index| (index < count).then(|| frame.tables.passes[first + index].list.read()));
+    let requests: [_; PassRuns::MAX_PASSES] = array::from_fn(|index| match &lists[index] {
+        Some(list) => frame.pass_request(first + index, list),
+        None => frame.pass_request(first, &empty),
+    });
+    let recordings = &frame.recordings[passes];
+    let mut parts: [Vec<B::Part>; PassRuns::MAX_PASSES] = array::from_fn(|_| Vec::new());
+    for (parts, recording) in parts.iter_mut().zip(recordings) {
+        *parts = mem::take(&mut *recording.ordered_parts()?);
+    }
+    let mut finished = 0;
+    let mut emit = |commands| {
+        recordings[finished].put_finished(commands);
+        finished += 1;
+    };
+    let (requests, parts) = (&requests[..count], &mut parts[..count]);
+    let result = frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit);
+    if result.is_err() {
+        frame.pass_runs.add_failure(PassFailure { failed: first + finished, job_of });
+    }
+    for (parts, recording) in parts.iter_mut().zip(recordings) {
+        recording.keep_memory(mem::take(parts));
+    }
+    result
 }

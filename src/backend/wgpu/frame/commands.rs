@@ -14,6 +14,8 @@ pub struct WgpuCommands(pub(crate) PassCommands);
 
 pub(crate) enum PassCommands {
     Finished(wgpu::CommandBuffer),
+    /// In the encoder of an earlier pass of the frame.
+    InEarlierPass,
     /// From several encoders, in submission order.
     Parts(Vec<WgpuPart>),
     /// To be finished on the device thread.

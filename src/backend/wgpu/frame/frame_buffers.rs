@@ -362,7 +362,7 @@ impl Buffers {
         let mut command_pass_indices = 0..;
         for (state, &pass) in self.passes.iter_mut().zip(request.passes) {
             let draws = &request.draws[pass.process_index];
-            state.pass = pass;
+            state.set_pass(pass);
             state.set_label(
                 request.plan.processes()[pass.process_index].name.as_str(),
                 request.views[pass.view_index].name(),

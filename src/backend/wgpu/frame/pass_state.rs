@@ -1,6 +1,8 @@
 //! The state of one pass in a frame's buffers.
 
 use std::fmt::Write;
+use std::mem;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use parking_lot::RwLock;
 
@@ -12,7 +14,7 @@ use crate::backend::wgpu::resources::{CachedBindGroup, GrowingBuffer, UploadQueu
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
-use crate::process::Pass;
+use crate::process::{Draws, Pass};
 use crate::tuning::CostSample;
 
 /// One pass of a frame, and what it caches for the next frame that uses the same buffers.
@@ -40,6 +42,14 @@ pub(crate) struct WgpuPassState {
     pub(crate) is_trial: bool,
     /// Whether the strategy's cache was there when the frame began.
     is_warm: bool,
+    /// The number of batches that it drew when a frame last recorded it; `None` for another pass than in that frame.
+    latest_batches: Option<usize>,
+    /// Whether it may be encoded together with its neighbours.
+    pub(crate) can_share_encoder: bool,
+    /// Whether it is finished together with the pass before it.
+    pub(crate) continues_previous: bool,
+    /// Whether it is in the encoder of the pass before it.
+    pub(crate) is_in_previous_encoder: AtomicBool,
     pub(crate) bundle_cache: BundleCache,
     pub(crate) indirect_arguments: IndirectArguments,
     /// The indices of partial batches' remaining triangles.
@@ -63,6 +73,10 @@ impl Default for WgpuPassState {
             strategy_index: 0,
             is_trial: false,
             is_warm: false,
+            latest_batches: None,
+            can_share_encoder: false,
+            continues_previous: false,
+            is_in_previous_encoder: AtomicBool::new(false),
             bundle_cache: BundleCache::default(),
             indirect_arguments: IndirectArguments::default(),
             partial_indices: RwLock::new(new_index_buffer()),
@@ -72,6 +86,9 @@ impl Default for WgpuPassState {
 }
 
 impl WgpuPassState {
+    /// A batch takes some 0.1 µs to record, and an encoder 4 to 5 µs to make, finish and submit.
+    const MAX_BATCHES_OF_SMALL_PASS: usize = 64;
+
     pub(crate) fn set_label(&mut self, process: &str, view: &str) {
         self.label.clear();
         // Writing into a string cannot fail.
@@ -93,6 +110,23 @@ impl WgpuPassState {
             self.indirect_arguments.clear();
         }
         self.timing = PassTiming::default();
+        self.is_in_previous_encoder = AtomicBool::new(false);
+    }
+
+    /// Makes this the state of a pass in the frame that begins.
+    pub(crate) fn set_pass(&mut self, pass: Pass) {
+        let is_same = mem::replace(&mut self.pass, pass) == pass;
+        self.latest_batches = is_same.then(|| self.timing.batches());
+    }
+
+    /// Whether the pass probably takes less to encode than an encoder does.
+    pub(crate) fn is_small(&self, draws: &Draws<'_>) -> bool {
+        match draws {
+            // The engine's own code, which may do anything.
+            Draws::Raw(_) => false,
+            Draws::Commands(_) => self.latest_batches.is_some_and(|batches| batches <= Self::MAX_BATCHES_OF_SMALL_PASS),
+            _ => true,
+        }
     }
 
     /// Drops the caches that keep other resources alive.
@@ -133,7 +167,11 @@ impl WgpuPassState {
             view: self.pass.view_index,
             recording: self.strategy.recording,
             encoding: self.strategy.encoding,
-            encoders: self.strategy.encoder_count(self.timing.bundles()),
+            encoders: if self.is_in_previous_encoder.load(Ordering::Relaxed) {
+                0
+            } else {
+                self.strategy.encoder_count(self.timing.bundles())
+            },
             batches: self.timing.batches(),
             recorded_bundles: self.timing.recorded_bundles(),
             replayed_bundles: self.timing.replayed_bundles(),

@@ -13,7 +13,7 @@ pub struct WgpuPassStatistics {
     pub recording: RecordingStrategy,
     /// How it was encoded.
     pub encoding: EncodingStrategy,
-    /// The number of encoders that it was split over.
+    /// The number of encoders that it was split over; 0 if it is in the encoder of the pass before it.
     pub encoders: usize,
     /// The number of batches that it draws.
     pub batches: usize,

@@ -5,7 +5,7 @@ use super::compute::encode_compute;
 use super::record_pass::{encode_raw, record_batches, record_without_commands, replay_bundles};
 use crate::backend::wgpu::frame::{RecordedPart, WgpuFrame, WgpuPart, WgpuPassState};
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
-use crate::backend::{BackendError, FrameRequest};
+use crate::backend::{BackendError, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::Draws;
 
@@ -17,22 +17,45 @@ use crate::process::Draws;
 pub(crate) fn encode_pass(
     device: &wgpu::Device,
     frame: &WgpuFrame,
-    request: &FrameRequest<'_>,
-    index: usize,
-    list: &DrawList,
+    pass: &PassRequest<'_>,
     parts: &[WgpuPart],
 ) -> Result<wgpu::CommandEncoder, BackendError> {
+    encode(device, frame, pass.index, |encoder| record_pass(device, encoder, frame, pass, parts))
+}
+
+/// Encodes whole passes in one encoder, one after the other, each as [`encode_pass`] does. It is labelled as the first.
+///
+/// # Errors
+/// As [`encode_pass`].
+pub(crate) fn encode_passes(
+    device: &wgpu::Device,
+    frame: &WgpuFrame,
+    passes: &[PassRequest<'_>],
+    parts: &[Vec<WgpuPart>],
+) -> Result<wgpu::CommandEncoder, BackendError> {
+    encode(device, frame, passes[0].index, |encoder| {
+        passes.iter().zip(parts).try_for_each(|(pass, parts)| record_pass(device, encoder, frame, pass, parts))
+    })
+}
+
+fn record_pass(
+    device: &wgpu::Device,
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WgpuFrame,
+    &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
+    parts: &[WgpuPart],
+) -> Result<(), BackendError> {
     use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
     let WgpuPassState { pass, strategy, timed_pass_index, .. } = *frame.pass(index);
     let accesses = &request.plan.processes()[pass.process_index].declaration.accesses;
     let clears = accesses.iter().any(|(_, access)| access.writes() && !access.reads());
-    let record = |encoder: &mut wgpu::CommandEncoder| match (&request.draws[pass.process_index], strategy.recording) {
-        (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw),
+    match (&request.draws[pass.process_index], strategy.recording) {
+        (Draws::Raw(raw), _) => encode_raw(device, encoder, frame, request, index, *raw)?,
         // A pass that would only load and store its targets.
-        (Draws::Commands(_), _) if list.batches.is_empty() && timed_pass_index.is_none() && !clears => Ok(()),
-        (Draws::Compute(dispatch), _) => encode_compute(encoder, frame, index, dispatch),
+        (Draws::Commands(_), _) if list.batches.is_empty() && timed_pass_index.is_none() && !clears => {}
+        (Draws::Compute(dispatch), _) => encode_compute(encoder, frame, index, dispatch)?,
         (Draws::Commands(_), Direct | Indirect) => {
-            record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())
+            record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())?;
         }
         (Draws::Commands(_), Bundles | CachedBundles) => {
             let bundles = parts.iter().filter_map(|part| match &part.0 {
@@ -40,15 +63,11 @@ pub(crate) fn encode_pass(
                 RecordedPart::Encoder(_) => None,
             });
             replay_bundles(encoder, frame, request, index, PassSegment::WHOLE, bundles);
-            Ok(())
         }
-        _ => record_without_commands(encoder, frame, request, index),
-    };
-    encode(device, frame, index, |encoder| {
-        record(encoder)?;
-        frame.generate_mip_levels(encoder, request, index);
-        Ok(())
-    })
+        _ => record_without_commands(encoder, frame, request, index)?,
+    }
+    frame.generate_mip_levels(encoder, request, index);
+    Ok(())
 }
 
 /// Encodes what follows the segments of a pass that is split over several encoders: the mip levels that it leaves out of date.

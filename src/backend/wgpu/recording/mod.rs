@@ -8,4 +8,4 @@ mod encode_pass;
 mod record_pass;
 
 pub(crate) use bundles::{cached_bundle, record_bundle};
-pub(crate) use encode_pass::{encode_after_segments, encode_pass, encode_segment};
+pub(crate) use encode_pass::{encode_after_segments, encode_pass, encode_passes, encode_segment};

@@ -24,10 +24,11 @@ pub enum RecordingStrategy {
 /// Where and when a recorded pass is encoded for the device. Every strategy draws the same picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EncodingStrategy {
-    /// One encoder per pass, finished on a worker.
+    /// One encoder per pass, finished on a worker. Small passes that follow each other in one view share one,
+    /// and in frames of many small views those of several.
     PerPass,
     /// A pass of more than two bundles is split over up to eight encoders, which several workers finish. The first one clears
-    /// the targets; the others load them and draw on, in order.
+    /// the targets; the others load them and draw on, in order. A smaller pass is encoded as with `PerPass`.
     Split,
     /// One encoder per pass, recorded on a worker and finished on the device thread, when the frame is submitted.
     OnSubmit,

@@ -36,6 +36,11 @@ impl PassTiming {
         time(&self.serial_time, work)
     }
 
+    /// Adds a time in nanoseconds that one thread spent on the pass, measured with that of other passes.
+    pub(crate) fn add_serial(&self, nanoseconds: u64) {
+        self.serial_time.fetch_add(nanoseconds, Ordering::Relaxed);
+    }
+
     pub(crate) fn count_bundle(&self, is_replayed: bool) {
         let counter = if is_replayed { &self.replayed_bundles } else { &self.recorded_bundles };
         counter.fetch_add(1, Ordering::Relaxed);
@@ -43,6 +48,11 @@ impl PassTiming {
 
     pub(crate) fn batches(&self) -> usize {
         self.batches.load(Ordering::Relaxed)
+    }
+
+    /// The batches of the pass; `None` if it was not recorded.
+    pub(crate) fn latest_batches(&self) -> Option<usize> {
+        (self.total() > 0.0).then(|| self.batches())
     }
 
     pub(crate) fn bundles(&self) -> usize {
