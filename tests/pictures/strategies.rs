@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use drawloom::backend::{BackendError, EncodingStrategy, Picture, RecordingStrategy, WgpuBackend, WgpuPassStatistics};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
-use drawloom::scene::{Blend, Light, Material, RenderObject, Scene, Texture};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Granularity, Recorded, Renderer, SubmitError, wgpu};
@@ -24,6 +24,7 @@ pub const CASES: &[Case] = &[
     ("frames_in_flight_are_independent_with_every_strategy", frames_in_flight),
     ("trials_of_the_tuner_draw_the_same_bytes", tuned),
     ("cached_bundles_are_replayed_while_objects_move", moving),
+    ("cached_bundles_are_replayed_when_another_view_comes_or_goes", other_view),
     ("cached_bundles_are_recorded_again_when_their_inputs_change", recorded_again),
     ("cached_bundles_are_recorded_again_when_a_subdivision_level_changes", subdivided_again),
     ("an_error_at_submission_names_the_pass", refused_at_submission),
@@ -311,6 +312,24 @@ fn moving() -> Result<(), Failed> {
         if draw(&mut fixture, &scene)? != drawn_by_a_new_renderer(&scene)? {
             return Err("replayed bundles draw objects at their old positions".into());
         }
+    }
+    Ok(())
+}
+
+fn other_view() -> Result<(), Failed> {
+    let (mut scene, mut fixture) = (many_batches(), fixture_alone(EncodingStrategy::PerPass)?);
+    let other = Camera { name: "other".into(), size: [16, 16], ..scene.cameras[0].clone() };
+    // It stands before the others, so these get other indices. At first the buffers grow to what all need.
+    for (round, comes) in [true, false, true, false, true].into_iter().enumerate() {
+        if comes {
+            scene.cameras.insert(0, other.clone());
+        } else {
+            scene.cameras.remove(0);
+        }
+        let first_of_others = scene.cameras.len() - 2;
+        expect(draw(&mut fixture, &scene)? == drawn_by_a_new_renderer(&scene)?, || format!("round {round} differs"))?;
+        let (recorded, replayed) = counts(&fixture, |pass| pass.view >= first_of_others);
+        expect(round == 0 || (recorded == 0 && replayed > 10), || format!("{round}: {recorded} and {replayed}"))?;
     }
     Ok(())
 }

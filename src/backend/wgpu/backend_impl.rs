@@ -245,7 +245,7 @@ impl Backend for WgpuBackend {
     fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let strategies = self.strategies.strategies();
         let state = frame.pass(pass);
-        if strategies.len() == 1 || state.command_pass_index.is_none() {
+        if strategies.len() == 1 || !state.draws_commands {
             return None;
         }
         let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));

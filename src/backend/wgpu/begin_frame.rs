@@ -119,7 +119,7 @@ impl WgpuBackend {
             update_bind_groups(&self.device, request, pipelines, (targets, storage_buffers), &resources, pass)?;
 
             let (mut index, mut is_trial) = (0, false);
-            if strategies.len() > 1 && pass.command_pass_index.is_some() {
+            if strategies.len() > 1 && pass.draws_commands {
                 let is_distinct = |index: usize, batches| strategies[index].is_distinct(batches);
                 (index, is_trial) = pipelines
                     .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
@@ -127,8 +127,7 @@ impl WgpuBackend {
             pass.set_strategy(strategies[index], index, is_trial);
             pass.can_share_encoder =
                 pass.strategy.encoding != EncodingStrategy::OnSubmit && pass.is_small(&request.draws[process]);
-            let caches_bundles =
-                pass.command_pass_index.is_some() && pass.strategy.recording == RecordingStrategy::CachedBundles;
+            let caches_bundles = pass.draws_commands && pass.strategy.recording == RecordingStrategy::CachedBundles;
             let shared = pass.frame_bind_group.as_ref().zip(resources.materials_bind_group);
             if let Some((frame_bind_group, materials_bind_group)) = shared.filter(|_| caches_bundles) {
                 pass.bundle_cache.begin_frame(BundleKey {

@@ -21,7 +21,7 @@ pub(super) fn update_bind_groups(
     let Pass { process_index: process, view_index: view } = pass.pass;
     let declaration = &request.plan.processes()[process].declaration;
 
-    let parameters = pass.parameters.and_then(|(offset, length)| resources.parameters.binding(offset, length));
+    let parameters = pass.parameter_bytes().and_then(|bytes| resources.parameters.binding(bytes.start, bytes.len()));
     let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
     let sampled = |(name, access): &(String, Access)| match access {
         Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.sampled),

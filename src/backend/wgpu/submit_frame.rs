@@ -71,7 +71,7 @@ impl WgpuBackend {
     /// Reports the frame's measured costs to the tuners, and keeps the statistics of its passes.
     fn report_costs(&self, frame: &WgpuFrame) {
         let workers = self.workers.load(Ordering::Relaxed);
-        let passes = frame.buffers.passes().iter().filter(|pass| pass.command_pass_index.is_some());
+        let passes = frame.buffers.passes().iter().filter(|pass| pass.draws_commands);
         let all = passes.clone().map(|pass| pass.timing.total()).sum();
         let mut latest = self.latest.lock();
         let mut count = 0;

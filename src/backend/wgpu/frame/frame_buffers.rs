@@ -1,26 +1,29 @@
 //! The buffers of one frame in flight, pooled for later frames.
 
+use std::collections::{HashMap, VecDeque};
 use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 
 use parking_lot::{Mutex, RwLock};
 
+use super::allotment::allot;
 use super::material_buffer::MaterialBuffer;
 use super::object_buffers::ObjectBuffers;
-use super::pass_state::WgpuPassState;
+use super::pass_state::{FrameRanges, PassName, WgpuPassState};
 use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
     ALIGNMENT, BindGroupLayouts, GrowingBuffer, MaterialSnapshot, MirroredBuffer, SubdividedMesh, UploadQueue,
-    append_aligned, check_storage_binding_size, size_with_headroom,
+    check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
-use crate::backend::{BackendError, FrameRequest};
+use crate::backend::{BackendError, FrameRequest, kept_views};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
-use crate::view::GpuView;
+use crate::scene::ViewKind;
+use crate::view::{GpuView, RenderView};
 
 /// A pool of frame buffers.
 ///
@@ -154,15 +157,12 @@ impl FrameBuffers {
         for bytes in [objects * 4, light_bytes] {
             check_storage_binding_size(device, bytes)?;
         }
-        write_views(buffers.views.rewrite(), request)?;
-        buffers.next_key.passes.clear();
-        buffers.next_key.passes.extend(buffers.passes.iter().map(|pass| (pass.pass, pass.command_pass_index)));
-        buffers.set_light_ranges(request, limits.max_storage_buffer_binding_size);
-        let command_passes = buffers.passes.iter().filter(|pass| pass.command_pass_index.is_some()).count();
+        buffers.set_views(request, limits.max_storage_buffer_binding_size)?;
+        let object_lists =
+            allot(&mut buffers.passes, |pass| &mut pass.object_list, |pass| usize::from(pass.draws_commands));
         let max_stride =
-            limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / command_passes.max(1) as u64);
-        let stride = size_with_headroom(buffers.key.object_indices_stride, objects * 4, max_stride);
-        buffers.next_key.object_indices_stride = stride;
+            limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / object_lists.max(1) as u64);
+        buffers.object_indices_stride = size_with_headroom(buffers.object_indices_stride, objects * 4, max_stride);
 
         let mut reallocated = buffers.objects.reserve(device, request.plan.columns(), objects)?;
         if reallocated {
@@ -172,16 +172,24 @@ impl FrameBuffers {
         let processes = request.plan.processes().iter().zip(request.draws);
         let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
         buffers.bytes.update(device, uploads, bytes)?;
-        reallocated |= buffers.object_indices.reserve(device, command_passes * stride)?;
+        let lost_lists = buffers.object_indices.reserve(device, object_lists * buffers.object_indices_stride)?;
+        reallocated |= lost_lists;
         for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
             reallocated |= mirrored.upload(device, uploads)?;
         }
-        if reallocated || buffers.key != buffers.next_key {
-            mem::swap(&mut buffers.key, &mut buffers.next_key);
-            for index in 0..buffers.passes.len() {
-                let bind_group = buffers.new_frame_bind_group(device, layouts, index);
-                let pass = &mut buffers.passes[index];
-                pass.frame_bind_group = Some(bind_group);
+        for index in 0..buffers.passes.len() {
+            let ranges = buffers.frame_ranges(index);
+            let before = &buffers.passes[index];
+            let is_bound = before.frame_bind_group.is_some() && before.frame_ranges == ranges;
+            let has_list = !lost_lists && before.frame_ranges.object_indices == ranges.object_indices;
+            if is_bound && !reallocated {
+                continue;
+            }
+            let bind_group = buffers.new_frame_bind_group(device, layouts, &ranges);
+            let pass = &mut buffers.passes[index];
+            pass.frame_bind_group = Some(bind_group);
+            pass.frame_ranges = ranges;
+            if !has_list {
                 *pass.uploaded_list.get_mut() = Version::default();
             }
         }
@@ -274,13 +282,15 @@ impl FrameBuffers {
     /// Uploads the objects that a pass draws, in the order of instances, unless the buffer holds them already.
     pub(crate) fn write_object_indices(&self, uploads: &UploadQueue, pass: usize, list: &DrawList) {
         let state = &self.buffers.passes[pass];
-        let Some(index) = state.command_pass_index else { return };
+        if !state.draws_commands {
+            return;
+        }
         let mut uploaded = state.uploaded_list.write();
         if list.version() != Version::default() && *uploaded == list.version() {
             return;
         }
         *uploaded = list.version();
-        let offset = index * self.buffers.key.object_indices_stride;
+        let offset = state.frame_ranges.object_indices.start;
         self.buffers.object_indices.write(uploads, offset, bytemuck::cast_slice(&list.objects));
     }
 }
@@ -307,9 +317,9 @@ struct Buffers {
     /// What processes read of the engine's own.
     bytes: ResourceBytes,
     passes: Vec<WgpuPassState>,
-    /// The key of the passes' bind groups, and the key of this frame.
-    key: BindGroupKey,
-    next_key: BindGroupKey,
+    /// By view index.
+    view_ranges: Vec<ViewRanges>,
+    object_indices_stride: usize,
     subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
     timestamps: Option<Timestamps>,
     /// For how many frames no frame has taken them.
@@ -318,14 +328,15 @@ struct Buffers {
     objects_epoch: u64,
 }
 
-/// The key of bind groups, beside the buffers themselves.
-#[derive(Default, PartialEq)]
-struct BindGroupKey {
-    /// Each with its index in `object_indices`.
-    passes: Vec<(Pass, Option<usize>)>,
-    /// Offset and size of each view's lights in their buffer.
-    light_ranges: Vec<(usize, usize)>,
-    object_indices_stride: usize,
+/// The bytes of a view in the frame's buffers.
+struct ViewRanges {
+    kind: ViewKind,
+    name: String,
+    /// Of its [`GpuView`].
+    view: Range<usize>,
+    /// Of the lights that reach it, and the length that these need.
+    lights: Range<usize>,
+    lights_length: usize,
 }
 
 impl Buffers {
@@ -340,8 +351,8 @@ impl Buffers {
             parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
             bytes: ResourceBytes::default(),
             passes: Vec::new(),
-            key: BindGroupKey::default(),
-            next_key: BindGroupKey::default(),
+            view_ranges: Vec::new(),
+            object_indices_stride: 0,
             subdivided: RwLock::default(),
             timestamps: None,
             unused: 0,
@@ -355,55 +366,99 @@ impl Buffers {
         [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]
     }
 
-    /// Sets the passes of this frame, and collects their parameters.
+    /// Sets the passes of this frame, and collects their parameters. A pass that an earlier frame had keeps what it has cached, whatever its
+    /// index.
     fn set_passes(&mut self, request: &FrameRequest<'_>) {
-        let bytes = self.parameters.rewrite();
-        self.passes.resize_with(request.passes.len(), WgpuPassState::default);
-        let mut command_pass_indices = 0..;
-        for (state, &pass) in self.passes.iter_mut().zip(request.passes) {
-            let draws = &request.draws[pass.process_index];
-            state.set_pass(pass);
-            state.set_label(
-                request.plan.processes()[pass.process_index].name.as_str(),
-                request.views[pass.view_index].name(),
-            );
-            state.command_pass_index =
-                if matches!(draws, Draws::Commands(_)) { command_pass_indices.next() } else { None };
-            if state.command_pass_index.is_none() {
-                state.clear_partial_indices();
+        let FrameRequest { plan, draws, views, passes, .. } = *request;
+        let are_same = self.passes.len() == passes.len()
+            && self.passes.iter().zip(passes).all(|(state, pass)| state.name().is_of(plan, views, *pass));
+        if !are_same {
+            let mut before: HashMap<_, VecDeque<_>> = HashMap::new();
+            for state in self.passes.drain(..) {
+                before.entry(state.name().clone()).or_default().push_back(state);
             }
-            let parameters = draws.parameters();
-            state.parameters = (!parameters.is_empty()).then_some((bytes.len(), parameters.len()));
-            append_aligned(bytes, parameters);
+            let state_of = |pass: &Pass| {
+                let name = PassName::new(plan, views, *pass);
+                let kept = before.get_mut(&name).and_then(VecDeque::pop_front);
+                kept.unwrap_or_else(|| WgpuPassState::new(name))
+            };
+            self.passes.extend(passes.iter().map(state_of));
+        }
+        for (state, &pass) in self.passes.iter_mut().zip(passes) {
+            state.begin_frame(pass, &draws[pass.process_index]);
+        }
+        let length = |pass: &WgpuPassState| pass.parameters_length.next_multiple_of(ALIGNMENT);
+        let end = allot(&mut self.passes, |pass| &mut pass.parameters, length);
+        let bytes = self.parameters.rewrite();
+        bytes.resize(end, 0);
+        for state in &self.passes {
+            if let Some(range) = state.parameter_bytes() {
+                bytes[range].copy_from_slice(draws[state.pass.process_index].parameters());
+            }
         }
     }
 
-    /// Allots each view a range for its lights, and collects them.
-    fn set_light_ranges(&mut self, request: &FrameRequest<'_>, max: u64) {
-        let bytes = self.lights.rewrite();
-        let ranges = &mut self.next_key.light_ranges;
-        ranges.clear();
-        for (view, lights) in request.light_tables.iter().enumerate() {
-            let before = self.key.light_ranges.get(view).map_or(0, |(_, length)| *length);
+    /// Allots each view its ranges, and collects the views and their lights. A view that an earlier frame had keeps its ranges, whatever its
+    /// index. `max` is the largest size of a binding.
+    ///
+    /// # Errors
+    /// If a camera is out of reach.
+    fn set_views(&mut self, request: &FrameRequest<'_>, max: u64) -> Result<(), BackendError> {
+        let FrameRequest { views, light_tables, scene, .. } = *request;
+        let ranges = &mut self.view_ranges;
+        let is_of =
+            |ranges: &ViewRanges, view: &RenderView| (ranges.kind, ranges.name.as_str()) == (view.kind(), view.name());
+        if ranges.len() != views.len() || !ranges.iter().zip(views).all(|(ranges, view)| is_of(ranges, view)) {
+            let names = ranges.iter().map(|ranges| (ranges.kind, ranges.name.as_str()));
+            let kept = kept_views(names, views);
+            let mut before: Vec<_> = ranges.drain(..).map(Some).collect();
+            ranges.extend(views.iter().zip(kept).map(|(view, kept)| {
+                let kept = kept.and_then(|kept| before[kept.index].take());
+                let [of_view, lights] = kept.map_or([0..0, 0..0], |kept| [kept.view, kept.lights]);
+                ViewRanges { kind: view.kind(), name: view.name().to_owned(), view: of_view, lights, lights_length: 0 }
+            }));
+        }
+        for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
             // The layout requires a binding even if no light reaches the view.
-            let size = size_with_headroom(before, size_of_val(lights.gpu_lights()), max);
-            let start = bytes.len();
-            bytes.extend_from_slice(bytemuck::cast_slice(lights.gpu_lights()));
-            bytes.resize(start + size, 0);
-            ranges.push((start, size));
+            ranges.lights_length = size_with_headroom(ranges.lights.len(), size_of_val(lights.gpu_lights()), max);
         }
+        let end_of_views = allot(ranges, |ranges| &mut ranges.view, |_| GPU_VIEW_BYTES);
+        let end_of_lights = allot(ranges, |ranges| &mut ranges.lights, |ranges| ranges.lights_length);
+        let (view_bytes, light_bytes) = (self.views.rewrite(), self.lights.rewrite());
+        view_bytes.resize(end_of_views, 0);
+        light_bytes.resize(end_of_lights, 0);
+        for ((ranges, view), lights) in ranges.iter().zip(views).zip(light_tables) {
+            let gpu_view = GpuView::new(view, scene, lights.light_count())
+                .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
+            view_bytes[ranges.view.start..][..size_of::<GpuView>()].copy_from_slice(bytemuck::bytes_of(&gpu_view));
+            let lights: &[u8] = bytemuck::cast_slice(lights.gpu_lights());
+            light_bytes[ranges.lights.start..][..lights.len()].copy_from_slice(lights);
+        }
+        Ok(())
     }
 
-    fn new_frame_bind_group(&self, device: &wgpu::Device, layouts: &BindGroupLayouts, pass: usize) -> wgpu::BindGroup {
-        let WgpuPassState { pass: Pass { view_index: view, .. }, command_pass_index, .. } = self.passes[pass];
+    /// What a pass binds in these buffers, by index.
+    fn frame_ranges(&self, pass: usize) -> FrameRanges {
+        let state = &self.passes[pass];
+        let ViewRanges { view, lights, .. } = &self.view_ranges[state.pass.view_index];
+        let stride = self.object_indices_stride;
+        let lists = &state.object_list;
         // The layout requires a binding even if the pass draws no commands; it reads nothing from it.
-        let stride = self.key.object_indices_stride;
-        let (offset, size) = command_pass_index.map_or((0, ALIGNMENT), |index| (index * stride, stride));
+        let object_indices = if lists.is_empty() { 0..ALIGNMENT } else { lists.start * stride..lists.end * stride };
+        FrameRanges { view: view.clone(), lights: lights.clone(), object_indices }
+    }
+
+    fn new_frame_bind_group(
+        &self,
+        device: &wgpu::Device,
+        layouts: &BindGroupLayouts,
+        FrameRanges { view, lights, object_indices }: &FrameRanges,
+    ) -> wgpu::BindGroup {
         let bindings = [
-            self.views.on_device.binding(view * ALIGNMENT, size_of::<GpuView>()),
+            self.views.on_device.binding(view.start, size_of::<GpuView>()),
             self.objects.gpu_objects(),
-            self.object_indices.binding(offset, size),
-            self.lights.on_device.binding(self.key.light_ranges[view].0, self.key.light_ranges[view].1),
+            self.object_indices.binding(object_indices.start, object_indices.len()),
+            self.lights.on_device.binding(lights.start, lights.len()),
         ];
         let entries: Vec<_> = (0..)
             .zip(bindings.into_iter().flatten())
@@ -427,15 +482,5 @@ fn bytes_of_process<'a>(
     of_materials.chain(draws.resources().iter().filter_map(ShaderResource::bytes))
 }
 
-/// Appends the views' GPU layouts.
-///
-/// # Errors
-/// If a camera is out of reach.
-fn write_views(bytes: &mut Vec<u8>, request: &FrameRequest<'_>) -> Result<(), BackendError> {
-    for (view, lights) in request.views.iter().zip(request.light_tables) {
-        let record = GpuView::new(view, request.scene, lights.light_count())
-            .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
-        append_aligned(bytes, bytemuck::bytes_of(&record));
-    }
-    Ok(())
-}
+/// What a view takes in the buffer of views.
+const GPU_VIEW_BYTES: usize = size_of::<GpuView>().next_multiple_of(ALIGNMENT);

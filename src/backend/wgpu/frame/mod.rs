@@ -1,5 +1,6 @@
 //! A frame in flight: its buffers, its passes, and what they cache for later frames.
 
+mod allotment;
 mod bundle_cache;
 mod commands;
 mod frame_buffers;

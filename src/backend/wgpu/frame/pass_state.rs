@@ -1,7 +1,6 @@
 //! The state of one pass in a frame's buffers.
 
-use std::fmt::Write;
-use std::mem;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use parking_lot::RwLock;
@@ -14,22 +13,60 @@ use crate::backend::wgpu::resources::{CachedBindGroup, GrowingBuffer, UploadQueu
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
-use crate::process::{Draws, Pass};
+use crate::process::{Draws, FramePlan, Pass};
+use crate::scene::ViewKind;
 use crate::tuning::CostSample;
+use crate::view::RenderView;
+
+/// What a pass is known by from frame to frame, whatever its index.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct PassName {
+    kind: ViewKind,
+    view: String,
+    process: String,
+}
+
+impl PassName {
+    pub(super) fn new(plan: &FramePlan, views: &[RenderView], pass: Pass) -> Self {
+        let view = &views[pass.view_index];
+        let process = plan.processes()[pass.process_index].name.clone();
+        Self { kind: view.kind(), view: view.name().to_owned(), process }
+    }
+
+    /// Whether it is the name of a pass. Allocates nothing.
+    pub(super) fn is_of(&self, plan: &FramePlan, views: &[RenderView], pass: Pass) -> bool {
+        let view = &views[pass.view_index];
+        (self.kind, self.view.as_str()) == (view.kind(), view.name())
+            && self.process == plan.processes()[pass.process_index].name
+    }
+}
+
+/// The bytes that a pass binds in the frame's buffers, beside those of the objects.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct FrameRanges {
+    pub(super) view: Range<usize>,
+    pub(super) lights: Range<usize>,
+    pub(super) object_indices: Range<usize>,
+}
 
 /// One pass of a frame, and what it caches for the next frame that uses the same buffers.
 pub(crate) struct WgpuPassState {
     pub(crate) pass: Pass,
+    name: PassName,
     /// Process and view, for error messages.
     pub(crate) label: String,
-    /// Its index among the passes of commands; `None` for other passes.
-    pub(crate) command_pass_index: Option<usize>,
+    /// Whether it draws commands.
+    pub(crate) draws_commands: bool,
+    /// Its index among the lists of object indices; empty for a pass without commands.
+    pub(super) object_list: Range<usize>,
     /// Its index among the timed passes; `None` for a pass that is not timed.
     pub(crate) timed_pass_index: Option<usize>,
-    /// Offset and size of its parameters; `None` for a pass without.
-    pub(crate) parameters: Option<(usize, usize)>,
-    /// `@group(0)`.
+    /// The bytes allotted to its parameters, and the length of these.
+    pub(super) parameters: Range<usize>,
+    pub(super) parameters_length: usize,
+    /// `@group(0)`, and what it binds.
     pub(crate) frame_bind_group: Option<wgpu::BindGroup>,
+    pub(super) frame_ranges: FrameRanges,
     /// `@group(2)`: the parameters, and the targets that the process samples.
     pub(crate) process_bind_group: Option<CachedBindGroup>,
     /// `@group(3)`: the columns and the engine's own resources that the process reads.
@@ -42,7 +79,7 @@ pub(crate) struct WgpuPassState {
     pub(crate) is_trial: bool,
     /// Whether the strategy's cache was there when the frame began.
     is_warm: bool,
-    /// The number of batches that it drew when a frame last recorded it; `None` for another pass than in that frame.
+    /// The number of batches that it drew when a frame last recorded it with these buffers; `None` if none did.
     latest_batches: Option<usize>,
     /// Whether it may be encoded together with its neighbours.
     pub(crate) can_share_encoder: bool,
@@ -61,11 +98,15 @@ impl Default for WgpuPassState {
     fn default() -> Self {
         Self {
             pass: Pass { process_index: 0, view_index: 0 },
+            name: PassName::default(),
             label: String::new(),
-            command_pass_index: None,
+            draws_commands: false,
+            object_list: 0..0,
             timed_pass_index: None,
-            parameters: None,
+            parameters: 0..0,
+            parameters_length: 0,
             frame_bind_group: None,
+            frame_ranges: FrameRanges::default(),
             process_bind_group: None,
             engine_bind_group: None,
             uploaded_list: RwLock::default(),
@@ -89,10 +130,19 @@ impl WgpuPassState {
     /// A batch takes some 0.1 µs to record, and an encoder 4 to 5 µs to make, finish and submit.
     const MAX_BATCHES_OF_SMALL_PASS: usize = 64;
 
-    pub(crate) fn set_label(&mut self, process: &str, view: &str) {
-        self.label.clear();
-        // Writing into a string cannot fail.
-        let _ = write!(self.label, "{process:?} in view {view:?}");
+    /// The state of a new pass.
+    pub(super) fn new(name: PassName) -> Self {
+        let label = format!("{:?} in view {:?}", name.process, name.view);
+        Self { name, label, ..Self::default() }
+    }
+
+    pub(super) fn name(&self) -> &PassName {
+        &self.name
+    }
+
+    /// The bytes of its parameters in their buffer; `None` for a pass without.
+    pub(crate) fn parameter_bytes(&self) -> Option<Range<usize>> {
+        (self.parameters_length > 0).then(|| self.parameters.start..self.parameters.start + self.parameters_length)
     }
 
     /// Sets the frame's strategy. Unless it is a trial, drops the caches of other strategies.
@@ -113,10 +163,15 @@ impl WgpuPassState {
         self.is_in_previous_encoder = AtomicBool::new(false);
     }
 
-    /// Makes this the state of a pass in the frame that begins.
-    pub(crate) fn set_pass(&mut self, pass: Pass) {
-        let is_same = mem::replace(&mut self.pass, pass) == pass;
-        self.latest_batches = is_same.then(|| self.timing.batches());
+    /// Begins a frame, in which the pass has these indices and draws this.
+    pub(super) fn begin_frame(&mut self, pass: Pass, draws: &Draws<'_>) {
+        self.pass = pass;
+        self.latest_batches = self.timing.latest_batches();
+        self.draws_commands = matches!(draws, Draws::Commands(_));
+        if !self.draws_commands {
+            self.clear_partial_indices();
+        }
+        self.parameters_length = draws.parameters().len();
     }
 
     /// Whether the pass probably takes less to encode than an encoder does.
@@ -155,8 +210,8 @@ impl WgpuPassState {
         Ok(())
     }
 
-    /// Drops the index buffer that an earlier frame's pass at this index has left.
-    pub(crate) fn clear_partial_indices(&mut self) {
+    /// Drops the index buffer that it has left when it drew commands.
+    fn clear_partial_indices(&mut self) {
         *self.partial_indices.get_mut() = new_index_buffer();
     }
 

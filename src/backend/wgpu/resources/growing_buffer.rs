@@ -57,12 +57,6 @@ impl GrowingBuffer {
     }
 }
 
-/// Appends bytes, and pads with zeros to the next offset at which a binding may begin.
-pub(crate) fn append_aligned(bytes: &mut Vec<u8>, more: &[u8]) {
-    bytes.extend_from_slice(more);
-    bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
-}
-
 /// The size of an allocation for `needed` bytes that had `before` bytes: `before` again if that is enough and not far too much,
 /// so that bindings change rarely; otherwise a quarter more than needed, within `max`. A multiple of [`ALIGNMENT`].
 pub(crate) fn size_with_headroom(before: usize, needed: usize, max: u64) -> usize {

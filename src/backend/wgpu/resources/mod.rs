@@ -32,9 +32,7 @@ pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
-pub(crate) use growing_buffer::{
-    ALIGNMENT, GrowingBuffer, append_aligned, check_storage_binding_size, size_with_headroom,
-};
+pub(crate) use growing_buffer::{ALIGNMENT, GrowingBuffer, check_storage_binding_size, size_with_headroom};
 pub(crate) use imported_meshes::{VertexSlot, VertexStreamLayouts};
 pub(crate) use imported_target::{ImportedTarget, ResolvedImport};
 pub(crate) use light_meshes::LightMeshes;
