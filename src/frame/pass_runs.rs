@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use parking_lot::Mutex;
 
-/// The passes of a frame in runs: neighbours in submission order that are finished together, by the job that is the last to have one of them
-/// ready. A pass that is finished alone is a run of its own.
+/// The passes of a frame in runs: neighbours in submission order that are finished together, by the job of the pass that becomes ready last.
+/// A pass that is finished alone is a run of its own.
 #[derive(Debug, Default)]
 pub(super) struct PassRuns {
     runs: Vec<PassRun>,
@@ -91,7 +91,7 @@ mod tests {
         runs.begin_frame(PassRuns::MAX_PASSES + 1, |_| true);
         assert_eq!(runs.complete(PassRuns::MAX_PASSES), Some(PassRuns::MAX_PASSES..PassRuns::MAX_PASSES + 1));
         let last = (0..PassRuns::MAX_PASSES).filter_map(|pass| runs.complete(pass)).collect::<Vec<_>>();
-        assert_eq!(last, [0..PassRuns::MAX_PASSES]);
+        assert_eq!((last.len(), last.first()), (1, Some(&(0..PassRuns::MAX_PASSES))));
     }
 
     #[test]

@@ -396,7 +396,7 @@ fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: 
     recordings.iter_mut().for_each(|recording| drop(recording.take()));
 }
 
-/// The error of a run. One that a job of another pass met names the pass that failed.
+/// The error of a run. If the job of another pass met it, it names the pass that failed.
 fn error_of_pass<B: Backend>(
     error: RunError,
     graph: &StageGraph<B>,

@@ -106,8 +106,9 @@ fn refused() -> Result<(), Failed> {
     let (device, queue) = device()?;
     let backend = WgpuBackend::new(device, queue)?.encoding_strategy(EncodingStrategy::PerPass);
     let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros);
-    let (mut renderer, _submitter) = builder.output("tail").build(Arc::new(Scheduler::new(2)?))?;
+    let (mut renderer, _submitter) = builder.output("tail").build(Arc::new(Scheduler::new(1)?))?;
     let scene = everything();
+    // One worker finishes both in the job of the pass after them.
     for _ in 0..2 {
         match renderer.record(scene.as_scene_ref()).err() {
             Some(FrameError::Failed { stage, source }) => {

@@ -25,6 +25,7 @@ pub const CASES: &[Case] = &[
     ("trials_of_the_tuner_draw_the_same_bytes", tuned),
     ("cached_bundles_are_replayed_while_objects_move", moving),
     ("cached_bundles_are_replayed_when_another_view_comes_or_goes", other_view),
+    ("passes_draw_the_same_after_their_ranges_have_moved", moved_ranges),
     ("cached_bundles_are_recorded_again_when_their_inputs_change", recorded_again),
     ("cached_bundles_are_recorded_again_when_a_subdivision_level_changes", subdivided_again),
     ("an_error_at_submission_names_the_pass", refused_at_submission),
@@ -330,6 +331,24 @@ fn other_view() -> Result<(), Failed> {
         expect(draw(&mut fixture, &scene)? == drawn_by_a_new_renderer(&scene)?, || format!("round {round} differs"))?;
         let (recorded, replayed) = counts(&fixture, |pass| pass.view >= first_of_others);
         expect(round == 0 || (recorded == 0 && replayed > 10), || format!("{round}: {recorded} and {replayed}"))?;
+    }
+    Ok(())
+}
+
+fn moved_ranges() -> Result<(), Failed> {
+    let (mut scene, mut fixture) = (many_batches(), fixture_alone(EncodingStrategy::PerPass)?);
+    let cameras: Vec<_> = (0..5_u32)
+        .map(|index| {
+            let mut camera = scene.cameras[0].clone();
+            (camera.name, camera.size) = (format!("view {index}"), [16 + index, 16]);
+            camera.position.x += f64::from(index);
+            camera
+        })
+        .collect();
+    // Where only the last is left, it moves to the start of the buffers.
+    for range in [0..5, 4..5, 0..5, 3..5, 1..2, 0..4] {
+        scene.cameras = cameras[range.clone()].to_vec();
+        expect(draw(&mut fixture, &scene)? == drawn_by_a_new_renderer(&scene)?, || format!("{range:?} differ"))?;
     }
     Ok(())
 }

@@ -218,7 +218,8 @@ impl Backend for WgpuBackend {
         parts: &mut [Vec<WgpuPart>],
         emit: &mut dyn FnMut(WgpuCommands),
     ) -> Result<(), BackendError> {
-        // One of them may have grown since the frame before.
+        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
+        // One of them may have grown since these buffers were used last.
         if !parts.iter().any(|parts| is_split(parts)) {
             let start = Instant::now();
             let label = &frame.pass(passes[0].index).label;
@@ -233,11 +234,13 @@ impl Backend for WgpuBackend {
                 }
                 return Ok(());
             }
+            self.buffers.clear();
         }
-        // Alone, the pass that the device refuses is found.
+        // Alone, the pass that the device refuses is found. A panic of wgpu would name the pass of this job.
         for (pass, parts) in passes.iter().zip(parts) {
             let label = &frame.pass(pass.index).label;
-            emit(catch_wgpu_panic(label, || self.finish(worker, frame, pass, parts)).flatten()?);
+            let finished = catch_wgpu_panic(label, || self.finish(worker, frame, pass, parts)).flatten();
+            emit(finished.inspect_err(|_| self.buffers.clear())?);
         }
         Ok(())
     }
@@ -286,7 +289,8 @@ fn is_split(parts: &[WgpuPart]) -> bool {
 }
 
 /// Divides the time that one encoder of several passes took among them, by their batches: wgpu encodes all of them when the encoder is
-/// finished.
+/// finished, so none can be timed alone. A trial of a recording strategy is measured with its neighbours, which blurs it; such a pass has few
+/// batches, so there is little to choose.
 fn divide_time(frame: &WgpuFrame, passes: &[PassRequest<'_>], time: Duration) {
     // A pass costs something without batches too.
     let weight_of = |pass: &PassRequest<'_>| 1 + pass.list.batches.len() as u64;

@@ -351,8 +351,8 @@ impl<B: Backend> Stage<B> for Record {
     }
 }
 
-/// Finishes the pass, or the whole run of passes that are finished together if this one is the last to be ready: their commands are ready
-/// to submit.
+/// Finishes the pass: its commands are ready to submit. Of passes that are finished together, the job of the one that becomes ready last
+/// finishes all.
 pub(super) struct Finish {
     pub(super) pass: usize,
 }
@@ -408,18 +408,21 @@ fn finish_together<B: Backend>(
     });
     let recordings = &frame.recordings[passes];
     let mut parts: [Vec<B::Part>; PassRuns::MAX_PASSES] = array::from_fn(|_| Vec::new());
-    for (parts, recording) in parts.iter_mut().zip(recordings) {
-        *parts = mem::take(&mut *recording.ordered_parts()?);
+    let fail = |index: usize| frame.pass_runs.add_failure(PassFailure { failed: first + index.min(count - 1), job_of });
+    for (index, (parts, recording)) in parts.iter_mut().zip(recordings).enumerate() {
+        *parts = mem::take(&mut *recording.ordered_parts().inspect_err(|_| fail(index))?);
     }
     let mut finished = 0;
     let mut emit = |commands| {
-        recordings[finished].put_finished(commands);
+        if let Some(recording) = recordings.get(finished) {
+            recording.put_finished(commands);
+        }
         finished += 1;
     };
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
     let result = frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit);
     if result.is_err() {
-        frame.pass_runs.add_failure(PassFailure { failed: first + finished, job_of });
+        fail(finished);
     }
     for (parts, recording) in parts.iter_mut().zip(recordings) {
         recording.keep_memory(mem::take(parts));

@@ -21,18 +21,18 @@ pub(super) fn allot<T>(
     if all_fit && end <= 2 * sum {
         return end;
     }
-    let gaps = free_gaps(owners, &range, &length);
+    let gaps = release_and_find_gaps(owners, &range, &length);
     let end = place(owners, gaps, &range, &length);
     if end <= 2 * sum {
         return end;
     }
     owners.iter_mut().for_each(|owner| *range(owner) = 0..0);
-    let gaps = free_gaps(owners, &range, &length);
+    let gaps = release_and_find_gaps(owners, &range, &length);
     place(owners, gaps, &range, &length)
 }
 
-/// What lies between the ranges of those who keep theirs, and all that lies behind; takes away the ranges of the others.
-fn free_gaps<T>(
+/// Takes away the ranges that have the wrong length. Returns the gaps between the others, and all that lies behind them.
+fn release_and_find_gaps<T>(
     owners: &mut [T],
     range: impl Fn(&mut T) -> &mut Range<usize>,
     length: impl Fn(&T) -> usize,
@@ -58,7 +58,7 @@ fn free_gaps<T>(
     gaps
 }
 
-/// Places those who have no range into the first gap with room for it. Returns where the last range ends.
+/// Places each owner without a range in the first gap with room for it. Returns where the last range ends.
 fn place<T>(
     owners: &mut [T],
     mut gaps: Vec<Range<usize>>,

@@ -158,8 +158,7 @@ impl FrameBuffers {
             check_storage_binding_size(device, bytes)?;
         }
         buffers.set_views(request, limits.max_storage_buffer_binding_size)?;
-        let object_lists =
-            allot(&mut buffers.passes, |pass| &mut pass.object_list, |pass| usize::from(pass.draws_commands));
+        let object_lists = buffers.allot_object_lists(limits.max_buffer_size / (objects as u64 * 4));
         let max_stride =
             limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / object_lists.max(1) as u64);
         buffers.object_indices_stride = size_with_headroom(buffers.object_indices_stride, objects * 4, max_stride);
@@ -174,9 +173,11 @@ impl FrameBuffers {
         buffers.bytes.update(device, uploads, bytes)?;
         let lost_lists = buffers.object_indices.reserve(device, object_lists * buffers.object_indices_stride)?;
         reallocated |= lost_lists;
-        for mirrored in [&mut buffers.views, &mut buffers.lights, &mut buffers.parameters] {
+        for mirrored in [&mut buffers.views, &mut buffers.lights] {
             reallocated |= mirrored.upload(device, uploads)?;
         }
+        // The bind groups of processes compare their buffer.
+        buffers.parameters.upload(device, uploads)?;
         for index in 0..buffers.passes.len() {
             let ranges = buffers.frame_ranges(index);
             let before = &buffers.passes[index];
@@ -332,9 +333,9 @@ struct Buffers {
 struct ViewRanges {
     kind: ViewKind,
     name: String,
-    /// Of its [`GpuView`].
+    /// Those of its [`GpuView`].
     view: Range<usize>,
-    /// Of the lights that reach it, and the length that these need.
+    /// Those of the lights that reach it, and the length that these need.
     lights: Range<usize>,
     lights_length: usize,
 }
@@ -366,8 +367,8 @@ impl Buffers {
         [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]
     }
 
-    /// Sets the passes of this frame, and collects their parameters. A pass that an earlier frame had keeps what it has cached, whatever its
-    /// index.
+    /// Sets the passes of this frame, and collects their parameters. A pass that the latest frame with these buffers had keeps what it has
+    /// cached, whatever its index.
     fn set_passes(&mut self, request: &FrameRequest<'_>) {
         let FrameRequest { plan, draws, views, passes, .. } = *request;
         let are_same = self.passes.len() == passes.len()
@@ -398,8 +399,8 @@ impl Buffers {
         }
     }
 
-    /// Allots each view its ranges, and collects the views and their lights. A view that an earlier frame had keeps its ranges, whatever its
-    /// index. `max` is the largest size of a binding.
+    /// Allots each view its ranges, and collects the views and their lights. A view that the latest frame with these buffers had keeps its
+    /// ranges, whatever its index; a new view takes those of one of its kind that is gone. `max` is the largest size of a binding.
     ///
     /// # Errors
     /// If a camera is out of reach.
@@ -435,6 +436,21 @@ impl Buffers {
             light_bytes[ranges.lights.start..][..lights.len()].copy_from_slice(lights);
         }
         Ok(())
+    }
+
+    /// Allots each pass of commands a place for its list of objects. Returns the number of places, which is at most `max` if that many are
+    /// enough.
+    fn allot_object_lists(&mut self, max: u64) -> usize {
+        let allot_lists = |passes: &mut [WgpuPassState]| {
+            allot(passes, |pass| &mut pass.object_list, |pass| usize::from(pass.draws_commands))
+        };
+        let lists = allot_lists(&mut self.passes);
+        if lists as u64 <= max {
+            return lists;
+        }
+        // Without the places that belong to nobody.
+        self.passes.iter_mut().for_each(|pass| pass.object_list = 0..0);
+        allot_lists(&mut self.passes)
     }
 
     /// What a pass binds in these buffers, by index.

@@ -57,7 +57,7 @@ pub(crate) struct WgpuPassState {
     pub(crate) label: String,
     /// Whether it draws commands.
     pub(crate) draws_commands: bool,
-    /// Its index among the lists of object indices; empty for a pass without commands.
+    /// The place of its list of objects in their buffer: a range of one place, empty for a pass without commands.
     pub(super) object_list: Range<usize>,
     /// Its index among the timed passes; `None` for a pass that is not timed.
     pub(crate) timed_pass_index: Option<usize>,
@@ -174,7 +174,7 @@ impl WgpuPassState {
         self.parameters_length = draws.parameters().len();
     }
 
-    /// Whether the pass probably takes less to encode than an encoder does.
+    /// Whether the pass probably takes about as long to encode as an encoder of its own, or less.
     pub(crate) fn is_small(&self, draws: &Draws<'_>) -> bool {
         match draws {
             // The engine's own code, which may do anything.
