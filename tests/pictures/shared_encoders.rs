@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, WgpuBackend, WgpuPassStatistics};
-use drawloom::process::Deferred;
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
@@ -102,11 +102,36 @@ fn growing() -> Result<(), Failed> {
     Ok(())
 }
 
+/// Samples what [`Ouroboros`] draws.
+struct Foot;
+
+impl RenderProcess for Foot {
+    fn name(&self) -> &str {
+        "foot"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples("tail");
+        declare.clears_color("foot", Format::Rgba8Unorm, ClearColor::Background);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @group(2) @binding(1) var tail: texture_2d<f32>;
+            @fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                return textureLoad(tail, vec2<i32>(0, 0), 0);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
+    }
+}
+
 fn refused() -> Result<(), Failed> {
     let (device, queue) = device()?;
     let backend = WgpuBackend::new(device, queue)?.encoding_strategy(EncodingStrategy::PerPass);
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros);
-    let (mut renderer, _submitter) = builder.output("tail").build(Arc::new(Scheduler::new(1)?))?;
+    let builder =
+        Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros).process(Foot);
+    let (mut renderer, _submitter) = builder.output("foot").build(Arc::new(Scheduler::new(1)?))?;
     let scene = everything();
     // One worker finishes both in the job of the pass after them.
     for _ in 0..2 {
