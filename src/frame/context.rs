@@ -1,5 +1,7 @@
 //! What the jobs of a frame share.
 
+use std::time::Duration;
+
 use super::cost_model::CostModel;
 use super::granularity::Granularity;
 use super::list_inputs::{ListInputs, OrderInputs};
@@ -129,6 +131,29 @@ impl<B: Backend> FrameContext<'_, B> {
     pub(super) fn items_per_job(&self, node: usize, width: usize, units_per_item: usize) -> usize {
         let by_cost = || self.costs.items_per_job(node, width, self.workers);
         self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
+    }
+
+    /// Adds a time that a job of another pass spent on a pass.
+    pub(super) fn add_view_time(&self, pass: usize, took: Duration) {
+        let view = self.view_index_of(pass);
+        self.tables.view_times.add(view, took);
+        if self.depends_on_occlusion(pass) {
+            self.tables.occlusion[view].add_time(took);
+        }
+    }
+
+    /// Takes away a time that the job of a pass spends on other passes.
+    pub(super) fn subtract_view_time(&self, pass: usize, took: Duration) {
+        let view = self.view_index_of(pass);
+        self.tables.view_times.subtract(view, took);
+        if self.depends_on_occlusion(pass) {
+            self.tables.occlusion[view].subtract_time(took);
+        }
+    }
+
+    /// Whether what a pass costs depends on the occlusion tests of its view.
+    fn depends_on_occlusion(&self, pass: usize) -> bool {
+        self.tables.passes[pass].selection.is_some() && self.occlusion[self.view_index_of(pass)].is_possible()
     }
 
     /// Overrides the job size that is reported for a node.

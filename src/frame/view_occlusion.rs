@@ -48,6 +48,11 @@ impl ViewOcclusion {
         self.nanoseconds.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
+    /// Takes away a time that a job spends on other views. It wraps below 0 until the job's own time is added.
+    pub(super) fn subtract_time(&self, took: Duration) {
+        self.nanoseconds.fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
     /// The thread time in nanoseconds.
     pub(super) fn nanoseconds(&self) -> u64 {
         self.nanoseconds.load(Ordering::Relaxed)

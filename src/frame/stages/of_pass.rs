@@ -3,12 +3,13 @@
 use std::array;
 use std::mem;
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
 use super::super::context::FrameContext;
 use super::super::pass_runs::{PassFailure, PassRuns};
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
-use crate::backend::{Backend, BackendError};
+use crate::backend::{Backend, BackendError, PassRequest};
 use crate::command::{DrawList, instance, sort};
 use crate::task::Worker;
 use crate::view::{self, SelectionFilter};
@@ -420,7 +421,9 @@ fn finish_together<B: Backend>(
         finished += 1;
     };
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
+    let start = Instant::now();
     let result = frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit);
+    attribute_time(frame, requests, job_of, start.elapsed());
     if result.is_err() {
         fail(finished);
     }
@@ -428,4 +431,21 @@ fn finish_together<B: Backend>(
         recording.keep_memory(mem::take(parts));
     }
     result
+}
+
+/// Divides the time of passes that one job finished among their views, by their batches. When the job ends, its whole time is added to the
+/// view of its own pass.
+fn attribute_time<B: Backend>(
+    frame: &FrameContext<'_, B>,
+    requests: &[PassRequest<'_>],
+    job_of: usize,
+    took: Duration,
+) {
+    // A pass costs something without batches too.
+    let weight_of = |request: &PassRequest<'_>| 1.0 + request.list.batches.len() as f64;
+    let all: f64 = requests.iter().map(weight_of).sum();
+    for request in requests {
+        frame.add_view_time(request.index, took.mul_f64(weight_of(request) / all));
+    }
+    frame.subtract_view_time(job_of, took);
 }

@@ -12,6 +12,7 @@ use super::material_buffer::MaterialBuffer;
 use super::object_buffers::ObjectBuffers;
 use super::pass_state::{FrameRanges, PassName, WgpuPassState};
 use super::resource_bytes::ResourceBytes;
+use super::view_ranges::ViewRanges;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
@@ -19,11 +20,10 @@ use crate::backend::wgpu::resources::{
     check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
-use crate::backend::{BackendError, FrameRequest, kept_views};
+use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
-use crate::scene::ViewKind;
-use crate::view::{GpuView, RenderView};
+use crate::view::GpuView;
 
 /// A pool of frame buffers.
 ///
@@ -329,17 +329,6 @@ struct Buffers {
     objects_epoch: u64,
 }
 
-/// The bytes of a view in the frame's buffers.
-struct ViewRanges {
-    kind: ViewKind,
-    name: String,
-    /// Those of its [`GpuView`].
-    view: Range<usize>,
-    /// Those of the lights that reach it, and the length that these need.
-    lights: Range<usize>,
-    lights_length: usize,
-}
-
 impl Buffers {
     fn new(maps_memory: bool) -> Self {
         use wgpu::BufferUsages;
@@ -407,18 +396,7 @@ impl Buffers {
     fn set_views(&mut self, request: &FrameRequest<'_>, max: u64) -> Result<(), BackendError> {
         let FrameRequest { views, light_tables, scene, .. } = *request;
         let ranges = &mut self.view_ranges;
-        let is_of =
-            |ranges: &ViewRanges, view: &RenderView| (ranges.kind, ranges.name.as_str()) == (view.kind(), view.name());
-        if ranges.len() != views.len() || !ranges.iter().zip(views).all(|(ranges, view)| is_of(ranges, view)) {
-            let names = ranges.iter().map(|ranges| (ranges.kind, ranges.name.as_str()));
-            let kept = kept_views(names, views);
-            let mut before: Vec<_> = ranges.drain(..).map(Some).collect();
-            ranges.extend(views.iter().zip(kept).map(|(view, kept)| {
-                let kept = kept.and_then(|kept| before[kept.index].take());
-                let [of_view, lights] = kept.map_or([0..0, 0..0], |kept| [kept.view, kept.lights]);
-                ViewRanges { kind: view.kind(), name: view.name().to_owned(), view: of_view, lights, lights_length: 0 }
-            }));
-        }
+        ViewRanges::keep(ranges, views);
         for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
             // The layout requires a binding even if no light reaches the view.
             ranges.lights_length = size_with_headroom(ranges.lights.len(), size_of_val(lights.gpu_lights()), max);

@@ -10,6 +10,7 @@ mod object_buffers;
 mod pass_state;
 mod pass_statistics;
 mod resource_bytes;
+mod view_ranges;
 mod wgpu_frame;
 
 pub(crate) use bundle_cache::BundleKey;
