@@ -45,3 +45,11 @@ pub struct PassRequest<'a> {
     /// Its batches; empty for a pass without commands.
     pub list: &'a DrawList,
 }
+
+impl PassRequest<'_> {
+    /// What finishing the pass costs, relative to other passes that are finished together with it.
+    pub(crate) fn relative_cost(&self) -> u64 {
+        // A pass costs something without batches too.
+        1 + self.list.batches.len() as u64
+    }
+}

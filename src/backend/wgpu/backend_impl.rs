@@ -292,10 +292,8 @@ fn is_split(parts: &[WgpuPart]) -> bool {
 /// finished, so none can be timed alone. A trial of a recording strategy is measured with its neighbours, which blurs it; such a pass has few
 /// batches, so there is little to choose.
 fn divide_time(frame: &WgpuFrame, passes: &[PassRequest<'_>], time: Duration) {
-    // A pass costs something without batches too.
-    let weight_of = |pass: &PassRequest<'_>| 1 + pass.list.batches.len() as u64;
-    let all: u64 = passes.iter().map(weight_of).sum();
+    let all: u64 = passes.iter().map(PassRequest::relative_cost).sum();
     for pass in passes {
-        frame.pass(pass.index).timing.add_serial(time.as_nanos() as u64 * weight_of(pass) / all);
+        frame.pass(pass.index).timing.add_serial(time.as_nanos() as u64 * pass.relative_cost() / all);
     }
 }

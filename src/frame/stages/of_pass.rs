@@ -441,11 +441,9 @@ fn attribute_time<B: Backend>(
     job_of: usize,
     took: Duration,
 ) {
-    // A pass costs something without batches too.
-    let weight_of = |request: &PassRequest<'_>| 1.0 + request.list.batches.len() as f64;
-    let all: f64 = requests.iter().map(weight_of).sum();
+    let all: u64 = requests.iter().map(PassRequest::relative_cost).sum();
     for request in requests {
-        frame.add_view_time(request.index, took.mul_f64(weight_of(request) / all));
+        frame.add_view_time(request.index, took.mul_f64(request.relative_cost() as f64 / all as f64));
     }
     frame.subtract_view_time(job_of, took);
 }

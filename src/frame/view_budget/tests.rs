@@ -78,7 +78,7 @@ impl Simulation {
         Duration::from_secs_f64(milliseconds * (1.0 + self.noise * (2.0 * self.random.f64() - 1.0)) * 1e-3)
     }
 
-    /// Draws a frame, and returns its statistics, before the controller is told of them.
+    /// Draws a frame, and returns its statistics, before the controller gets them.
     fn draw(&mut self) -> FrameStatistics {
         let views: Vec<_> = self.views.iter().map(|simulated| simulated.view.clone()).collect();
         let cameras = self.budget.cameras(&views).unwrap();
