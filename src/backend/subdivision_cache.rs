@@ -13,7 +13,8 @@ use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::RejectionReason;
 
-/// Keeps subdivided meshes, as a backend's geometry `T`, for as long as frames draw them and a while longer.
+/// Keeps subdivided meshes, as a backend's geometry `T`. A view that comes back finds those that it drew before, because to subdivide
+/// takes longer than the rest of a frame; so unused ones are dropped only where they take much memory.
 pub(super) struct SubdivisionCache<T> {
     meshes: Mutex<HashMap<Key, Arc<CachedSubdivision<T>>>>,
     /// The identity of the assets that the meshes belong to.
@@ -27,6 +28,7 @@ pub(crate) struct CachedSubdivision<T> {
     pub(super) geometry: T,
     /// Whether its edges are too long, because shorter ones would take too many triangles.
     pub(super) is_coarse: bool,
+    triangles: usize,
     used_in: AtomicU64,
 }
 
@@ -49,18 +51,38 @@ impl<T> Default for SubdivisionCache<T> {
 }
 
 impl<T> SubdivisionCache<T> {
-    /// Meshes that were not drawn for this many frames are dropped.
+    /// Meshes that were not drawn for this many frames are unused.
     const MAX_UNUSED_FRAMES: u64 = 120;
+    /// The maximum number of triangles of unused meshes: some 24 MB.
+    const MAX_UNUSED_TRIANGLES: usize = 1 << 20;
 
-    /// Begins a frame: drops meshes of other assets and long unused ones.
+    /// Begins a frame: drops meshes of other assets, those whose source is gone, and, where unused ones have too many triangles, the
+    /// longest unused ones.
     pub(super) fn begin_frame(&self, assets: &Assets) {
         // Relaxed, here and below: frames begin one after the other, and the end of a frame's run orders its jobs' stores.
         let frame = self.frame.fetch_add(1, Ordering::Relaxed) + 1;
         let identity = assets.meshes.identity();
         let same_assets = self.assets.swap(identity, Ordering::Relaxed) == identity;
-        let is_used =
-            |mesh: &CachedSubdivision<T>| mesh.used_in.load(Ordering::Relaxed) + Self::MAX_UNUSED_FRAMES >= frame;
-        self.meshes.lock().retain(|_, mesh| same_assets && is_used(mesh));
+        let mut meshes = self.meshes.lock();
+        let has_source = |((slot, ..), revision, _): &Key| {
+            assets.meshes.get_with_revision(*slot).is_some_and(|(current, _)| current == *revision)
+        };
+        meshes.retain(|key, _| same_assets && has_source(key));
+        let last_used = |mesh: &CachedSubdivision<T>| mesh.used_in.load(Ordering::Relaxed);
+        let is_unused = |mesh: &CachedSubdivision<T>| last_used(mesh) + Self::MAX_UNUSED_FRAMES < frame;
+        let unused = || meshes.iter().filter(|(_, mesh)| is_unused(mesh));
+        let mut unused_triangles: usize = unused().map(|(_, mesh)| mesh.triangles).sum();
+        if unused_triangles > Self::MAX_UNUSED_TRIANGLES {
+            let mut oldest_first: Vec<_> = unused().map(|(key, mesh)| (last_used(mesh), *key)).collect();
+            oldest_first.sort_unstable_by_key(|(last_used, _)| *last_used);
+            for (_, key) in oldest_first {
+                if unused_triangles > Self::MAX_UNUSED_TRIANGLES
+                    && let Some(dropped) = meshes.remove(&key)
+                {
+                    unused_triangles -= dropped.triangles;
+                }
+            }
+        }
     }
 
     /// Drops everything.
@@ -114,8 +136,8 @@ impl<T> SubdivisionCache<T> {
                     0 => subdivided(mesh, level),
                     coarser => subdivided(&mesh.at_level(coarser), level),
                 };
-                let created =
-                    Arc::new(CachedSubdivision { geometry: create(mesh)?, is_coarse, used_in: AtomicU64::new(0) });
+                let (triangles, used_in) = (mesh.indices().len() / 3, AtomicU64::new(0));
+                let created = Arc::new(CachedSubdivision { geometry: create(mesh)?, is_coarse, triangles, used_in });
                 Arc::clone(self.meshes.lock().entry(key).or_insert(created))
             }
         };
@@ -141,4 +163,66 @@ fn subdivided(mesh: &Mesh, level: u32) -> (Mesh, bool) {
 /// The error for a batch without a mesh. This is a bug in Drawloom.
 pub(crate) fn missing_mesh_error() -> BackendError {
     BackendError::BrokenRule { rule: "a batch draws an existing mesh".to_owned() }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    type Cache = SubdivisionCache<()>;
+
+    /// Draws a level of the mesh in this slot. `made` counts the meshes that are made for it.
+    fn draw(cache: &Cache, assets: &Assets, slot: u32, level: u32, made: &mut usize) {
+        let create = |_| {
+            *made += 1;
+            Ok(())
+        };
+        cache.get_or_create(assets, (slot, 0, level), VertexFormat::Full, create).unwrap();
+    }
+
+    #[test]
+    fn unused_meshes_are_kept_as_long_as_their_source_is_there() {
+        let mut assets = Assets::default();
+        let mesh = assets.add(Mesh::cuboid("box", Vec3::ONE).unwrap()).unwrap();
+        let (cache, mut made) = (Cache::default(), 0);
+        for frame in 0..=1_000 {
+            cache.begin_frame(&assets);
+            if frame % 500 == 0 {
+                draw(&cache, &assets, mesh.index(), 3, &mut made);
+            }
+        }
+        assert_eq!(made, 1);
+        assets.remove(mesh).unwrap();
+        cache.begin_frame(&assets);
+        assert!(cache.meshes.lock().is_empty());
+    }
+
+    #[test]
+    fn the_longest_unused_meshes_are_dropped_where_they_have_too_many_triangles() {
+        let mut assets = Assets::default();
+        let mut meshes = Vec::new();
+        for _ in 0..8 {
+            meshes.push(assets.add(Mesh::cuboid("box", Vec3::ONE).unwrap()).unwrap().index());
+        }
+        let (cache, mut made) = (Cache::default(), 0);
+        for mesh in &meshes {
+            cache.begin_frame(&assets);
+            draw(&cache, &assets, *mesh, 7, &mut made);
+        }
+        let triangles = || cache.meshes.lock().values().map(|mesh| mesh.triangles).sum::<usize>();
+        assert!(triangles() > Cache::MAX_UNUSED_TRIANGLES);
+        for _ in 0..Cache::MAX_UNUSED_FRAMES + 10 {
+            cache.begin_frame(&assets);
+        }
+        let left = triangles();
+        let of_one = left / cache.meshes.lock().len();
+        assert!(left <= Cache::MAX_UNUSED_TRIANGLES && left + of_one > Cache::MAX_UNUSED_TRIANGLES, "{left}, {of_one}");
+        made = 0;
+        draw(&cache, &assets, meshes[7], 7, &mut made);
+        assert_eq!(made, 0, "the latest is kept");
+        draw(&cache, &assets, meshes[0], 7, &mut made);
+        assert_eq!(made, 1, "the oldest is not");
+    }
 }
