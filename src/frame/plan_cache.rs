@@ -85,7 +85,8 @@ impl PlanCache {
         Ok(Arc::clone(&self.current))
     }
 
-    /// The plans for such a scene, and for one that requires everything, compiled if the cache does not have them. The current plan stays.
+    /// Plans for such a scene and for others, which together have every pipeline that a plan may have. They are compiled if the cache does
+    /// not have them. The current plan stays.
     ///
     /// # Errors
     /// If the processes make no frame.
@@ -94,10 +95,11 @@ impl PlanCache {
         lights: &[Light],
         transparency: bool,
         cameras: &[Camera],
-    ) -> Result<[Arc<FramePlan>; 2], PlanError> {
+    ) -> Result<Vec<Arc<FramePlan>>, PlanError> {
         let requirements =
             Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
-        Ok([self.plan_for(requirements)?, self.plan_for(Requirements::all())?])
+        let all = [requirements].into_iter().chain(Requirements::with_every_shader());
+        all.map(|requirements| self.plan_for(requirements)).collect()
     }
 
     /// The plan for these requirements, compiled if the cache does not have it.

@@ -3,7 +3,9 @@
 use drawloom::RendererBuilder;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
-use drawloom::scene::{Material, Scene};
+use drawloom::scene::{Blend, LightKind, Material, Scene};
+use drawloom::view::LightClass;
+use drawloom_testing::scenes::everything::{class_of, everything, glasses};
 use drawloom_testing::scenes::{cube, field};
 use libtest_mimic::Failed;
 
@@ -12,6 +14,7 @@ use crate::fixture::Fixture;
 
 pub const CASES: &[Case] = &[
     ("a_first_frame_makes_no_pipelines_that_were_prepared", first_frame),
+    ("lights_and_glass_come_and_go_without_new_pipelines_once_these_are_prepared", requirements),
     ("pipelines_that_are_prepared_in_the_background_are_those_of_frames", in_the_background),
     ("preparing_pipelines_finds_what_is_wrong_with_a_shader", wrong_shader),
 ];
@@ -43,6 +46,35 @@ fn first_frame() -> Result<(), Failed> {
     }
     if before == 0 || count(&prepared) != before || count(&usual) > before {
         return Err(format!("{before} pipelines, {} after a frame, {} usually", count(&prepared), count(&usual)).into());
+    }
+    Ok(())
+}
+
+fn requirements() -> Result<(), Failed> {
+    let mut scene = scene()?;
+    scene.lights = everything().lights;
+    let mut fixture = Fixture::with(2, shipped)?;
+    fixture.renderer.prepare_pipelines(scene.as_scene_ref())?;
+    let count = |fixture: &Fixture| fixture.renderer.backend().resources().pipelines;
+    let (prepared, lights, glasses) = (count(&fixture), scene.lights.clone(), glasses(&scene));
+    let without = |is_absent: fn(LightClass) -> bool| {
+        let lights = lights.iter().copied().filter(move |light| !is_absent(class_of(light)));
+        lights.collect::<Vec<_>>()
+    };
+    let hemispherical = without(|class| class.shadowed && class.kind == LightKind::Hemispherical);
+    for lights in [lights.clone(), hemispherical, without(|class| class.shadowed), Vec::new()] {
+        for has_glass in [true, false] {
+            scene.lights.clone_from(&lights);
+            for (handle, glass) in &glasses {
+                let blend = if has_glass { glass.blend } else { Blend::None };
+                scene.replace(*handle, Material { blend, ..glass.clone() })?;
+            }
+            fixture.draw(&scene)?;
+            if count(&fixture) != prepared {
+                let lights = lights.len();
+                return Err(format!("{prepared} pipelines, {} with {lights} lights", count(&fixture)).into());
+            }
+        }
     }
     Ok(())
 }

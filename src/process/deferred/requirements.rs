@@ -1,7 +1,7 @@
 //! Which processes a scene requires.
 
 use super::{LightVolumes, ShadowCasters, Transparency};
-use crate::scene::{Blend, Camera, Light, Material, SceneRef, ViewKind};
+use crate::scene::{Blend, Camera, Light, LightKind, Material, SceneRef, ViewKind};
 use crate::view::LightClass;
 
 /// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what the scene
@@ -48,6 +48,19 @@ impl Requirements {
         let mut requirements = Self { lights: 0, transparency: true, reflections: true, shadow_maps: true };
         LightClass::all().for_each(|class| requirements.lights |= 1 << class.index());
         requirements
+    }
+
+    /// Requirements whose plans have every shader that a plan may have: transparency reads shadow maps or does not, and shadow casters are
+    /// drawn for hemispherical lights too or are not.
+    pub(crate) fn with_every_shader() -> [Self; 3] {
+        let without = |is_absent: fn(LightClass) -> bool| {
+            let mut requirements = Self::all();
+            let absent = LightClass::all().filter(|class| is_absent(*class));
+            absent.for_each(|class| requirements.lights &= !(1 << class.index()));
+            Self { shadow_maps: requirements.shadows(), ..requirements }
+        };
+        let hemispherical = without(|class| class.shadowed && class.kind == LightKind::Hemispherical);
+        [Self::all(), hemispherical, without(|class| class.shadowed)]
     }
 
     /// The same for a scene with these cameras.
