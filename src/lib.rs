@@ -102,7 +102,7 @@ pub use bytemuck;
 pub use frame::{
     BudgetError, BudgetedView, BuildError, FrameError, FrameStatistics, Granularity, LevelStatistics, Recorded,
     Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
-    ViewStatistics,
+    ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

@@ -82,6 +82,9 @@ pub trait Backend: Send + Sync + 'static {
     /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame alone.
     fn discard_frame(&self) {}
 
+    /// Makes the next frame's [histories](crate::process::Declare::samples_previous) empty.
+    fn forget_histories(&self) {}
+
     /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. Such a view is never cached.
     fn imports_targets_of(&self, view: &str) -> bool {
         let _ = view;

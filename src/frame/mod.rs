@@ -40,6 +40,7 @@ mod view_occlusion;
 mod view_times;
 mod view_visibility;
 mod views;
+mod warm_up;
 mod warnings;
 
 pub use budgeted_view::{BudgetedView, Rung, ViewForm};
@@ -52,3 +53,4 @@ pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
 pub use statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};
 pub use view_budget::ViewBudget;
+pub use warm_up::WarmUp;

@@ -122,8 +122,17 @@ impl<B: Backend> Renderer<B> {
     /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
+        self.record_part(&scene, true)
+    }
+
+    /// Records a frame of the scene, of its objects that [need transparency](Requirements::needs_transparency) only if `transparency` is
+    /// true.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub(super) fn record_part(&mut self, scene: &SceneRef<'_>, transparency: bool) -> Result<Recorded<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
-        let recorded = self.record_frame(&scene, choices);
+        let recorded = self.record_frame(scene, choices, transparency);
         match recorded {
             Ok(_) => self.tables.end_frame(),
             Err(_) => {
@@ -134,16 +143,25 @@ impl<B: Backend> Renderer<B> {
         recorded
     }
 
+    /// Makes the next frame one without frames before it: [histories](crate::process::Declare::samples_previous) are empty, every view is
+    /// drawn, and levels of detail are chosen without hysteresis. For a cut of the camera, or another world.
+    pub fn forget_previous_frames(&mut self) {
+        self.view_cache = ViewCache::default();
+        self.tables.levels.clear();
+        self.backend.forget_histories();
+    }
+
     /// Adds choices that the engine made by measured cost for the next frame, such as those of a
     /// [`ViewBudget`](crate::ViewBudget), to what that frame [reports](FrameStatistics::tuning).
     pub fn add_choices(&mut self, choices: impl IntoIterator<Item = TuningChoice>) {
         self.choices.extend(choices);
     }
 
-    /// Compiles the shaders of frames of this scene, and of one that requires every process of the pipeline, and makes their pipelines for
-    /// this scene's meshes and materials. Without this call that happens in the first frames that need them, as it still does for mirrored
-    /// objects, for meshes in the engine's own buffers, and for pipelines between these two. Call it while the world is loaded, on any
-    /// thread: it also finds what is wrong with the engine's processes.
+    /// Compiles the shaders of frames of this scene, and of all that may follow when lights, blended objects and reflections come and go, and
+    /// makes their pipelines for this scene's meshes and materials. Without this call that happens in the first frames that need them, as
+    /// it still does for mirrored objects and for meshes in the engine's own buffers. Call it while the world is loaded, on any
+    /// thread: it also finds what is wrong with the engine's processes. What drivers compile when something is first drawn is left to a
+    /// [`WarmUp`](super::WarmUp).
     ///
     /// # Errors
     /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
@@ -178,8 +196,8 @@ impl<B: Backend> Renderer<B> {
         Ok(self.scheduler.background(preparation))
     }
 
-    /// A closure that makes the pipelines of this scene, and of one that requires everything. It owns all that it needs, so that it can run in
-    /// the background.
+    /// A closure that makes the pipelines of this scene, and of those that may follow. It owns all that it needs, so that it can run in the
+    /// background.
     fn preparation(
         &mut self,
         scene: &SceneRef<'_>,
@@ -206,6 +224,7 @@ impl<B: Backend> Renderer<B> {
         &mut self,
         scene: &SceneRef<'_>,
         mut choices: Vec<TuningChoice>,
+        transparency: bool,
     ) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
@@ -218,7 +237,7 @@ impl<B: Backend> Renderer<B> {
         self.tables.objects.begin_frame(scene);
         count_unknown_objects(scene, self.tables.objects.rejections());
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
-        let transparency = self.tables.blended_object.update(scene, &self.tables.objects);
+        let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
         let interval = self.quality.shadows.interval;
         let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;

@@ -35,6 +35,7 @@ mod tuning;
 mod uploads;
 mod view_budget;
 mod views;
+mod warm_up;
 
 use std::sync::{Arc, LazyLock, Mutex};
 

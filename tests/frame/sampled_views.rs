@@ -17,10 +17,11 @@ use drawloom_testing::scenes::field;
 
 use crate::declaring::Declaring;
 
-const MIRROR: LayerMask = LayerMask::layer(3);
+/// The layer of mirrors.
+pub const MIRROR: LayerMask = LayerMask::layer(3);
 
 /// Draws mirrors with what the view `mirror` has in a target.
-struct Mirror {
+pub struct Mirror {
     target: &'static str,
     place: Place,
 }
@@ -43,7 +44,8 @@ impl RenderProcess for Mirror {
     }
 }
 
-const RADIANCE: Mirror = Mirror { target: "radiance", place: Place::AfterLighting };
+/// Draws mirrors with the light of their views.
+pub const RADIANCE: Mirror = Mirror { target: "radiance", place: Place::AfterLighting };
 
 fn renderer(mirror: Mirror) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());

@@ -85,6 +85,17 @@ fn shadow_maps_are_drawn_every_nth_frame_in_turns() {
     }
 }
 
+#[test]
+fn after_frames_that_are_forgotten_maps_are_drawn_as_in_first_frames() {
+    let (scene, mut fixture) = (two_lights(), Fixture::new(3));
+    let mut draw = |frames: usize| (0..frames).map(|_| fixture.drawn(&scene)).collect::<Vec<_>>();
+    let first = draw(5);
+    assert_ne!(draw(5), first);
+    fixture.renderer.forget_previous_frames();
+    let mut draw = |frames: usize| (0..frames).map(|_| fixture.drawn(&scene)).collect::<Vec<_>>();
+    assert_eq!(draw(5), first);
+}
+
 /// All maps of a light are drawn together, whichever of them no longer fits.
 #[test]
 fn lights_with_several_maps_have_all_of_them_cached() {

@@ -22,6 +22,7 @@ use crate::image_distance::assert_color;
 pub const CASES: &[Case] = &[
     ("a_target_keeps_the_frame_before_and_a_dropped_frame_leaves_none", history),
     ("another_view_or_size_has_no_history", another_history),
+    ("frames_that_are_forgotten_leave_no_history", forgotten),
     ("software_keeps_the_frame_before_as_wgpu_does", history_in_software),
     ("targets_may_be_parts_of_the_picture_or_of_a_size_of_their_own", sizes),
     ("objects_are_drawn_into_smaller_targets_as_into_smaller_pictures", smaller_objects),
@@ -77,7 +78,8 @@ fn scene() -> Scene {
     scene
 }
 
-fn accumulates<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
+/// With a process that adds to the target `sum` in each frame.
+pub fn accumulates<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
     builder.process(Accumulate).output("sum")
 }
 
@@ -147,6 +149,29 @@ fn history_in_software() -> Result<(), Failed> {
         if found != expected {
             return Err(format!("frame {frame} differs").into());
         }
+    }
+    Ok(())
+}
+
+fn forgotten() -> Result<(), Failed> {
+    let (mut by_wgpu, scene) = (Fixture::with(2, accumulates)?, scene());
+    let scheduler = Arc::new(Scheduler::new(2)?);
+    let builder = accumulates(Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))));
+    let (mut by_software, submitter) = builder.build(scheduler)?;
+    // A frame in flight is not affected.
+    let in_flight = by_wgpu.record(&scene)?;
+    by_wgpu.renderer.forget_previous_frames();
+    assert_color(pixel(&by_wgpu.submit(in_flight)?.read(0, "sum")?, 1, 1), [32, 0, 0])?;
+    for sum in [32, 64, 32, 64, 96] {
+        if sum == 32 {
+            by_wgpu.renderer.forget_previous_frames();
+            by_software.forget_previous_frames();
+        }
+        let recorded = by_wgpu.record(&scene)?;
+        let green = if sum == 32 { 0 } else { 255 };
+        assert_color(pixel(&by_wgpu.submit(recorded)?.read(0, "sum")?, 1, 1), [sum, green, 0])?;
+        let submission = submitter.submit(by_software.record(scene.as_scene_ref())?)?.submission;
+        assert_color(pixel(&submission.read(0, "sum")?, 1, 1), [sum, green, 0])?;
     }
     Ok(())
 }

@@ -64,6 +64,7 @@ mod transforms;
 mod transient_targets;
 mod transparency;
 mod triangles;
+mod warm_up;
 
 use std::path::PathBuf;
 
@@ -134,6 +135,7 @@ fn main() {
         (transforms::CASES, Needs::Adapter),
         (transient_targets::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),
+        (warm_up::CASES, Needs::Adapter),
         (imported_meshes::CASES, Needs::Adapter),
         (device_times::CASES, Needs::Adapter),
         (devices::CASES, Needs::Nothing),

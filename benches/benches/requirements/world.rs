@@ -17,10 +17,13 @@ pub struct World {
     has: [bool; World::FEATURES],
     lights: Vec<Light>,
     glass: Vec<(ObjectHandle, RenderObject)>,
+    /// The indices of the glass.
+    glass_indices: Vec<u32>,
     stone: Handle<Material>,
     cameras: [Camera; 2],
     frames: usize,
-    objects_changed: bool,
+    /// Whether the glass changed since the last frame.
+    glass_changed: bool,
 }
 
 impl World {
@@ -45,11 +48,12 @@ impl World {
         scene.add_object(surface)?;
 
         let materials: Vec<_> = glasses(&scene).into_iter().map(|(handle, _)| handle).collect();
-        let mut glass = Vec::new();
-        for handle in scene.objects() {
+        let (mut glass, mut glass_indices) = (Vec::new(), Vec::new());
+        for (index, handle) in (0..).zip(scene.objects()) {
             let object = scene.object(handle)?;
             if materials.contains(&object.material) {
                 glass.push((handle, object));
+                glass_indices.push(index);
             }
         }
         let main = Camera { size, ..scene.cameras[0].clone() };
@@ -61,10 +65,11 @@ impl World {
             has: [true; Self::FEATURES],
             lights,
             glass,
+            glass_indices,
             stone,
             cameras: [main, Camera { kind: ViewKind::Reflection, ..reflected }],
             frames: 0,
-            objects_changed: true,
+            glass_changed: false,
         };
         world.set_lights();
         Ok(world)
@@ -82,7 +87,7 @@ impl World {
                     let material = if self.has[feature] { object.material } else { self.stone };
                     self.scene.replace_object(*handle, RenderObject { material, ..*object })?;
                 }
-                self.objects_changed = true;
+                self.glass_changed = true;
             }
             Self::MIRROR => {}
             _ => self.set_lights(),
@@ -96,7 +101,8 @@ impl World {
             camera.position.x += if self.frames.is_multiple_of(2) { 0.01 } else { -0.01 };
         }
         self.frames += 1;
-        let changes = if std::mem::take(&mut self.objects_changed) { Changes::Unknown } else { Changes::NONE };
+        let changed = std::mem::take(&mut self.glass_changed);
+        let changes = if changed { Changes::Objects(&self.glass_indices) } else { Changes::NONE };
         let cameras = if self.has[Self::MIRROR] { &self.cameras[..] } else { &self.cameras[..1] };
         SceneRef { cameras, changes, ..self.scene.as_scene_ref() }
     }

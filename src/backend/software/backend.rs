@@ -84,6 +84,10 @@ impl Backend for SoftwareBackend {
         self.rasterizer.adapter_name()
     }
 
+    fn forget_histories(&self) {
+        self.rasterizer.forget_histories();
+    }
+
     fn begin(&self, request: &FrameRequest<'_>) -> Result<SoftwareFrame, BackendError> {
         let shaders = cpu_shaders_of(request)?;
         Ok(SoftwareFrame { recording: self.rasterizer.begin(request, &shaders)? })

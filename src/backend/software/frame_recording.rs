@@ -12,6 +12,9 @@ use crate::view::ObjectTable;
 pub(super) trait BeginFrame: Send + Sync {
     fn adapter_name(&self) -> String;
 
+    /// Makes the histories of the next frame empty.
+    fn forget_histories(&self);
+
     /// Begins a frame, with the CPU shader of each process.
     ///
     /// # Errors

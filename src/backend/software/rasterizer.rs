@@ -53,6 +53,10 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         }
     }
 
+    fn forget_histories(&self) {
+        self.targets.lock().forget_histories();
+    }
+
     fn begin(
         &self,
         request: &FrameRequest<'_>,

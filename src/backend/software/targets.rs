@@ -11,7 +11,7 @@ use super::precision::Precision;
 use super::submission::ReadTargets;
 use super::target_mip_levels::{MipLevel, generate};
 use super::tiles::{Tile, Tiling};
-use crate::backend::{BackendError, Picture, kept_views};
+use crate::backend::{BackendError, KeptView, Picture, kept_views};
 use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 use crate::scene::ViewKind;
@@ -104,15 +104,22 @@ pub(super) struct TargetCache<R> {
     current: Arc<SoftwareTargets<R>>,
     /// The kind and name of each of its views.
     views: Vec<(ViewKind, String)>,
+    /// Whether the histories of the next frame are empty.
+    forgets_histories: bool,
 }
 
 impl<R> Default for TargetCache<R> {
     fn default() -> Self {
-        Self { current: Arc::default(), views: Vec::new() }
+        Self { current: Arc::default(), views: Vec::new(), forgets_histories: false }
     }
 }
 
 impl<R: Precision> TargetCache<R> {
+    /// Makes the histories of the next frame empty.
+    pub(super) fn forget_histories(&mut self) {
+        self.forgets_histories = true;
+    }
+
     /// The targets of a frame of these views.
     ///
     /// # Errors
@@ -150,7 +157,8 @@ impl<R: Precision> TargetCache<R> {
                 }
                 let size = planned.size.in_view(view.camera.size);
                 // Another view has no part in this one's history.
-                let kept = kept_view.filter(|kept| kept.is_same || planned.copy_of.is_none());
+                let keeps_history = |kept: &KeptView| kept.is_same && !self.forgets_histories;
+                let kept = kept_view.filter(|kept| planned.copy_of.is_none() || keeps_history(kept));
                 let kept = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
                 let texture = match kept.filter(|kept| kept.texture.is_for(planned, size)) {
                     Some(kept) => Arc::clone(&kept.texture),
@@ -172,6 +180,7 @@ impl<R: Precision> TargetCache<R> {
                 next.placeholder.push(placeholder);
             }
         }
+        self.forgets_histories = false;
         self.current = Arc::new(next);
         self.views = views.iter().map(|view| (view.kind(), view.name().to_owned())).collect();
         Ok(Arc::clone(&self.current))

@@ -80,6 +80,10 @@ impl Backend for WgpuBackend {
         self.imports.lock().clear();
     }
 
+    fn forget_histories(&self) {
+        self.targets.lock().forget_histories();
+    }
+
     fn imports_targets_of(&self, view: &str) -> bool {
         self.imports.lock().iter().any(|import| import.view == view)
     }

@@ -376,6 +376,16 @@ impl TargetCache {
         slots.collect()
     }
 
+    /// Makes the histories of the next frame empty.
+    pub(crate) fn forget_histories(&mut self) {
+        if self.current.have_histories() {
+            let targets = Arc::make_mut(&mut self.current).views.iter_mut().map(|(_, targets)| targets);
+            targets.for_each(|targets| targets.retain(|target| target.planned.copy_of.is_none()));
+            // The next frame has other targets than these.
+            self.plan = None;
+        }
+    }
+
     /// The latest frame's targets.
     pub(crate) fn current(&self) -> &WgpuTargets {
         &self.current
