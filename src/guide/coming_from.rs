@@ -11,7 +11,7 @@
 //! | phases, `PhaseItem`, `SetItemPipeline` ... | | a sort of draws | a process's commands, by its [`Selection`] |
 //! | `MeshUniform`, instance data | | a storage buffer by object | an [`ObjectColumn`], lent and uploaded where objects changed |
 //! | `ExtractSchedule`, `Changed<T>` | | a dirty flag | [`Changes`]: what the engine reports; `examples/ecs` derives it from ticks |
-//! | `PipelineCache`, which compiles in the background | | pipelines made at start | [`Renderer::prepare_pipelines_in_background`], or at start; otherwise in the frame that needs one first |
+//! | `PipelineCache`, which compiles in the background | | pipelines made at start | [`WarmUp`] at start, [`Renderer::prepare_pipelines_in_background`] later; otherwise in the frame that needs one first |
 //! | `ComputeTaskPool`, `par_iter_mut` | | rayon | [`Scheduler`], [`Scheduler::parallel_for_each`]: one set of threads for engine and renderer |
 //! | `PipelinedRenderingPlugin` | | a render thread | `record`, then `submit` on the device thread beside the next update: see [step 7](super::from_wgpu#7-overlap-and-look) |
 //! | `RenderDiagnosticsPlugin`, Tracy | | timers of one's own | the [timeline](crate::timeline), the inspector, `drawloom-tracy` |
