@@ -62,7 +62,7 @@ pub struct FrameGraph<P> {
     nodes_added: usize,
     pub(super) nodes: Vec<NodeEntry<P>>,
     pub(super) resources: Vec<Resource>,
-    resource_by_name: HashMap<String, usize>,
+    pub(super) resource_by_name: HashMap<String, usize>,
     pub(super) accesses: Vec<Access>,
     /// Pairs of indices into `nodes`: the first comes before the second.
     pub(super) orders: Vec<(usize, usize)>,

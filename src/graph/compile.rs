@@ -43,8 +43,19 @@ impl<P> FrameGraph<P> {
     /// Returns [`CompileError`] with the graph and its first [`GraphProblem`], in the order of the variants. Names and cycles are
     /// checked in the whole graph. A missing producer and unordered writers are only reported if the nodes concerned are
     /// kept.
-    pub fn compile(mut self) -> Result<Schedule<P>, CompileError<P>> {
-        match plan(&mut self) {
+    pub fn compile(self) -> Result<Schedule<P>, CompileError<P>> {
+        self.compile_with_outputs_of(|_| Vec::new())
+    }
+
+    /// Compiles the graph, where each node that is not dropped makes more resources outputs: those that `outputs_of` names for its payload.
+    ///
+    /// # Errors
+    /// As [`compile`](Self::compile).
+    pub(crate) fn compile_with_outputs_of(
+        mut self,
+        outputs_of: impl Fn(&P) -> Vec<String>,
+    ) -> Result<Schedule<P>, CompileError<P>> {
+        match plan(&mut self, outputs_of) {
             Ok(plan) => Ok(flatten(self, &plan)),
             Err(problem) => Err(CompileError { graph: Box::new(self), problem }),
         }
@@ -60,7 +71,7 @@ struct Plan {
     dependencies: Vec<Vec<usize>>,
 }
 
-fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
+fn plan<P>(graph: &mut FrameGraph<P>, outputs_of: impl Fn(&P) -> Vec<String>) -> Result<Plan, GraphProblem> {
     if let Some(problem) = graph.invalid_calls.pop_front() {
         return Err(problem);
     }
@@ -76,7 +87,7 @@ fn plan<P>(graph: &mut FrameGraph<P>) -> Result<Plan, GraphProblem> {
     }
     let position = positions(order.len(), &order);
     edges::add_versions(&mut edges, &roles, &position);
-    let needed = edges::needed(graph, &roles, &edges);
+    let needed = edges::needed(graph, &roles, &edges, outputs_of);
     let analysis = Analysis { graph, roles: &roles, edges: &edges, needed: &needed, position: &position };
     analysis.check_producers()?;
     analysis.check_writers()?;

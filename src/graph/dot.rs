@@ -22,7 +22,7 @@ impl<P> FrameGraph<P> {
         let mut edges = edges::derive(self, &roles);
         let position = positions(edges.node_count(), &topological_order(&edges, self.nodes.len()));
         edges::add_versions(&mut edges, &roles, &position);
-        let needed = edges::needed(self, &roles, &edges);
+        let needed = edges::needed(self, &roles, &edges, |_| Vec::new());
 
         let mut dot = Dot::new();
         for (index, node) in self.nodes.iter().enumerate() {

@@ -148,24 +148,31 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize
     }
 }
 
-/// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data.
-pub(super) fn needed<P>(graph: &FrameGraph<P>, roles: &[Roles], edges: &Edges) -> Vec<bool> {
-    let mut needed: Vec<bool> = graph.nodes.iter().map(|node| node.kept).collect();
-    needed.resize(edges.node_count(), false);
-    for (resource, roles) in graph.resources.iter().zip(roles) {
-        if resource.output {
-            roles.makers().for_each(|maker| needed[maker.index()] = true);
+/// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data. The resources that `outputs_of`
+/// names for the payload of a needed node are outputs too.
+pub(super) fn needed<P>(
+    graph: &FrameGraph<P>,
+    roles: &[Roles],
+    edges: &Edges,
+    outputs_of: impl Fn(&P) -> Vec<String>,
+) -> Vec<bool> {
+    let mut needed = vec![false; edges.node_count()];
+    let mut stack: Vec<NodeIndex> = Vec::new();
+    let mut need = |vertex: NodeIndex, stack: &mut Vec<NodeIndex>| {
+        if !std::mem::replace(&mut needed[vertex.index()], true) {
+            stack.push(vertex);
         }
-    }
-    let mut stack: Vec<NodeIndex> = edges.node_indices().filter(|vertex| needed[vertex.index()]).collect();
+    };
+    let kept = graph.nodes.iter().enumerate().filter(|(_, node)| node.kept);
+    kept.for_each(|(index, _)| need(NodeIndex::new(index), &mut stack));
+    let outputs = graph.resources.iter().zip(roles).filter(|(resource, _)| resource.output);
+    outputs.for_each(|(_, roles)| roles.makers().for_each(|maker| need(maker, &mut stack)));
     while let Some(vertex) = stack.pop() {
-        for edge in edges.edges_directed(vertex, Direction::Incoming) {
-            let source = edge.source();
-            if *edge.weight() != Relation::Order && !needed[source.index()] {
-                needed[source.index()] = true;
-                stack.push(source);
-            }
-        }
+        let edges = edges.edges_directed(vertex, Direction::Incoming);
+        edges.filter(|edge| *edge.weight() != Relation::Order).for_each(|edge| need(edge.source(), &mut stack));
+        let outputs = graph.nodes.get(vertex.index()).map_or_else(Vec::new, |node| outputs_of(&node.payload));
+        let outputs = outputs.iter().filter_map(|name| graph.resource_by_name.get(name));
+        outputs.for_each(|resource| roles[*resource].makers().for_each(|maker| need(maker, &mut stack)));
     }
     needed.truncate(graph.nodes.len());
     needed

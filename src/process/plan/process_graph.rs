@@ -11,7 +11,7 @@ use crate::scene::ViewKind;
 /// descending priority, each with its slot in the chain if it has one. The nodes of the schedule are their indices.
 ///
 /// What a process samples of other views is an output of those: which view that is, and the order of views, depends on the scene. So
-/// targets that the remaining processes sample are added to the outputs until none is missing, and so are those whose history they read.
+/// targets that the remaining processes sample are outputs too, and so are those whose history they read.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -21,41 +21,35 @@ pub(super) fn compile(
     imported: Option<&PlannedTarget>,
     outputs: &[String],
 ) -> Result<Schedule<usize>, PlanError> {
-    let mut sampled: Vec<(ViewKind, String)> = Vec::new();
-    loop {
-        let graph = process_graph(slot_names, added, imported, (outputs, &sampled))?;
-        let schedule = graph.compile().map_err(|error| PlanError::Graph(error.problem))?;
-        let mut missing = Vec::new();
-        for (_, index) in schedule.nodes() {
-            let (_, planned) = &added[*index];
-            for (target, access) in &planned.declaration.accesses {
-                let (views, is_wanted): (_, &dyn Fn(&str) -> bool) = match *access {
-                    Access::SampleView(views, _) => (views, &|written| written == target),
-                    Access::SampleViewPrevious(views, _) => (views, &|written| previous_name(written) == *target),
-                    Access::SamplePrevious => (planned.declaration.views, &|written| previous_name(written) == *target),
-                    _ => continue,
-                };
-                let of_views = added.iter().filter(|(_, other)| other.declaration.views == views);
-                let mut written = of_views.flat_map(|(_, other)| other.declaration.written());
-                let Some(found) = written.find(|written| is_wanted(written)) else { continue };
-                let wanted = (views, found.to_owned());
-                if !sampled.contains(&wanted) && !missing.contains(&wanted) {
-                    missing.push(wanted);
-                }
-            }
-        }
-        if missing.is_empty() {
-            return Ok(schedule);
-        }
-        sampled.extend(missing);
+    let graph = process_graph(slot_names, added, imported, outputs)?;
+    let schedule = graph.compile_with_outputs_of(|index| sampled_resources(added, &added[*index].1));
+    schedule.map_err(|error| PlanError::Graph(error.problem))
+}
+
+/// The names of the resources that a process samples in other views, or as they were in the frame before.
+fn sampled_resources(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> Vec<String> {
+    let mut resources = Vec::new();
+    for (target, access) in &planned.declaration.accesses {
+        let (views, is_history) = match *access {
+            Access::SampleView(views, _) => (views, false),
+            Access::SampleViewPrevious(views, _) => (views, true),
+            Access::SamplePrevious => (planned.declaration.views, true),
+            _ => continue,
+        };
+        let of_views = added.iter().filter(|(_, other)| other.declaration.views == views);
+        let mut written = of_views.flat_map(|(_, other)| other.declaration.written());
+        let is_sampled =
+            |written: &&str| if is_history { previous_name(written) == *target } else { written == target };
+        resources.extend(written.find(is_sampled).map(|written| resource_name(views, written)));
     }
+    resources
 }
 
 fn process_graph(
     slot_names: &[String],
     added: &[(Option<usize>, PlannedProcess)],
     imported: Option<&PlannedTarget>,
-    (outputs, sampled): (&[String], &[(ViewKind, String)]),
+    outputs: &[String],
 ) -> Result<FrameGraph<usize>, PlanError> {
     let mut graph = FrameGraph::new();
     let mut nodes: Vec<AddedProcess<'_>> = Vec::new();
@@ -100,10 +94,6 @@ fn process_graph(
             let resource = graph.resource(resource_name(kind, output));
             graph.output(resource);
         }
-    }
-    for (views, target) in sampled {
-        let resource = graph.resource(resource_name(*views, target));
-        graph.output(resource);
     }
     Ok(graph)
 }
