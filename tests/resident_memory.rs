@@ -1,5 +1,6 @@
 //! Frames that are submitted leave no memory behind in the driver: lavapipe of Mesa 22.3 keeps shaders that it compiles anew for each
-//! pass (`src/view/gpu_view.rs`). This is the only case of its binary, so that it can measure the process.
+//! pass (`src/view/gpu_view.rs`). Frames that are dropped leave none behind in wgpu. These cases have a binary of their own, and run one after
+//! the other, so that they can measure the process.
 //!
 //! Without an adapter, or on a system that does not tell how much memory a process has, the case is ignored. With
 //! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails it.
@@ -17,6 +18,7 @@ use drawloom::scene::Camera;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, demo};
 use drawloom_testing::adapter;
+use drawloom_testing::scenes::field;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 const WARM_UP_FRAMES: usize = 30;
@@ -31,10 +33,41 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let required = env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let can_measure = resident_kib().is_some() && (required || adapter::device().is_ok());
-    let trial = Trial::test("submitted_frames_leave_no_memory_behind", || {
+    let submitted = Trial::test("submitted_frames_leave_no_memory_behind", || {
         draw_and_measure().map_err(|error| Failed::from(error.to_string()))
     });
-    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(!can_measure)]).exit_code()
+    let dropped = Trial::test("frames_that_are_recorded_and_dropped_leave_no_memory_behind", || {
+        drop_and_measure().map_err(|error| Failed::from(error.to_string()))
+    });
+    let trials = vec![submitted.with_ignored_flag(!can_measure), dropped.with_ignored_flag(resident_kib().is_none())];
+    // Each measures the whole process.
+    libtest_mimic::run(&Arguments { test_threads: Some(1), ..arguments }, trials).exit_code()
+}
+
+/// Records frames that upload every object anew, half a MiB each, and drops them.
+fn drop_and_measure() -> Result<(), Box<dyn Error>> {
+    let (device, queue) = adapter::noop_device()?;
+    let builder = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture());
+    let (mut renderer, _submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
+    let scene = field(5_000);
+    let mut record = |frames: usize| -> Result<(), Box<dyn Error>> {
+        for _ in 0..frames {
+            drop(renderer.record(scene.as_scene_ref())?);
+        }
+        Ok(())
+    };
+    record(WARM_UP_FRAMES)?;
+    let mut growths = Vec::new();
+    for _ in 0..PERIODS {
+        let before = resident_kib().ok_or("the process's memory is unknown")?;
+        record(100)?;
+        growths.push(resident_kib().ok_or("the process's memory is unknown")?.saturating_sub(before));
+    }
+    growths.sort_unstable();
+    if growths[PERIODS / 2] > MAX_GROWTH_KIB {
+        return Err(format!("each 100 frames left this behind, in KiB: {growths:?}").into());
+    }
+    Ok(())
 }
 
 /// Draws the project's scene, with all that it requires, from a camera that moves.

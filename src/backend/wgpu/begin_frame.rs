@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
-use super::frame::{BundleKey, WgpuFrame, WgpuPassState};
+use super::frame::{BundleKey, PendingUploads, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
 use super::resources::{LightMeshes, ResolvedImport, StorageBuffers, SubdividedMesh};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
@@ -28,6 +28,8 @@ impl WgpuBackend {
         let FrameRequest { plan, draws, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
         self.check_device()?;
+        // From here on, so that what a frame uploads that cannot begin is not kept either.
+        let pending_uploads = PendingUploads::new(&self.device, self.queue());
         let quality = request.quality;
         let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
         let light_meshes = self.light_meshes(draws)?;
@@ -68,6 +70,7 @@ impl WgpuBackend {
                 background,
                 read_backs,
                 buffers,
+                pending_uploads,
             };
             self.begin_passes(&mut frame, request)?;
             Ok(frame)

@@ -62,7 +62,8 @@ impl WgpuBackend {
             Ok((WgpuSubmission::new(device, queue, index.clone(), Arc::clone(&frame.targets), readback), index))
         })
         .flatten()?;
-        // Only now, because a submission that is refused copies nothing.
+        // Only now, because a submission that is refused uploads and copies nothing.
+        frame.pending_uploads.submitted();
         frame.read_backs.drain(..).for_each(|copy| copy.submitted(&index));
         self.report_costs(frame);
         Ok(submission)

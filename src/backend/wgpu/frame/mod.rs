@@ -9,6 +9,7 @@ mod material_buffer;
 mod object_buffers;
 mod pass_state;
 mod pass_statistics;
+mod pending_uploads;
 mod resource_bytes;
 mod view_ranges;
 mod wgpu_frame;
@@ -18,6 +19,7 @@ pub(crate) use commands::{PassCommands, RecordedPart};
 pub(crate) use frame_buffers::{BufferPool, PassResources};
 pub(crate) use indirect_arguments::IndirectArguments;
 pub(crate) use pass_state::WgpuPassState;
+pub(crate) use pending_uploads::PendingUploads;
 
 pub use commands::{WgpuCommands, WgpuPart};
 pub use pass_statistics::WgpuPassStatistics;

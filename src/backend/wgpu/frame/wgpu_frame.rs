@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::frame_buffers::FrameBuffers;
 use super::pass_state::WgpuPassState;
+use super::pending_uploads::PendingUploads;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
@@ -31,6 +32,7 @@ pub struct WgpuFrame {
     pub(crate) read_backs: Vec<ReadBackCopy>,
     /// Returned to the pool when the frame is dropped.
     pub(crate) buffers: FrameBuffers,
+    pub(crate) pending_uploads: PendingUploads,
 }
 
 impl WgpuFrame {
