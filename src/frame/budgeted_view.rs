@@ -16,7 +16,7 @@ pub struct BudgetedView {
     /// or the samples of antialiasing. Their names are unique among all views of the budget.
     pub cameras: Vec<Camera>,
     /// Forms that cost less, each less than the one before: rung 1, rung 2, and so on. Rung 0 is the view at its best. Only the last one may
-    /// be [`Rung::LeftOut`].
+    /// be [`Rung::LeftOut`]. A view whose ladder differs from that of the frame before is a new view: it is at its best, and not measured.
     pub ladder: Vec<Rung>,
 }
 
@@ -33,8 +33,8 @@ pub enum Rung {
 /// A cheaper form of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewForm {
-    /// The view is drawn every so many frames, at least 1: see [`Redraw::Interval`]. At 1, its cameras say how often. It makes no difference
-    /// to a camera with [`Redraw::OnCameraChange`].
+    /// The view is drawn every so many frames, at least 1: see [`Redraw::Interval`]. At 1, its cameras say how often. A camera with
+    /// [`Redraw::OnCameraChange`] keeps that.
     pub interval: u32,
     /// The width and height of the picture, as a share of those of the cameras: above 0 and up to 1.
     pub size: f32,
@@ -63,7 +63,8 @@ impl ViewForm {
     fn redraw(self, camera: &Camera) -> Redraw {
         match camera.redraw {
             Redraw::EveryFrame if self.interval > 1 => Redraw::Interval(self.interval),
-            Redraw::Interval(interval) => Redraw::Interval(interval.max(self.interval)),
+            // An interval of 0 frames stays one, so that its error names it.
+            Redraw::Interval(interval) if interval > 0 => Redraw::Interval(interval.max(self.interval)),
             redraw => redraw,
         }
     }
@@ -100,7 +101,7 @@ impl Rung {
     pub(super) fn draws_per_frame(self, cameras: &[Camera]) -> f32 {
         let Self::Drawn(form) = self else { return 0.0 };
         let draws = |camera: &Camera| match form.redraw(camera) {
-            Redraw::Interval(interval) => 1.0 / interval as f32,
+            Redraw::Interval(interval) => 1.0 / interval.max(1) as f32,
             Redraw::EveryFrame | Redraw::OnCameraChange => 1.0,
         };
         // `sum` of nothing is −0.

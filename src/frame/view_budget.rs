@@ -9,7 +9,8 @@
 //! nothing is passed over. If not even the last rungs fit, all views take these, and the budget is
 //! [exhausted](ViewBudget::is_exhausted). If there is room, it restores in the opposite order, one rung of one view at a time, and waits
 //! [`SETTLE_FRAMES`] for what that costs. While that view waits, no other view is restored, because it would take the room that the first one
-//! waits for.
+//! waits for. It also waits for views that changed their rung and are not measured there yet, as their costs count as 0, but not for ever: one
+//! that is cached, or has no cameras, never is.
 //!
 //! **Why it does not flap.** A rung is restored only if the prediction leaves room for a rise by [`HYSTERESIS`]. A restoration that is undone
 //! soon had a wrong prediction, so the view's pause before the next one doubles, up to [`MAX_PAUSE`].
@@ -35,8 +36,8 @@ use crate::tuning::{Estimate, Filter, Hysteresis};
 /// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best again when there is
 /// room (M 10.4: reflections are left out on slow hardware).
 ///
-/// The cost of a frame is thread time, summed over workers, or the device's time. Views are assumed to cost the same from frame to frame, so a
-/// view with [`Redraw::OnCameraChange`](crate::scene::Redraw::OnCameraChange) counts as if it were drawn in every frame.
+/// The cost of a frame is thread time, summed over workers, or the device's time. Whether the camera of a view with
+/// [`Redraw::OnCameraChange`](crate::scene::Redraw::OnCameraChange) will change is not known, so it counts as drawn in every frame.
 ///
 /// ```
 /// # use std::sync::Arc;
@@ -113,6 +114,8 @@ struct ViewState {
     requested: u64,
     /// The frames between being shed and being restored.
     pause: u64,
+    /// The frame in which it came to its rung.
+    on_rung_since: u64,
 }
 
 /// A rung is restored if the prediction is below the budget by this factor.
@@ -123,6 +126,9 @@ const OVER_FRAMES: u32 = 4;
 
 /// The frames between two restorations: enough samples of what the first one costs.
 const SETTLE_FRAMES: u64 = 8;
+
+/// For how long a restoration waits for the costs of views that changed their rung.
+const MAX_MEASURING_FRAMES: u64 = 128;
 
 /// A restoration that is undone within this number of frames was wrong.
 const RETRY_FRAMES: u64 = 64;
@@ -216,7 +222,7 @@ impl ViewBudget {
                 labels: Arc::clone(&view.labels),
                 alternatives: view.names.iter().enumerate().map(alternative).collect(),
                 chosen: view.rung,
-                is_trial: view.is_trial,
+                is_trial: view.is_trial && !view.is_measured(),
             }
         })
     }
@@ -232,10 +238,14 @@ impl ViewBudget {
         self.add_frame(statistics, stages.total().as_secs_f32() * 1e9, &costs);
     }
 
-    /// Chooses rungs by the device's time for a frame, with the statistics of that same frame. A budget is kept by this or by
+    /// Chooses rungs by the device's time for a frame, with the statistics of that same frame: the sum of its passes' times, although a device may
+    /// draw several at once. Times of which passes are [missing](DevicePassTimes::skipped) say nothing. A budget is kept by this or by
     /// [`Self::update`], not by both.
     #[cfg(feature = "wgpu")]
     pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
+        if times.skipped > 0 {
+            return;
+        }
         let mut costs: HashMap<&str, f32> = HashMap::new();
         for pass in &times.passes {
             *costs.entry(pass.view.as_str()).or_default() += pass.ended.saturating_sub(pass.began).as_secs_f32() * 1e9;
@@ -277,7 +287,7 @@ impl ViewBudget {
         self.choose();
     }
 
-    /// Warns once of frames that do not report the rungs of these views.
+    /// Warns of a run of frames that do not report the rungs of these views, once a run.
     fn warn_without_rungs(&mut self, rungs: &HashMap<&str, usize>) {
         let with_ladder = || self.requested().filter(|view| view.rungs.len() > 1);
         let is_missing = with_ladder().count() > 0 && !with_ladder().any(|view| rungs.contains_key(view.name()));
@@ -306,15 +316,15 @@ impl ViewBudget {
     /// Takes views down their ladders until the prediction fits.
     fn shed(&mut self) {
         let order = self.shedding_order();
-        for is_exhausted in [false, true] {
+        for sheds_small_savings in [false, true] {
             for &index in &order {
                 let mut rung = self.views[index].rung;
                 let others = self.predicted() - self.views[index].cost_on(rung);
                 let view = &self.views[index];
-                let least = (rung..view.rungs.len()).map(|rung| view.cost_on(rung)).fold(f32::INFINITY, f32::min);
-                let saves = view.cost_on(rung) - least >= MIN_SAVING * self.budget;
+                let min_cost = (rung..view.rungs.len()).map(|rung| view.cost_on(rung)).fold(f32::INFINITY, f32::min);
+                let saves = view.cost_on(rung) - min_cost >= MIN_SAVING * self.budget;
                 let is_last = |rung| rung + 1 == view.rungs.len();
-                while (saves || is_exhausted) && !is_last(rung) && others + view.cost_on(rung) > self.budget {
+                while (saves || sheds_small_savings) && !is_last(rung) && others + view.cost_on(rung) > self.budget {
                     rung += 1;
                 }
                 if rung != view.rung {
@@ -325,15 +335,20 @@ impl ViewBudget {
         }
     }
 
-    /// Takes the view that was shed last up by one rung if that fits, or if its turn has come to be measured.
+    /// Takes the shed view that would be shed last up by one rung if that fits, or if its turn has come to be measured.
     fn restore(&mut self) {
+        // A view that is drawn seldom may not have been measured since it was restored.
+        let is_awaited =
+            |view: &ViewState| !view.is_measured() && self.frame - view.on_rung_since < MAX_MEASURING_FRAMES;
+        if self.frame - self.changed < SETTLE_FRAMES || self.requested().any(is_awaited) {
+            return;
+        }
         let order = self.shedding_order();
-        let Some(&index) = order.iter().rev().find(|index| self.views[**index].rung > 0) else { return };
+        let is_restorable = |view: &ViewState| view.rung > 0 && view.is_measured();
+        let Some(&index) = order.iter().rev().find(|index| is_restorable(&self.views[**index])) else { return };
         let (view, now) = (&self.views[index], self.predicted());
         let waited = self.frame - view.shed;
-        // A view that is drawn seldom may not have been measured since it was restored.
-        let is_measured = view.rungs[view.rung] == Rung::LeftOut || view.cost.on(view.rung).is_some();
-        if self.frame - self.changed < SETTLE_FRAMES || waited < view.pause || !is_measured {
+        if waited < view.pause {
             return;
         }
         let has_room = |predicted: f32| predicted * HYSTERESIS.factor() <= self.budget;
@@ -380,6 +395,7 @@ impl ViewState {
             restored: None,
             requested: 0,
             pause: MIN_PAUSE,
+            on_rung_since: 0,
         }
     }
 
@@ -388,6 +404,9 @@ impl ViewState {
     }
 
     fn request(&mut self, view: &BudgetedView, frame: u64) {
+        if self.requested == 0 {
+            self.on_rung_since = frame;
+        }
         (self.priority, self.requested) = (view.priority, frame);
         self.draws = self.rungs.iter().map(|rung| rung.draws_per_frame(&view.cameras)).collect();
         self.cameras = view.cameras.iter().map(|camera| camera.name.clone()).collect();
@@ -398,16 +417,22 @@ impl ViewState {
         self.cost.on(rung).unwrap_or(0.0) * self.draws[rung]
     }
 
+    /// Whether the cost on the current rung is known.
+    fn is_measured(&self) -> bool {
+        self.draws[self.rung] == 0.0 || self.cost.on(self.rung).is_some()
+    }
+
     fn shed_to(&mut self, rung: usize, frame: u64) {
         let was_restored = self.restored.take().is_some_and(|restored| frame - restored < RETRY_FRAMES);
         self.pause = if was_restored { (2 * self.pause).min(MAX_PAUSE) } else { MIN_PAUSE };
-        (self.rung, self.shed, self.is_trial) = (rung, frame, false);
+        (self.rung, self.shed, self.is_trial, self.on_rung_since) = (rung, frame, false, frame);
         self.cost.move_to(rung, &self.rungs);
     }
 
     fn restore(&mut self, is_trial: bool, frame: u64) {
         let was_left_out = self.rungs[self.rung] == Rung::LeftOut;
         (self.rung, self.restored, self.is_trial) = (self.rung - 1, Some(frame), is_trial);
+        self.on_rung_since = frame;
         if is_trial {
             self.cost.measure_on(self.rung, was_left_out);
         } else {

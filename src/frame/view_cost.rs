@@ -17,7 +17,9 @@ pub(super) struct ViewCost {
     expected: Option<f32>,
     /// A rung and its cost, which the estimate is compared with when it is settled.
     reference: Option<(usize, f32)>,
-    /// By rung.
+    /// By rung: the first rung on which drawing a camera costs the same.
+    first_alike: Vec<usize>,
+    /// By the first of the rungs that cost the same.
     shares: Vec<f32>,
 }
 
@@ -33,20 +35,29 @@ impl ViewCost {
             // Costs are divided by the share of the rung on which they are measured.
             Rung::Drawn(_) => rung.expected_share().max(SHARES[0]),
         };
+        let first_alike = |rung: &Rung| rungs.iter().position(|other| other.draws_like(*rung));
+        let first_alike = rungs.iter().enumerate().map(|(index, rung)| first_alike(rung).unwrap_or(index)).collect();
         let shares = rungs.iter().map(share).collect();
-        Self { estimate: Estimate::default(), measured_on: 0, expected: None, reference: None, shares }
+        Self { estimate: Estimate::default(), measured_on: 0, expected: None, reference: None, first_alike, shares }
     }
 
     /// The cost on a rung; `None` before it was measured on any.
     pub(super) fn on(&self, rung: usize) -> Option<f32> {
         let settled = self.estimate.get().filter(|_| self.estimate.is_settled());
         let measured = settled.or(self.expected)?;
-        Some(measured * self.shares[rung] / self.shares[self.measured_on])
+        Some(measured * self.share(rung) / self.share(self.measured_on))
+    }
+
+    fn share(&self, rung: usize) -> f32 {
+        self.shares[self.first_alike[rung]]
     }
 
     /// Adds a sample, on the current rung.
     pub(super) fn add(&mut self, nanoseconds: f32) {
-        self.estimate.add(nanoseconds.max(f32::MIN_POSITIVE), FILTER);
+        if self.estimate.add(nanoseconds.max(f32::MIN_POSITIVE), FILTER) {
+            // The cost has risen, and the estimate starts over with what it is now.
+            self.expected = self.estimate.get();
+        }
         if !self.estimate.is_settled() {
             return;
         }
@@ -54,7 +65,8 @@ impl ViewCost {
         if let (Some((rung, cost)), Some(measured)) = (self.reference.take(), self.estimate.get())
             && cost > 0.0
         {
-            self.shares[self.measured_on] = (self.shares[rung] * measured / cost).clamp(SHARES[0], SHARES[1]);
+            let share = (self.share(rung) * measured / cost).clamp(SHARES[0], SHARES[1]);
+            self.shares[self.first_alike[self.measured_on]] = share;
         }
     }
 
@@ -64,7 +76,7 @@ impl ViewCost {
             // What was learned is kept until it is drawn again.
             return;
         }
-        if !rungs[rung].draws_like(rungs[self.measured_on]) {
+        if self.first_alike[rung] != self.first_alike[self.measured_on] {
             if self.reference.is_none() && self.estimate.is_settled() {
                 self.reference = self.estimate.get().map(|cost| (self.measured_on, cost));
             }

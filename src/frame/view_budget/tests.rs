@@ -34,6 +34,8 @@ struct Simulation {
     frame: u32,
     /// How often the rung of a view changed.
     changes: usize,
+    /// The cameras of the latest frame that are drawn when they change, with their size.
+    cached: Vec<(String, [u32; 2])>,
 }
 
 fn every(interval: u32) -> Rung {
@@ -59,7 +61,7 @@ impl Simulation {
     fn new(milliseconds: f64, rest: f64, views: &[Simulated]) -> Self {
         let budget = ViewBudget::new(milliseconds).unwrap();
         let (views, random) = (views.to_vec(), Rng::with_seed(3));
-        Self { budget, views, rest, noise: 0.0, random, frame: 0, changes: 0 }
+        Self { budget, views, rest, noise: 0.0, random, frame: 0, changes: 0, cached: Vec::new() }
     }
 
     fn rungs(&self) -> Vec<usize> {
@@ -87,10 +89,15 @@ impl Simulation {
             ..FrameStatistics::default()
         };
         let mut total = self.sample(self.rest);
+        let cached = std::mem::take(&mut self.cached);
         for (index, camera) in (0..).zip(cameras) {
             let is_drawn = match camera.redraw {
                 Redraw::Interval(interval) => (self.frame + index).is_multiple_of(interval),
-                _ => true,
+                Redraw::OnCameraChange => {
+                    self.cached.push((camera.name.clone(), camera.size));
+                    !cached.contains(&(camera.name.clone(), camera.size))
+                }
+                Redraw::EveryFrame => true,
             };
             let simulated = self.views.iter().find(|simulated| camera.name.starts_with(&simulated.view.name)).unwrap();
             let is_small = camera.size != simulated.view.cameras[0].size;
@@ -358,6 +365,97 @@ fn a_view_that_is_left_out_is_measured_now_and_then() {
     simulation.views[1].cost = 0.5;
     simulation.run(2 * (TRIAL_PAUSES * MAX_PAUSE) as usize);
     assert_eq!(simulation.rungs(), [0, 0]);
+}
+
+#[test]
+fn a_view_that_is_never_measured_does_not_keep_others_from_being_restored() {
+    let mut map = view("map", 2, 40.0, &[small(), Rung::LeftOut]);
+    map.view.cameras[0].redraw = Redraw::OnCameraChange;
+    let mut simulation = Simulation::new(1.5, 1.0, &[map, view("mirror", 1, 2.0, &[Rung::LeftOut])]);
+    // It is drawn in each of the first frames, and so is measured and left out.
+    for _ in 0..20 {
+        simulation.cached.clear();
+        simulation.run(1);
+    }
+    assert_eq!(simulation.rungs(), [2, 1]);
+    // Now a trial draws it once.
+    simulation.budget.set_milliseconds(4.0).unwrap();
+    simulation.run(2 * (TRIAL_PAUSES * MIN_PAUSE + MAX_MEASURING_FRAMES) as usize);
+    assert_eq!(simulation.rungs(), [1, 0]);
+}
+
+#[test]
+fn nothing_is_restored_on_the_room_of_a_view_that_is_not_measured_again_yet() {
+    let mut views = [view("rare", 2, 40.0, &[Rung::LeftOut]), view("mirror", 1, 2.0, &[Rung::LeftOut])];
+    views[0].view.cameras[0].redraw = Redraw::Interval(8);
+    let mut simulation = Simulation::new(4.0, 1.0, &views);
+    simulation.run(60);
+    assert_eq!(simulation.rungs(), [1, 1]);
+    let mut tried = 0;
+    for _ in 0..2_000 {
+        simulation.run(1);
+        let [rare, mirror] = simulation.rungs()[..] else { panic!() };
+        tried += usize::from(rare == 0);
+        assert!(rare != 0 || mirror != 0, "both are drawn");
+    }
+    assert!(tried > 0);
+}
+
+#[test]
+fn a_view_whose_cost_rises_leaves_no_room_meanwhile() {
+    let views = [view("main", 1, 2.0, &[]), view("mirror", 0, 6.0, &[Rung::LeftOut])];
+    let mut simulation = Simulation::new(10.0, 1.0, &views);
+    simulation.run(50);
+    assert_eq!(simulation.rungs(), [0, 0]);
+    simulation.views[0].cost = 4.0;
+    simulation.run(30);
+    assert_eq!(simulation.rungs(), [0, 1]);
+    simulation.run(200);
+    simulation.views[0].cost = 6.5;
+    let changes = simulation.changes;
+    let mut least = f64::INFINITY;
+    for _ in 0..40 {
+        simulation.run(1);
+        least = least.min(simulation.budget.predicted_milliseconds());
+    }
+    assert!(least > 4.9 && simulation.changes == changes, "predicts {least} ms of 5");
+}
+
+#[test]
+fn what_is_learned_on_a_rung_holds_for_those_that_draw_alike() {
+    let small_and_rare = Rung::Drawn(ViewForm { interval: 4, size: SMALL, ..ViewForm::BEST });
+    let mut simulated = view("mirror", 0, 8.0, &[every(2), small(), small_and_rare]);
+    simulated.share_of_small = 0.9;
+    let mut simulation = Simulation::new(8.1, 0.01, &[simulated]);
+    simulation.run(12);
+    simulation.budget.views[0].shed_to(3, simulation.budget.frame);
+    simulation.run(13);
+    let cost = |rung| f64::from(simulation.budget.views[0].cost.on(rung).unwrap()) * 1e-6;
+    for (rung, expected) in [8.0, 8.0, 7.2, 7.2].into_iter().enumerate() {
+        assert!((cost(rung) - expected).abs() < 0.1, "{} ms on rung {rung}", cost(rung));
+    }
+}
+
+#[test]
+#[cfg(feature = "wgpu")]
+fn device_times_are_added_up_by_view_unless_some_are_missing() {
+    use crate::backend::DevicePassTime;
+    let mut simulation = Simulation::new(100.0, 1.0, &[view("main", 0, 4.0, &[])]);
+    let pass = |view: &str, began: u64, ended: u64| DevicePassTime {
+        process: String::from("any"),
+        view: view.to_owned(),
+        began: Duration::from_millis(began),
+        ended: Duration::from_millis(ended),
+    };
+    let passes = vec![pass("main 0", 10, 13), pass("main 0", 12, 13), pass("another", 13, 15)];
+    for skipped in [1, 0] {
+        for _ in 0..6 {
+            let statistics = simulation.draw();
+            simulation.budget.update_from_device(&statistics, &DevicePassTimes { passes: passes.clone(), skipped });
+        }
+        let expected = if skipped == 0 { 6.0 } else { 0.0 };
+        assert!((simulation.budget.predicted_milliseconds() - expected).abs() < 1e-3);
+    }
 }
 
 #[test]
