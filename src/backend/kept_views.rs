@@ -15,7 +15,8 @@ pub(crate) struct KeptView {
 }
 
 /// For each view the one of the frame before whose targets it keeps, by the kinds and names of those: the view of the same kind and name, of
-/// several the one at the same place among them; otherwise one of the same kind that no other view keeps.
+/// several the one at the same place among them; otherwise one of the same kind that no other view keeps. Of several views with the same kind
+/// and name none is the same as before if their number has changed: which of them is new, or gone, nobody can tell.
 pub(crate) fn kept_views<'a>(
     before: impl Iterator<Item = (ViewKind, &'a str)> + Clone,
     views: &'a [RenderView],
@@ -24,10 +25,18 @@ pub(crate) fn kept_views<'a>(
     for (index, view) in before.clone().enumerate() {
         named.entry(view).or_default().push_back(index);
     }
+    let mut changes: HashMap<(ViewKind, &str), isize> = HashMap::new();
+    for view in views {
+        *changes.entry((view.kind(), view.name())).or_default() += 1;
+    }
+    for (view, before) in &named {
+        *changes.entry(*view).or_default() -= before.len() as isize;
+    }
     let mut kept = Vec::with_capacity(views.len());
     for view in views {
-        let index = named.get_mut(&(view.kind(), view.name())).and_then(VecDeque::pop_front);
-        kept.push(index.map(|index| KeptView { index, is_same: true }));
+        let view = (view.kind(), view.name());
+        let index = named.get_mut(&view).and_then(VecDeque::pop_front);
+        kept.push(index.map(|index| KeptView { index, is_same: changes[&view] == 0 }));
     }
 
     let mut left: Vec<_> = named.into_values().flatten().collect();
@@ -67,6 +76,9 @@ mod tests {
         // A mirror comes before the main view, and goes.
         assert_eq!(found(&before[..1], &[(Reflection, "mirror"), (Main, "main")]), [None, Some((0, true))]);
         assert_eq!(found(&before[1..3], &[(Main, "main")]), [Some((1, true))]);
+        // Nobody knows which of two views of a name is gone, or is the new one.
+        assert_eq!(found(&before, &[(Main, "main"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
+        assert_eq!(found(&before[..2], &[(Main, "main"), (Main, "main")]), [Some((0, false)), None]);
         // Another name takes the targets of a view that is gone, but not those of another kind, or of a view that is still there.
         assert_eq!(found(&before, &[(Main, "other"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
         assert_eq!(found(&before[..2], &[(Main, "mirror"), (Main, "main")]), [None, Some((0, true))]);

@@ -2,8 +2,11 @@
 
 use std::vec;
 
+use glam::Vec3;
+
 use super::{FrameError, Recorded, Renderer};
 use crate::backend::Backend;
+use crate::process::Requirements;
 use crate::scene::{Camera, Changes, Light, SceneRef, ViewKind};
 use crate::view::LightClass;
 
@@ -11,11 +14,14 @@ use crate::view::LightClass;
 ///
 /// Many drivers compile a shader when something is first drawn with it, for the formats and numbers of layers of the textures that are bound
 /// then. [`Renderer::prepare_pipelines`] makes pipelines, but draws nothing. A warm-up draws what a scene may require when lights, blended
-/// objects and reflections come and go: the whole scene, then one light of each class and nothing else of its kind, then no light, no
-/// transparency, and no reflections. It also uploads the scene's meshes and textures, and makes its targets.
+/// objects and reflections come and go: first the whole scene; then, for each class of lights that it has, one light and no other; then no
+/// light at all, with everything else, without transparency, and without reflections. It also uploads the scene's meshes and textures, and
+/// makes its targets.
 ///
-/// The scene holds everything that later frames may have, such as lights that are still off, at the size of the later pictures. The first
-/// frame after the warm-up is [one without frames before it](Renderer::forget_previous_frames).
+/// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of sight or dark, as
+/// those that are switched off are: a light that is drawn alone stands at a camera, and shines. Objects that no camera of the scene sees are
+/// not drawn, so neither is what only their materials need. The first frame after the warm-up is
+/// [one without frames before it](Renderer::forget_previous_frames).
 ///
 /// ```
 /// # use drawloom::{Renderer, Submitter, WarmUp, backend::WgpuBackend, scene::SceneRef};
@@ -45,13 +51,23 @@ struct WarmUpFrame {
 impl<'a> WarmUp<'a> {
     /// The warm-up for a scene.
     pub fn new(scene: SceneRef<'a>) -> Self {
-        let whole = WarmUpFrame { lights: scene.lights.to_vec(), transparency: true, reflections: true };
-        let of_class = |class| scene.lights.iter().find(|light| LightClass::of(light, true) == class);
-        let with_light = |light: &Light| WarmUpFrame { lights: vec![*light], transparency: true, reflections: true };
-        let unlit = |transparency, reflections| WarmUpFrame { lights: Vec::new(), transparency, reflections };
-        let mut frames = vec![whole];
-        frames.extend(LightClass::all().filter_map(of_class).map(with_light));
-        frames.extend([unlit(true, true), unlit(false, true), unlit(true, false)]);
+        let frame = |lights, transparency, reflections| WarmUpFrame { lights, transparency, reflections };
+        let of_class = |class| {
+            let mut lights = scene.lights.iter().filter(|light| LightClass::of(light, true) == class);
+            lights.find(|light| light.check(0).is_ok())
+        };
+        let main = scene.cameras.iter().find(|camera| camera.kind == ViewKind::Main).or(scene.cameras.first());
+        let alone = |light: &Light| frame(vec![main.map_or(*light, |camera| shining_from(camera, *light))], true, true);
+        let mut frames = vec![frame(scene.lights.to_vec(), true, true)];
+        frames.extend(LightClass::all().filter_map(of_class).map(alone));
+        frames.push(frame(Vec::new(), true, true));
+        if Requirements::any_needs_transparency(&scene) {
+            frames.push(frame(Vec::new(), false, true));
+        }
+        let is_reflection = |camera: &Camera| camera.kind == ViewKind::Reflection;
+        if scene.cameras.iter().any(is_reflection) && !scene.cameras.iter().all(is_reflection) {
+            frames.push(frame(Vec::new(), true, false));
+        }
         Self { scene, frames: frames.into_iter() }
     }
 
@@ -74,4 +90,18 @@ impl<'a> WarmUp<'a> {
         renderer.forget_previous_frames();
         recorded.map(Some)
     }
+}
+
+/// The light at the position of a camera, in its direction, and bright enough to be drawn.
+fn shining_from(camera: &Camera, mut light: Light) -> Light {
+    let (at, along) = (camera.position, camera.orientation * Vec3::NEG_Z);
+    match &mut light {
+        Light::Directional { illuminance, .. } => *illuminance = Vec3::ONE,
+        Light::Point { position, intensity, .. } => (*position, *intensity) = (at, Vec3::ONE),
+        Light::Spot { position, direction, intensity, .. }
+        | Light::Hemispherical { position, direction, intensity, .. } => {
+            (*position, *direction, *intensity) = (at, along.normalize(), Vec3::ONE);
+        }
+    }
+    light
 }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::Deferred;
+use drawloom::process::{Deferred, LightVolumes};
 use drawloom::quality::Quality;
-use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
+use drawloom::scene::{Camera, Light, LightKind, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::LightClass;
 use drawloom::{Renderer, Submitter, WarmUp};
-use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror};
+use drawloom_testing::scenes::everything::{class_of, dark, everything, everything_with_mirror, glasses};
 use drawloom_testing::scenes::leveled::globe;
 
 use crate::sampled_views;
@@ -28,7 +29,7 @@ fn a_warm_up_draws_everything_and_then_each_class_of_lights_alone_and_none_of_wh
     let scene = with_mirror();
     let (mut renderer, submitter) = new_renderer();
     let mut warm_up = WarmUp::new(scene.as_scene_ref());
-    let mut drawn = Vec::new();
+    let (frames, mut drawn) = (warm_up.frames_left(), Vec::new());
     while let Some(recorded) = warm_up.record_next(&mut renderer).unwrap() {
         let submitted = submitter.submit(recorded).unwrap();
         let has = |name: &str| submitted.submission.passes.iter().any(|pass| pass.process == name);
@@ -40,17 +41,73 @@ fn a_warm_up_draws_everything_and_then_each_class_of_lights_alone_and_none_of_wh
     let mut expected = vec![(8, true, 1, true)];
     expected.extend(scene.lights.iter().map(|light| (1, true, 1, casts_shadow(light))));
     expected.extend([(0, true, 1, false), (0, false, 1, false), (0, true, 0, false)]);
+    assert_eq!(frames, expected.len());
     assert_eq!(drawn, expected);
     assert_eq!(warm_up.frames_left(), 0);
     assert!(warm_up.record_next(&mut renderer).unwrap().is_none());
 }
 
 #[test]
-fn a_warm_up_of_a_scene_with_fewer_lights_has_fewer_frames() {
+fn a_warm_up_has_no_frames_for_what_its_scene_lacks() {
     let mut scene = everything();
     scene.lights.truncate(2);
     let doubled: Vec<_> = scene.lights.iter().flat_map(|light| [*light; 2]).collect();
-    assert_eq!(WarmUp::new(SceneRef { lights: &doubled, ..scene.as_scene_ref() }).frames_left(), 1 + 2 + 3);
+    let frames = |scene: SceneRef<'_>| WarmUp::new(scene).frames_left();
+    // Everything, two lights, no light, no glass.
+    assert_eq!(frames(SceneRef { lights: &doubled, ..scene.as_scene_ref() }), 5);
+    for handle in scene.objects().collect::<Vec<_>>().into_iter().rev() {
+        if glasses(&scene).iter().any(|(glass, _)| *glass == scene.object(handle).unwrap().material) {
+            scene.remove_object(handle).unwrap();
+        }
+    }
+    assert_eq!(frames(scene.as_scene_ref()), 4);
+    // Without another view there is no frame without reflections.
+    let mirror = with_mirror();
+    let reflections: Vec<_> =
+        mirror.cameras.iter().filter(|camera| camera.kind == ViewKind::Reflection).cloned().collect();
+    assert_eq!(frames(SceneRef { cameras: &reflections, ..mirror.as_scene_ref() }), frames(mirror.as_scene_ref()) - 1);
+}
+
+#[test]
+fn lights_that_are_dark_or_out_of_sight_are_drawn_too() {
+    let mut scene = everything();
+    let far = |mut light: Light| {
+        if let Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } =
+            &mut light
+        {
+            position.x += 1e6;
+        }
+        light
+    };
+    let invalid = |mut light: Light| {
+        if let Light::Directional { illuminance: color, .. }
+        | Light::Point { intensity: color, .. }
+        | Light::Spot { intensity: color, .. }
+        | Light::Hemispherical { intensity: color, .. } = &mut light
+        {
+            color.x = f32::NAN;
+        }
+        light
+    };
+    // The first light of each class cannot be drawn at all.
+    scene.lights = scene.lights.iter().flat_map(|light| [invalid(*light), dark(far(*light))]).collect();
+    let (mut renderer, submitter) = new_renderer();
+    let mut warm_up = WarmUp::new(scene.as_scene_ref());
+    let mut drawn = Vec::new();
+    while let Some(recorded) = warm_up.record_next(&mut renderer).unwrap() {
+        let submitted = submitter.submit(recorded).unwrap();
+        let of_lights = submitted.submission.passes.into_iter().find(|pass| pass.process.ends_with("lights"));
+        let maps = submitted.statistics.views.iter().filter(|view| view.kind == ViewKind::Shadow).count();
+        drawn.push((of_lights.map(|pass| pass.process), submitted.statistics.views[0].lights, maps));
+    }
+    let of_class = |class: LightClass| {
+        let maps = if class.kind == LightKind::Point { 6 } else { 1 };
+        (Some(LightVolumes::name_of(class)), 1, usize::from(class.shadowed) * maps)
+    };
+    let mut expected = vec![(None, 0, 0)];
+    expected.extend(LightClass::all().map(of_class));
+    expected.extend([(None, 0, 0), (None, 0, 0)]);
+    assert_eq!(drawn, expected);
 }
 
 #[test]

@@ -23,6 +23,7 @@ pub const CASES: &[Case] = &[
     ("a_target_keeps_the_frame_before_and_a_dropped_frame_leaves_none", history),
     ("another_view_or_size_has_no_history", another_history),
     ("frames_that_are_forgotten_leave_no_history", forgotten),
+    ("a_frame_whose_scene_cannot_be_drawn_loses_no_history", impossible),
     ("software_keeps_the_frame_before_as_wgpu_does", history_in_software),
     ("targets_may_be_parts_of_the_picture_or_of_a_size_of_their_own", sizes),
     ("objects_are_drawn_into_smaller_targets_as_into_smaller_pictures", smaller_objects),
@@ -172,6 +173,26 @@ fn forgotten() -> Result<(), Failed> {
         assert_color(pixel(&by_wgpu.submit(recorded)?.read(0, "sum")?, 1, 1), [sum, green, 0])?;
         let submission = submitter.submit(by_software.record(scene.as_scene_ref())?)?.submission;
         assert_color(pixel(&submission.read(0, "sum")?, 1, 1), [sum, green, 0])?;
+    }
+    Ok(())
+}
+
+fn impossible() -> Result<(), Failed> {
+    let (mut fixture, mut scene) = (Fixture::with(2, accumulates)?, scene());
+    let (position, size) = (scene.cameras[1].position, scene.cameras[1].size);
+    for sum in [32, 64, 96, 128] {
+        let recorded = fixture.record(&scene)?;
+        let green = if sum == 32 { 0 } else { 255 };
+        assert_color(pixel(&fixture.submit(recorded)?.read(0, "sum")?, 1, 1), [sum, green, 0])?;
+        match sum {
+            32 => scene.cameras[1].position.x = 1e300,
+            64 => scene.cameras[1].size = [1 << 20, 70],
+            _ => continue,
+        }
+        if fixture.renderer.record(scene.as_scene_ref()).is_ok() {
+            return Err("an impossible frame is recorded".into());
+        }
+        (scene.cameras[1].position, scene.cameras[1].size) = (position, size);
     }
     Ok(())
 }

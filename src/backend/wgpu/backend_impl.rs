@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::backend::WgpuBackend;
+use super::begin_frame::check_reach;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
@@ -70,10 +71,16 @@ impl Backend for WgpuBackend {
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let imports = mem::take(&mut *self.imports.lock());
-        // Nothing has changed yet, so a texture that does not fit leaves everything as it is.
+        // Nothing has changed yet, so what is wrong with the scene or with a process leaves everything as it is.
+        check_reach(request.views)?;
         let imports: Result<Vec<_>, _> =
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
-        self.begin_frame(request, &imports?).inspect_err(|_| self.clear())
+        let imports = imports?;
+        self.check_device().inspect_err(|_| self.clear())?;
+        let pipelines = self.update_pipelines(request)?;
+        let update = || self.targets.lock().update(&self.device, request, &imports, self.transient_targets);
+        let targets = with_error_scope(&self.device, "targets", update).inspect_err(|_| self.clear())??;
+        self.begin_frame(request, pipelines, targets).inspect_err(|_| self.clear())
     }
 
     fn discard_frame(&self) {

@@ -7,31 +7,41 @@ use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{BundleKey, PendingUploads, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
-use super::resources::{LightMeshes, ResolvedImport, StorageBuffers, SubdividedMesh};
+use super::pipelines::ProcessPipelines;
+use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::Mesh;
+use crate::view::{FixedPosition, RenderView};
+
+/// # Errors
+/// If a camera is out of reach.
+pub(super) fn check_reach(views: &[RenderView]) -> Result<(), BackendError> {
+    let is_out_of_reach = |view: &&RenderView| FixedPosition::new(view.camera.position).is_none();
+    match views.iter().find(is_out_of_reach) {
+        Some(view) => Err(BackendError::ViewOutOfReach { view: view.name().to_owned() }),
+        None => Ok(()),
+    }
+}
 
 impl WgpuBackend {
-    /// Begins a frame: creates or reuses the resources of its passes.
+    /// Begins a frame with these pipelines and targets: creates or reuses the other resources of its passes.
     ///
     /// # Errors
     /// If the device lacks room, or refuses a resource.
     pub(super) fn begin_frame(
         &self,
         request: &FrameRequest<'_>,
-        imports: &[ResolvedImport<'_>],
+        pipelines: Arc<[Arc<ProcessPipelines>]>,
+        targets: Arc<WgpuTargets>,
     ) -> Result<WgpuFrame, BackendError> {
         let FrameRequest { plan, draws, scene, rejections, .. } = *request;
         let vertices = request.quality.vertices;
-        self.check_device()?;
         // From here on, so that what a frame uploads that cannot begin is not kept either.
         let pending_uploads = PendingUploads::new(&self.device, self.queue());
-        let quality = request.quality;
-        let pipelines = self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)?;
         let light_meshes = self.light_meshes(draws)?;
         self.subdivisions.begin_frame(scene.assets);
         if self.meshes.lock().require_attributes(plan.attributes()) {
@@ -45,8 +55,6 @@ impl WgpuBackend {
             Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))
         })
         .flatten()?;
-        let update = || self.targets.lock().update(&self.device, request, imports, self.transient_targets);
-        let targets = with_error_scope(&self.device, "targets", update)??;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
@@ -91,12 +99,24 @@ impl WgpuBackend {
         Ok(Arc::clone(&current))
     }
 
+    /// The pipelines of the frame's processes, made where they are missing.
+    ///
+    /// # Errors
+    /// If a shader does not compile, or the device refuses a pipeline. Nothing is lost then.
+    pub(super) fn update_pipelines(
+        &self,
+        request: &FrameRequest<'_>,
+    ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
+        let FrameRequest { plan, draws, quality, .. } = *request;
+        self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)
+    }
+
     /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may
     /// have none.
     ///
     /// # Errors
     /// If the device is lost.
-    fn check_device(&self) -> Result<(), BackendError> {
+    pub(super) fn check_device(&self) -> Result<(), BackendError> {
         let finish = || {
             let descriptor = wgpu::RenderBundleEncoderDescriptor {
                 color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],

@@ -72,7 +72,10 @@ impl SmallTargets {
         {
             let (free, missing) = (free.entry(*kind).or_default(), missing.entry(*kind).or_default());
             if free.is_empty() {
-                let layers = (*missing).min(Self::MAX_LAYERS) as u32;
+                // As many as there were at least, so that views which come one at a time have few textures, too.
+                let of_kind = self.textures.iter().filter(|(other, _)| other == kind);
+                let layers: usize = of_kind.map(|(_, texture)| texture.depth_or_array_layers() as usize).sum();
+                let layers = layers.max(*missing).min(Self::MAX_LAYERS) as u32;
                 let texture = new_texture(device, "small targets", *kind, layers)?;
                 free.extend(layers_of(textures.len(), &texture));
                 textures.push((*kind, texture));
@@ -172,5 +175,25 @@ mod tests {
         let kept = assigned.into_iter().step_by(2).map(|kept| SmallTarget { kind, kept: Some(kept) });
         let (again, _) = all.assign(&device, &kept.chain(new(65)).collect::<Vec<_>>()).unwrap();
         assert_eq!(again.textures().count(), 3);
+    }
+
+    #[test]
+    fn targets_that_come_one_at_a_time_share_textures() {
+        let (device, _) = noop_device();
+        let kind = TextureKind {
+            format: Format::Rgba8Srgb,
+            multisampled: false,
+            stored: false,
+            mipmapped: false,
+            size: [8, 8],
+        };
+        let (mut small, mut kept) = (SmallTargets::default(), Vec::new());
+        for _ in 0..300 {
+            let known = kept.drain(..).map(Some).chain([None]);
+            let wanted: Vec<_> = known.map(|kept| SmallTarget { kind, kept }).collect();
+            (small, kept) = small.assign(&device, &wanted).unwrap();
+        }
+        // 1, 1, 2, 4, 8, 16 and 32 layers, then 64 at a time.
+        assert_eq!(small.textures().count(), 7 + 4);
     }
 }
