@@ -49,7 +49,7 @@ struct ViewsArguments {
 #[derive(Serialize)]
 struct Row {
     compared: &'static str,
-    /// Objects that the views see: all of the first frame's, and all of the second's.
+    /// Objects that the views see, summed over those of the first frame, and of the second.
     seen: [usize; 2],
     microseconds: [f64; 2],
 }

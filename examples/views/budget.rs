@@ -75,7 +75,7 @@ fn views(gallery: &Gallery) -> Vec<BudgetedView> {
             "main/portal/portal" | "main/portal" => ("main/portal", 4, mirror.clone()),
             "main/pool" => ("main/pool", 3, mirror.clone()),
             "guest" | "detail" => (camera.name.as_str(), 2, vec![every(2), every(4)]),
-            name if name.starts_with("detail/") => ("tiles of detail", 0, vec![every(4), Rung::LeftOut]),
+            name if name.starts_with("tiles/") => ("tiles of detail", 0, vec![every(4), Rung::LeftOut]),
             name if name.starts_with(mirror_ball::PROBE) => (mirror_ball::PROBE, 1, vec![every(6), Rung::LeftOut]),
             name => (name, 1, mirror.clone()),
         };

@@ -105,7 +105,7 @@ const CELLS: [(Cell, &str); 15] = [
     (Cell::Picture(ViewKind::Reflection, impostor::VIEW, "picture"), "impostor: the tree, for its square"),
     (Cell::Picture(ViewKind::Main, "main", smoke::TARGET), "main: smoke, with a quarter of the pixels"),
     (Cell::Picture(ViewKind::Main, "detail", "picture"), "detail: one camera"),
-    (Cell::Tiles("detail"), "detail: the mean of 2 x 2 tiles"),
+    (Cell::Tiles("tiles"), "detail: the mean of 2 x 2 tiles"),
     (Cell::ShadowMaps(ShadowedLight::Hemispherical), "the shadow map of a ceiling light: a paraboloid"),
     (Cell::ShadowMaps(ShadowedLight::Sun), "the sun's shadow maps: three cascades"),
     (Cell::ShadowMaps(ShadowedLight::Lamp), "a lamp's shadow maps: the faces of a cube"),

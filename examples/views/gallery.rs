@@ -183,7 +183,7 @@ fn cameras() -> Vec<Camera> {
     ];
     cameras.extend((0..TILES * TILES).map(|tile| {
         let camera = detail.tile([tile % TILES, tile / TILES], TILES);
-        Camera { name: format!("detail/{tile}"), ..camera }
+        Camera { name: format!("tiles/{tile}"), ..camera }
     }));
     cameras.extend(mirror_ball::cameras());
     cameras.extend(impostor::camera(&main, None));

@@ -20,7 +20,7 @@ use crate::view::LightClass;
 ///
 /// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of sight or dark, as
 /// those that are switched off are: a light that is drawn alone stands at a camera, and shines. Objects that no camera of the scene sees are
-/// not drawn, so neither is what only their materials need. The first frame after the warm-up is
+/// not drawn, so neither is what only their materials need. What processes change in their buffers stays. The first frame after the warm-up is
 /// [one without frames before it](Renderer::forget_previous_frames).
 ///
 /// ```

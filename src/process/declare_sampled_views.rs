@@ -72,13 +72,18 @@ impl Declare {
     /// The layers of views that the frame does not have are all zeros; a view that is one of them itself sees zeros in all layers.
     ///
     /// In WGSL it is a `texture_2d_array<f32>`, a `texture_depth_2d_array` or a `texture_2d_array<u32>`.
+    ///
+    /// A plan is refused if there are 0 layers, more than 256, or if the target is multisampled, layered or used by a raw pass
+    /// ([`PlanError::SampledLayers`](super::PlanError::SampledLayers)); a frame, if the targets' sizes differ
+    /// ([`FrameError::UnequalLayers`](crate::FrameError::UnequalLayers)).
     pub fn samples_view_layers(&mut self, views: ViewKind, view: &str, target: &str, layers: u32) {
         self.sample_shape(views, view, target, SampledShape::Layers(layers));
     }
 
     /// Reads a target of six views in the shader, as the faces of a cube map: what is reflected by things that are not flat (M 10.1).
     /// [`Camera::cube_faces`](crate::scene::Camera::cube_faces) makes the cameras. As for [`Declare::samples_view_layers`], face `i` is the
-    /// view called `view/i`, their targets must have the same size, and that must be square.
+    /// view called `view/i`, their targets must have the same size, and that must be square: otherwise the frame is
+    /// [`FrameError::OblongCubeFace`](crate::FrameError::OblongCubeFace).
     ///
     /// In WGSL it is a `texture_cube<f32>`, a `texture_depth_cube` or a `texture_cube<u32>`. Cube maps are left-handed, and the world is
     /// right-handed: `cube_direction` of the prelude turns a direction of the world into the one to sample.

@@ -11,7 +11,7 @@ impl Declare {
     /// Processes draw into level 0. The other levels are generated after the last pass that writes the target and before a pass samples it,
     /// in the same view, in another one or in a later frame. So whatever is sampled has all levels: [`Declare::samples`],
     /// [`Declare::samples_view`] with its layers and cubes, and the histories of [`Declare::samples_previous`] and
-    /// [`Declare::samples_view_previous`]. The pixel of zeros in place of a view that the frame does not have is its only level.
+    /// [`Declare::samples_view_previous`]. A view that the frame does not have is a single pixel of zeros, with one level.
     ///
     /// A pixel of a level is the mean of the pixels of the level before that it covers, weighted by area: of 2 × 2, and of 3 in a direction
     /// in which their number is odd. So the last level is the mean of the whole target. Means are of linear values, also in sRGB formats;

@@ -7,7 +7,7 @@ impl Mesh {
     /// Replaces the mesh's coarser levels, the finest first. Views draw them where their errors are small enough in the picture: see
     /// [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail).
     ///
-    /// A level draws vertices of the mesh, with its topology and attributes. An occluder is only what is drawn at level 0.
+    /// A level draws vertices of the mesh, with its topology and attributes. Only objects that are drawn at level 0 hide others.
     ///
     /// ```
     /// use drawloom::scene::{LevelOfDetail, Mesh, Topology, Vertex};

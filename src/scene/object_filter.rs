@@ -7,13 +7,14 @@ use super::{MaterialPredicate, ObjectSet};
 ///
 /// It decides what is visible, for all processes of the view at once, as if the scene had no other objects: what it leaves out hides
 /// nothing either, and is not among the [visible objects](crate::ViewStatistics::visible). A view that shows no object is an empty picture, and no
-/// error. Views without a filter cost what they cost without the others' filters.
+/// error. A filter costs only the view that has it.
 ///
 /// Shadow maps are views of their own, and show what [`ShadowMaps::layers`](crate::view::ShadowMaps::layers) says, whatever the filter of
 /// the view that they light. So an object that a camera leaves out still casts its shadow there, as the player's own body does in the
 /// player's own view.
 ///
-/// Cameras [derived](super::Camera::reflected) from another one inherit its filter.
+/// Cameras derived from another one ([`reflected`](super::Camera::reflected), [`through_portal`](super::Camera::through_portal),
+/// [`tile`](super::Camera::tile)) inherit its filter; that of an [impostor](super::Camera::impostor) does not.
 ///
 /// ```
 /// use drawloom::glam::{DVec3, Vec3};

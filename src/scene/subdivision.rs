@@ -26,6 +26,8 @@ impl Mesh {
     /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result is a single
     /// degenerate triangle. A mesh [in the engine's own buffers](Self::from_buffers) stays as it is.
     ///
+    /// The result has no levels of detail, and its triangles are not culled, whatever the mesh has.
+    ///
     /// ```
     /// use drawloom::scene::{Mesh, Topology, Vertex};
     ///

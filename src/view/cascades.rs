@@ -13,7 +13,7 @@ use crate::scene::{Camera, Projection, ViewKind};
 /// metres. `lambda` blends them with splits at equal depths. A near plane below a thousandth of `far` counts as that.
 pub(super) fn cascade_slice([near, far]: [f32; 2], lambda: f32, cascade: u32, count: u32) -> [f64; 2] {
     let (far, lambda) = (f64::from(far), f64::from(lambda));
-    let near = f64::from(near).clamp(far * MIN_NEAR_SHARE, far);
+    let near = f64::from(near).max(far * MIN_NEAR_SHARE).min(far);
     [cascade, cascade + 1].map(|split| match split {
         0 => 0.0,
         _ if split == count => far,
@@ -26,10 +26,16 @@ pub(super) fn cascade_slice([near, far]: [f32; 2], lambda: f32, cascade: u32, co
 }
 
 /// A sphere around all that the main cameras among `cameras` see between the two distances of `slice`: its centre in the
-/// world and its radius, in metres. Its size does not change when a camera turns.
+/// world and its radius, in metres. Its size does not change when a camera turns. `None` without a main camera, or where no finite sphere is
+/// around what invalid cameras, or too distant ones, see.
 pub(super) fn visible_sphere(cameras: &[Camera], slice: impl Fn(&Camera) -> [f64; 2]) -> Option<(DVec3, f64)> {
     let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
-    main.map(|camera| slice_sphere(camera, slice(camera))).reduce(enclosing_sphere)
+    let spheres = main.map(|camera| {
+        let [begin, end] = slice(camera);
+        (end > 0.0 && begin <= end).then(|| slice_sphere(camera, [begin, end]))
+    });
+    let sphere = spheres.collect::<Option<Vec<_>>>()?.into_iter().reduce(enclosing_sphere);
+    sphere.filter(|(center, radius)| center.is_finite() && radius.is_finite() && *radius > 0.0)
 }
 
 /// A sphere around what a camera sees between two distances.
@@ -39,7 +45,7 @@ fn slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64) {
     match camera.projection {
         Projection::Perspective { field_of_view } => {
             let up = (f64::from(field_of_view) * 0.5).tan();
-            // Less a pixel, so that a jitter of less moves no shadow.
+            // Less a pixel, so that a jitter of less than that changes nothing for a camera that is on centre.
             let pixel = 2.0 / DVec2::from(camera.size.map(f64::from));
             let shift = (camera.shift.abs().as_dvec2() - pixel).max(DVec2::ZERO);
             let corner = DVec2::new(up * aspect, up) * (1.0 + shift);

@@ -12,14 +12,14 @@ use crate::scene::{Projection, ViewKind};
 pub(crate) struct LevelSelector {
     eye: DVec3,
     forward: DVec3,
-    /// Geometry nearer than this is not drawn.
+    /// Geometry nearer than this is not drawn. It is 0 behind a clip plane, which takes the place of the near plane and may be nearer.
     near: f64,
     magnification: Magnification,
     /// In pixels.
     largest_error: f64,
 }
 
-/// How much larger than in the world a small displacement is in the picture.
+/// The pixels by which a point moves in the picture for each metre of a small displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Magnification {
     /// At a depth of 1 m on the view's axis, in pixels per metre, and the largest secant of the angle between the axis and a ray of the
@@ -54,7 +54,7 @@ impl LevelSelector {
         Self {
             eye: camera.position,
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
-            near: f64::from(camera.near),
+            near: if view.has_oblique_near_plane() { 0.0 } else { f64::from(camera.near) },
             magnification,
             largest_error: f64::from(quality.level_of_detail) * f64::from(camera.level_of_detail_scale) * of_kind,
         }
@@ -79,6 +79,7 @@ impl LevelSelector {
         let (offset, radius) = (center - self.eye, f64::from(radius));
         match self.magnification {
             Magnification::Perspective { focal, largest_secant } => {
+                // What may be arbitrarily near is enlarged without a bound.
                 let depth = (self.forward.dot(offset) - radius).max(self.near);
                 focal / depth * ((offset.length() + radius) / depth).min(largest_secant)
             }
@@ -90,11 +91,11 @@ impl LevelSelector {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use glam::{DQuat, Quat, Vec2};
+    use glam::{DQuat, Quat, Vec2, Vec3};
     use proptest::prelude::*;
 
     use super::*;
-    use crate::scene::{Camera, LevelOfDetail};
+    use crate::scene::{Camera, ClipPlane, LevelOfDetail};
 
     prop_compose! {
         fn any_camera()(
@@ -104,6 +105,7 @@ mod tests {
             size in prop::array::uniform2(16_u32..3000),
             shift in prop::array::uniform2(-1.0..1.0_f32),
             kind in 0_u32..4,
+            clip_plane in prop::option::of((prop::array::uniform3(-0.5..0.5_f32), 0.01..0.5_f64)),
         ) -> Camera {
             let (projection, shift) = match kind {
                 0 | 1 => (Projection::Perspective { field_of_view: degrees.to_radians() }, Vec2::from(shift)),
@@ -111,9 +113,16 @@ mod tests {
                 _ => (Projection::Paraboloid, Vec2::ZERO),
             };
             let is_map = projection == Projection::Paraboloid;
+            let (position, orientation) = (DVec3::from(position), Quat::from_scaled_axis(turn.into()));
+            // Before the camera, and nearer than the near plane in part.
+            let clip_plane = clip_plane.filter(|_| kind == 1).map(|(lean, distance)| ClipPlane {
+                point: position + (orientation * Vec3::NEG_Z).as_dvec3() * distance,
+                normal: orientation * (Vec3::NEG_Z + Vec3::from(lean)).normalize(),
+            });
             Camera {
-                position: DVec3::from(position),
-                orientation: Quat::from_scaled_axis(turn.into()),
+                position,
+                orientation,
+                clip_plane,
                 projection,
                 shift: if kind == 0 { shift } else { Vec2::ZERO },
                 size: if is_map { [size[0]; 2] } else { size },
@@ -145,7 +154,11 @@ mod tests {
                 (local.truncate() / (distance - local.z), if local.z < 0.0 { distance } else { 0.0 })
             }
         };
-        let is_drawn = depth >= f64::from(camera.near) && clip.abs().max_element() <= 1.0;
+        let is_clipped = match camera.clip_plane {
+            Some(plane) => plane.distance(point) < 0.0 || depth <= 0.0,
+            None => depth < f64::from(camera.near),
+        };
+        let is_drawn = !is_clipped && clip.abs().max_element() <= 1.0;
         is_drawn.then(|| (clip * DVec2::new(0.5, -0.5) + 0.5) * size)
     }
 
@@ -238,6 +251,20 @@ mod tests {
                 level = next;
             }
         }
+    }
+
+    #[test]
+    fn what_a_clip_plane_lets_nearer_than_the_near_plane_is_as_fine_as_with_that_near_plane() {
+        let camera = Camera { near: 1.0, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
+        let plane = ClipPlane { point: DVec3::NEG_Z * 0.02, normal: Vec3::NEG_Z };
+        let bounds = BoundingSphere { center: DVec3::NEG_Z * 0.06, radius: 0.01 };
+        let level = |camera: Camera| {
+            let selector = LevelSelector::new(&RenderView::new(&camera), &Quality::balanced());
+            selector.level(bounds, 1.0, &errors(&[1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3]), u32::MAX)
+        };
+        let clipped = level(Camera { clip_plane: Some(plane), ..camera.clone() });
+        assert_eq!(clipped, level(Camera { near: 0.02, ..camera.clone() }));
+        assert!(clipped < level(camera));
     }
 
     #[test]

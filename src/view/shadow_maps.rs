@@ -16,7 +16,7 @@ pub struct ShadowMaps {
     /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a
     /// hemispherical light, 2·d·tan(angle)/side for a spot light, and 2·d/(side − 2·`filter` − 2) for a point light,
     /// where d is along the axis of the cube's face. For a directional light it is as wide as the diameter of the sphere
-    /// around what main cameras see, divided by `side`: at 60° and 16:9 some 2.3·`max_distance`/side.
+    /// around what main cameras see of the map's slice, divided by `side`: at 60° and 16:9 and with one cascade some 2.4·`max_distance`/side.
     pub side: u32,
     /// The distance from the main cameras, in metres, up to which a directional light's maps cover their views; at most
     /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. The maps are for all main cameras: the
@@ -69,7 +69,7 @@ impl ShadowMaps {
     /// for a spot light, a paraboloid for a hemispherical light, six perspective cameras for a point light, and for a
     /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what the main
     /// cameras among `cameras` see. A light has all its maps or none: none if it casts no shadow, and a directional
-    /// light if there is no main camera or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
+    /// light if there is no main camera, if one is invalid, or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
     /// invalid: a renderer with such maps is [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
     ///
     /// The only map of a light is called `name`, the faces of a cube `name, +X` and so on, and cascades `name, cascade
@@ -151,8 +151,8 @@ impl ShadowMaps {
                 cascade_slice([camera.near, far], self.split_lambda, cascade, self.cascades)
             };
             let (center, radius) = visible_sphere(cameras, slice)?;
-            // Snapping moves the map by less than a pixel, so it is a pixel larger on every side; with another map to
-            // go on with, by as much as the filter reads, too, so that no point of the slice needs the coarser one.
+            // Snapping moves the map by less than a pixel, so it is a pixel larger on every side. With several cascades it is also
+            // larger by what the filter reads, so that no point of the slice falls through to the coarser map.
             let radius = match self.cascades {
                 1 => radius * (1.0 + 4.0 / f64::from(self.side)),
                 _ => self.extent_with_margin(radius, self.filter + 2),
@@ -184,7 +184,8 @@ impl ShadowMaps {
     }
 
     /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to
-    /// frame and shadows do not crawl when the camera moves.
+    /// frame and shadows do not crawl when the camera moves. They do where the radius changes: when main cameras move relative to each
+    /// other, or the frustum of one that is off centre does.
     fn snapped_to_texels(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
         let pixel = 2.0 * radius / f64::from(self.side);
         let local = orientation.inverse() * center;
@@ -307,6 +308,26 @@ mod tests {
             for (now, first) in pixels_of_origin(f64::from(step) * 0.37).into_iter().zip(&first) {
                 let moved = now - first;
                 assert!((moved - moved.round()).abs().max_element() < 1e-3, "{moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn main_cameras_that_are_invalid_or_too_far_apart_have_no_map_of_the_sun() {
+        let main = || Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+        let at = |x: f64| Camera { position: DVec3::X * x, ..main() };
+        let invalid = [
+            vec![Camera { size: [0, 0], ..main() }],
+            vec![Camera { projection: Projection::Perspective { field_of_view: f32::NAN }, ..main() }],
+            vec![Camera { far: 0.0, ..main() }],
+            vec![Camera { far: -1.0, ..main() }],
+            vec![at(1e200), at(0.0), at(-1e200)],
+        ];
+        for cascades in 1..=ShadowMaps::MAX_CASCADES {
+            let maps = ShadowMaps { cascades, ..ShadowMaps::default() };
+            assert_eq!(maps.cameras("sun", &sun(), &[main()]).len(), cascades as usize);
+            for (case, cameras) in invalid.iter().enumerate() {
+                assert!(maps.cameras("sun", &sun(), cameras).is_empty(), "case {case} with {cascades} cascades");
             }
         }
     }

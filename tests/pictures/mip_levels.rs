@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
     ("mip_levels_are_means_in_every_view_and_frame", own),
     ("mip_levels_are_means_where_targets_are_transient", transient),
     ("mip_levels_are_means_at_every_size_and_in_every_format", atlases),
-    ("mip_levels_are_the_same_with_every_strategy", same_bytes),
+    ("level_0_is_the_same_and_the_last_level_its_mean_with_every_strategy", same_bytes),
     ("levels_of_what_a_raw_pass_writes_are_generated", raw),
     ("statistics_have_the_bytes_of_mip_levels", memory),
     ("a_target_with_mip_levels_cannot_be_imported", import),

@@ -97,7 +97,7 @@ pub(super) fn generate<R: Precision>(
     Ok(())
 }
 
-/// How much of a pixel's extent in one direction each of three pixels of the finer level covers, from the one at twice its index on.
+/// The weights, along one axis, of the finer level's pixels 2i, 2i + 1 and 2i + 2 in pixel i.
 fn weights<R: Real>(index: usize, finer_size: usize) -> [R; 3] {
     let (zero, half) = (R::zero(), R::of(0.5));
     if finer_size == 1 {

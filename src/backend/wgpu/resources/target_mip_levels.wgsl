@@ -6,7 +6,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
     return vec4<f32>(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Which shares of a pixel's extent in one direction three pixels of the finer level cover, from the one at twice its index on.
+// The weights, along one axis, of the finer level's pixels 2i, 2i + 1 and 2i + 2 in pixel i.
 fn shares(index: u32, finer_size: u32) -> array<f32, 3> {
     if finer_size == 1u {
         return array<f32, 3>(1.0, 0.0, 0.0);
