@@ -8,12 +8,14 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, TargetMemory};
 use drawloom::scene::{Camera, SceneRef};
+use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use serde::Serialize;
 
 use crate::gallery::Gallery;
 
-/// Frames that are drawn before others are measured: targets and pipelines are made in them.
+/// Frames that are drawn before others are measured: targets and pipelines are made in them, and the impostor is drawn, which is cached
+/// afterwards.
 const WARM_UP_FRAMES: u32 = 3;
 
 /// A view, and what it costs.
@@ -34,9 +36,13 @@ pub struct ViewCost {
     rung: usize,
 }
 
+/// The gallery is drawn whole for so many frames, then without a view for as many, and again.
+const BLOCK_FRAMES: u32 = 10;
+
 /// How many frames [`measure`] draws.
 pub fn frames_to_draw(gallery: &Gallery, frames: u32) -> u64 {
-    u64::from(frames) + u64::from(2 * (frames + WARM_UP_FRAMES.min(frames))) * gallery.optional_views().count() as u64
+    let [frames, blocks, warm_up] = [frames, frames.div_ceil(BLOCK_FRAMES), WARM_UP_FRAMES].map(u64::from);
+    frames + warm_up + 2 * (frames + blocks * warm_up) * gallery.optional_views().count() as u64
 }
 
 /// Draws the gallery, in turn whole and without each of its views. Calls `drawn` after each frame.
@@ -50,47 +56,48 @@ pub fn measure<B: Backend>(
     frames: u32,
     mut drawn: impl FnMut(),
 ) -> Result<(Vec<ViewCost>, TargetMemory), Box<dyn Error>> {
-    let mut draw = |cameras: &[Camera]| -> Result<Duration, Box<dyn Error>> {
+    let mut draw = |renderer: &mut Renderer<B>, cameras: &[Camera]| -> Result<_, Box<dyn Error>> {
         let scene = SceneRef { cameras, ..gallery.scene.as_scene_ref() };
         let start = Instant::now();
         let submitted = submitter.submit(renderer.record(scene)?)?;
         let took = start.elapsed();
-        drop(submitted);
         drawn();
-        Ok(took)
+        Ok((took, submitted.statistics))
     };
+    let whole = &gallery.scene.cameras;
     let mut saved: HashMap<String, f64> = HashMap::new();
     for view in gallery.optional_views() {
-        let cameras = gallery.without(view);
-        let mut medians = [0.0; 2];
-        for (median, cameras) in medians.iter_mut().zip([&gallery.scene.cameras, &cameras]) {
-            for _ in 0..WARM_UP_FRAMES.min(frames) {
-                draw(cameras)?;
+        let without = gallery.without(view);
+        let mut times = [Vec::new(), Vec::new()];
+        while times[1].len() < frames as usize {
+            for (times, cameras) in times.iter_mut().zip([whole, &without]) {
+                for _ in 0..WARM_UP_FRAMES {
+                    draw(renderer, cameras)?;
+                }
+                for _ in 0..BLOCK_FRAMES.min(frames - times.len() as u32) {
+                    times.push(draw(renderer, cameras)?.0);
+                }
             }
-            let mut times = (0..frames).map(|_| draw(cameras)).collect::<Result<Vec<_>, _>>()?;
-            times.sort_unstable();
-            *median = times[times.len() / 2].as_secs_f64() * 1e3;
         }
-        saved.insert(view.to_owned(), medians[0] - medians[1]);
+        let [whole, without] = times.map(|mut times| {
+            times.sort_unstable();
+            times[times.len() / 2].as_secs_f64() * 1e3
+        });
+        saved.insert(view.to_owned(), whole - without);
     }
 
+    for _ in 0..WARM_UP_FRAMES {
+        draw(renderer, whole)?;
+    }
     let timeline = Arc::clone(renderer.scheduler().timeline());
     timeline.start();
-    let mut statistics = None;
+    let (mut statistics, mut times) = (None, HashMap::new());
     for _ in 0..frames {
-        statistics = Some(submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?.statistics);
-        drawn();
+        statistics = Some(draw(renderer, whole)?.1);
+        // After each frame, because the timeline has room for some only.
+        add_times(&timeline.take(), &mut times)?;
     }
     timeline.stop();
-    let log = timeline.take();
-    let mut times: HashMap<&str, Duration> = HashMap::new();
-    for run in &log.runs {
-        for chunk in &run.chunks {
-            if let Some(view) = &run.graph.nodes[chunk.node].labels.view {
-                *times.entry(view).or_default() += chunk.ended.saturating_sub(chunk.started);
-            }
-        }
-    }
     let FrameStatistics { views, targets, .. } = statistics.ok_or("no frame was drawn")?;
     let names: Vec<_> = views.iter().map(|view| view.name.clone()).collect();
     let cost_of = |view: drawloom::ViewStatistics| {
@@ -100,13 +107,31 @@ pub fn measure<B: Backend>(
             parent: parent.filter(|parent| names.contains(parent)),
             objects: view.visible,
             commands: view.commands,
-            ms: times.get(view.name.as_str()).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
+            ms: times.get(&view.name).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
             saves_ms: saved.get(&view.name).copied(),
             rung: 0,
             name: view.name,
         }
     };
     Ok((views.into_iter().map(cost_of).collect(), targets))
+}
+
+/// Adds the thread time of each view's stages, by its name.
+///
+/// # Errors
+/// If the timeline had no room for all events.
+fn add_times(log: &Log, times: &mut HashMap<String, Duration>) -> Result<(), Box<dyn Error>> {
+    if log.all_dropped() > 0 {
+        return Err(format!("the timeline had no room for {} events of a frame", log.all_dropped()).into());
+    }
+    for run in &log.runs {
+        for chunk in &run.chunks {
+            if let Some(view) = &run.graph.nodes[chunk.node].labels.view {
+                *times.entry(view.to_string()).or_default() += chunk.ended.saturating_sub(chunk.started);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Sets the rungs of views, by name.
@@ -131,7 +156,7 @@ pub fn print(views: &[ViewCost], targets: TargetMemory) {
     println!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
 }
 
-/// Writes what was printed as JSON.
+/// Writes the table of views as JSON.
 ///
 /// # Errors
 /// If the file cannot be written.

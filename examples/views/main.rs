@@ -24,7 +24,7 @@ use std::sync::Arc;
 use clap::Parser;
 use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, Submitter};
+use drawloom::{Renderer, Submitter, ViewBudget};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -38,12 +38,12 @@ struct Arguments {
     #[arg(long, value_name = "PNG", default_value = "sheet.png")]
     out: PathBuf,
 
-    /// Also writes what is printed, as JSON.
+    /// Also writes the table of views, as JSON.
     #[arg(long, value_name = "JSON")]
     report: Option<PathBuf>,
 
     /// The frames that are measured of the whole gallery, and without each view.
-    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
 
     /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are left.
@@ -66,7 +66,27 @@ fn main() -> ExitCode {
     }
 }
 
+/// Checks what can be checked before anything is drawn.
+///
+/// # Errors
+/// If a file could not be written where it is to go, or the budget is no time.
+fn check(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let out = &arguments.out;
+    image::ImageFormat::from_path(out)
+        .ok()
+        .filter(image::ImageFormat::can_write)
+        .ok_or_else(|| format!("{} is in no format that pictures are written in, such as .png", out.display()))?;
+    for path in [out].into_iter().chain(&arguments.report) {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            return Err(format!("{} cannot be written: {} is no folder", path.display(), folder.display()).into());
+        }
+    }
+    arguments.budget_ms.map_or(Ok(()), |milliseconds| Ok(ViewBudget::new(milliseconds).map(drop)?))
+}
+
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    check(arguments)?;
     let mut gallery = Gallery::new()?;
     let (mut renderer, submitter) = measured_renderer()?;
     let (mut views, targets) = {
@@ -81,12 +101,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         costs::set_rungs(&mut views, &chosen.rungs);
         gallery.scene.cameras = chosen.cameras;
     }
-    draw(arguments, &gallery)?;
     costs::print(&views, targets);
-    match &arguments.report {
-        Some(path) => costs::write(&views, path),
-        None => Ok(()),
+    if let Some(path) = &arguments.report {
+        costs::write(&views, path)?;
     }
+    draw(arguments, &gallery)
 }
 
 /// A renderer on a device that draws nothing, so that only the processor's work counts.
