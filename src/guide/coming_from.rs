@@ -37,6 +37,7 @@
 //! [`ObjectFilter`]: crate::scene::ObjectFilter
 //! [`RenderProcess`]: crate::process::RenderProcess
 //! [`Renderer::prepare_pipelines_in_background`]: crate::Renderer::prepare_pipelines_in_background
+//! [`WarmUp`]: crate::WarmUp
 //! [`SceneRef`]: crate::scene::SceneRef
 //! [`Scheduler`]: crate::task::Scheduler
 //! [`Scheduler::parallel_for_each`]: crate::task::Scheduler::parallel_for_each
