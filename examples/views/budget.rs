@@ -21,11 +21,39 @@ pub struct Chosen {
     pub rungs: HashMap<String, usize>,
 }
 
-/// Draws frames within a budget of so many milliseconds of thread time. Prints a line whenever the rung of a view changes.
+/// How often a budget that gives nothing up is halved, to show what would be.
+const MAX_HALVINGS: u32 = 8;
+
+/// Draws frames within a budget of so many milliseconds of thread time. Prints a line whenever the rung of a view changes. If the budget gives
+/// nothing up, goes on with half of it, and so on, to show what would be given up first; what is left is still that of the budget.
 ///
 /// # Errors
 /// If the budget is no time, or a frame fails.
 pub fn choose<B: Backend>(
+    milliseconds: f64,
+    gallery: &Gallery,
+    renderer: &mut Renderer<B>,
+    submitter: &Submitter<B>,
+) -> Result<Chosen, Box<dyn Error>> {
+    let chosen = keep(milliseconds, gallery, renderer, submitter)?;
+    let mut is_at_best = chosen.rungs.values().all(|rung| *rung == 0);
+    let mut less = milliseconds;
+    for _ in 0..MAX_HALVINGS {
+        if !is_at_best {
+            break;
+        }
+        less *= 0.5;
+        println!("nothing is given up; with {less} ms:");
+        is_at_best = keep(less, gallery, renderer, submitter)?.rungs.values().all(|rung| *rung == 0);
+    }
+    Ok(chosen)
+}
+
+/// Draws frames within one budget.
+///
+/// # Errors
+/// If the budget is no time, or a frame fails.
+fn keep<B: Backend>(
     milliseconds: f64,
     gallery: &Gallery,
     renderer: &mut Renderer<B>,

@@ -301,7 +301,7 @@ pub fn draw_labels(sheet: &mut Picture) {
             for (y, row) in (0..).zip(rows) {
                 for x in (0..8).filter(|x| row >> x & 1 == 1) {
                     let pixel = ((top + y) * sheet.width + left + letter * 9 + x) as usize * 4;
-                    if let Some(channels) = sheet.bytes.get_mut(pixel..pixel + 4) {
+                    if let Some(channels) = sheet.bytes.get_mut(pixel..pixel + 3) {
                         channels.fill(230);
                     }
                 }

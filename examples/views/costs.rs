@@ -153,6 +153,10 @@ pub fn print(views: &[ViewCost], targets: TargetMemory) {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let TargetMemory { textures, bytes, dedicated_bytes, .. } = targets;
     let (bytes, dedicated) = (mebibytes(bytes), mebibytes(dedicated_bytes));
+    println!(
+        "ms: thread time of a frame with all views. saves ms: wall time of a frame without the view; below 0 is noise."
+    );
+    println!("rung: 0 is a view at its best, higher ones are cheaper.");
     println!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
 }
 

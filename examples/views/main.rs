@@ -46,7 +46,8 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
 
-    /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are left.
+    /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are left. The table still has
+    /// what they cost at their best, and the rung that each ends on.
     #[arg(long, value_name = "MS")]
     budget_ms: Option<f64>,
 
