@@ -3,7 +3,7 @@
 use super::order::{AddedProcess, order_constraints};
 use super::resource_names::{buffer_name, resource_name, views_of_output};
 use super::{PlanError, PlannedProcess, PlannedTarget};
-use crate::graph::{FrameGraph, Schedule};
+use crate::graph::{CompileError, FrameGraph, Schedule};
 use crate::process::{Access, BufferAccess, previous_name};
 use crate::scene::ViewKind;
 
@@ -23,7 +23,10 @@ pub(super) fn compile(
 ) -> Result<Schedule<usize>, PlanError> {
     let graph = process_graph(slot_names, added, imported, outputs)?;
     let schedule = graph.compile_with_outputs_of(|index| sampled_resources(added, &added[*index].1));
-    schedule.map_err(|error| PlanError::Graph(error.problem))
+    schedule.map_err(|CompileError { graph, problem }| {
+        // What the outputs themselves lack is named before what the views lack that they sample.
+        PlanError::Graph(graph.compile().map_or_else(|error| error.problem, |_| problem))
+    })
 }
 
 /// The names of the resources that a process samples in other views, or as they were in the frame before.
