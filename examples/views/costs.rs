@@ -36,7 +36,7 @@ pub struct ViewCost {
     rung: usize,
 }
 
-/// The gallery is drawn whole for so many frames, then without a view for as many, and again.
+/// Frames drawn in a row with a view, and then without it, before the two alternate.
 const BLOCK_FRAMES: u32 = 10;
 
 /// How many frames [`measure`] draws.

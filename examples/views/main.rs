@@ -34,7 +34,7 @@ use gallery::Gallery;
 #[derive(Parser)]
 #[command(name = "views")]
 struct Arguments {
-    /// Where the contact sheet goes.
+    /// Where the contact sheet goes, a .png.
     #[arg(long, value_name = "PNG", default_value = "sheet.png")]
     out: PathBuf,
 
@@ -73,10 +73,9 @@ fn main() -> ExitCode {
 /// If a file could not be written where it is to go, or the budget is no time.
 fn check(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let out = &arguments.out;
-    image::ImageFormat::from_path(out)
-        .ok()
-        .filter(image::ImageFormat::can_write)
-        .ok_or_else(|| format!("{} is in no format that pictures are written in, such as .png", out.display()))?;
+    if image::ImageFormat::from_path(out).ok() != Some(image::ImageFormat::Png) {
+        return Err(format!("{} is no .png, which is what the sheet is written as", out.display()).into());
+    }
     for path in [out].into_iter().chain(&arguments.report) {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {

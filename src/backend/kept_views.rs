@@ -25,18 +25,18 @@ pub(crate) fn kept_views<'a>(
     for (index, view) in before.clone().enumerate() {
         named.entry(view).or_default().push_back(index);
     }
-    let mut changes: HashMap<(ViewKind, &str), isize> = HashMap::new();
+    let mut count_changes: HashMap<(ViewKind, &str), isize> = HashMap::new();
     for view in views {
-        *changes.entry((view.kind(), view.name())).or_default() += 1;
+        *count_changes.entry((view.kind(), view.name())).or_default() += 1;
     }
     for (view, before) in &named {
-        *changes.entry(*view).or_default() -= before.len() as isize;
+        *count_changes.entry(*view).or_default() -= before.len() as isize;
     }
     let mut kept = Vec::with_capacity(views.len());
     for view in views {
         let view = (view.kind(), view.name());
         let index = named.get_mut(&view).and_then(VecDeque::pop_front);
-        kept.push(index.map(|index| KeptView { index, is_same: changes[&view] == 0 }));
+        kept.push(index.map(|index| KeptView { index, is_same: count_changes[&view] == 0 }));
     }
 
     let mut left: Vec<_> = named.into_values().flatten().collect();

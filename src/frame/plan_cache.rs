@@ -99,7 +99,14 @@ impl PlanCache {
         let requirements =
             Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
         let all = [requirements].into_iter().chain(Requirements::with_every_shader());
-        all.map(|requirements| self.plan_for(requirements)).collect()
+        let mut plans: Vec<Arc<FramePlan>> = Vec::new();
+        for requirements in all {
+            let plan = self.plan_for(requirements)?;
+            if plans.iter().all(|other| other.identity() != plan.identity()) {
+                plans.push(plan);
+            }
+        }
+        Ok(plans)
     }
 
     /// The plan for these requirements, compiled if the cache does not have it.

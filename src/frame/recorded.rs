@@ -12,6 +12,8 @@ use crate::timeline::Timeline;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
 /// dropped without being submitted, the next frame draws all of its views, also those that it would have [cached](crate::scene::Redraw).
+/// With wgpu, the thread that drops it then hands its uploads to the device, which may call back for work that has finished: hold no lock
+/// that such a callback takes.
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.

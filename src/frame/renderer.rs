@@ -143,7 +143,7 @@ impl<B: Backend> Renderer<B> {
         recorded
     }
 
-    /// Makes the next frame one without frames before it: [histories](crate::process::Declare::samples_previous) are empty, every view is
+    /// Makes the next frame be drawn as if it were the first: [histories](crate::process::Declare::samples_previous) are empty, every view is
     /// drawn, and levels of detail are chosen without hysteresis. For a cut of the camera, or another world. Buffers that processes change keep
     /// what they hold.
     pub fn forget_previous_frames(&mut self) {

@@ -9,8 +9,8 @@
 //! nothing is passed over. If not even the last rungs fit, all views take these, and the budget is
 //! [exhausted](ViewBudget::is_exhausted). If there is room, it restores in the opposite order, one rung of one view at a time, and waits
 //! [`SETTLE_FRAMES`] for what that costs. While that view waits, no other view is restored, because it would take the room that the first one
-//! waits for. It also waits for views that changed their rung and are not measured there yet, as their costs count as 0, but not for ever: one
-//! that is cached, or has no cameras, never is.
+//! waits for. It also waits for views that it moved to another rung and has not measured there yet, as their costs count as 0, but not for
+//! ever: one that is cached never is.
 //!
 //! **Why it does not flap.** A rung is restored only if the prediction leaves room for a rise by [`HYSTERESIS`]. A restoration that is undone
 //! soon had a wrong prediction, so the view's pause before the next one doubles, up to [`MAX_PAUSE`].
@@ -91,6 +91,9 @@ pub struct ViewBudget {
     over: u32,
     /// How many frames in a row reported no rung of a view that has a ladder.
     without_rungs: u32,
+    /// How many frames in a row lacked the device's times of passes.
+    #[cfg(feature = "wgpu")]
+    incomplete: u32,
 }
 
 /// A view, and the rung it is on.
@@ -114,8 +117,8 @@ struct ViewState {
     requested: u64,
     /// The frames between being shed and being restored.
     pause: u64,
-    /// The frame in which it came to its rung.
-    on_rung_since: u64,
+    /// The frame in which the budget moved it to its rung; `None` if it never did.
+    moved: Option<u64>,
 }
 
 /// A rung is restored if the prediction is below the budget by this factor.
@@ -133,7 +136,7 @@ const MAX_MEASURING_FRAMES: u64 = 128;
 /// A restoration that is undone within this number of frames was wrong.
 const RETRY_FRAMES: u64 = 64;
 
-/// After this many frames in a row that report no rung, the budget warns: a frame in flight may have had other views.
+/// After this many frames in a row that report no rung, or lack times, the budget warns: a frame in flight may have had other views.
 const WARNING_FRAMES: u32 = 8;
 
 const MIN_PAUSE: u64 = 16;
@@ -157,7 +160,17 @@ impl ViewBudget {
     /// If that is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`].
     pub fn new(milliseconds: f64) -> Result<Self, BudgetError> {
         let (rest, views) = (Estimate::default(), Vec::new());
-        let mut budget = Self { budget: 0.0, rest, views, frame: 0, changed: 0, over: 0, without_rungs: 0 };
+        let mut budget = Self {
+            budget: 0.0,
+            rest,
+            views,
+            frame: 0,
+            changed: 0,
+            over: 0,
+            without_rungs: 0,
+            #[cfg(feature = "wgpu")]
+            incomplete: 0,
+        };
         budget.set_milliseconds(milliseconds)?;
         Ok(budget)
     }
@@ -239,11 +252,15 @@ impl ViewBudget {
     }
 
     /// Chooses rungs by the device's time for a frame, with the statistics of that same frame: the sum of its passes' times, although a device may
-    /// draw several at once. Times of which passes are [missing](DevicePassTimes::skipped) say nothing. A budget is kept by this or by
+    /// draw several at once. Frames of which the times of passes are [missing](DevicePassTimes::skipped) say nothing; a run of them is warned of. A budget is kept by this or by
     /// [`Self::update`], not by both.
     #[cfg(feature = "wgpu")]
     pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
-        if times.skipped > 0 {
+        self.incomplete = if times.skipped > 0 { self.incomplete.saturating_add(1) } else { 0 };
+        if self.incomplete == WARNING_FRAMES {
+            tracing::warn!(target: "drawloom", "the device's times lack passes, so that a view budget learns nothing of them");
+        }
+        if self.incomplete > 0 {
             return;
         }
         let mut costs: HashMap<&str, f32> = HashMap::new();
@@ -316,7 +333,7 @@ impl ViewBudget {
     /// Takes views down their ladders until the prediction fits.
     fn shed(&mut self) {
         let order = self.shedding_order();
-        for sheds_small_savings in [false, true] {
+        for includes_small_savings in [false, true] {
             for &index in &order {
                 let mut rung = self.views[index].rung;
                 let others = self.predicted() - self.views[index].cost_on(rung);
@@ -324,7 +341,7 @@ impl ViewBudget {
                 let min_cost = (rung..view.rungs.len()).map(|rung| view.cost_on(rung)).fold(f32::INFINITY, f32::min);
                 let saves = view.cost_on(rung) - min_cost >= MIN_SAVING * self.budget;
                 let is_last = |rung| rung + 1 == view.rungs.len();
-                while (saves || sheds_small_savings) && !is_last(rung) && others + view.cost_on(rung) > self.budget {
+                while (saves || includes_small_savings) && !is_last(rung) && others + view.cost_on(rung) > self.budget {
                     rung += 1;
                 }
                 if rung != view.rung {
@@ -335,11 +352,12 @@ impl ViewBudget {
         }
     }
 
-    /// Takes the shed view that would be shed last up by one rung if that fits, or if its turn has come to be measured.
+    /// Restores one rung of the shed view with the highest priority, if that fits or if its turn has come to be measured.
     fn restore(&mut self) {
         // A view that is drawn seldom may not have been measured since it was restored.
-        let is_awaited =
-            |view: &ViewState| !view.is_measured() && self.frame - view.on_rung_since < MAX_MEASURING_FRAMES;
+        let is_awaited = |view: &ViewState| {
+            !view.is_measured() && view.moved.is_some_and(|moved| self.frame - moved < MAX_MEASURING_FRAMES)
+        };
         if self.frame - self.changed < SETTLE_FRAMES || self.requested().any(is_awaited) {
             return;
         }
@@ -395,7 +413,7 @@ impl ViewState {
             restored: None,
             requested: 0,
             pause: MIN_PAUSE,
-            on_rung_since: 0,
+            moved: None,
         }
     }
 
@@ -404,9 +422,6 @@ impl ViewState {
     }
 
     fn request(&mut self, view: &BudgetedView, frame: u64) {
-        if self.requested == 0 {
-            self.on_rung_since = frame;
-        }
         (self.priority, self.requested) = (view.priority, frame);
         self.draws = self.rungs.iter().map(|rung| rung.draws_per_frame(&view.cameras)).collect();
         self.cameras = view.cameras.iter().map(|camera| camera.name.clone()).collect();
@@ -425,14 +440,14 @@ impl ViewState {
     fn shed_to(&mut self, rung: usize, frame: u64) {
         let was_restored = self.restored.take().is_some_and(|restored| frame - restored < RETRY_FRAMES);
         self.pause = if was_restored { (2 * self.pause).min(MAX_PAUSE) } else { MIN_PAUSE };
-        (self.rung, self.shed, self.is_trial, self.on_rung_since) = (rung, frame, false, frame);
+        (self.rung, self.shed, self.is_trial, self.moved) = (rung, frame, false, Some(frame));
         self.cost.move_to(rung, &self.rungs);
     }
 
     fn restore(&mut self, is_trial: bool, frame: u64) {
         let was_left_out = self.rungs[self.rung] == Rung::LeftOut;
         (self.rung, self.restored, self.is_trial) = (self.rung - 1, Some(frame), is_trial);
-        self.on_rung_since = frame;
+        self.moved = Some(frame);
         if is_trial {
             self.cost.measure_on(self.rung, was_left_out);
         } else {

@@ -89,7 +89,8 @@ impl ViewCost {
     /// The view is drawn on this rung from the next frame on, to be measured: nothing is expected of it.
     pub(super) fn measure_on(&mut self, rung: usize, was_left_out: bool) {
         // What it cost before it was left out is too old to be compared with.
-        let settled = self.estimate.get().filter(|_| self.estimate.is_settled() && !was_left_out);
+        let is_comparable = !was_left_out && self.first_alike[rung] != self.first_alike[self.measured_on];
+        let settled = self.estimate.get().filter(|_| self.estimate.is_settled() && is_comparable);
         self.reference = settled.map(|cost| (self.measured_on, cost));
         (self.estimate, self.expected, self.measured_on) = (Estimate::default(), None, rung);
     }

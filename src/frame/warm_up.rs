@@ -19,7 +19,7 @@ use crate::view::LightClass;
 /// makes its targets.
 ///
 /// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of sight or dark, as
-/// those that are switched off are: a light that is drawn alone stands at a camera, and shines. Objects that no camera of the scene sees are
+/// those that are switched off are: a light that is drawn alone stands before a camera, and shines. Objects that no camera of the scene sees are
 /// not drawn, so neither is what only their materials need. What processes change in their buffers stays. The first frame after the warm-up is
 /// [one without frames before it](Renderer::forget_previous_frames).
 ///
@@ -92,15 +92,17 @@ impl<'a> WarmUp<'a> {
     }
 }
 
-/// The light at the position of a camera, in its direction, and bright enough to be drawn.
+/// The light at the near plane of a camera, in its direction, and bright enough to be drawn.
 fn shining_from(camera: &Camera, mut light: Light) -> Light {
-    let (at, along) = (camera.position, camera.orientation * Vec3::NEG_Z);
+    let along = (camera.orientation * Vec3::NEG_Z).normalize();
+    // Behind the near plane the volume of a light with a short range would not be seen.
+    let at = camera.position + along.as_dvec3() * f64::from(camera.near);
     match &mut light {
-        Light::Directional { illuminance, .. } => *illuminance = Vec3::ONE,
-        Light::Point { position, intensity, .. } => (*position, *intensity) = (at, Vec3::ONE),
+        Light::Directional { illuminance, .. } => *illuminance = illuminance.max(Vec3::ONE),
+        Light::Point { position, intensity, .. } => (*position, *intensity) = (at, intensity.max(Vec3::ONE)),
         Light::Spot { position, direction, intensity, .. }
         | Light::Hemispherical { position, direction, intensity, .. } => {
-            (*position, *direction, *intensity) = (at, along.normalize(), Vec3::ONE);
+            (*position, *direction, *intensity) = (at, along, intensity.max(Vec3::ONE));
         }
     }
     light

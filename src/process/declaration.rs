@@ -95,8 +95,8 @@ impl Declare {
     /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`] does: the history
     /// of temporal filters. The process may write the target itself.
     ///
-    /// That is the frame submitted before, if that had a view of this kind and name, and its target this size and format, and so had all
-    /// frames that were recorded since and dropped. Otherwise
+    /// That is the frame submitted last. It, and every frame that was recorded since and dropped, had a view of this kind and name, and its
+    /// target this size and format; of several views of one name none has a history after their number changed. Otherwise
     /// all channels of the format are 0: a target with an alpha that is written as 1 tells whether it has a history. The price is a
     /// copy of the target at the end of each frame. A raw pass finds it as the target [`previous_name`].
     pub fn samples_previous(&mut self, target: &str) {

@@ -27,7 +27,7 @@ pub(super) fn cascade_slice([near, far]: [f32; 2], lambda: f32, cascade: u32, co
 
 /// A sphere around all that the main cameras among `cameras` see between the two distances of `slice`: its centre in the
 /// world and its radius, in metres. Its size does not change when a camera turns. `None` without a main camera, or where no finite sphere is
-/// around what invalid cameras, or too distant ones, see.
+/// around what they see.
 pub(super) fn visible_sphere(cameras: &[Camera], slice: impl Fn(&Camera) -> [f64; 2]) -> Option<(DVec3, f64)> {
     let main = cameras.iter().filter(|camera| camera.kind == ViewKind::Main);
     let spheres = main.map(|camera| {

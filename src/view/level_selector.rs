@@ -12,7 +12,7 @@ use crate::scene::{Projection, ViewKind};
 pub(crate) struct LevelSelector {
     eye: DVec3,
     forward: DVec3,
-    /// Geometry nearer than this is not drawn. It is 0 behind a clip plane, which takes the place of the near plane and may be nearer.
+    /// Geometry nearer than this is not drawn. 0 if a clip plane replaces the near plane, because it may be nearer.
     near: f64,
     magnification: Magnification,
     /// In pixels.

@@ -13,8 +13,8 @@ use crate::scene::SceneRef;
 /// The level of detail of each object that a view sees. It is kept from frame to frame, because a level depends on the one before.
 #[derive(Debug, Default)]
 pub(crate) struct ObjectLevels {
-    /// By the index of an object. An object that the view does not see keeps the level that it had. One that moves to another index, as the last one
-    /// does when one is removed, begins with the level of the object before it there.
+    /// By the index of an object. An object that the view does not see keeps the level that it had. When an object is removed,
+    /// the last object takes its index and its level.
     levels: Vec<AtomicU8>,
     /// Whether a level changed since the latest [`ObjectLevels::complete`].
     has_changed: AtomicBool,

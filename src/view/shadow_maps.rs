@@ -69,7 +69,7 @@ impl ShadowMaps {
     /// for a spot light, a paraboloid for a hemispherical light, six perspective cameras for a point light, and for a
     /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what the main
     /// cameras among `cameras` see. A light has all its maps or none: none if it casts no shadow, and a directional
-    /// light if there is no main camera, if one is invalid, or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
+    /// light if there is no main camera, if no finite sphere is around what they see, or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
     /// invalid: a renderer with such maps is [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
     ///
     /// The only map of a light is called `name`, the faces of a cube `name, +X` and so on, and cascades `name, cascade

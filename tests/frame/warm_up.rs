@@ -72,10 +72,13 @@ fn a_warm_up_has_no_frames_for_what_its_scene_lacks() {
 fn lights_that_are_dark_or_out_of_sight_are_drawn_too() {
     let mut scene = everything();
     let far = |mut light: Light| {
-        if let Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } =
-            &mut light
+        if let Light::Point { position, range, .. }
+        | Light::Spot { position, range, .. }
+        | Light::Hemispherical { position, range, .. } = &mut light
         {
             position.x += 1e6;
+            // Less than the near plane's distance.
+            *range = 0.01;
         }
         light
     };

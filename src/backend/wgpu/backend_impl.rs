@@ -71,7 +71,8 @@ impl Backend for WgpuBackend {
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let imports = mem::take(&mut *self.imports.lock());
-        // Nothing has changed yet, so what is wrong with the scene or with a process leaves everything as it is.
+        // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that does not compile leave
+        // everything as it is.
         check_reach(request.views)?;
         let imports: Result<Vec<_>, _> =
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();

@@ -239,6 +239,22 @@ fn a_view_that_is_never_measured_does_not_keep_others_from_being_restored() {
 }
 
 #[test]
+fn new_views_that_are_cached_keep_no_other_from_being_restored() {
+    let mut simulation = Simulation::new(1.5, 1.0, &[view("mirror", 1, 2.0, &[Rung::LeftOut])]);
+    simulation.run(40);
+    assert_eq!(simulation.rungs(), [1]);
+    simulation.budget.set_milliseconds(8.0).unwrap();
+    for number in 0..6 {
+        let mut picture = view(&format!("picture {number}"), 0, 0.1, &[]);
+        picture.view.cameras[0].redraw = Redraw::OnCameraChange;
+        simulation.views.truncate(1);
+        simulation.views.push(picture);
+        simulation.run(20);
+    }
+    assert_eq!(simulation.rungs()[0], 0);
+}
+
+#[test]
 fn nothing_is_restored_on_the_room_of_a_view_that_is_not_measured_again_yet() {
     let mut views = [view("rare", 2, 40.0, &[Rung::LeftOut]), view("mirror", 1, 2.0, &[Rung::LeftOut])];
     views[0].view.cameras[0].redraw = Redraw::Interval(8);

@@ -72,7 +72,7 @@ impl SmallTargets {
         {
             let (free, missing) = (free.entry(*kind).or_default(), missing.entry(*kind).or_default());
             if free.is_empty() {
-                // As many as there were at least, so that views which come one at a time have few textures, too.
+                // At least doubles the layers, so that views that come one at a time share few textures.
                 let of_kind = self.textures.iter().filter(|(other, _)| other == kind);
                 let layers: usize = of_kind.map(|(_, texture)| texture.depth_or_array_layers() as usize).sum();
                 let layers = layers.max(*missing).min(Self::MAX_LAYERS) as u32;
