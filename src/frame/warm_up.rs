@@ -24,7 +24,9 @@ use crate::view::LightClass;
 /// [one without frames before it](Renderer::forget_previous_frames).
 ///
 /// ```
+/// # #[cfg(feature = "wgpu")]
 /// # use drawloom::{Renderer, Submitter, WarmUp, backend::WgpuBackend, scene::SceneRef};
+/// # #[cfg(feature = "wgpu")]
 /// # fn load(
 /// #     renderer: &mut Renderer<WgpuBackend>, submitter: &Submitter<WgpuBackend>, world: SceneRef<'_>,
 /// # ) -> Result<(), Box<dyn std::error::Error>> {
