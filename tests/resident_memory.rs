@@ -26,6 +26,7 @@ const WARM_UP_FRAMES: usize = 30;
 /// some MiB from the system in one period and in another none.
 const PERIODS: usize = 7;
 const FRAMES_IN_A_PERIOD: usize = 8;
+const DROPPED_FRAMES_IN_A_PERIOD: usize = 100;
 /// A shader that the driver compiles and keeps is some 100 KiB or more, and a frame of this scene compiled dozens.
 const MAX_GROWTH_KIB: usize = 2 * 1024;
 
@@ -50,24 +51,10 @@ fn drop_and_measure() -> Result<(), Box<dyn Error>> {
     let builder = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture());
     let (mut renderer, _submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
     let scene = field(5_000);
-    let mut record = |frames: usize| -> Result<(), Box<dyn Error>> {
-        for _ in 0..frames {
-            drop(renderer.record(scene.as_scene_ref())?);
-        }
+    expect_steady_memory(DROPPED_FRAMES_IN_A_PERIOD, |_| {
+        drop(renderer.record(scene.as_scene_ref())?);
         Ok(())
-    };
-    record(WARM_UP_FRAMES)?;
-    let mut growths = Vec::new();
-    for _ in 0..PERIODS {
-        let before = resident_kib().ok_or("the process's memory is unknown")?;
-        record(100)?;
-        growths.push(resident_kib().ok_or("the process's memory is unknown")?.saturating_sub(before));
-    }
-    growths.sort_unstable();
-    if growths[PERIODS / 2] > MAX_GROWTH_KIB {
-        return Err(format!("each 100 frames left this behind, in KiB: {growths:?}").into());
-    }
-    Ok(())
+    })
 }
 
 /// Draws the project's scene, with all that it requires, from a camera that moves.
@@ -78,27 +65,31 @@ fn draw_and_measure() -> Result<(), Box<dyn Error>> {
         .deferred(Deferred::to_picture().depth_pre_pass(true))
         .build(scheduler)?;
     let mut scene = demo::colonnade()?;
-    let mut draw = |frame: usize| -> Result<(), Box<dyn Error>> {
+    expect_steady_memory(FRAMES_IN_A_PERIOD, |frame| {
         let position = DVec3::new(0.01 * frame as f64, 2.0, 8.0);
         scene.cameras =
             vec![Camera { size: [64, 36], ..Camera::looking_at("main", position, DVec3::new(0.0, 1.5, 0.0)) }];
         submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
         Ok(())
-    };
-    for frame in 0..WARM_UP_FRAMES {
-        draw(frame)?;
-    }
+    })
+}
+
+/// Calls `draw` with the number of each frame, and measures how the process grows in periods of so many of them.
+fn expect_steady_memory(
+    frames_in_a_period: usize,
+    mut draw: impl FnMut(usize) -> Result<(), Box<dyn Error>>,
+) -> Result<(), Box<dyn Error>> {
+    (0..WARM_UP_FRAMES).try_for_each(&mut draw)?;
     let mut growths = Vec::new();
     for period in 0..PERIODS {
         let before = resident_kib().ok_or("the process's memory is unknown")?;
-        for frame in 0..FRAMES_IN_A_PERIOD {
-            draw(WARM_UP_FRAMES + period * FRAMES_IN_A_PERIOD + frame)?;
-        }
+        let first = WARM_UP_FRAMES + period * frames_in_a_period;
+        (first..first + frames_in_a_period).try_for_each(&mut draw)?;
         growths.push(resident_kib().ok_or("the process's memory is unknown")?.saturating_sub(before));
     }
     growths.sort_unstable();
     if growths[PERIODS / 2] > MAX_GROWTH_KIB {
-        return Err(format!("each {FRAMES_IN_A_PERIOD} frames left this behind, in KiB: {growths:?}").into());
+        return Err(format!("each {frames_in_a_period} frames left this behind, in KiB: {growths:?}").into());
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ pub(crate) struct KeptView {
 
 /// For each view the one of the frame before whose targets it keeps, by the kinds and names of those: the view of the same kind and name, of
 /// several the one at the same place among them; otherwise one of the same kind that no other view keeps. Of several views with the same kind
-/// and name none is the same as before if their number has changed: which of them is new, or gone, nobody can tell.
+/// and name none is the same as before if their number has changed, because it is unknown which of them is new or gone.
 pub(crate) fn kept_views<'a>(
     before: impl Iterator<Item = (ViewKind, &'a str)> + Clone,
     views: &'a [RenderView],
@@ -76,7 +76,7 @@ mod tests {
         // A mirror comes before the main view, and goes.
         assert_eq!(found(&before[..1], &[(Reflection, "mirror"), (Main, "main")]), [None, Some((0, true))]);
         assert_eq!(found(&before[1..3], &[(Main, "main")]), [Some((1, true))]);
-        // Nobody knows which of two views of a name is gone, or is the new one.
+        // It is unknown which of two views of a name is gone, or is the new one.
         assert_eq!(found(&before, &[(Main, "main"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
         assert_eq!(found(&before[..2], &[(Main, "main"), (Main, "main")]), [Some((0, false)), None]);
         // Another name takes the targets of a view that is gone, but not those of another kind, or of a view that is still there.

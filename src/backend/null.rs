@@ -13,7 +13,6 @@ use crate::command::DrawList;
 use crate::process::{Draws, Pass};
 use crate::scene::Assets;
 use crate::task::Worker;
-use crate::view::GpuView;
 
 /// Draws nothing. It returns an error if the frame breaks one of the rules between frame and backend:
 ///
@@ -86,11 +85,7 @@ impl Backend for NullBackend {
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
-        for view in request.views {
-            if GpuView::new(view, request.scene, 0).is_none() {
-                return Err(BackendError::ViewOutOfReach { view: view.name().to_owned() });
-            }
-        }
+        request.check_reach()?;
         Ok(NullFrame {
             passes: request.passes.to_vec(),
             object_count: request.scene.object_count(),

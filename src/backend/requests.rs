@@ -1,10 +1,11 @@
 //! What frames request of a backend.
 
+use super::BackendError;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
 use crate::scene::{Light, SceneRef};
-use crate::view::{LightTable, ObjectTable, Rejections, RenderView};
+use crate::view::{GpuView, LightTable, ObjectTable, Rejections, RenderView};
 
 /// Everything that a backend needs to know of a frame.
 #[derive(Clone, Copy)]
@@ -31,6 +32,17 @@ pub struct FrameRequest<'a> {
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.
     pub rejections: &'a Rejections,
+}
+
+impl FrameRequest<'_> {
+    /// # Errors
+    /// If the camera of a view is out of reach.
+    pub(crate) fn check_reach(&self) -> Result<(), BackendError> {
+        match self.views.iter().find(|view| !GpuView::is_in_reach(view)) {
+            Some(view) => Err(BackendError::ViewOutOfReach { view: view.name().to_owned() }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Everything that a backend needs to know of one pass of a frame.

@@ -76,11 +76,10 @@ impl<T> SubdivisionCache<T> {
             let mut oldest_first: Vec<_> = unused().map(|(key, mesh)| (last_used(mesh), *key)).collect();
             oldest_first.sort_unstable_by_key(|(last_used, _)| *last_used);
             for (_, key) in oldest_first {
-                if unused_triangles > Self::MAX_UNUSED_TRIANGLES
-                    && let Some(dropped) = meshes.remove(&key)
-                {
-                    unused_triangles -= dropped.triangles;
+                if unused_triangles <= Self::MAX_UNUSED_TRIANGLES {
+                    break;
                 }
+                unused_triangles -= meshes.remove(&key).map_or(0, |dropped| dropped.triangles);
             }
         }
     }

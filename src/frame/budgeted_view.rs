@@ -63,7 +63,7 @@ impl ViewForm {
     fn redraw(self, camera: &Camera) -> Redraw {
         match camera.redraw {
             Redraw::EveryFrame if self.interval > 1 => Redraw::Interval(self.interval),
-            // An interval of 0 frames stays one, so that its error names it.
+            // An interval of 0 frames is kept, so that its error names it.
             Redraw::Interval(interval) if interval > 0 => Redraw::Interval(interval.max(self.interval)),
             redraw => redraw,
         }

@@ -86,7 +86,7 @@ impl PlanCache {
     }
 
     /// Plans for such a scene and for others, which together have every pipeline that a plan may have. They are compiled if the cache does
-    /// not have them. The current plan stays.
+    /// not have them. The current plan does not change.
     ///
     /// # Errors
     /// If the processes make no frame.

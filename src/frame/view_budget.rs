@@ -117,8 +117,6 @@ struct ViewState {
     requested: u64,
     /// The frames between being shed and being restored.
     pause: u64,
-    /// The frame in which the budget moved it to its rung; `None` if it never did.
-    moved: Option<u64>,
 }
 
 /// A rung is restored if the prediction is below the budget by this factor.
@@ -252,11 +250,11 @@ impl ViewBudget {
     }
 
     /// Chooses rungs by the device's time for a frame, with the statistics of that same frame: the sum of its passes' times, although a device may
-    /// draw several at once. Frames of which the times of passes are [missing](DevicePassTimes::skipped) say nothing; a run of them is warned of. A budget is kept by this or by
-    /// [`Self::update`], not by both.
+    /// draw several at once. A frame that [lacks](DevicePassTimes::skipped) times of passes is ignored, and a run of such frames is warned of. A
+    /// budget is kept by this or by [`Self::update`], not by both.
     #[cfg(feature = "wgpu")]
     pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
-        self.incomplete = if times.skipped > 0 { self.incomplete.saturating_add(1) } else { 0 };
+        self.incomplete = continued(self.incomplete, times.skipped > 0);
         if self.incomplete == WARNING_FRAMES {
             tracing::warn!(target: "drawloom", "the device's times lack passes, so that a view budget learns nothing of them");
         }
@@ -308,7 +306,7 @@ impl ViewBudget {
     fn warn_without_rungs(&mut self, rungs: &HashMap<&str, usize>) {
         let with_ladder = || self.requested().filter(|view| view.rungs.len() > 1);
         let is_missing = with_ladder().count() > 0 && !with_ladder().any(|view| rungs.contains_key(view.name()));
-        self.without_rungs = if is_missing { self.without_rungs.saturating_add(1) } else { 0 };
+        self.without_rungs = continued(self.without_rungs, is_missing);
         if self.without_rungs == WARNING_FRAMES {
             tracing::warn!(
                 target: "drawloom",
@@ -321,7 +319,7 @@ impl ViewBudget {
         if !self.rest.is_settled() {
             return;
         }
-        self.over = if self.predicted() > self.budget { self.over + 1 } else { 0 };
+        self.over = continued(self.over, self.predicted() > self.budget);
         if self.over >= OVER_FRAMES {
             self.over = 0;
             self.shed();
@@ -356,7 +354,7 @@ impl ViewBudget {
     fn restore(&mut self) {
         // A view that is drawn seldom may not have been measured since it was restored.
         let is_awaited = |view: &ViewState| {
-            !view.is_measured() && view.moved.is_some_and(|moved| self.frame - moved < MAX_MEASURING_FRAMES)
+            !view.is_measured() && view.moved().is_some_and(|moved| self.frame - moved < MAX_MEASURING_FRAMES)
         };
         if self.frame - self.changed < SETTLE_FRAMES || self.requested().any(is_awaited) {
             return;
@@ -413,7 +411,6 @@ impl ViewState {
             restored: None,
             requested: 0,
             pause: MIN_PAUSE,
-            moved: None,
         }
     }
 
@@ -437,23 +434,32 @@ impl ViewState {
         self.draws[self.rung] == 0.0 || self.cost.on(self.rung).is_some()
     }
 
+    /// The frame in which the budget moved it to its rung; `None` if it never did.
+    fn moved(&self) -> Option<u64> {
+        self.restored.or((self.shed > 0).then_some(self.shed))
+    }
+
     fn shed_to(&mut self, rung: usize, frame: u64) {
         let was_restored = self.restored.take().is_some_and(|restored| frame - restored < RETRY_FRAMES);
         self.pause = if was_restored { (2 * self.pause).min(MAX_PAUSE) } else { MIN_PAUSE };
-        (self.rung, self.shed, self.is_trial, self.moved) = (rung, frame, false, Some(frame));
+        (self.rung, self.shed, self.is_trial) = (rung, frame, false);
         self.cost.move_to(rung, &self.rungs);
     }
 
     fn restore(&mut self, is_trial: bool, frame: u64) {
         let was_left_out = self.rungs[self.rung] == Rung::LeftOut;
         (self.rung, self.restored, self.is_trial) = (self.rung - 1, Some(frame), is_trial);
-        self.moved = Some(frame);
         if is_trial {
             self.cost.measure_on(self.rung, was_left_out);
         } else {
             self.cost.move_to(self.rung, &self.rungs);
         }
     }
+}
+
+/// The length of a run of frames after one more, which belongs to it or ends it.
+fn continued(run: u32, belongs: bool) -> u32 {
+    if belongs { run.saturating_add(1) } else { 0 }
 }
 
 /// # Errors

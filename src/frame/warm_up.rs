@@ -10,7 +10,7 @@ use crate::process::Requirements;
 use crate::scene::{Camera, Changes, Light, SceneRef, ViewKind};
 use crate::view::LightClass;
 
-/// Frames to draw while a world is loaded, and to show to nobody.
+/// Frames to draw while a world is loaded, whose pictures are not shown.
 ///
 /// Many drivers compile a shader when something is first drawn with it, for the formats and numbers of layers of the textures that are bound
 /// then. [`Renderer::prepare_pipelines`] makes pipelines, but draws nothing. A warm-up draws what a scene may require when lights, blended
@@ -20,7 +20,7 @@ use crate::view::LightClass;
 ///
 /// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of sight or dark, as
 /// those that are switched off are: a light that is drawn alone stands before a camera, and shines. Objects that no camera of the scene sees are
-/// not drawn, so neither is what only their materials need. What processes change in their buffers stays. The first frame after the warm-up is
+/// not drawn, so neither is what only their materials need. Buffers that processes change keep what they hold. The first frame after the warm-up is
 /// [one without frames before it](Renderer::forget_previous_frames).
 ///
 /// ```

@@ -55,6 +55,11 @@ pub struct GpuView {
 }
 
 impl GpuView {
+    /// Whether `view` has a layout: see [`GpuView::new`].
+    pub(crate) fn is_in_reach(view: &RenderView) -> bool {
+        FixedPosition::new(origin(view)).is_some()
+    }
+
     /// The layout of `view`; `None` if its camera is beyond [`FixedPosition::MAX_COORDINATE`].
     pub fn new(view: &RenderView, scene: &SceneRef<'_>, light_count: usize) -> Option<Self> {
         let (position, clip_from_relative) = origin_and_matrix(view);
@@ -85,26 +90,28 @@ impl GpuView {
 }
 
 /// The origin that a view's vertices are relative to, and the matrix from there to clip space.
+fn origin_and_matrix(view: &RenderView) -> (DVec3, Mat4) {
+    let (origin, matrix) = (origin(view), view.precise_clip_from_relative());
+    // The origin was rounded: the matrix translates by the actual difference, so that the picture does not move.
+    let offset = origin - view.camera.position;
+    let matrix = if offset == DVec3::ZERO { matrix } else { matrix * DMat4::from_translation(offset) };
+    (origin, matrix.as_mat4())
+}
+
+/// The origin that a view's vertices are relative to.
 ///
 /// The camera of an orthographic shadow map is many radii away from what it covers. Along parallel rays that distance
 /// serves no purpose and costs f32 precision. So the origin is midway between the near and far planes, which at least
 /// halves the distances, and the matrix includes the translation to it.
-fn origin_and_matrix(view: &RenderView) -> (DVec3, Mat4) {
+fn origin(view: &RenderView) -> DVec3 {
     let camera = &view.camera;
-    let matrix = view.precise_clip_from_relative();
     match camera.projection {
         Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => {
             let along = (f64::from(camera.near) + f64::from(camera.far)) * 0.5;
-            let offset = camera.orientation.as_dquat().normalize() * DVec3::NEG_Z * along;
-            let origin = camera.position + offset;
-            if FixedPosition::new(origin).is_none() {
-                return (camera.position, matrix.as_mat4());
-            }
-            // The sum was rounded: the matrix translates by the actual difference, so that the picture does not move.
-            let offset = origin - camera.position;
-            (origin, (matrix * DMat4::from_translation(offset)).as_mat4())
+            let origin = camera.position + camera.orientation.as_dquat().normalize() * DVec3::NEG_Z * along;
+            if FixedPosition::new(origin).is_some() { origin } else { camera.position }
         }
-        _ => (camera.position, matrix.as_mat4()),
+        _ => camera.position,
     }
 }
 
@@ -142,6 +149,27 @@ mod tests {
                 let [plain, moved] = [clip(&plain, point), clip(&moved, point)];
                 assert!(plain.abs_diff_eq(moved, 1e-5), "{plain} is not {moved}");
             }
+        }
+    }
+
+    #[test]
+    fn a_view_is_in_reach_if_its_camera_or_the_middle_of_its_shadow_map_is() {
+        let far = FixedPosition::MAX_COORDINATE + 1e3;
+        let parallel = Projection::Orthographic { height: 10.0 };
+        let at = |x: f64| Camera { far: 1e6, ..Camera::looking_at("view", DVec3::X * x, DVec3::ZERO) };
+        let map = |x: f64| Camera { kind: ViewKind::Shadow, projection: parallel, ..at(x) };
+        let cases = [
+            (at(0.0), true),
+            (at(far), false),
+            (at(f64::NAN), false),
+            (Camera { projection: parallel, ..at(far) }, false),
+            (map(far), true),
+            (map(2.0 * far), false),
+        ];
+        for (camera, expected) in cases {
+            let (view, scene) = (RenderView::new(&camera), Scene::new());
+            let has_layout = GpuView::new(&view, &scene.as_scene_ref(), 0).is_some();
+            assert_eq!((GpuView::is_in_reach(&view), has_layout), (expected, expected), "{camera:?}");
         }
     }
 

@@ -95,18 +95,10 @@ fn frames<B: Backend>(
     Ok(pictures)
 }
 
-/// All frames of the warm-up, and some of them.
-fn warm_up_frames() -> [usize; 2] {
-    [WarmUp::new(everything().as_scene_ref()).frames_left(), 3]
-}
-
-fn same_frames() -> Result<(), Failed> {
-    let draw = |warm_up_frames| {
-        let Fixture { renderer, submitter } = Fixture::with(2, with_memory)?;
-        frames((renderer, submitter), warm_up_frames, |submission, target| submission.read(0, target))
-    };
+/// Compares the frames after no frame of a warm-up, after all of them, and after some.
+fn expect_same_frames(draw: impl Fn(usize) -> Result<Vec<Picture>, Failed>) -> Result<(), Failed> {
     let expected = draw(0)?;
-    for warm_up_frames in warm_up_frames() {
+    for warm_up_frames in [WarmUp::new(everything().as_scene_ref()).frames_left(), 3] {
         if draw(warm_up_frames)? != expected {
             return Err(format!("another picture after {warm_up_frames} frames of a warm-up").into());
         }
@@ -114,18 +106,18 @@ fn same_frames() -> Result<(), Failed> {
     Ok(())
 }
 
+fn same_frames() -> Result<(), Failed> {
+    expect_same_frames(|warm_up_frames| {
+        let Fixture { renderer, submitter } = Fixture::with(2, with_memory)?;
+        frames((renderer, submitter), warm_up_frames, |submission, target| submission.read(0, target))
+    })
+}
+
 fn same_frames_in_software() -> Result<(), Failed> {
-    let draw = |warm_up_frames| {
+    expect_same_frames(|warm_up_frames| {
         let scheduler = Arc::new(Scheduler::new(2)?);
         let builder = with_memory(Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))));
         let built = builder.build(scheduler)?;
         frames(built, warm_up_frames, |submission, target| submission.read(0, target))
-    };
-    let expected = draw(0)?;
-    for warm_up_frames in warm_up_frames() {
-        if draw(warm_up_frames)? != expected {
-            return Err(format!("another picture after {warm_up_frames} frames of a warm-up").into());
-        }
-    }
-    Ok(())
+    })
 }

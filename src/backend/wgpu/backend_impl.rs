@@ -7,7 +7,6 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::backend::WgpuBackend;
-use super::begin_frame::check_reach;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
@@ -73,7 +72,7 @@ impl Backend for WgpuBackend {
         let imports = mem::take(&mut *self.imports.lock());
         // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that does not compile leave
         // everything as it is.
-        check_reach(request.views)?;
+        request.check_reach()?;
         let imports: Result<Vec<_>, _> =
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
         let imports = imports?;

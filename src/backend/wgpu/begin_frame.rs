@@ -15,17 +15,6 @@ use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::Mesh;
-use crate::view::{FixedPosition, RenderView};
-
-/// # Errors
-/// If a camera is out of reach.
-pub(super) fn check_reach(views: &[RenderView]) -> Result<(), BackendError> {
-    let is_out_of_reach = |view: &&RenderView| FixedPosition::new(view.camera.position).is_none();
-    match views.iter().find(is_out_of_reach) {
-        Some(view) => Err(BackendError::ViewOutOfReach { view: view.name().to_owned() }),
-        None => Ok(()),
-    }
-}
 
 impl WgpuBackend {
     /// Begins a frame with these pipelines and targets: creates or reuses the other resources of its passes.

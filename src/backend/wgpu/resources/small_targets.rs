@@ -107,17 +107,16 @@ mod tests {
     use crate::backend::wgpu::noop_device::noop_device;
     use crate::process::Format;
 
+    fn kind(format: Format, size: [u32; 2]) -> TextureKind {
+        TextureKind { format, multisampled: false, stored: false, mipmapped: false, size }
+    }
+
     #[test]
     #[expect(clippy::mutable_key_type, reason = "textures are equal if they are the same")]
     fn each_target_has_a_layer_of_its_own_and_keeps_it() {
         let (device, _) = noop_device();
-        let kind = |index: usize| TextureKind {
-            format: [Format::Rgba8Srgb, Format::Depth32Float][index % 2],
-            multisampled: false,
-            stored: false,
-            mipmapped: false,
-            size: [[8, 8], [16, 8]][index / 2],
-        };
+        let kind =
+            |index: usize| kind([Format::Rgba8Srgb, Format::Depth32Float][index % 2], [[8, 8], [16, 8]][index / 2]);
         for seed in 0..40 {
             let mut random = Rng::with_seed(seed);
             let mut small = SmallTargets::default();
@@ -161,13 +160,7 @@ mod tests {
     #[test]
     fn layers_are_used_again_before_there_are_more_textures() {
         let (device, _) = noop_device();
-        let kind = TextureKind {
-            format: Format::Rgba8Srgb,
-            multisampled: false,
-            stored: false,
-            mipmapped: false,
-            size: [8, 8],
-        };
+        let kind = kind(Format::Rgba8Srgb, [8, 8]);
         let new = |count: usize| (0..count).map(|_| SmallTarget { kind, kept: None }).collect::<Vec<_>>();
         let (all, assigned) = SmallTargets::default().assign(&device, &new(130)).unwrap();
         let layers: Vec<_> = all.textures().map(|(_, texture)| texture.depth_or_array_layers()).collect();
@@ -180,13 +173,7 @@ mod tests {
     #[test]
     fn targets_that_come_one_at_a_time_share_textures() {
         let (device, _) = noop_device();
-        let kind = TextureKind {
-            format: Format::Rgba8Srgb,
-            multisampled: false,
-            stored: false,
-            mipmapped: false,
-            size: [8, 8],
-        };
+        let kind = kind(Format::Rgba8Srgb, [8, 8]);
         let (mut small, mut kept) = (SmallTargets::default(), Vec::new());
         for _ in 0..300 {
             let known = kept.drain(..).map(Some).chain([None]);
