@@ -75,6 +75,7 @@
 // Each module uses only modules above it; `tests/architecture` fails otherwise.
 mod sync;
 mod unwind;
+pub mod fence;
 pub mod timeline;
 mod tuning;
 pub mod task;
@@ -100,9 +101,9 @@ pub mod guide;
 pub use backend::ViewQueue;
 pub use bytemuck;
 pub use frame::{
-    BudgetError, BudgetedView, BuildError, FrameError, FrameStatistics, Granularity, LevelStatistics, Recorded,
-    Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
-    ViewStatistics, WarmUp,
+    BudgetError, BudgetedView, Buffering, BuildError, FinishedFrame, FrameError, FrameLoop, FrameLoopError, FramePlace,
+    FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, Recorded, Renderer, RendererBuilder, Rung,
+    StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

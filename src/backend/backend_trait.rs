@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::error::BackendError;
+use super::frame_fence::FrameFence;
 use super::requests::{FrameRequest, PassRequest};
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
@@ -191,11 +192,15 @@ pub trait Backend: Send + Sync + 'static {
     /// A view has one queue, unless its plan has it submitted [process by
     /// process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
     ///
+    /// The device sets each of `fences` when it has done all passes up to the fence's place; they are in the order of their places. A fence
+    /// that is dropped is abandoned, so after an error none need be set.
+    ///
     /// # Errors
     /// If the device refuses.
     fn submit(
         &self,
         frame: Self::Frame,
         queues: Vec<ViewQueue<Self::Commands>>,
+        fences: Vec<FrameFence>,
     ) -> Result<Self::Submission, BackendError>;
 }

@@ -7,6 +7,7 @@ use parking_lot::Mutex;
 
 use super::backend_trait::Backend;
 use super::error::BackendError;
+use super::frame_fence::FrameFence;
 use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::command::DrawList;
@@ -24,7 +25,8 @@ use crate::task::Worker;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
 /// - a pass without commands has neither batches nor bundles;
-/// - passes are submitted in the planned order.
+/// - passes are submitted in the planned order;
+/// - fences have places within the frame, in order.
 #[derive(Debug, Default)]
 pub struct NullBackend;
 
@@ -195,7 +197,12 @@ impl Backend for NullBackend {
         })
     }
 
-    fn submit(&self, frame: NullFrame, queues: Vec<ViewQueue<NullPass>>) -> Result<NullSubmission, BackendError> {
+    fn submit(
+        &self,
+        frame: NullFrame,
+        queues: Vec<ViewQueue<NullPass>>,
+        mut fences: Vec<FrameFence>,
+    ) -> Result<NullSubmission, BackendError> {
         let uploaded = frame.uploaded.lock().len();
         ensure(uploaded == frame.object_count, || {
             format!("all objects are uploaded, but {uploaded} of {} are", frame.object_count)
@@ -203,6 +210,10 @@ impl Backend for NullBackend {
         let passes = || queues.iter().flat_map(|queue| &queue.passes);
         let in_order = passes().map(|(pass, _)| pass).eq(&frame.passes);
         ensure(in_order, || "passes are submitted in the planned order".to_owned())?;
+        ensure(fences.is_sorted_by_key(|fence| fence.passes), || "fences are in the order of their places".to_owned())?;
+        let within = fences.iter().all(|fence| fence.passes <= frame.passes.len());
+        ensure(within, || "fences have their places within the frame".to_owned())?;
+        FrameFence::set_up_to(frame.passes.len(), &mut fences);
         let passes = queues.into_iter().flat_map(|queue| queue.passes);
         Ok(NullSubmission { passes: passes.map(|(_, pass)| pass).collect() })
     }

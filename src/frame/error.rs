@@ -1,6 +1,7 @@
 //! Errors of building a renderer, recording a frame and submitting it.
 
 use crate::backend::BackendError;
+use crate::fence::FenceError;
 use crate::graph::{GraphProblem, NodeError, RunError};
 use crate::process::{PlanError, ProcessError};
 use crate::quality::QualityError;
@@ -122,6 +123,12 @@ pub enum FrameError {
     /// A callback of the scheduler panicked.
     #[error(transparent)]
     Scheduler(#[from] JobPanic),
+    /// A frame has no such [place](super::FramePlace).
+    #[error("the frame draws nothing at this place: {place}")]
+    UnknownPlace {
+        /// The place.
+        place: String,
+    },
     /// The frame's stage graph does not compile: a bug in Drawloom.
     #[error("the frame's stage graph does not compile: {0}")]
     StageGraph(GraphProblem),
@@ -204,6 +211,9 @@ pub enum SubmitError {
     /// It was recorded by another renderer.
     #[error("the frame was recorded by another renderer")]
     ForeignFrame,
+    /// A fence that it waits for was not set.
+    #[error("the frame could not be submitted: {0}")]
+    Fence(#[from] FenceError),
     /// The device refused it.
     #[error("the frame could not be submitted: {0}")]
     Backend(#[from] BackendError),

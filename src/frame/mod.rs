@@ -9,6 +9,8 @@ mod column_check;
 mod context;
 mod cost_model;
 mod error;
+mod frame_loop;
+mod frame_place;
 mod granularity;
 mod job_size;
 mod light_maps;
@@ -46,6 +48,8 @@ mod warnings;
 pub use budgeted_view::{BudgetedView, Rung, ViewForm};
 pub use builder::RendererBuilder;
 pub use error::{BudgetError, BuildError, FrameError, SubmitError};
+pub use frame_loop::{Buffering, FinishedFrame, FrameLoop, FrameLoopError, FrameSlot, FrameTimes};
+pub use frame_place::FramePlace;
 pub use granularity::Granularity;
 #[cfg(feature = "report")]
 pub(crate) use job_size::job_size;

@@ -2,12 +2,13 @@
 
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::view_cache::InFlight;
-use super::{FrameStatistics, SubmitError};
-use crate::backend::{Backend, ViewQueue};
-use crate::process::Pass;
+use super::{FrameError, FramePlace, FrameStatistics, Renderer, SubmitError};
+use crate::backend::{Backend, FrameFence, ViewQueue};
+use crate::fence::Fence;
+use crate::process::{FramePlan, Pass};
 use crate::timeline::Timeline;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
@@ -20,12 +21,23 @@ pub struct Recorded<B: Backend> {
     pub(super) queues: Vec<ViewQueue<B::Commands>>,
     /// The passes of all queues in the order of the plan.
     pub(super) submission_order: Vec<Pass>,
+    pub(super) plan: Arc<FramePlan>,
     pub(super) frame: B::Frame,
     pub(super) statistics: FrameStatistics,
     pub(super) backend: Arc<B>,
     /// The number of its frame in the timeline, if that was on.
     pub(super) frame_number: Option<u64>,
     pub(super) in_flight: InFlight,
+    pub(super) fences: FrameFences,
+}
+
+/// The fences of a recorded frame.
+#[derive(Default)]
+pub(super) struct FrameFences {
+    /// Those that its submission waits for, each with the longest wait.
+    awaited: Vec<(Fence, Duration)>,
+    /// Those that the device sets.
+    set: Vec<FrameFence>,
 }
 
 impl<B: Backend> Recorded<B> {
@@ -37,6 +49,49 @@ impl<B: Backend> Recorded<B> {
     /// The number of its frame in the [timeline](crate::timeline), if that was on while it was recorded.
     pub fn frame_number(&self) -> Option<u64> {
         self.frame_number
+    }
+
+    /// A fence that the device sets when it has done the frame up to this place (S 9.4). It is abandoned if the frame is dropped or
+    /// refused.
+    ///
+    /// With wgpu each place but the end is a submission of its own. Where passes share a command encoder, the fence is set after the last of these.
+    ///
+    /// ```
+    /// # use std::time::Duration;
+    /// # use drawloom::{FramePlace, Recorded, Submitter, backend::Backend};
+    /// # fn submit<B: Backend>(mut recorded: Recorded<B>, submitter: &Submitter<B>) -> Result<(), Box<dyn std::error::Error>> {
+    /// let mirror_is_drawn = recorded.fence_at(FramePlace::View(1))?;
+    /// let frame_is_drawn = recorded.fence_at(FramePlace::End)?;
+    /// frame_is_drawn.on_set(|drawn| println!("{drawn:?}"));
+    /// submitter.submit(recorded)?;
+    /// mirror_is_drawn.wait(Duration::from_secs(10))?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`FrameError::UnknownPlace`] if the frame has no such pass or view, or the view is [cached](crate::scene::Redraw).
+    pub fn fence_at(&mut self, place: FramePlace<'_>) -> Result<Fence, FrameError> {
+        let process_name = |index: usize| self.plan.processes()[index].name.as_str();
+        let passes = place.passes_before(&self.submission_order, process_name);
+        let passes = passes.ok_or_else(|| FrameError::UnknownPlace { place: place.to_string() })?;
+        let (setter, fence) = Fence::new(format!("{place} of {}", self.name()));
+        let later = self.fences.set.partition_point(|fence| fence.passes <= passes);
+        self.fences.set.insert(later, FrameFence { passes, setter });
+        Ok(fence)
+    }
+
+    /// Makes the submission of the frame wait until the CPU sets a fence (S 9.4), at most as long as `limit`. Otherwise
+    /// [`Submitter::submit`] returns [`SubmitError::Fence`], and drops the frame.
+    ///
+    /// Devices of wgpu cannot wait for the CPU themselves, so the device thread waits, and nothing behind this frame is submitted meanwhile.
+    pub fn submit_after(&mut self, fence: &Fence, limit: Duration) {
+        self.fences.awaited.push((fence.clone(), limit));
+    }
+
+    /// What messages call the frame.
+    fn name(&self) -> String {
+        self.frame_number.map_or_else(|| "a frame".to_owned(), |number| format!("frame {number}"))
     }
 
     /// The queue of each view.
@@ -103,17 +158,21 @@ impl<B: Backend> Submitter<B> {
     /// which they were recorded; nothing checks that.
     ///
     /// # Errors
-    /// If the frame is another renderer's, or the device refuses it.
+    /// If the frame is another renderer's, the device refuses it, or a fence that it [waits for](Recorded::submit_after) is not set.
     pub fn submit(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
         let span = tracing::debug_span!(target: "drawloom", "submit");
         let _entered = span.enter();
         if !Arc::ptr_eq(&self.backend, &recorded.backend) {
             return Err(SubmitError::ForeignFrame);
         }
+        for (fence, limit) in &recorded.fences.awaited {
+            fence.wait_as(*limit, || format!("the submission of {}", recorded.name()))?;
+        }
         let _timeline_span = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
-        let Recorded { queues, submission_order, frame, mut statistics, in_flight, .. } = recorded;
-        let submission = self.backend.submit(frame, in_submission_order(queues, &submission_order))?;
+        let Recorded { queues, submission_order, frame, mut statistics, in_flight, fences, .. } = recorded;
+        let queues = in_submission_order(queues, &submission_order);
+        let submission = self.backend.submit(frame, queues, fences.set)?;
         in_flight.submitted();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })
@@ -122,6 +181,16 @@ impl<B: Backend> Submitter<B> {
     /// The backend.
     pub fn backend(&self) -> &B {
         &self.backend
+    }
+
+    /// Whether it submits the frames of this renderer.
+    pub(super) fn submits_for(&self, renderer: &Renderer<B>) -> bool {
+        std::ptr::eq(&raw const *self.backend, renderer.backend())
+    }
+
+    /// What a submitter on another thread is made of, in place of this one.
+    pub(super) fn into_parts(self) -> (Arc<B>, Arc<Timeline>) {
+        (self.backend, self.timeline)
     }
 }
 

@@ -9,7 +9,7 @@ use super::context::FrameContext;
 use super::pass_recording::PassRecording;
 use super::pass_runs::{PassFailure, PassRuns};
 use super::plan_cache::{PlanCache, with_quality};
-use super::recorded::Recorded;
+use super::recorded::{FrameFences, Recorded};
 use super::scene_check::check_scene;
 use super::stage_clock::{StageClock, StageGroup};
 use super::stage_graph::{StageGraph, StageGraphCache, StageOptions};
@@ -331,7 +331,8 @@ impl<B: Backend> Renderer<B> {
         let submission_order = graph.passes.clone();
         let in_flight = self.view_cache.store(&plan, FrameViews { views, lights, arrays });
         let backend = Arc::clone(&self.backend);
-        Ok(Recorded { queues, submission_order, frame, statistics, backend, frame_number, in_flight })
+        let fences = FrameFences::default();
+        Ok(Recorded { queues, submission_order, plan, frame, statistics, backend, frame_number, in_flight, fences })
     }
 
     /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.

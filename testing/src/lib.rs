@@ -13,4 +13,5 @@ pub mod precision;
 pub mod random;
 pub mod samples;
 pub mod scenes;
+pub mod simulated_device;
 pub mod tinted;

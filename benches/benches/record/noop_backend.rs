@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use drawloom::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
+use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use drawloom::task::Worker;
 
 /// Ignores all that it receives.
@@ -61,7 +61,8 @@ impl Backend for NoopBackend {
         Ok(())
     }
 
-    fn submit(&self, _frame: (), _queues: Vec<ViewQueue<()>>) -> Result<(), BackendError> {
+    fn submit(&self, _frame: (), _queues: Vec<ViewQueue<()>>, fences: Vec<FrameFence>) -> Result<(), BackendError> {
+        fences.into_iter().for_each(|fence| fence.setter.set());
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use super::executor::Executor;
 use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
-use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use crate::task::{Scheduler, Worker};
 
 /// Draws on the CPU.
@@ -137,7 +137,8 @@ impl Backend for SoftwareBackend {
         &self,
         frame: SoftwareFrame,
         queues: Vec<ViewQueue<SoftwareCommands>>,
+        fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
-        frame.recording.submit(queues)
+        frame.recording.submit(queues, fences)
     }
 }

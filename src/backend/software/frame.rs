@@ -21,7 +21,7 @@ use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
-use crate::backend::{BackendError, PassRequest, ViewQueue};
+use crate::backend::{BackendError, FrameFence, PassRequest, ViewQueue};
 use crate::command::Batch;
 use crate::process::ShaderColumns;
 use crate::quality::VertexFormat;
@@ -57,9 +57,14 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         })
     }
 
-    fn submit(self: Box<Self>, queues: Vec<ViewQueue<SoftwareCommands>>) -> Result<SoftwareSubmission, BackendError> {
+    fn submit(
+        self: Box<Self>,
+        queues: Vec<ViewQueue<SoftwareCommands>>,
+        mut fences: Vec<FrameFence>,
+    ) -> Result<SoftwareSubmission, BackendError> {
         let _one_at_a_time = self.context.drawing.lock();
-        for (pass, commands) in queues.iter().flat_map(|queue| &queue.passes) {
+        for (before, (pass, commands)) in queues.iter().flat_map(|queue| &queue.passes).enumerate() {
+            FrameFence::set_up_to(before, &mut fences);
             let known = self.passes.iter().find(|known| known.pass == *pass);
             let unknown = || BackendError::BrokenRule {
                 rule: format!("submitted passes belong to the frame, but {pass:?} does not"),
@@ -68,6 +73,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         }
         let drawn: HashSet<_> = queues.iter().map(|queue| queue.view).collect();
         self.targets.copy_histories(|view| drawn.contains(&view));
+        fences.into_iter().for_each(|fence| fence.setter.set());
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::SoftwareSubmission;
 use super::commands::SoftwareCommands;
-use crate::backend::{BackendError, FrameRequest, PassRequest, ViewQueue};
+use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use crate::process::CpuShader;
 use crate::view::ObjectTable;
 
@@ -34,9 +34,13 @@ pub(super) trait FrameRecording: Send + Sync {
     /// If a batch's mesh does not exist. This is a bug in Drawloom.
     fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
 
-    /// Draws all passes.
+    /// Draws all passes, and sets each fence when the passes before its place are drawn.
     ///
     /// # Errors
     /// If a CPU shader panics.
-    fn submit(self: Box<Self>, queues: Vec<ViewQueue<SoftwareCommands>>) -> Result<SoftwareSubmission, BackendError>;
+    fn submit(
+        self: Box<Self>,
+        queues: Vec<ViewQueue<SoftwareCommands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<SoftwareSubmission, BackendError>;
 }

@@ -15,7 +15,7 @@ use super::recording::{
 };
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
-use crate::backend::{Backend, BackendError, FrameRequest, PassRequest, TargetMemory, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::Quality;
@@ -282,8 +282,9 @@ impl Backend for WgpuBackend {
         &self,
         mut frame: WgpuFrame,
         queues: Vec<ViewQueue<WgpuCommands>>,
+        fences: Vec<FrameFence>,
     ) -> Result<WgpuSubmission, BackendError> {
-        let submission = self.submit_frame(&mut frame, queues).inspect_err(|_| {
+        let submission = self.submit_frame(&mut frame, queues, fences).inspect_err(|_| {
             self.buffers.clear();
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();

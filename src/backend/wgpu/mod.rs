@@ -19,6 +19,7 @@ mod backend;
 mod backend_impl;
 mod begin_frame;
 mod error_scope;
+mod fences;
 mod frame;
 #[cfg(all(test, not(drawloom_loom)))]
 mod noop_device;

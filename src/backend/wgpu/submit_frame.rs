@@ -6,9 +6,11 @@ use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::fences::set_when_done;
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::submission::WgpuSubmission;
-use crate::backend::{BackendError, ViewQueue};
+use crate::backend::{BackendError, FrameFence, ViewQueue};
+use crate::fence::FenceSetter;
 use crate::tuning::Tuner;
 
 impl WgpuBackend {
@@ -20,11 +22,21 @@ impl WgpuBackend {
         &self,
         frame: &mut WgpuFrame,
         queues: Vec<ViewQueue<WgpuCommands>>,
+        fences: Vec<FrameFence>,
     ) -> Result<WgpuSubmission, BackendError> {
         let has_histories = frame.targets.have_histories();
         let drawn: HashSet<_> = queues.iter().filter(|_| has_histories).map(|queue| queue.view).collect();
-        let mut finished = Vec::with_capacity(queues.iter().map(|queue| queue.passes.len()).sum());
+        let pass_count = queues.iter().map(|queue| queue.passes.len()).sum();
+        let mut finished = Vec::with_capacity(pass_count);
+        let (inner_fences, end_fences): (Vec<_>, Vec<_>) =
+            fences.into_iter().partition(|fence| fence.passes < pass_count);
+        let mut inner_fences = inner_fences.into_iter().peekable();
+        // Of each inner fence, the number of command buffers before its place.
+        let mut inner_places = Vec::new();
         for (index, (_, WgpuCommands(commands))) in queues.into_iter().flat_map(|queue| queue.passes).enumerate() {
+            while let Some(fence) = inner_fences.next_if(|fence| fence.passes <= index) {
+                inner_places.push((finished.len(), fence.setter));
+            }
             match commands {
                 PassCommands::Finished(commands) => finished.push(commands),
                 PassCommands::InEarlierPass => {}
@@ -56,7 +68,9 @@ impl WgpuBackend {
                 frame.targets.copy_histories(&mut encoder, |view| drawn.contains(&view));
                 encoder.finish()
             });
-            let index = self.queue().submit(finished.into_iter().chain(copies).chain(copy));
+            let mut finished = finished.into_iter();
+            self.submit_up_to_fences(&mut finished, inner_places)?;
+            let index = self.queue().submit(finished.chain(copies).chain(copy));
             frame.buffers.objects().await_submission(self.queue());
             let (device, queue) = (self.device.clone(), self.queue().clone());
             Ok((WgpuSubmission::new(device, queue, index.clone(), Arc::clone(&frame.targets), readback), index))
@@ -65,8 +79,30 @@ impl WgpuBackend {
         // Only now, because a submission that is refused uploads and copies nothing.
         frame.pending_uploads.submitted();
         frame.read_backs.drain(..).for_each(|copy| copy.submitted(&index));
+        end_fences.into_iter().for_each(|fence| set_when_done(&self.device, self.queue(), &index, fence.setter));
         self.report_costs(frame);
         Ok(submission)
+    }
+
+    /// Submits the command buffers before the place of each of these fences, and has the device set the fence after them. A fence has the
+    /// number of command buffers before its place.
+    ///
+    /// # Errors
+    /// If the device refuses one of the command buffers. Its fence and those behind it are abandoned.
+    fn submit_up_to_fences(
+        &self,
+        commands: &mut impl Iterator<Item = wgpu::CommandBuffer>,
+        fences: Vec<(usize, FenceSetter)>,
+    ) -> Result<(), BackendError> {
+        let mut submitted = 0;
+        for (count, setter) in fences {
+            // An error scope of its own, as a fence must not be set for what the device has refused.
+            let part = commands.take(count - submitted);
+            let index = with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
+            set_when_done(&self.device, self.queue(), &index, setter);
+            submitted = count;
+        }
+        Ok(())
     }
 
     /// Reports the frame's measured costs to the tuners, and keeps the statistics of its passes.

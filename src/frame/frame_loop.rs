@@ -1,0 +1,215 @@
+//! A loop of frames with a device thread of its own.
+
+mod buffering;
+mod finished_frame;
+mod queues;
+mod slot;
+
+use std::io;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+pub use buffering::Buffering;
+pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
+pub use slot::FrameSlot;
+
+use self::queues::{AwaitedFrame, LoopQueues};
+use super::{FramePlace, Renderer, Submitter};
+use crate::backend::Backend;
+use crate::task::catch;
+
+/// Keeps a few frames in flight: it owns the device thread, which submits recorded frames, and keeps the engine from running further ahead of
+/// the device than its [`Buffering`] says (S figures 9.1 and 9.2). An engine may use it, or call [`Submitter::submit`] where it likes.
+///
+/// The engine's thread updates its world and records; the world is its own again when recording ends (L 3), so it updates and records the
+/// next frame while the device thread submits this one and the device draws. The order of an iteration is that of this example: what it
+/// draws depends on the input after [`begin`](Self::begin), so that is where [latency](FrameTimes::latency) is measured from.
+///
+/// ```
+/// # use std::sync::Arc;
+/// # use drawloom::backend::NullBackend;
+/// # use drawloom::glam::DVec3;
+/// # use drawloom::process::Deferred;
+/// # use drawloom::scene::{Camera, Scene};
+/// # use drawloom::task::Scheduler;
+/// use drawloom::{Buffering, FrameLoop, Renderer};
+///
+/// # let scheduler = Arc::new(Scheduler::new(2)?);
+/// # let mut world = Scene::new();
+/// # world.cameras.push(Camera::looking_at("main", DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO));
+/// let (renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// let mut frames = FrameLoop::new(renderer, submitter, Buffering::Double)?;
+/// for _ in 0..3 {
+///     // Waits while two frames are in flight.
+///     let (slot, finished) = frames.begin();
+///     for frame in finished {
+///         frame.outcome?;
+///         println!("frame {}: {:?} from the input to the picture", frame.number, frame.times.latency());
+///     }
+///     // Here the engine reads its input, and updates the world.
+///     let recorded = frames.renderer().record(world.as_scene_ref())?;
+///     // The world is free again.
+///     slot.submit(recorded);
+/// }
+/// let (_renderer, last_frames) = frames.finish();
+/// assert!(last_frames.iter().all(|frame| frame.outcome.is_ok()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct FrameLoop<B: Backend>
+where
+    B::Submission: Send,
+{
+    /// `None` once it is handed back.
+    renderer: Option<Renderer<B>>,
+    queues: Arc<LoopQueues<B>>,
+    threads: Vec<JoinHandle<()>>,
+    /// The number of frames begun.
+    begun: u64,
+}
+
+impl<B: Backend> FrameLoop<B>
+where
+    B::Submission: Send,
+{
+    /// How long the device may take for a frame, if [nothing else](Self::set_device_limit) is set.
+    pub const DEVICE_LIMIT: Duration = Duration::from_secs(30);
+
+    /// A loop around a renderer. The submitter moves to a thread of the loop, so that thread is the device thread from now on.
+    ///
+    /// # Errors
+    /// - [`FrameLoopError::ForeignSubmitter`] if the submitter is not the renderer's.
+    /// - [`FrameLoopError::Thread`] if the OS starts no thread.
+    pub fn new(renderer: Renderer<B>, submitter: Submitter<B>, buffering: Buffering) -> Result<Self, FrameLoopError> {
+        if !submitter.submits_for(&renderer) {
+            return Err(FrameLoopError::ForeignSubmitter);
+        }
+        let queues = Arc::new(LoopQueues::new(buffering, Self::DEVICE_LIMIT));
+        // A loop from the first thread on, so that dropping it ends a thread if the other one cannot start.
+        let mut frames = Self { renderer: Some(renderer), queues, threads: Vec::new(), begun: 0 };
+        // The submitter itself cannot leave its thread, which is what makes that the device thread; what it submits to can.
+        let (backend, timeline) = submitter.into_parts();
+        frames.spawn("drawloom device", move |queues| submit_frames(&Submitter::new(backend, timeline), queues))?;
+        frames.spawn("drawloom completion", await_frames)?;
+        Ok(frames)
+    }
+
+    fn spawn(&mut self, name: &str, work: impl FnOnce(&LoopQueues<B>) + Send + 'static) -> Result<(), FrameLoopError> {
+        let queues = Arc::clone(&self.queues);
+        let thread = thread::Builder::new().name(name.to_owned()).spawn(move || work(&queues));
+        self.threads.push(thread.map_err(|error: io::Error| FrameLoopError::Thread(error))?);
+        Ok(())
+    }
+
+    /// Begins a frame: waits until fewer frames are in flight than the buffering allows, and returns a slot for one, with the frames that
+    /// finished since the last call, in their order. A frame that is dropped instead of submitted frees its slot.
+    ///
+    /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of the device, allow.
+    pub fn begin(&mut self) -> (FrameSlot<B>, Vec<FinishedFrame<B>>) {
+        let start = Instant::now();
+        let finished = self.queues.take_slot();
+        let begun = Instant::now();
+        self.begun += 1;
+        (FrameSlot::new(Arc::clone(&self.queues), self.begun, begun, begun - start), finished)
+    }
+
+    /// The renderer, to record a frame with.
+    pub fn renderer(&mut self) -> &mut Renderer<B> {
+        self.renderer.as_mut().expect("only `finish` takes the renderer, and with it the loop")
+    }
+
+    /// Sets the buffering from the next frame on.
+    pub fn set_buffering(&mut self, buffering: Buffering) {
+        self.queues.set_buffering(buffering);
+    }
+
+    /// The buffering.
+    pub fn buffering(&self) -> Buffering {
+        self.queues.buffering()
+    }
+
+    /// Sets how long the device may take from the submission of a frame until it is drawn. After that the frame is
+    /// [reported](FrameLoopError::Unfinished) as failed, and the loop goes on without it.
+    pub fn set_device_limit(&mut self, limit: Duration) {
+        self.queues.set_device_limit(limit);
+    }
+
+    /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since the last
+    /// [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is dropped.
+    pub fn finish(mut self) -> (Renderer<B>, Vec<FinishedFrame<B>>) {
+        self.end_threads();
+        let renderer = self.renderer.take().expect("nothing takes it before");
+        (renderer, self.queues.take_finished())
+    }
+
+    fn end_threads(&mut self) {
+        self.queues.close();
+        for thread in self.threads.drain(..) {
+            // What the engine's code can panic in is caught on these threads.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl<B: Backend> Drop for FrameLoop<B>
+where
+    B::Submission: Send,
+{
+    fn drop(&mut self) {
+        self.end_threads();
+    }
+}
+
+/// The device thread: submits frames in the order in which they come.
+fn submit_frames<B: Backend>(submitter: &Submitter<B>, queues: &LoopQueues<B>)
+where
+    B::Submission: Send,
+{
+    while let Some(frame) = queues.next_to_submit() {
+        let (slot, mut recorded, after) = (frame.slot, frame.recorded, frame.after);
+        let start = Instant::now();
+        let submit = || {
+            let drawn = recorded.fence_at(FramePlace::End).map_err(|error| error.to_string())?;
+            let submitted = submitter.submit(recorded);
+            if let Ok(submitted) = &submitted {
+                after(submitted);
+            }
+            Ok((submitted, drawn))
+        };
+        let outcome = match catch(submit) {
+            Ok(Ok((Ok(submitted), drawn))) => Ok((submitted, drawn)),
+            Ok(Ok((Err(error), _))) => Err(FrameLoopError::Submit(error)),
+            Ok(Err(message)) => Err(FrameLoopError::Panicked { message }),
+            Err(panic) => Err(FrameLoopError::Panicked { message: panic.message }),
+        };
+        queues.add_awaited(AwaitedFrame { slot, recorded_at: frame.recorded_at, start, end: Instant::now(), outcome });
+    }
+    queues.end_submission();
+}
+
+/// The completion thread: waits until the device has drawn the frames, one after the other.
+fn await_frames<B: Backend>(queues: &LoopQueues<B>)
+where
+    B::Submission: Send,
+{
+    while let Some(AwaitedFrame { slot, recorded_at, start, end, outcome }) = queues.next_to_await() {
+        let mut drawn_at = end;
+        let outcome = outcome.and_then(|(submitted, drawn)| {
+            drawn.wait(queues.device_limit())?;
+            drawn_at = drawn.set_at().unwrap_or(end).max(end);
+            Ok(submitted)
+        });
+        let times = FrameTimes {
+            waited: slot.waited(),
+            begun: slot.begun(),
+            recorded: recorded_at,
+            submission_began: start,
+            submitted: end,
+            finished: if outcome.is_ok() { drawn_at } else { Instant::now() },
+        };
+        let number = slot.number();
+        // Before the slot is free, so that whoever begins a frame in it hears of this one.
+        queues.add_finished(FinishedFrame { number, outcome, times });
+        drop(slot);
+    }
+}

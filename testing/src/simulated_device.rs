@@ -1,0 +1,205 @@
+//! A device that takes a given time for a frame.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue};
+use drawloom::command::DrawState;
+use drawloom::process::{Draws, FramePlan};
+use drawloom::quality::Quality;
+use drawloom::task::Worker;
+use drawloom::timeline::{Labels, TuningChoice};
+
+/// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
+/// Its passes take equal shares of that time.
+pub struct SimulatedDevice<B> {
+    inner: B,
+    /// The times of the next frames, before `frame_time`.
+    next_times: Mutex<VecDeque<Duration>>,
+    frame_time: Duration,
+    /// `None` once it ends.
+    frames: Option<Sender<DeviceFrame>>,
+    device: Option<JoinHandle<()>>,
+}
+
+/// A frame that the device draws.
+struct DeviceFrame {
+    submitted: Instant,
+    time: Duration,
+    passes: usize,
+    fences: Vec<FrameFence>,
+}
+
+impl<B> SimulatedDevice<B> {
+    /// A device that takes so long for each frame.
+    pub fn new(inner: B, frame_time: Duration) -> Self {
+        let (frames, received) = channel();
+        let device = thread::spawn(move || draw_frames(&received));
+        Self { inner, next_times: Mutex::default(), frame_time, frames: Some(frames), device: Some(device) }
+    }
+
+    /// The times of the frames that are submitted next, in order. Those after them take the usual time.
+    pub fn with_next_times(self, times: impl IntoIterator<Item = Duration>) -> Self {
+        self.next_times.lock().unwrap().extend(times);
+        self
+    }
+}
+
+impl<B> Drop for SimulatedDevice<B> {
+    fn drop(&mut self) {
+        self.frames = None;
+        if let Some(device) = self.device.take() {
+            device.join().unwrap();
+        }
+    }
+}
+
+fn draw_frames(frames: &Receiver<DeviceFrame>) {
+    let mut free = Instant::now();
+    for DeviceFrame { submitted, time, passes, fences } in frames {
+        let start = free.max(submitted);
+        for fence in fences {
+            let share = if passes == 0 { 1.0 } else { fence.passes as f64 / passes as f64 };
+            sleep_until(start + time.mul_f64(share));
+            fence.setter.set();
+        }
+        free = start + time;
+        sleep_until(free);
+    }
+}
+
+/// More exact than a sleep alone, which may take a tenth of a millisecond more.
+fn sleep_until(time: Instant) {
+    const SPIN: Duration = Duration::from_micros(200);
+    if let Some(rest) = time.checked_duration_since(Instant::now()).and_then(|rest| rest.checked_sub(SPIN)) {
+        thread::sleep(rest);
+    }
+    while Instant::now() < time {
+        thread::yield_now();
+    }
+}
+
+impl<B: Backend> Backend for SimulatedDevice<B> {
+    type Frame = B::Frame;
+    type Part = B::Part;
+    type Commands = B::Commands;
+    type Submission = B::Submission;
+
+    fn submit(
+        &self,
+        frame: B::Frame,
+        queues: Vec<ViewQueue<B::Commands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<B::Submission, BackendError> {
+        let passes = queues.iter().map(|queue| queue.passes.len()).sum();
+        let submission = self.inner.submit(frame, queues, Vec::new())?;
+        let time = self.next_times.lock().unwrap().pop_front().unwrap_or(self.frame_time);
+        let frame = DeviceFrame { submitted: Instant::now(), time, passes, fences };
+        self.frames.as_ref().expect("it ends when it is dropped").send(frame).expect("the device runs until then");
+        Ok(submission)
+    }
+
+    fn adapter_name(&self) -> String {
+        format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        self.inner.uploaded_bytes()
+    }
+
+    fn prepare_pipelines(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        states: &[Vec<DrawState>],
+        quality: &Quality,
+    ) -> Result<(), BackendError> {
+        self.inner.prepare_pipelines(plan, draws, states, quality)
+    }
+
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<B::Frame, BackendError> {
+        self.inner.begin(request)
+    }
+
+    fn discard_frame(&self) {
+        self.inner.discard_frame();
+    }
+
+    fn forget_histories(&self) {
+        self.inner.forget_histories();
+    }
+
+    fn imports_targets_of(&self, view: &str) -> bool {
+        self.inner.imports_targets_of(view)
+    }
+
+    fn objects_epoch(&self, frame: &B::Frame) -> u64 {
+        self.inner.objects_epoch(frame)
+    }
+
+    fn target_memory(&self, frame: &B::Frame) -> TargetMemory {
+        self.inner.target_memory(frame)
+    }
+
+    fn upload_objects(
+        &self,
+        worker: &Worker,
+        frame: &B::Frame,
+        request: &FrameRequest<'_>,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        self.inner.upload_objects(worker, frame, request, blocks)
+    }
+
+    fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        self.inner.prepare(worker, frame, pass)
+    }
+
+    fn part_count(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> usize {
+        self.inner.part_count(frame, pass)
+    }
+
+    fn record(
+        &self,
+        worker: &Worker,
+        frame: &B::Frame,
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        emit: &mut dyn FnMut(B::Part),
+    ) -> Result<(), BackendError> {
+        self.inner.record(worker, frame, pass, parts, emit)
+    }
+
+    fn finish(
+        &self,
+        worker: &Worker,
+        frame: &B::Frame,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<B::Part>,
+    ) -> Result<B::Commands, BackendError> {
+        self.inner.finish(worker, frame, pass, parts)
+    }
+
+    fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> bool {
+        self.inner.continues_previous_pass(frame, pass)
+    }
+
+    fn finish_together(
+        &self,
+        worker: &Worker,
+        frame: &B::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<B::Part>],
+        emit: &mut dyn FnMut(B::Commands),
+    ) -> Result<(), BackendError> {
+        self.inner.finish_together(worker, frame, passes, parts, emit)
+    }
+
+    fn recording_choice(&self, frame: &B::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
+        self.inner.recording_choice(frame, pass, labels)
+    }
+}
