@@ -42,6 +42,11 @@ impl<B> SimulatedDevice<B> {
         Self { inner, next_times: Mutex::default(), frame_time, frames: Some(frames), device: Some(device) }
     }
 
+    /// The backend that it wraps.
+    pub fn inner(&self) -> &B {
+        &self.inner
+    }
+
     /// The times of the frames that are submitted next, in order. Those after them take the usual time.
     pub fn with_next_times(self, times: impl IntoIterator<Item = Duration>) -> Self {
         self.next_times.lock().unwrap().extend(times);

@@ -20,6 +20,7 @@ mod imported_meshes;
 mod device_times;
 mod devices;
 mod extremes;
+mod fences;
 mod fixture;
 mod formats;
 mod geometry;
@@ -85,6 +86,7 @@ fn main() {
         (cascades::CASES, Needs::Adapter),
         (changes::CASES, Needs::Adapter),
         (extremes::CASES, Needs::Adapter),
+        (fences::CASES, Needs::Adapter),
         (formats::CASES, Needs::Adapter),
         (geometry::CASES, Needs::Adapter),
         (history::CASES, Needs::Adapter),

@@ -10,6 +10,9 @@ use crate::backend::Backend;
 use crate::fence::Fence;
 use crate::frame::{Recorded, Submitted};
 
+/// What the engine does when a frame is submitted.
+type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
+
 /// A frame on its way to the device thread.
 pub(super) struct RecordedFrame<B: Backend>
 where
@@ -17,7 +20,7 @@ where
 {
     pub(super) slot: FrameSlot<B>,
     pub(super) recorded: Recorded<B>,
-    pub(super) after: Box<dyn FnOnce(&Submitted<B>) + Send>,
+    pub(super) after: AfterSubmission<B>,
     pub(super) recorded_at: Instant,
 }
 
