@@ -28,7 +28,8 @@
 //! Where to begin:
 //!
 //! - `guide`, with the feature `wgpu`: from a plain wgpu renderer to Drawloom in seven steps, and what it is not for.
-//! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
+//! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop. [`FrameLoop`] is a device
+//!   thread with one, two or three frames in flight.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
 //! - [`timeline`] tells what ran where and when; `report`, behind its feature, why a frame took as long as it did.
