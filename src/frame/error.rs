@@ -108,11 +108,11 @@ pub enum FrameError {
         /// Why.
         source: NodeError,
     },
-    /// A stage panicked, in the code of a process or in Drawloom's own. Where the program is built with `panic =
+    /// A stage panicked, in the code of a process, of a backend, or in Drawloom's own. Where the program is built with `panic =
     /// "abort"` the program ends instead, as no panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
-        /// The process, the view and the stage.
+        /// The process, the view and the stage; the stage alone where it is the whole frame's.
         stage: String,
         /// What the panic said.
         message: String,
@@ -137,6 +137,15 @@ pub enum FrameError {
 impl FrameError {
     /// The most views of a frame, shadow maps among them. Each has passes and targets of its own.
     pub const MAX_VIEWS: usize = 4_096;
+
+    /// What the backend or its device says, if that is why the frame failed.
+    pub fn backend_error(&self) -> Option<&BackendError> {
+        match self {
+            Self::Backend(error) => Some(error),
+            Self::Failed { source, .. } => source.downcast_ref(),
+            _ => None,
+        }
+    }
 }
 
 impl From<RunError> for FrameError {
@@ -208,8 +217,9 @@ impl BudgetError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubmitError {
-    /// It was recorded by another renderer.
-    #[error("the frame was recorded by another renderer")]
+    /// It was recorded by another renderer, or for a backend that this renderer [had before](super::Renderer::replace_backend) or has had
+    /// since.
+    #[error("the frame was recorded by another renderer, or for another backend")]
     ForeignFrame,
     /// A fence that it waits for was not set.
     #[error("the frame could not be submitted: {0}")]
@@ -217,4 +227,20 @@ pub enum SubmitError {
     /// The device refused it.
     #[error("the frame could not be submitted: {0}")]
     Backend(#[from] BackendError),
+    /// The backend panicked. Where the program is built with `panic = "abort"` the program ends instead.
+    #[error("the submission of the frame panicked: {message}")]
+    Panicked {
+        /// What the panic said.
+        message: String,
+    },
+}
+
+impl SubmitError {
+    /// What the backend or its device says, if that is why the frame was not submitted.
+    pub fn backend_error(&self) -> Option<&BackendError> {
+        match self {
+            Self::Backend(error) => Some(error),
+            Self::ForeignFrame | Self::Fence(_) | Self::Panicked { .. } => None,
+        }
+    }
 }

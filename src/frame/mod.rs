@@ -22,6 +22,7 @@ mod pass_runs;
 mod plan_cache;
 mod recorded;
 mod renderer;
+mod replace_backend;
 mod scene_check;
 mod stage;
 mod stage_clock;

@@ -9,6 +9,7 @@ use super::{FrameError, FramePlace, FrameStatistics, Renderer, SubmitError};
 use crate::backend::{Backend, FrameFence, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
+use crate::task::{JobPanic, catch};
 use crate::timeline::Timeline;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
@@ -158,7 +159,8 @@ impl<B: Backend> Submitter<B> {
     /// which they were recorded; nothing checks that.
     ///
     /// # Errors
-    /// If the frame is another renderer's, the device refuses it, or a fence that it [waits for](Recorded::submit_after) is not set.
+    /// If the frame is another renderer's, or another backend's, if the device refuses it, or if a fence that it
+    /// [waits for](Recorded::submit_after) is not set. If the device is lost, that is the error.
     pub fn submit(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
         let span = tracing::debug_span!(target: "drawloom", "submit");
         let _entered = span.enter();
@@ -172,7 +174,9 @@ impl<B: Backend> Submitter<B> {
         let start = Instant::now();
         let Recorded { queues, submission_order, frame, mut statistics, in_flight, fences, .. } = recorded;
         let queues = in_submission_order(queues, &submission_order);
-        let submission = self.backend.submit(frame, queues, fences.set)?;
+        // No scheduler would catch a panic of this thread.
+        let submission = catch(|| self.backend.submit(frame, queues, fences.set))
+            .map_err(|JobPanic { message }| SubmitError::Panicked { message })??;
         in_flight.submitted();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })

@@ -26,7 +26,7 @@ use crate::graph::RunError;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
-use crate::task::{BackgroundJob, Scheduler};
+use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
 use crate::view::{RenderView, possible_draw_states};
 
@@ -215,7 +215,8 @@ impl<B: Backend> Renderer<B> {
         let (backend, quality) = (Arc::clone(&self.backend), self.quality);
         Ok(move || {
             for (plan, states) in plans.iter().zip(&states_of_plans) {
-                backend.prepare_pipelines(plan, &plan.draws()?, states, &quality)?;
+                let draws = plan.draws()?;
+                catch_panics("prepare pipelines", || backend.prepare_pipelines(plan, &draws, states, &quality))??;
             }
             Ok(())
         })
@@ -278,7 +279,8 @@ impl<B: Backend> Renderer<B> {
             rejections: self.tables.objects.rejections(),
         };
         let uploaded_before = self.backend.uploaded_bytes();
-        let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0?;
+        let begin = || catch_panics("begin", || self.backend.begin(&request));
+        let frame = clock.measure(StageGroup::Record, begin).0??;
         reset_recordings(&mut self.recordings, request.passes.len());
         self.pass_runs.begin_frame(request.passes.len(), |pass| self.backend.continues_previous_pass(&frame, pass));
 
@@ -333,6 +335,14 @@ impl<B: Backend> Renderer<B> {
         let backend = Arc::clone(&self.backend);
         let fences = FrameFences::default();
         Ok(Recorded { queues, submission_order, plan, frame, statistics, backend, frame_number, in_flight, fences })
+    }
+
+    /// Puts a backend in the place of the one before, and drops what belongs to that one.
+    pub(super) fn set_backend(&mut self, backend: Arc<B>) {
+        self.backend = backend;
+        // A frame that failed may have left commands of its device.
+        self.recordings.clear();
+        self.view_cache.forget_frames_in_flight();
     }
 
     /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.
@@ -411,6 +421,14 @@ impl<B: Backend> Renderer<B> {
     }
 }
 
+/// Calls a backend on a thread whose panics no scheduler catches.
+///
+/// # Errors
+/// If it panics.
+fn catch_panics<R>(stage: &str, call: impl FnOnce() -> R) -> Result<R, FrameError> {
+    catch(call).map_err(|JobPanic { message }| FrameError::Panicked { stage: stage.to_owned(), message })
+}
+
 /// Makes `recordings` one for each pass, empty.
 fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
     recordings.resize_with(passes, PassRecording::default);
@@ -425,11 +443,13 @@ fn error_of_pass<B: Backend>(
     views: &[RenderView],
 ) -> RunError {
     let name_of = |pass| graph.node_name("finish", pass, views);
+    let name_failed = |node: String| {
+        let failure = failures.iter().find(|failure| name_of(failure.job_of) == node);
+        failure.map_or(node, |failure| name_of(failure.failed))
+    };
     match error {
-        RunError::Failed { node, source } => {
-            let failure = failures.iter().find(|failure| name_of(failure.job_of) == node);
-            RunError::Failed { node: failure.map_or(node, |failure| name_of(failure.failed)), source }
-        }
+        RunError::Failed { node, source } => RunError::Failed { node: name_failed(node), source },
+        RunError::Panicked { node, message } => RunError::Panicked { node: name_failed(node), message },
         other => other,
     }
 }

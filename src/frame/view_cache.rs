@@ -114,6 +114,11 @@ impl ViewCache {
     pub(super) fn invalidate(&mut self) {
         self.latest = None;
     }
+
+    /// Makes the next frame draw all of its views, whatever becomes of frames that are in flight.
+    pub(super) fn forget_frames_in_flight(&mut self) {
+        (self.latest, self.lost) = (None, Arc::default());
+    }
 }
 
 impl InFlight {

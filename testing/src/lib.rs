@@ -7,6 +7,7 @@ pub mod adversarial_names;
 pub mod changing_world;
 pub mod culling;
 pub mod draw_lists;
+pub mod fault_injection;
 pub mod feedback;
 pub mod mip_levels;
 pub mod precision;

@@ -3,6 +3,7 @@
 use std::array;
 use std::mem;
 use std::ops::Range;
+use std::panic::resume_unwind;
 use std::time::{Duration, Instant};
 
 use super::super::context::FrameContext;
@@ -11,7 +12,7 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError, PassRequest};
 use crate::command::{DrawList, instance, sort};
-use crate::task::Worker;
+use crate::task::{JobPanic, Worker, catch};
 use crate::view::{self, SelectionFilter};
 
 /// Makes a command for each visible object (M 10.3).
@@ -422,7 +423,12 @@ fn finish_together<B: Backend>(
     };
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
     let start = Instant::now();
-    let result = frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit);
+    let result = catch(|| frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit));
+    let result = result.unwrap_or_else(|JobPanic { message }| {
+        fail(finished);
+        // The run reports it.
+        resume_unwind(Box::new(message))
+    });
     attribute_time(frame, requests, job_of, start.elapsed());
     if result.is_err() {
         fail(finished);

@@ -1,0 +1,60 @@
+//! Another device in the place of one that is lost.
+
+use std::sync::Arc;
+
+use super::{Renderer, Submitter};
+use crate::backend::Backend;
+
+impl<B: Backend> Renderer<B> {
+    /// Puts another backend in the place of this one, from the next frame on: one on a new device, after the device was lost. The renderer
+    /// never does that by itself. The next frame uploads everything that it draws from the scene's assets again, makes targets and
+    /// pipelines, and is the same to the byte as it would have been on the device before, unless a process reads what only that one had.
+    /// Plans, measured costs, and what is derived from the scene on the CPU stay.
+    ///
+    /// The thread that calls this becomes the device thread: the returned submitter cannot leave it. An engine that records on another
+    /// thread hands the renderer to the device thread for this call, as when it was built. Frames that were recorded for the backend before
+    /// are refused by the new submitter, as [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame); the submitter before still
+    /// takes them, and refuses those that follow. The backend before is dropped with its submitter and frames.
+    ///
+    /// These are the engine's to do:
+    ///
+    /// - What it set on the backend before, it sets on the new one: the recording and encoding strategy, the timing of passes, transient
+    ///   targets, and imports for the next frame.
+    /// - [Meshes in its own buffers](crate::scene::Mesh::from_buffers) and other resources of its own belong to the device before. It makes
+    ///   their buffers anew and replaces the assets, or the next frame is refused with an error that names the mesh.
+    /// - A window's [surface](crate::backend::WindowSurface) belongs to a device too. It is dropped before another one is made.
+    /// - [Histories](crate::process::Declare::samples_previous) are empty, and buffers that processes share are zero, as in the first frame.
+    /// - Pipelines are made in the next frame, unless the engine calls [`prepare_pipelines`](Self::prepare_pipelines) before it. One that it
+    ///   prepares in the background for the backend before goes on, and its result is of no use.
+    ///
+    /// ```
+    /// use drawloom::backend::{Backend, BackendError};
+    /// use drawloom::scene::SceneRef;
+    /// use drawloom::{FrameError, Renderer, SubmitError, Submitted, Submitter};
+    ///
+    /// /// Draws a frame, on a new device if this one is lost. `open` makes a backend on a new device, as when the engine started.
+    /// fn draw<B: Backend>(
+    ///     renderer: &mut Renderer<B>,
+    ///     submitter: &mut Submitter<B>,
+    ///     world: SceneRef<'_>,
+    ///     open: impl Fn() -> Result<B, BackendError>,
+    /// ) -> Result<Submitted<B>, Box<dyn std::error::Error>> {
+    ///     let is_loss = |error: Option<&BackendError>| matches!(error, Some(BackendError::DeviceLost { .. }));
+    ///     match renderer.record(world) {
+    ///         Ok(frame) => match submitter.submit(frame) {
+    ///             Err(error) if is_loss(error.backend_error()) => {}
+    ///             submitted => return Ok(submitted?),
+    ///         },
+    ///         Err(error) if is_loss(error.backend_error()) => {}
+    ///         Err(error) => return Err(error.into()),
+    ///     }
+    ///     *submitter = renderer.replace_backend(open()?);
+    ///     Ok(submitter.submit(renderer.record(world)?)?)
+    /// }
+    /// ```
+    pub fn replace_backend(&mut self, backend: B) -> Submitter<B> {
+        let backend = Arc::new(backend);
+        self.set_backend(Arc::clone(&backend));
+        Submitter::new(backend, Arc::clone(self.scheduler().timeline()))
+    }
+}

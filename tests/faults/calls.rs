@@ -1,0 +1,185 @@
+//! Every call of a frame fails once, in turn. The frame is refused with an error that says what failed and where, and the next one is right.
+
+use std::time::Duration;
+
+#[cfg(feature = "wgpu")]
+use drawloom::backend::WgpuBackend;
+use drawloom::backend::{BackendError, NullBackend, SoftwareBackend};
+use drawloom::scene::Changes;
+use drawloom::{FrameError, Granularity, SubmitError};
+use drawloom_testing::fault_injection::{CallKind, FailedCall, Fault};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::fixture::{Fixture, Refusal, Setting, two_scenes};
+use crate::subjects::Subject;
+
+pub const CASES: &[Case] = &[
+    ("every_call_of_a_frame_of_the_null_backend_fails_once", null),
+    ("every_call_of_a_frame_of_the_software_backend_fails_once", software),
+    ("every_call_of_a_simple_frame_of_the_software_backend_fails_once", simple_software),
+    ("slow_calls_change_no_picture", slow_calls),
+    ("pipelines_whose_preparation_failed_are_made_by_the_next_frame", preparation),
+];
+
+#[cfg(feature = "wgpu")]
+pub const CASES_OF_ADAPTERS: &[Case] = &[
+    ("every_call_of_a_frame_of_wgpu_fails_once", wgpu),
+    ("every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once", wgpu_together),
+];
+
+const FULL: Setting = Setting { workers: 2, granularity: Granularity::Adaptive, joins_passes: false, is_full: true };
+
+fn null() -> Result<(), Failed> {
+    for workers in [1, 2, 4] {
+        for joins_passes in [false, true] {
+            for granularity in [Granularity::PerCamera, Granularity::Chunk(2), Granularity::Adaptive] {
+                every_call_fails_once::<NullBackend>(Setting { workers, granularity, joins_passes, is_full: true })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn software() -> Result<(), Failed> {
+    every_call_fails_once::<SoftwareBackend>(FULL)?;
+    every_call_fails_once::<SoftwareBackend>(Setting { workers: 1, joins_passes: true, ..FULL })
+}
+
+fn simple_software() -> Result<(), Failed> {
+    let granularity = Granularity::Chunk(1);
+    every_call_fails_once::<SoftwareBackend>(Setting { granularity, is_full: false, ..FULL })
+}
+
+#[cfg(feature = "wgpu")]
+fn wgpu() -> Result<(), Failed> {
+    every_call_fails_once::<WgpuBackend>(FULL)
+}
+
+#[cfg(feature = "wgpu")]
+fn wgpu_together() -> Result<(), Failed> {
+    every_call_fails_once::<WgpuBackend>(Setting { workers: 1, joins_passes: true, ..FULL })
+}
+
+fn every_call_fails_once<S: Subject>(setting: Setting) -> Result<(), Failed> {
+    let (scenes, moved) = two_scenes()?;
+    let expected = [
+        Fixture::<S>::new(setting)?.picture(&scenes[0], Changes::Unknown)?,
+        Fixture::<S>::new(setting)?.picture(&scenes[1], Changes::Unknown)?,
+    ];
+    let mut fixture = Fixture::<S>::new(setting)?;
+    fixture.picture(&scenes[1], Changes::Unknown)?;
+    let mut turn = 0;
+    for kind in CallKind::ALL {
+        for index in 0.. {
+            let (scene, expected) = (&scenes[turn % 2], &expected[turn % 2]);
+            let fault = fault_of_turn(turn);
+            turn += 1;
+            let name = format!("{setting:?}, {kind:?} {index}");
+            fixture.renderer.backend().inject(kind, index, fault.clone());
+            // Either all is uploaded with the objects, or the objects that moved apart from them.
+            let changes = if turn % 3 == 0 { Changes::Unknown } else { Changes::Objects(&moved) };
+            let drawn = fixture.draw(scene, changes)?;
+            let Some(call) = fixture.renderer.backend().failed_call() else {
+                let picture = drawn.map_err(|refusal| format!("{name} did not come, but {refusal:?}"))?;
+                expect(picture == *expected, || format!("{name} did not come, and the picture is another one"))?;
+                break;
+            };
+            let refusal = drawn.err().ok_or_else(|| format!("{name}: the frame is drawn nevertheless"))?;
+            check_refusal(&refusal, &call, &fault).map_err(|problem| format!("{name}: {problem}: {refusal:?}"))?;
+            // What the failed frame was told has changed is not told again.
+            let picture = fixture.picture(scene, Changes::NONE).map_err(|error| format!("{name}: then {error:?}"))?;
+            expect(picture == *expected, || format!("{name}: the next picture is another one"))?;
+        }
+        let has_calls = match kind {
+            // The software backend records no parts.
+            CallKind::Record => continue,
+            CallKind::PreparePipelines => false,
+            CallKind::Finish => !setting.joins_passes,
+            CallKind::FinishTogether => setting.joins_passes,
+            _ => true,
+        };
+        let calls = fixture.renderer.backend().calls(kind);
+        expect(!has_calls || calls > 0, || format!("{setting:?} has no {kind:?}"))?;
+    }
+    Ok(())
+}
+
+fn fault_of_turn(turn: usize) -> Fault {
+    let faults = [Fault::DeviceLost, Fault::OutOfMemory, Fault::Panic, Fault::Validation, Fault::Limit];
+    faults[turn % faults.len()].clone()
+}
+
+/// Whether an error says what failed, and where.
+fn check_refusal(refusal: &Refusal, call: &FailedCall, fault: &Fault) -> Result<(), &'static str> {
+    let require = |holds: bool, problem| if holds { Ok(()) } else { Err(problem) };
+    let (stage, error, message) = match refusal {
+        Refusal::Frame(error) => match error {
+            FrameError::Panicked { stage, message } => (stage.as_str(), None, Some(message)),
+            FrameError::Failed { stage, .. } => (stage.as_str(), error.backend_error(), None),
+            FrameError::Backend(source) => ("begin", Some(source), None),
+            _ => return Err("it is another error"),
+        },
+        Refusal::Submission(SubmitError::Panicked { message }) => ("submit", None, Some(message)),
+        Refusal::Submission(error) => ("submit", error.backend_error(), None),
+    };
+    let is_told = match fault {
+        Fault::DeviceLost => matches!(error, Some(BackendError::DeviceLost { .. })),
+        Fault::OutOfMemory => matches!(error, Some(BackendError::OutOfMemory { .. })),
+        Fault::Validation => matches!(error, Some(BackendError::Validation { .. })),
+        Fault::Limit => matches!(error, Some(BackendError::Limit { .. })),
+        Fault::Panic => message.is_some_and(|message| message.contains("injected")),
+        Fault::Delay(_) | Fault::After(_) => false,
+    };
+    require(is_told, "it says something else")?;
+    if call.process.is_empty() {
+        let of_frame: &[&str] = match call.kind {
+            CallKind::UploadObjects => &["objects", "upload"],
+            CallKind::Submit => &["submit"],
+            _ => &["begin"],
+        };
+        return require(of_frame.contains(&stage), "it names another stage");
+    }
+    let names_process = stage.starts_with(&format!("{}, view ", call.process));
+    require(names_process, "it names another process")?;
+    require(stage.contains(&format!(" {:?}, ", call.view)), "it names another view")
+}
+
+/// Jobs meet each other in another order, and nothing else changes.
+fn slow_calls() -> Result<(), Failed> {
+    let (scenes, _) = two_scenes()?;
+    let expected = Fixture::<SoftwareBackend>::new(FULL)?.picture(&scenes[0], Changes::Unknown)?;
+    let mut fixture = Fixture::<SoftwareBackend>::new(FULL)?;
+    for (index, kind) in CallKind::ALL.into_iter().enumerate() {
+        fixture.renderer.backend().inject(kind, index % 2, Fault::Delay(Duration::from_millis(5)));
+        let picture = fixture.picture(&scenes[0], Changes::Unknown)?;
+        expect(picture == expected, || format!("a slow {kind:?} changes the picture"))?;
+    }
+    Ok(())
+}
+
+fn preparation() -> Result<(), Failed> {
+    let (scenes, _) = two_scenes()?;
+    let mut fixture = Fixture::<NullBackend>::new(FULL)?;
+    for turn in 0..5 {
+        let fault = fault_of_turn(turn);
+        fixture.renderer.backend().inject(CallKind::PreparePipelines, turn % 2, fault.clone());
+        let prepared = match turn % 2 {
+            0 => fixture.renderer.prepare_pipelines(scenes[0].as_scene_ref()),
+            _ => fixture.renderer.prepare_pipelines_in_background(scenes[0].as_scene_ref())?.wait()?,
+        };
+        let is_told = match (&prepared, &fault) {
+            (Err(FrameError::Panicked { stage, .. }), Fault::Panic) => stage == "prepare pipelines",
+            (Err(error), _) => error.backend_error().is_some(),
+            (Ok(()), _) => false,
+        };
+        expect(is_told, || format!("{prepared:?}"))?;
+        fixture.picture(&scenes[0], Changes::Unknown)?;
+        fixture.renderer.prepare_pipelines(scenes[0].as_scene_ref())?;
+    }
+    Ok(())
+}
+
+pub fn expect(holds: bool, problem: impl FnOnce() -> String) -> Result<(), Failed> {
+    if holds { Ok(()) } else { Err(problem().into()) }
+}

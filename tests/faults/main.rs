@@ -1,0 +1,50 @@
+//! Devices that fail: every call of a frame fails once, devices are lost, and others take their place.
+//!
+//! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then.
+
+mod calls;
+mod fixture;
+mod replaced;
+#[cfg(feature = "wgpu")]
+mod subjects;
+
+use std::panic;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+type Case = (&'static str, fn() -> Result<(), Failed>);
+
+fn main() {
+    let arguments = Arguments::from_args();
+    hide_injected_panics();
+    #[cfg(feature = "wgpu")]
+    let (more, of_adapters) = (Vec::<Case>::new(), [calls::CASES_OF_ADAPTERS, replaced::CASES_OF_ADAPTERS].concat());
+    #[cfg(not(feature = "wgpu"))]
+    let (more, of_adapters): (Vec<Case>, Vec<Case>) = Default::default();
+    let cases = [calls::CASES, replaced::CASES].concat().into_iter().chain(more);
+    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let is_ignored = !has_adapter() && !required;
+    let with_adapter = |(name, case): Case| Trial::test(name, case).with_ignored_flag(is_ignored);
+    let trials = cases.map(|(name, case)| Trial::test(name, case)).chain(of_adapters.into_iter().map(with_adapter));
+    libtest_mimic::run(&arguments, trials.collect()).exit();
+}
+
+/// Hundreds of panics are wanted here.
+fn hide_injected_panics() {
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if info.payload_as_str() != Some("an injected fault") {
+            hook(info);
+        }
+    }));
+}
+
+#[cfg(feature = "wgpu")]
+fn has_adapter() -> bool {
+    subjects::shared_device().is_some()
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn has_adapter() -> bool {
+    false
+}

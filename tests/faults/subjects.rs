@@ -1,0 +1,69 @@
+//! The backends under test.
+
+use std::sync::Arc;
+
+use drawloom::backend::{Backend, NullBackend, NullSubmission, SoftwareBackend, SoftwareSubmission};
+use drawloom::task::Scheduler;
+use libtest_mimic::Failed;
+
+/// A backend under test.
+pub trait Subject: Backend + Sized {
+    /// A backend on a device that may be shared.
+    fn open(scheduler: &Arc<Scheduler>) -> Result<Self, Failed>;
+
+    /// What a submission has drawn, byte by byte.
+    fn output(submission: &Self::Submission) -> Result<Vec<u8>, Failed>;
+}
+
+impl Subject for NullBackend {
+    fn open(_: &Arc<Scheduler>) -> Result<Self, Failed> {
+        Ok(Self)
+    }
+
+    fn output(submission: &NullSubmission) -> Result<Vec<u8>, Failed> {
+        Ok(format!("{submission:?}").into_bytes())
+    }
+}
+
+impl Subject for SoftwareBackend {
+    fn open(scheduler: &Arc<Scheduler>) -> Result<Self, Failed> {
+        Ok(Self::new(Arc::clone(scheduler)))
+    }
+
+    fn output(submission: &SoftwareSubmission) -> Result<Vec<u8>, Failed> {
+        Ok(submission.read(0, "picture")?.bytes)
+    }
+}
+
+#[cfg(feature = "wgpu")]
+pub use of_wgpu::shared_device;
+
+#[cfg(feature = "wgpu")]
+mod of_wgpu {
+    use std::sync::{Arc, OnceLock};
+
+    use drawloom::backend::{WgpuBackend, WgpuSubmission};
+    use drawloom::task::Scheduler;
+    use drawloom::wgpu;
+    use drawloom_testing::adapter;
+    use libtest_mimic::Failed;
+
+    use super::Subject;
+
+    /// A device on the machine's adapter, which cases share; `None` without an adapter.
+    pub fn shared_device() -> Option<(wgpu::Device, wgpu::Queue)> {
+        static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+        DEVICE.get_or_init(|| adapter::device().ok()).clone()
+    }
+
+    impl Subject for WgpuBackend {
+        fn open(_: &Arc<Scheduler>) -> Result<Self, Failed> {
+            let (device, queue) = shared_device().ok_or("there is no graphics adapter")?;
+            Ok(Self::new(device, queue)?)
+        }
+
+        fn output(submission: &WgpuSubmission) -> Result<Vec<u8>, Failed> {
+            Ok(submission.read(0, "picture")?.bytes)
+        }
+    }
+}
