@@ -1,5 +1,7 @@
 //! Errors of backends.
 
+use std::time::Duration;
+
 use crate::process::AccessError;
 
 /// An error of a backend or its device.
@@ -68,11 +70,18 @@ pub enum BackendError {
         /// The pass or resource that needed memory.
         label: String,
     },
-    /// The device was lost.
+    /// The device was lost, with everything on it: see [`Renderer::replace_backend`](crate::Renderer::replace_backend). Every later frame on
+    /// it has this error.
     #[error("the device was lost: {message}")]
     DeviceLost {
         /// The device's message.
         message: String,
+    },
+    /// The device is not done in time. It may be later.
+    #[error("the device was not done within {timeout:?}")]
+    Timeout {
+        /// How long it was waited for.
+        timeout: Duration,
     },
     /// The view's camera is too far from the world's origin, or its position is not finite.
     #[error(

@@ -4,6 +4,8 @@
 
 mod calls;
 mod fixture;
+#[cfg(feature = "wgpu")]
+mod lost_devices;
 mod replaced;
 #[cfg(feature = "wgpu")]
 mod subjects;
@@ -18,10 +20,13 @@ fn main() {
     let arguments = Arguments::from_args();
     hide_injected_panics();
     #[cfg(feature = "wgpu")]
-    let (more, of_adapters) = (Vec::<Case>::new(), [calls::CASES_OF_ADAPTERS, replaced::CASES_OF_ADAPTERS].concat());
+    let (more, of_adapters) = (
+        lost_devices::CASES,
+        [calls::CASES_OF_ADAPTERS, replaced::CASES_OF_ADAPTERS, lost_devices::CASES_OF_ADAPTERS].concat(),
+    );
     #[cfg(not(feature = "wgpu"))]
-    let (more, of_adapters): (Vec<Case>, Vec<Case>) = Default::default();
-    let cases = [calls::CASES, replaced::CASES].concat().into_iter().chain(more);
+    let (more, of_adapters): (&[Case], Vec<Case>) = Default::default();
+    let cases = [calls::CASES, replaced::CASES, more].concat().into_iter();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let is_ignored = !has_adapter() && !required;
     let with_adapter = |(name, case): Case| Trial::test(name, case).with_ignored_flag(is_ignored);
@@ -29,11 +34,12 @@ fn main() {
     libtest_mimic::run(&arguments, trials.collect()).exit();
 }
 
-/// Hundreds of panics are wanted here.
+/// Hundreds of panics are wanted here, and wgpu tells of a lost device by one.
 fn hide_injected_panics() {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
-        if info.payload_as_str() != Some("an injected fault") {
+        let message = info.payload_as_str().unwrap_or_default();
+        if message != "an injected fault" && !message.contains("device is lost") {
             hook(info);
         }
     }));

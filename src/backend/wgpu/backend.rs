@@ -23,10 +23,13 @@ use crate::timeline::Timeline;
 /// Drawloom builds wgpu with Vulkan, Metal, DX12 and `noop`, and WGSL. An engine that depends on wgpu 30 itself can
 /// enable more of it.
 ///
-/// Errors in what Drawloom records are returned. Other device errors are not: for those an engine sets its own
-/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`. Submitting to a lost device reports nothing;
-/// the next [`WgpuSubmission::wait`](super::WgpuSubmission::wait) or
-/// [`WgpuSubmission::read`](super::WgpuSubmission::read) returns the error, and so does the next frame.
+/// Errors in what Drawloom records and submits are returned. Other device errors are not: for those an engine sets its own
+/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`.
+///
+/// If the device is lost, the frame that is being recorded or submitted returns [`BackendError::DeviceLost`], and so does every later one.
+/// Of the frames in flight, [`WgpuSubmission::wait`](super::WgpuSubmission::wait) and
+/// [`WgpuSubmission::read`](super::WgpuSubmission::read) return it where the device has not drawn the frame; what it has drawn is lost too,
+/// so `read` returns it for all of them. [`Renderer::replace_backend`](crate::Renderer::replace_backend) goes on with a new device.
 pub struct WgpuBackend {
     pub(super) device: wgpu::Device,
     pub(super) uploads: UploadQueue,

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::backend::WgpuBackend;
-use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::error_scope::{catch_wgpu_panic, check_device, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
 use super::recording::{
@@ -76,7 +76,7 @@ impl Backend for WgpuBackend {
         let imports: Result<Vec<_>, _> =
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
         let imports = imports?;
-        self.check_device().inspect_err(|_| self.clear())?;
+        check_device(&self.device).inspect_err(|_| self.clear())?;
         let pipelines = self.update_pipelines(request)?;
         let update = || self.targets.lock().update(&self.device, request, &imports, self.transient_targets);
         let targets = with_error_scope(&self.device, "targets", update).inspect_err(|_| self.clear())??;
@@ -284,7 +284,8 @@ impl Backend for WgpuBackend {
         queues: Vec<ViewQueue<WgpuCommands>>,
         fences: Vec<FrameFence>,
     ) -> Result<WgpuSubmission, BackendError> {
-        let submission = self.submit_frame(&mut frame, queues, fences).inspect_err(|_| {
+        let submission = catch_wgpu_panic("the frame", || self.submit_frame(&mut frame, queues, fences));
+        let submission = submission.flatten().inspect_err(|_| {
             self.buffers.clear();
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();

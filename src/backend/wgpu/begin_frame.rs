@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
-use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::error_scope::with_error_scope;
 use super::frame::{BundleKey, PendingUploads, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
 use super::pipelines::ProcessPipelines;
@@ -98,23 +98,6 @@ impl WgpuBackend {
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let FrameRequest { plan, draws, quality, .. } = *request;
         self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)
-    }
-
-    /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may
-    /// have none.
-    ///
-    /// # Errors
-    /// If the device is lost.
-    pub(super) fn check_device(&self) -> Result<(), BackendError> {
-        let finish = || {
-            let descriptor = wgpu::RenderBundleEncoderDescriptor {
-                color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
-                sample_count: 1,
-                ..wgpu::RenderBundleEncoderDescriptor::default()
-            };
-            self.device.create_render_bundle_encoder(&descriptor).finish(&wgpu::RenderBundleDescriptor::default())
-        };
-        catch_wgpu_panic("the device", finish).map(|_| ())
     }
 
     /// Updates the bind groups of each pass, and chooses its strategy.

@@ -1,12 +1,14 @@
 //! Device errors as `Result`s.
 
+use std::time::Duration;
+
 use crate::backend::BackendError;
 use crate::task::catch;
 
 /// Does `work` inside error scopes of this thread, and returns the first error that the device reports.
 ///
 /// # Errors
-/// Returns the device's first error.
+/// Returns the device's first error. On a lost device, whose resources are all invalid, that is the loss.
 pub(crate) fn with_error_scope<R>(
     device: &wgpu::Device,
     label: &str,
@@ -24,8 +26,25 @@ pub(crate) fn with_error_scope<R>(
     match first {
         None => Ok(result),
         Some(wgpu::Error::OutOfMemory { .. }) => Err(BackendError::OutOfMemory { label: label.to_owned() }),
-        Some(error) => Err(refused(label, error.to_string())),
+        // What is created on a lost device is invalid, and only its first use is an error.
+        Some(error) => Err(check_device(device).err().unwrap_or_else(|| refused(label, error.to_string()))),
     }
+}
+
+/// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have none.
+///
+/// # Errors
+/// If the device is lost.
+pub(crate) fn check_device(device: &wgpu::Device) -> Result<(), BackendError> {
+    let finish = || {
+        let descriptor = wgpu::RenderBundleEncoderDescriptor {
+            color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
+            sample_count: 1,
+            ..wgpu::RenderBundleEncoderDescriptor::default()
+        };
+        device.create_render_bundle_encoder(&descriptor).finish(&wgpu::RenderBundleDescriptor::default())
+    };
+    catch_wgpu_panic("the device", finish).map(|_| ())
 }
 
 /// Does work whose errors wgpu reports by a panic instead of an error scope: finishing bundles.
@@ -41,8 +60,16 @@ pub(crate) fn catch_wgpu_panic<R>(label: &str, work: impl FnOnce() -> R) -> Resu
 /// # Errors
 /// If the device is lost, or is not done in time.
 pub(crate) fn poll(device: &wgpu::Device, poll: wgpu::PollType) -> Result<(), BackendError> {
-    let lost = |error: wgpu::PollError| BackendError::DeviceLost { message: error.to_string() };
-    catch_wgpu_panic("the device", || device.poll(poll).map(|_| ()))?.map_err(lost)
+    let timeout = match &poll {
+        wgpu::PollType::Wait { timeout, .. } => timeout.unwrap_or(Duration::MAX),
+        wgpu::PollType::Poll => Duration::ZERO,
+    };
+    let refused = |error: wgpu::PollError| match error {
+        wgpu::PollError::Timeout => BackendError::Timeout { timeout },
+        // The submission that is waited for was refused, because the device was lost.
+        other => BackendError::DeviceLost { message: other.to_string() },
+    };
+    catch_wgpu_panic("the device", || device.poll(poll).map(|_| ()))?.map_err(refused)
 }
 
 fn refused(label: &str, message: String) -> BackendError {

@@ -82,8 +82,7 @@ impl WgpuReadBack {
         let mut state = self.progress.state.lock();
         while matches!(*state, State::Recorded | State::Submitted(_)) {
             if self.progress.ended.wait_until(&mut state, deadline).timed_out() {
-                let message = "pixels that were read back never came".to_owned();
-                return Err(BackendError::DeviceLost { message });
+                return Err(BackendError::Timeout { timeout: Self::MAX_CALLBACK_DELAY });
             }
         }
         drop(state);
@@ -124,16 +123,23 @@ impl ReadBackCopy {
     }
 
     /// Maps the buffer when the device is done with the frame, which was submitted.
-    pub(crate) fn submitted(self, index: &wgpu::SubmissionIndex) {
+    pub(crate) fn submitted(self, device: &wgpu::Device, index: &wgpu::SubmissionIndex) {
         let Self { buffer, progress, .. } = self;
         let in_callback = Arc::clone(&progress);
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        let mapped = move |result: Result<(), wgpu::BufferAsyncError>| {
             *in_callback.state.lock() = match result {
                 Ok(()) => State::Done,
                 Err(error) => State::Failed(error.to_string()),
             };
             in_callback.ended.notify_all();
-        });
+        };
+        // The buffer of a device that is lost by now is invalid.
+        if let Err(error) = with_error_scope(device, "read back", || buffer.map_async(wgpu::MapMode::Read, .., mapped))
+        {
+            *progress.state.lock() = State::Failed(error.to_string());
+            progress.ended.notify_all();
+            return;
+        }
         // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped. Another thread may
         // have polled already.
         let mut state = progress.state.lock();

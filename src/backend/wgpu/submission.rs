@@ -1,8 +1,9 @@
 //! A submitted frame, and the readback of its targets.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use super::error_scope::{poll, with_error_scope};
+use super::error_scope::{check_device, poll, with_error_scope};
 use super::read_back::new_read_back;
 use super::resources::WgpuTargets;
 use super::timing::{DevicePassTimes, TimestampReadback};
@@ -47,12 +48,25 @@ impl WgpuSubmission {
         Some((&found.texture, found.layer))
     }
 
-    /// Waits until the device has drawn the frame.
+    /// Waits until the device has drawn the frame, however long that takes.
     ///
     /// # Errors
-    /// If the device is lost.
+    /// If the device is lost before it has drawn the frame.
     pub fn wait(&self) -> Result<(), BackendError> {
-        poll(&self.device, wgpu::PollType::Wait { submission_index: Some(self.index.clone()), timeout: None })
+        self.poll(None)
+    }
+
+    /// Waits until the device has drawn the frame, but no longer than this time: for engines that notice a device which hangs.
+    ///
+    /// # Errors
+    /// - [`BackendError::Timeout`] if the time is over. The frame may still be drawn, and may be waited for again.
+    /// - If the device is lost before it has drawn the frame.
+    pub fn wait_timeout(&self, timeout: Duration) -> Result<(), BackendError> {
+        self.poll(Some(timeout))
+    }
+
+    fn poll(&self, timeout: Option<Duration>) -> Result<(), BackendError> {
+        poll(&self.device, wgpu::PollType::Wait { submission_index: Some(self.index.clone()), timeout })
     }
 
     /// Waits until the device has drawn the frame, and reads back a view's target.
@@ -60,8 +74,9 @@ impl WgpuSubmission {
     /// # Errors
     /// If there is no such target, it is [transient](super::WgpuBackend::transient_targets), or the device refuses or is lost.
     pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
-        // Only this reports a lost device; the calls below do not.
         self.wait()?;
+        // The calls below do not report it, and the wait does not if the frame was drawn before.
+        check_device(&self.device)?;
         let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
         let found = self.targets.find(view, target).ok_or_else(unknown)?;
         let whole = [found.texture.width(), found.texture.height()];
@@ -71,7 +86,7 @@ impl WgpuSubmission {
             copy.encode(&mut encoder);
             self.queue.submit([encoder.finish()])
         })?;
-        copy.submitted(&index);
+        copy.submitted(&self.device, &index);
         read_back.read()
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
-use super::error_scope::{catch_wgpu_panic, with_error_scope};
+use super::error_scope::{catch_wgpu_panic, check_device, with_error_scope};
 use super::fences::set_when_done;
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::submission::WgpuSubmission;
@@ -17,7 +17,7 @@ impl WgpuBackend {
     /// Finishes open encoders, and submits the frame.
     ///
     /// # Errors
-    /// If the device refuses.
+    /// If the device refuses, or is lost.
     pub(super) fn submit_frame(
         &self,
         frame: &mut WgpuFrame,
@@ -76,9 +76,11 @@ impl WgpuBackend {
             Ok((WgpuSubmission::new(device, queue, index.clone(), Arc::clone(&frame.targets), readback), index))
         })
         .flatten()?;
+        // The queue of a lost device refuses a submission without a word.
+        check_device(&self.device)?;
         // Only now, because a submission that is refused uploads and copies nothing.
         frame.pending_uploads.submitted();
-        frame.read_backs.drain(..).for_each(|copy| copy.submitted(&index));
+        frame.read_backs.drain(..).for_each(|copy| copy.submitted(&self.device, &index));
         end_fences.into_iter().for_each(|fence| set_when_done(&self.device, self.queue(), &index, fence.setter));
         self.report_costs(frame);
         Ok(submission)
@@ -99,6 +101,7 @@ impl WgpuBackend {
             // An error scope of its own, as a fence must not be set for what the device has refused.
             let part = commands.take(count - submitted);
             let index = with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
+            check_device(&self.device)?;
             set_when_done(&self.device, self.queue(), &index, setter);
             submitted = count;
         }

@@ -26,7 +26,13 @@ pub enum SurfaceError {
     /// The surface is lost again as soon as it is made.
     #[error("the window's surface stays lost")]
     StaysLost,
-    /// The device is lost, or refuses the surface's settings.
+    /// The device of the surface is lost. The surface is of no use any more: the engine drops it, and opens another device and surface.
+    #[error("the device of the window's surface was lost: {message}")]
+    DeviceLost {
+        /// What wgpu says.
+        message: String,
+    },
+    /// The device refuses the surface's settings.
     #[error("the device refuses the window's surface: {reason}")]
     Refused {
         /// What wgpu says.

@@ -6,10 +6,11 @@ use wgpu::util::TextureBlitter;
 use wgpu::wgt::WgpuHasDisplayHandle;
 
 use super::WgpuBackend;
-use super::error_scope::with_error_scope;
+use super::error_scope::{check_device, with_error_scope};
 use super::resources::texture_format;
 use super::surface_error::SurfaceError;
 use super::surface_formats::{SurfaceFormats, picture_format};
+use crate::backend::BackendError;
 use crate::process::Format;
 
 /// A device that presents in windows, and what else of wgpu another window needs. All of them are handles, and clones are cheap.
@@ -252,7 +253,7 @@ impl WindowSurface {
     /// or lost is made anew.
     ///
     /// # Errors
-    /// If the device refuses, or the surface stays lost.
+    /// If the device refuses or is lost, or the surface stays lost.
     pub fn acquire(&mut self, size: impl Into<[u32; 2]>) -> Result<Option<SurfaceFrame>, SurfaceError> {
         let max_side = self.graphics.device.limits().max_texture_dimension_2d;
         let size = size.into().map(|side| side.min(max_side));
@@ -287,12 +288,20 @@ impl WindowSurface {
                 }
                 wgpu::CurrentSurfaceTexture::Validation => {
                     let reason = "it has no texture".to_owned();
-                    return Err(SurfaceError::Refused { reason });
+                    return Err(self.cause_of(SurfaceError::Refused { reason }));
                 }
             };
             self.mark_outdated();
         }
-        failure.map_or(Ok(None), Err)
+        failure.map_or(Ok(None), |failure| Err(self.cause_of(failure)))
+    }
+
+    /// The loss of the device, if that is why the surface has no textures.
+    fn cause_of(&self, failure: SurfaceError) -> SurfaceError {
+        match check_device(&self.graphics.device) {
+            Err(BackendError::DeviceLost { message }) => SurfaceError::DeviceLost { message },
+            _ => failure,
+        }
     }
 
     fn mark_outdated(&mut self) {

@@ -3,6 +3,7 @@
 use super::bind_group_layouts::texture_format;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_level_count;
+use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::process::{Format, PlannedTarget};
 
 /// What a texture for a target is like. Only targets that are alike in all of it share one.
@@ -58,6 +59,10 @@ pub(super) fn new_views(
     (view, sampled)
 }
 
+/// A texture for the target `label`.
+///
+/// # Errors
+/// If the device lacks a feature, a limit is too low, or the device has no room.
 pub(super) fn new_texture(
     device: &wgpu::Device,
     label: &str,
@@ -81,7 +86,7 @@ pub(super) fn new_texture(
     let sampled = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
     let copied = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
     let usage = if multisampled { sampled } else { sampled | copied };
-    Ok(device.create_texture(&wgpu::TextureDescriptor {
+    let descriptor = wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
         mip_level_count: if mipmapped { mip_level_count(kind.size) } else { 1 },
@@ -90,5 +95,7 @@ pub(super) fn new_texture(
         format: texture_format(format),
         usage: if stored { usage | wgpu::TextureUsages::STORAGE_BINDING } else { usage },
         view_formats: &[],
-    }))
+    };
+    // A scope of its own, so that the error names the target that there is no room for.
+    with_error_scope(device, label, || device.create_texture(&descriptor))
 }
