@@ -109,7 +109,8 @@
 //!
 //! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own. A [`WindowSurface`]
 //! chooses formats, follows the window's size, and makes a lost surface anew; [`WindowDevice::open`] opens the device too, and an
-//! engine that has one makes a [`WindowDevice`] of its handles.
+//! engine that has one makes a [`WindowDevice`] of its handles. If the device is lost, it opens another, and hands it to
+//! [`Renderer::replace_backend`].
 //!
 //! ```
 //! # use std::sync::Arc;

@@ -28,13 +28,11 @@ pub const CASES_OF_ADAPTERS: &[Case] = &[
     ("every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once", wgpu_together),
 ];
 
-const FULL: Setting = Setting { workers: 2, granularity: Granularity::Adaptive, joins_passes: false, is_full: true };
-
 fn null() -> Result<(), Failed> {
     for workers in [1, 2, 4] {
         for joins_passes in [false, true] {
             for granularity in [Granularity::PerCamera, Granularity::Chunk(2), Granularity::Adaptive] {
-                every_call_fails_once::<NullBackend>(Setting { workers, granularity, joins_passes, is_full: true })?;
+                every_call_fails_once::<NullBackend>(Setting { workers, granularity, joins_passes, ..Setting::FULL })?;
             }
         }
     }
@@ -42,23 +40,23 @@ fn null() -> Result<(), Failed> {
 }
 
 fn software() -> Result<(), Failed> {
-    every_call_fails_once::<SoftwareBackend>(FULL)?;
-    every_call_fails_once::<SoftwareBackend>(Setting { workers: 1, joins_passes: true, ..FULL })
+    every_call_fails_once::<SoftwareBackend>(Setting::FULL)?;
+    every_call_fails_once::<SoftwareBackend>(Setting { workers: 1, joins_passes: true, ..Setting::FULL })
 }
 
 fn simple_software() -> Result<(), Failed> {
     let granularity = Granularity::Chunk(1);
-    every_call_fails_once::<SoftwareBackend>(Setting { granularity, is_full: false, ..FULL })
+    every_call_fails_once::<SoftwareBackend>(Setting { granularity, is_full: false, ..Setting::FULL })
 }
 
 #[cfg(feature = "wgpu")]
 fn wgpu() -> Result<(), Failed> {
-    every_call_fails_once::<WgpuBackend>(FULL)
+    every_call_fails_once::<WgpuBackend>(Setting::FULL)
 }
 
 #[cfg(feature = "wgpu")]
 fn wgpu_together() -> Result<(), Failed> {
-    every_call_fails_once::<WgpuBackend>(Setting { workers: 1, joins_passes: true, ..FULL })
+    every_call_fails_once::<WgpuBackend>(Setting { workers: 1, joins_passes: true, ..Setting::FULL })
 }
 
 fn every_call_fails_once<S: Subject>(setting: Setting) -> Result<(), Failed> {
@@ -148,8 +146,8 @@ fn check_refusal(refusal: &Refusal, call: &FailedCall, fault: &Fault) -> Result<
 /// Jobs meet each other in another order, and nothing else changes.
 fn slow_calls() -> Result<(), Failed> {
     let (scenes, _) = two_scenes()?;
-    let expected = Fixture::<SoftwareBackend>::new(FULL)?.picture(&scenes[0], Changes::Unknown)?;
-    let mut fixture = Fixture::<SoftwareBackend>::new(FULL)?;
+    let expected = Fixture::<SoftwareBackend>::new(Setting::FULL)?.picture(&scenes[0], Changes::Unknown)?;
+    let mut fixture = Fixture::<SoftwareBackend>::new(Setting::FULL)?;
     for (index, kind) in CallKind::ALL.into_iter().enumerate() {
         fixture.renderer.backend().inject(kind, index % 2, Fault::Delay(Duration::from_millis(5)));
         let picture = fixture.picture(&scenes[0], Changes::Unknown)?;
@@ -160,7 +158,7 @@ fn slow_calls() -> Result<(), Failed> {
 
 fn preparation() -> Result<(), Failed> {
     let (scenes, _) = two_scenes()?;
-    let mut fixture = Fixture::<NullBackend>::new(FULL)?;
+    let mut fixture = Fixture::<NullBackend>::new(Setting::FULL)?;
     for turn in 0..5 {
         let fault = fault_of_turn(turn);
         fixture.renderer.backend().inject(CallKind::PreparePipelines, turn % 2, fault.clone());

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Changes, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::view::ShadowMaps;
 use drawloom::{FrameError, Granularity, Renderer, RendererBuilder, SubmitError, Submitter};
 use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::scenes::everything::everything;
@@ -21,8 +21,16 @@ pub struct Setting {
     pub granularity: Granularity,
     /// Whether passes are finished together wherever the trait allows.
     pub joins_passes: bool,
-    /// Whether there are shadow maps, transparency and post-processing beyond tone mapping.
+    /// Whether there are shadow maps, and post-processing beyond tone mapping.
     pub is_full: bool,
+    /// Shadow maps are drawn every so many frames.
+    pub shadow_interval: u32,
+}
+
+impl Setting {
+    /// Everything that the pipeline has, drawn in every frame.
+    pub const FULL: Self =
+        Self { workers: 2, granularity: Granularity::Adaptive, joins_passes: false, is_full: true, shadow_interval: 1 };
 }
 
 pub struct Fixture<S: Subject> {
@@ -79,8 +87,8 @@ fn with_deferred<S: Subject>(
     if !setting.is_full {
         return builder.deferred(deferred.shadow_maps(None));
     }
-    let maps = ShadowMaps { side: 24, ..ShadowMaps::default() };
-    builder.deferred(deferred.shadow_maps(Some(maps)).post(Fxaa::default()))
+    let shadows = ShadowQuality { side: 24, interval: setting.shadow_interval, ..Quality::balanced().shadows };
+    builder.deferred(deferred.post(Fxaa::default())).quality(Quality { shadows, ..Quality::balanced() })
 }
 
 /// Two scenes with all that the pipeline draws, and the objects in which they differ.

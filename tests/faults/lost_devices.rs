@@ -12,7 +12,7 @@ use drawloom::scene::{
 };
 use drawloom::task::Scheduler;
 use drawloom::wgpu::util::DeviceExt;
-use drawloom::{FrameError, Granularity, Renderer, SubmitError, Submitter, wgpu};
+use drawloom::{FrameError, Renderer, SubmitError, Submitter, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
 use drawloom_testing::scenes::everything::everything;
@@ -36,8 +36,6 @@ pub const CASES_OF_ADAPTERS: &[Case] = &[
 
 type OpenDevice = dyn Fn() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>>;
 
-const SETTING: Setting = Setting { workers: 2, granularity: Granularity::Adaptive, joins_passes: false, is_full: true };
-
 fn open(open_device: &OpenDevice) -> Result<(WgpuBackend, wgpu::Device), Failed> {
     let (device, queue) = open_device().map_err(|error| error.to_string())?;
     Ok((WgpuBackend::new(device.clone(), queue)?, device))
@@ -49,13 +47,13 @@ fn is_loss(error: Option<&BackendError>) -> bool {
 
 fn lost_in_any_call_of_noop() -> Result<(), Failed> {
     for joins_passes in [false, true] {
-        lost_in_calls(&adapter::noop_device, Setting { joins_passes, ..SETTING }, &|_| true)?;
+        lost_in_calls(&adapter::noop_device, Setting { joins_passes, ..Setting::FULL }, &|_| true)?;
     }
     Ok(())
 }
 
 fn lost_in_any_kind_of_call() -> Result<(), Failed> {
-    lost_in_calls(&adapter::device, SETTING, &|index| index == 0 || index == 5)
+    lost_in_calls(&adapter::device, Setting::FULL, &|index| index == 0 || index == 5)
 }
 
 /// Loses a device at each call that is chosen by its index. Each time another device takes its place.
