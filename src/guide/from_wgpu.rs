@@ -325,6 +325,7 @@
 //! [`RenderProcess`]: crate::process::RenderProcess
 //! [`Renderer::prepare_pipelines`]: crate::Renderer::prepare_pipelines
 //! [`Renderer::record`]: crate::Renderer::record
+//! [`Renderer::replace_backend`]: crate::Renderer::replace_backend
 //! [`Scene`]: crate::scene::Scene
 //! [`SceneRef`]: crate::scene::SceneRef
 //! [`Scheduler`]: crate::task::Scheduler

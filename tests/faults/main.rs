@@ -7,7 +7,6 @@ mod fixture;
 #[cfg(feature = "wgpu")]
 mod lost_devices;
 mod replaced;
-#[cfg(feature = "wgpu")]
 mod subjects;
 
 use std::panic;
