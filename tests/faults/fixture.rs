@@ -68,7 +68,7 @@ impl<S: Subject> Fixture<S> {
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };
         match self.submitter.submit(recorded) {
-            Ok(submitted) => S::output(&submitted.submission).map(Ok),
+            Ok(submitted) => S::read(&submitted.submission, 0, "picture").map(Ok),
             Err(error) => Ok(Err(Refusal::Submission(error))),
         }
     }

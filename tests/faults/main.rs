@@ -4,6 +4,7 @@
 
 mod calls;
 mod fixture;
+mod histories;
 #[cfg(feature = "wgpu")]
 mod lost_devices;
 mod replaced;
@@ -21,11 +22,17 @@ fn main() {
     #[cfg(feature = "wgpu")]
     let (more, of_adapters) = (
         lost_devices::CASES,
-        [calls::CASES_OF_ADAPTERS, replaced::CASES_OF_ADAPTERS, lost_devices::CASES_OF_ADAPTERS].concat(),
+        [
+            calls::CASES_OF_ADAPTERS,
+            histories::CASES_OF_ADAPTERS,
+            replaced::CASES_OF_ADAPTERS,
+            lost_devices::CASES_OF_ADAPTERS,
+        ]
+        .concat(),
     );
     #[cfg(not(feature = "wgpu"))]
     let (more, of_adapters): (&[Case], Vec<Case>) = Default::default();
-    let cases = [calls::CASES, replaced::CASES, more].concat().into_iter();
+    let cases = [calls::CASES, histories::CASES, replaced::CASES, more].concat().into_iter();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let is_ignored = !has_adapter() && !required;
     let with_adapter = |(name, case): Case| Trial::test(name, case).with_ignored_flag(is_ignored);

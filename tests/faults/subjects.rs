@@ -11,8 +11,8 @@ pub trait Subject: Backend + Sized {
     /// A backend on a device that may be shared.
     fn open(scheduler: &Arc<Scheduler>) -> Result<Self, Failed>;
 
-    /// What a submission has drawn, byte by byte.
-    fn output(submission: &Self::Submission) -> Result<Vec<u8>, Failed>;
+    /// What a submission has drawn into a view's target, byte by byte.
+    fn read(submission: &Self::Submission, view: usize, target: &str) -> Result<Vec<u8>, Failed>;
 }
 
 impl Subject for NullBackend {
@@ -20,7 +20,7 @@ impl Subject for NullBackend {
         Ok(Self)
     }
 
-    fn output(submission: &NullSubmission) -> Result<Vec<u8>, Failed> {
+    fn read(submission: &NullSubmission, _: usize, _: &str) -> Result<Vec<u8>, Failed> {
         Ok(format!("{submission:?}").into_bytes())
     }
 }
@@ -30,8 +30,8 @@ impl Subject for SoftwareBackend {
         Ok(Self::new(Arc::clone(scheduler)))
     }
 
-    fn output(submission: &SoftwareSubmission) -> Result<Vec<u8>, Failed> {
-        Ok(submission.read(0, "picture")?.bytes)
+    fn read(submission: &SoftwareSubmission, view: usize, target: &str) -> Result<Vec<u8>, Failed> {
+        Ok(submission.read(view, target)?.bytes)
     }
 }
 
@@ -62,8 +62,8 @@ mod of_wgpu {
             Ok(Self::new(device, queue)?)
         }
 
-        fn output(submission: &WgpuSubmission) -> Result<Vec<u8>, Failed> {
-            Ok(submission.read(0, "picture")?.bytes)
+        fn read(submission: &WgpuSubmission, view: usize, target: &str) -> Result<Vec<u8>, Failed> {
+            Ok(submission.read(view, target)?.bytes)
         }
     }
 }
