@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec2, Vec3};
 
 use super::transform::is_unit;
-use super::{ClipPlane, LayerMask, ObjectFilter, Redraw, SceneError};
+use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Redraw, SceneError};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,10 @@ pub struct Camera {
     pub kind: ViewKind,
     /// How often the picture is drawn. Between redraws, what it shows is as old as the latest one.
     pub redraw: Redraw,
+    /// How far the camera may move between recording and submission. `None`, for most cameras, costs nothing: then
+    /// [`Recorded::replace_camera`](crate::Recorded::replace_camera) refuses to replace it. Only for a view that is drawn in every frame and
+    /// is no shadow map. What is [derived](Camera::reflected) from a camera has the same bounds.
+    pub late_latch: Option<CameraMotion>,
 }
 
 /// How positions are projected onto the picture.
@@ -136,6 +140,7 @@ impl Camera {
             samples_views: true,
             kind: ViewKind::Main,
             redraw: Redraw::EveryFrame,
+            late_latch: None,
         }
     }
 
@@ -174,6 +179,8 @@ impl Camera {
             reason
         } else if self.redraw == Redraw::Interval(0) {
             "it is redrawn every 0 frames"
+        } else if let Some(reason) = self.late_latch.and_then(|motion| motion.problem(self)) {
+            reason
         } else if let Some(reason) = self.projection_problem() {
             reason
         } else {

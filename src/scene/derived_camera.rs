@@ -62,6 +62,7 @@ impl Camera {
     /// Moves the camera to the right and up, in metres.
     fn move_aside(&mut self, metres: Vec2) {
         self.position += (self.orientation.normalize() * metres.extend(0.0)).as_dvec3();
+        self.late_latch = self.late_latch.map(|motion| motion.at_distance(metres.length()));
     }
 
     /// The camera whose picture a plane mirror shows this camera, for a view that the process of the mirror's surface samples as `mirror`:

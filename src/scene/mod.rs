@@ -5,6 +5,7 @@
 
 mod assets;
 mod camera;
+mod camera_motion;
 mod changes;
 mod clip_plane;
 mod cuboid;
@@ -39,6 +40,8 @@ mod vertex_attribute;
 pub use assets::{Asset, Assets};
 pub(crate) use camera::child_name;
 pub use camera::{Camera, Projection, ViewKind};
+pub use camera_motion::CameraMotion;
+pub(crate) use camera_motion::PreciseMotion;
 pub use changes::Changes;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;

@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 use multiversion::multiversion;
 
 use super::BoundingSpheres;
-use crate::scene::{Camera, Projection, ViewKind};
+use super::camera_planes::{CameraPlanes, PairSlopes};
+use crate::scene::Camera;
 
 /// The volume that a camera sees, within six planes: a pyramid, a box or a hemisphere.
 ///
@@ -57,52 +58,24 @@ pub(super) struct CameraPoint {
 }
 
 impl Frustum {
-    /// The frustum of `camera`.
+    /// The frustum of `camera`. If the camera has a [`late_latch`](Camera::late_latch), it is a volume around the frusta of all cameras that may
+    /// replace it; `inflated_volume.rs` derives it.
     pub fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
         let forward = orientation * DVec3::NEG_Z;
-        let [width, height] = camera.size.map(f64::from);
-        // Of each pair: a point at c metres aside of the view direction and f metres along it is between the planes if
-        // slope · f + offset ≥ |scale · c − skew · f|.
-        let (slopes_scales_and_skews, offsets) = match camera.projection {
-            Projection::Perspective { field_of_view } => {
-                let tangent_y = (f64::from(field_of_view) * 0.5).tan();
-                let of_tangent = |half: f64, shift: f32| {
-                    let middle = half * f64::from(shift);
-                    // The longer normal of the two has unit length.
-                    let scale = 1.0 / (half + middle.abs()).hypot(1.0);
-                    [half * scale, scale, middle * scale]
-                };
-                let halves = [tangent_y * width / height, tangent_y];
-                (from_fn(|pair| of_tangent(halves[pair], camera.shift[pair])), [0.0; 2])
-            }
-            Projection::Orthographic { height: picture } => {
-                let half = f64::from(picture) * 0.5;
-                ([[0.0, 1.0, 0.0]; 2], [half * width / height, half])
-            }
-            Projection::Paraboloid => ([[0.0, 1.0, 0.0]; 2], [f64::from(camera.far); 2]),
-        };
-        let near = match camera.projection {
-            // Objects in front of the near plane of a shadow map cast shadows too.
-            Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => f32::INFINITY,
-            // Filtering at the disc's rim reads a few texels beyond it.
-            Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,
-            // Its near plane is the clip plane, which may be nearer.
-            _ if camera.clip_plane.is_some() => 0.0,
-            _ => -camera.near,
-        };
+        let CameraPlanes { pairs, offsets, near, far } = CameraPlanes::new(camera);
         let axes = [DVec3::X, DVec3::Y].map(|axis| orientation * axis);
         let sides = from_fn(|pair| {
-            let [slope, scale, skew] = slopes_scales_and_skews[pair];
+            let PairSlopes { slope, scale, skew } = pairs[pair];
             // Rounded up, so that the plane errs outwards.
             let offset = moved_outwards((offsets[pair] as f32).next_up());
             SidePlanes { across: (axes[pair] * scale - forward * skew).as_vec3(), slope: slope as f32, offset }
         });
         let normal = |pair: usize, sign: f64| {
-            let [slope, scale, skew] = slopes_scales_and_skews[pair];
-            (forward * (slope - skew * sign) + axes[pair] * (scale * sign)).as_vec3()
+            let [aside, along] = pairs[pair].normal(sign);
+            (forward * along + axes[pair] * aside).as_vec3()
         };
-        let (near, far) = (moved_outwards(near), moved_outwards(camera.far));
+        let (near, far) = (moved_outwards(near), moved_outwards(far));
         Self {
             origin: camera.position,
             forward: forward.as_vec3(),
@@ -273,9 +246,6 @@ fn moved_outwards(offset: f32) -> f32 {
     offset + ROUNDING_TOLERANCE * offset.abs() + f32::MIN_POSITIVE
 }
 
-/// How far a paraboloid view extends behind its camera, as a share of its range.
-const PARABOLOID_MARGIN: f32 = 0.05;
-
 /// 16 unit roundoffs of 2⁻²⁴ each: see [`Frustum::intersects_sphere`].
 pub(super) const ROUNDING_TOLERANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
 
@@ -285,6 +255,7 @@ pub(super) mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::scene::{Projection, ViewKind};
     use crate::view::BoundingSphere;
 
     /// The least distance of a point inside the camera's planes, in f64, from the camera's definition.

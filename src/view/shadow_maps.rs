@@ -128,6 +128,7 @@ impl ShadowMaps {
             samples_views: true,
             kind: ViewKind::Shadow,
             redraw: Redraw::EveryFrame,
+            late_latch: None,
         }
     }
 
