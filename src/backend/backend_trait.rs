@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
-use super::requests::{FrameRequest, PassRequest};
+use super::requests::{FrameRequest, PassRequest, ViewRequest};
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
 use crate::command::DrawState;
@@ -14,7 +14,7 @@ use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
-/// The interface between frames and a device. All methods but [`Backend::submit`] are called while a frame is recorded,
+/// The interface between frames and a device. All methods but [`Backend::replace_view`] and [`Backend::submit`] are called while a frame is recorded,
 /// most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also beside a frame. Those that record take the worker as proof that they run in a job (M 10.3
 /// asserts it).
 ///
@@ -25,7 +25,8 @@ use crate::timeline::{Labels, TuningChoice};
 ///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
 ///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
-/// 4. Later, on the device thread, `submit`.
+/// 4. `replace_view`, as often as the engine replaces a camera.
+/// 5. Later, on the device thread, `submit`.
 ///
 /// What a backend must honour:
 ///
@@ -185,6 +186,17 @@ pub trait Backend: Send + Sync + 'static {
     fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let _ = (frame, pass, labels);
         None
+    }
+
+    /// Replaces what shaders read of a view that [may be replaced](crate::view::RenderView::may_be_replaced), in a frame that is recorded and
+    /// not submitted: the view, and the same lights relative to the new camera. Only position and orientation of the camera differ from those
+    /// that the frame was recorded with, and what its passes draw stays as it is.
+    ///
+    /// # Errors
+    /// If the device refuses; [`BackendError::CannotReplaceViews`] from a backend that does not implement it.
+    fn replace_view(&self, frame: &mut Self::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        let _ = (frame, request);
+        Err(BackendError::CannotReplaceViews)
     }
 
     /// Submits a frame's queues one after the other. Called only on the device thread.

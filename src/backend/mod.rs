@@ -31,7 +31,7 @@ pub use frame_fence::FrameFence;
 pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
-pub use requests::{FrameRequest, PassRequest};
+pub use requests::{FrameRequest, PassRequest, ViewRequest};
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
 pub use target_memory::TargetMemory;

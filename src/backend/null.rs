@@ -8,7 +8,7 @@ use parking_lot::Mutex;
 use super::backend_trait::Backend;
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
-use super::requests::{FrameRequest, PassRequest};
+use super::requests::{FrameRequest, PassRequest, ViewRequest};
 use super::view_queue::ViewQueue;
 use crate::command::DrawList;
 use crate::process::{Draws, Pass};
@@ -25,6 +25,7 @@ use crate::task::Worker;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
 /// - a pass without commands has neither batches nor bundles;
+/// - the camera of a view is replaced only if it may be;
 /// - passes are submitted in the planned order;
 /// - fences have places within the frame, in order.
 #[derive(Debug, Default)]
@@ -195,6 +196,13 @@ impl Backend for NullBackend {
                 _ => 0,
             },
         })
+    }
+
+    fn replace_view(&self, _frame: &mut NullFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        ensure(request.view.may_be_replaced(), || {
+            format!("the camera of a view is replaced only if it may be, but that of {:?} may not", request.view.name())
+        })?;
+        request.gpu_view().map(|_| ())
     }
 
     fn submit(

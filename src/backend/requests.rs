@@ -1,5 +1,7 @@
 //! What frames request of a backend.
 
+use glam::Vec3;
+
 use super::BackendError;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
@@ -35,6 +37,18 @@ pub struct FrameRequest<'a> {
 }
 
 impl FrameRequest<'_> {
+    /// One of the views, by index.
+    pub fn view(&self, index: usize) -> ViewRequest<'_> {
+        ViewRequest {
+            index,
+            view: &self.views[index],
+            light_table: &self.light_tables[index],
+            views: self.views,
+            lights: self.lights,
+            ambient: self.scene.ambient,
+        }
+    }
+
     /// # Errors
     /// If the camera of a view is out of reach.
     pub(crate) fn check_reach(&self) -> Result<(), BackendError> {
@@ -42,6 +56,34 @@ impl FrameRequest<'_> {
             Some(view) => Err(BackendError::ViewOutOfReach { view: view.name().to_owned() }),
             None => Ok(()),
         }
+    }
+}
+
+/// Everything that a backend needs to know of one view of a frame.
+#[derive(Clone, Copy)]
+pub struct ViewRequest<'a> {
+    /// The view's index.
+    pub index: usize,
+    /// The view.
+    pub view: &'a RenderView,
+    /// The lights that reach it.
+    pub light_table: &'a LightTable,
+    /// The views of the frame, among them those of the shadow maps that the lights have.
+    pub views: &'a [RenderView],
+    /// The valid lights of the scene, in its order.
+    pub lights: &'a [Light],
+    /// The scene's ambient light.
+    pub ambient: Vec3,
+}
+
+impl ViewRequest<'_> {
+    /// What shaders read of the view.
+    ///
+    /// # Errors
+    /// If the camera is out of reach.
+    pub fn gpu_view(&self) -> Result<GpuView, BackendError> {
+        GpuView::new(self.view, self.ambient, self.light_table.light_count())
+            .ok_or_else(|| BackendError::ViewOutOfReach { view: self.view.name().to_owned() })
     }
 }
 

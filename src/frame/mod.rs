@@ -13,6 +13,7 @@ mod frame_loop;
 mod frame_place;
 mod granularity;
 mod job_size;
+mod latched_views;
 mod light_maps;
 mod list_inputs;
 mod occluders;
@@ -48,7 +49,7 @@ mod warnings;
 
 pub use budgeted_view::{BudgetedView, Rung, ViewForm};
 pub use builder::RendererBuilder;
-pub use error::{BudgetError, BuildError, FrameError, SubmitError};
+pub use error::{BudgetError, BuildError, FrameError, LatchError, SubmitError};
 pub use frame_loop::{Buffering, FinishedFrame, FrameLoop, FrameLoopError, FrameSlot, FrameTimes};
 pub use frame_place::FramePlace;
 pub use granularity::Granularity;

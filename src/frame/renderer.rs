@@ -6,6 +6,7 @@ use parking_lot::RwLockReadGuard;
 
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
+use super::latched_views::LatchedViews;
 use super::pass_recording::PassRecording;
 use super::pass_runs::{PassFailure, PassRuns};
 use super::plan_cache::{PlanCache, with_quality};
@@ -331,10 +332,24 @@ impl<B: Backend> Renderer<B> {
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);
         let submission_order = graph.passes.clone();
-        let in_flight = self.view_cache.store(&plan, FrameViews { views, lights, arrays });
+        let views = Arc::new(FrameViews { views, lights, arrays });
+        let in_flight = self.view_cache.store(&plan, &views);
+        let views = LatchedViews::new(views, &self.tables.lights, scene.ambient);
         let backend = Arc::clone(&self.backend);
         let fences = FrameFences::default();
-        Ok(Recorded { queues, submission_order, plan, frame, statistics, backend, frame_number, in_flight, fences })
+        let recorded = Recorded {
+            queues,
+            submission_order,
+            plan,
+            frame,
+            statistics,
+            backend,
+            frame_number,
+            in_flight,
+            views,
+            fences,
+        };
+        Ok(recorded)
     }
 
     /// Puts a backend in the place of the one before, and drops what belongs to that one.

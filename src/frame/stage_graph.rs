@@ -80,6 +80,7 @@ struct ViewKey {
     is_cached: bool,
     is_paraboloid: bool,
     has_oblique_near_plane: bool,
+    may_be_replaced: bool,
     layers: LayerMask,
     samples_views: bool,
 }
@@ -92,6 +93,7 @@ impl ViewKey {
             is_cached: view.is_cached(),
             is_paraboloid: is_paraboloid(view),
             has_oblique_near_plane: view.has_oblique_near_plane(),
+            may_be_replaced: view.may_be_replaced(),
             layers: view.camera.layers,
             samples_views: view.camera.samples_views,
         }
@@ -100,6 +102,7 @@ impl ViewKey {
     fn fits(&self, view: &RenderView) -> bool {
         (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached())
             && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
+            && self.may_be_replaced == view.may_be_replaced()
             && (self.layers, self.samples_views) == (view.camera.layers, view.camera.samples_views)
     }
 }
@@ -153,8 +156,8 @@ impl<B: Backend> StageGraph<B> {
         }
         let tests_occlusion = key.options.occlusion_tile.is_some();
         let control_of = |view: (usize, &RenderView)| {
-            // What is behind a clip plane hides nothing.
-            let is_enabled = tests_occlusion && !view.1.has_oblique_near_plane();
+            // What is behind a clip plane hides nothing, and a camera that is replaced may look past what hides others.
+            let is_enabled = tests_occlusion && !view.1.has_oblique_near_plane() && !view.1.may_be_replaced();
             OcclusionControl::new(is_enabled, plan, draws, &passes, view)
         };
         let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();

@@ -26,7 +26,7 @@ pub(super) struct ViewCache {
 struct DrawnViews {
     /// The plan's identity.
     plan: u64,
-    views: FrameViews,
+    views: Arc<FrameViews>,
 }
 
 /// A recorded frame that is not submitted yet. If it is dropped, the views that it draws are lost.
@@ -105,8 +105,8 @@ impl ViewCache {
     }
 
     /// Stores the views of a frame that was recorded.
-    pub(super) fn store(&mut self, plan: &FramePlan, views: FrameViews) -> InFlight {
-        self.latest = views.may_be_cached().then(|| DrawnViews { plan: plan.identity(), views });
+    pub(super) fn store(&mut self, plan: &FramePlan, views: &Arc<FrameViews>) -> InFlight {
+        self.latest = views.may_be_cached().then(|| DrawnViews { plan: plan.identity(), views: Arc::clone(views) });
         InFlight { lost: self.latest.is_some().then(|| Arc::clone(&self.lost)) }
     }
 

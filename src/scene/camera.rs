@@ -161,10 +161,8 @@ impl Camera {
     /// # Errors
     /// If a number is not finite or out of its range.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
-        let reason = if !self.position.is_finite() {
-            "its position is not finite"
-        } else if !is_unit(self.orientation.length_squared()) {
-            "its orientation is not of unit length"
+        let reason = if let Some(reason) = self.pose_problem() {
+            reason
         } else if !(self.near > 0.0 && self.near.is_finite()) {
             "its near plane is not a positive distance"
         } else if self.near < MIN_NEAR {
@@ -187,6 +185,17 @@ impl Camera {
             return Ok(());
         };
         Err(SceneError::InvalidCamera { camera: self.name.clone(), reason })
+    }
+
+    /// What is wrong with its position or orientation; `None` if nothing is.
+    pub(crate) fn pose_problem(&self) -> Option<&'static str> {
+        if !self.position.is_finite() {
+            Some("its position is not finite")
+        } else if !is_unit(self.orientation.length_squared()) {
+            Some("its orientation is not of unit length")
+        } else {
+            None
+        }
     }
 
     fn projection_problem(&self) -> Option<&'static str> {

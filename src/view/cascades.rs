@@ -38,8 +38,19 @@ pub(super) fn visible_sphere(cameras: &[Camera], slice: impl Fn(&Camera) -> [f64
     sphere.filter(|(center, radius)| center.is_finite() && radius.is_finite() && *radius > 0.0)
 }
 
-/// A sphere around what a camera sees between two distances.
-fn slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64) {
+/// A sphere around what a camera sees between two distances, wherever it may be when the frame is submitted: a turn moves the sphere's centre
+/// along a chord around the camera.
+fn slice_sphere(camera: &Camera, slice: [f64; 2]) -> (DVec3, f64) {
+    let (center, radius) = recorded_slice_sphere(camera, slice);
+    let moves = camera.late_latch.map_or(0.0, |motion| {
+        let bounds = motion.with_rounding();
+        bounds.distance + bounds.moves_at(center.distance(camera.position))
+    });
+    (center, radius + moves)
+}
+
+/// A sphere around what the camera sees from where it is.
+fn recorded_slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64) {
     let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
     let aspect = f64::from(camera.aspect());
     match camera.projection {

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::{FixedPosition, RenderView};
-use crate::scene::{Projection, SceneRef, ViewKind};
+use crate::scene::{Projection, ViewKind};
 
 /// The GPU layout of a view: `View` in `drawloom.wgsl`.
 ///
@@ -60,8 +60,8 @@ impl GpuView {
         FixedPosition::new(origin(view)).is_some()
     }
 
-    /// The layout of `view`; `None` if its camera is beyond [`FixedPosition::MAX_COORDINATE`].
-    pub fn new(view: &RenderView, scene: &SceneRef<'_>, light_count: usize) -> Option<Self> {
+    /// The layout of `view` in a scene with this ambient light; `None` if its camera is beyond [`FixedPosition::MAX_COORDINATE`].
+    pub fn new(view: &RenderView, ambient: Vec3, light_count: usize) -> Option<Self> {
         let (position, clip_from_relative) = origin_and_matrix(view);
         let (position_low, position_high) = FixedPosition::new(position)?.halves();
         let [right, up, forward] = view.picture_axes();
@@ -83,7 +83,7 @@ impl GpuView {
                 Projection::Orthographic { .. } => 1 + u32::from(view.kind() == ViewKind::Shadow),
                 Projection::Paraboloid => 3,
             },
-            ambient: scene.ambient,
+            ambient,
             far: view.camera.far,
         })
     }
@@ -120,7 +120,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::{Camera, Scene};
+    use crate::scene::Camera;
 
     /// The clip-space position of a point in the world.
     fn clip(gpu_view: &GpuView, point: DVec3) -> Vec3 {
@@ -132,7 +132,6 @@ mod tests {
 
     #[test]
     fn moving_the_origin_of_a_directional_shadow_map_keeps_its_picture() {
-        let scene = Scene::new();
         for position in [DVec3::ZERO, DVec3::new(1e3, -5e8, 4e9)] {
             let camera = Camera {
                 projection: Projection::Orthographic { height: 10.0 },
@@ -142,7 +141,7 @@ mod tests {
             };
             let map = Camera { kind: ViewKind::Shadow, ..camera.clone() };
             let [plain, moved] =
-                [&camera, &map].map(|camera| GpuView::new(&RenderView::new(camera), &scene.as_scene_ref(), 0).unwrap());
+                [&camera, &map].map(|camera| GpuView::new(&RenderView::new(camera), Vec3::ZERO, 0).unwrap());
             assert_ne!(plain.position_low, moved.position_low);
             for (x, y, depth) in [(0.0, 0.0, 5.0), (4.0, -3.0, 50.0), (-2.0, 1.0, 95.0)] {
                 let point = position + camera.orientation.as_dquat() * DVec3::new(x, y, -depth);
@@ -167,8 +166,8 @@ mod tests {
             (map(2.0 * far), false),
         ];
         for (camera, expected) in cases {
-            let (view, scene) = (RenderView::new(&camera), Scene::new());
-            let has_layout = GpuView::new(&view, &scene.as_scene_ref(), 0).is_some();
+            let view = RenderView::new(&camera);
+            let has_layout = GpuView::new(&view, Vec3::ZERO, 0).is_some();
             assert_eq!((GpuView::is_in_reach(&view), has_layout), (expected, expected), "{camera:?}");
         }
     }
@@ -181,6 +180,6 @@ mod tests {
             far: 1e6,
             ..Camera::looking_at("map", DVec3::X * 4.2949e9, DVec3::X * 5e9)
         };
-        assert!(GpuView::new(&RenderView::new(&camera), &Scene::new().as_scene_ref(), 0).is_some());
+        assert!(GpuView::new(&RenderView::new(&camera), Vec3::ZERO, 0).is_some());
     }
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::{GpuLight, RenderView};
 use crate::scene::{Light, LightKind, ViewKind};
 
@@ -15,7 +17,7 @@ pub struct LightTable {
     /// For each layer of the shadow maps, if a light has several: the index of the light among the valid ones and of the view;
     /// `None` for a shadow camera of the engine's own.
     layers: Vec<Option<(usize, usize)>>,
-    /// The class and the index among the frame's valid lights of each light that reaches the view.
+    /// The class and the index among the frame's valid lights of each light that reaches the view, ordered by class.
     reaching: Vec<(usize, usize)>,
     /// For each valid light, the index of its first shadow map's view.
     shadow_views: Vec<Option<usize>>,
@@ -74,7 +76,7 @@ impl LightTable {
                 shadow_view.get_or_insert(index);
             }
         }
-        let mut counts = [0; LightClass::COUNT];
+        let mut counts = [0_u32; LightClass::COUNT];
         for (index, light) in lights.iter().enumerate() {
             if light.bounding_sphere().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
                 let class = LightClass::of(light, shadows).index();
@@ -82,27 +84,35 @@ impl LightTable {
                 self.reaching.push((class, index));
             }
         }
-        let origin = view.camera.position;
-        // Most classes are empty: iterate over all lights only for the others.
-        for (class, _) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
-            let start = self.gpu_lights.len() as u32;
-            let of_class = self.reaching.iter().filter(|(other, _)| *other == class);
-            let gpu_light = |&(_, light): &(usize, usize)| {
-                let map = self.shadow_views.get(light).copied().flatten();
-                GpuLight::new(&lights[light], origin, map.map(|index| &views[index]))
-            };
-            self.gpu_lights.extend(of_class.map(gpu_light));
-            self.ranges[class] = start..self.gpu_lights.len() as u32;
+        self.reaching.sort_unstable();
+        let mut start = 0;
+        for (class, count) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
+            self.ranges[class] = start..start + count;
+            start += count;
         }
         if has_several {
             let maps = views.iter().enumerate().filter(|(_, map)| map.kind() == ViewKind::Shadow);
             self.layers.extend(maps.map(|(index, map)| map.valid_light.map(|light| (light, index))));
-            let of_layer = |layer: &Option<(usize, usize)>| {
-                let map = |(light, map): (usize, usize)| GpuLight::new(&lights[light], origin, Some(&views[map]));
-                layer.map_or_else(bytemuck::Zeroable::zeroed, map)
-            };
-            self.gpu_lights.extend(self.layers.iter().map(of_layer));
         }
+        self.set_origin(view.camera.position, lights, views);
+    }
+
+    /// Makes the lights relative to a camera at `origin`. Which lights are in the table, and in which order, stays as it is. `lights` and
+    /// `views` are those that it was filled with.
+    ///
+    /// # Panics
+    /// If there are fewer of them.
+    pub(crate) fn set_origin(&mut self, origin: DVec3, lights: &[Light], views: &[RenderView]) {
+        let Self { gpu_lights, reaching, shadow_views, layers, .. } = self;
+        gpu_lights.clear();
+        gpu_lights.extend(reaching.iter().map(|&(_, light)| {
+            let map = shadow_views.get(light).copied().flatten();
+            GpuLight::new(&lights[light], origin, map.map(|index| &views[index]))
+        }));
+        gpu_lights.extend(layers.iter().map(|layer| {
+            let map = |(light, map): (usize, usize)| GpuLight::new(&lights[light], origin, Some(&views[map]));
+            layer.map_or_else(bytemuck::Zeroable::zeroed, map)
+        }));
     }
 
     /// What shaders read: all lights, ordered by class, and then those by layer.
@@ -118,9 +128,7 @@ impl LightTable {
     /// For each light: its index among the frame's valid lights, and the index of the view that draws its first shadow map,
     /// if any.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
-        let of_class = |class: usize| self.reaching.iter().filter(move |(other, _)| *other == class);
-        let lights = (0..LightClass::COUNT).flat_map(of_class);
-        lights.map(|&(_, light)| (light, self.shadow_views.get(light).copied().flatten()))
+        self.reaching.iter().map(|&(_, light)| (light, self.shadow_views.get(light).copied().flatten()))
     }
 
     /// For each of [`LightTable::gpu_lights`] by layer: the light's index among the frame's valid lights and that of the view that
@@ -137,7 +145,7 @@ impl LightTable {
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use glam::{DVec3, Vec3};
+    use glam::Vec3;
 
     use super::*;
     use crate::scene::Camera;

@@ -45,6 +45,12 @@ impl RenderView {
         self.age > 0
     }
 
+    /// Whether the camera may be [replaced](crate::Recorded::replace_camera) until the frame is submitted. Then what is culled must be
+    /// invisible from wherever the camera may be.
+    pub fn may_be_replaced(&self) -> bool {
+        self.camera.late_latch.is_some()
+    }
+
     /// Which of the objects that a process draws it draws in this view.
     pub fn selection_of(&self, process: Selection) -> Selection {
         process.visible_in(self.camera.layers)

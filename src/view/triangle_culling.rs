@@ -33,10 +33,11 @@ impl RenderView {
         )
     }
 
-    /// Whether a matrix alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow
-    /// map whose depth is clamped at the near plane.
+    /// Whether a matrix that is known alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow
+    /// map whose depth is clamped at the near plane, nor for a camera that may still be replaced.
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
+            _ if self.may_be_replaced() => false,
             Projection::Perspective { .. } => true,
             Projection::Orthographic { .. } => self.kind() != ViewKind::Shadow,
             Projection::Paraboloid => false,

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue};
+use drawloom::backend::{
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
+};
 use drawloom::command::DrawState;
 use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
@@ -265,6 +267,10 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         self.call(CallKind::Prepare, Some(pass))?;
         self.inner.prepare(worker, frame, pass)
+    }
+
+    fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        self.inner.replace_view(frame, request)
     }
 
     fn part_count(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> usize {

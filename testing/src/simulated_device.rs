@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue};
+use drawloom::backend::{
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
+};
 use drawloom::command::DrawState;
 use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
@@ -162,6 +164,10 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
 
     fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         self.inner.prepare(worker, frame, pass)
+    }
+
+    fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        self.inner.replace_view(frame, request)
     }
 
     fn part_count(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> usize {

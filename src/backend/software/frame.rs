@@ -21,10 +21,10 @@ use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
-use crate::backend::{BackendError, FrameFence, PassRequest, ViewQueue};
+use crate::backend::{BackendError, FrameFence, PassRequest, ViewQueue, ViewRequest};
 use crate::command::Batch;
 use crate::process::ShaderColumns;
-use crate::quality::VertexFormat;
+use crate::quality::{TransformPrecision, VertexFormat};
 use crate::scene::{ColumnLayout, Mesh};
 use crate::view::ObjectTable;
 
@@ -32,6 +32,7 @@ use crate::view::ObjectTable;
 pub(super) struct TypedFrame<R: Precision> {
     pub(super) context: Arc<DrawContext>,
     pub(super) views: Vec<ViewState<R>>,
+    pub(super) transforms: TransformPrecision,
     /// In the order they are submitted.
     pub(super) passes: Vec<SoftwarePass<R>>,
     pub(super) objects: R::Objects,
@@ -55,6 +56,11 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         self.context.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
             self.subdivided.lock().insert(key, mesh);
         })
+    }
+
+    fn replace_view(&mut self, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        self.views[request.index] = ViewState::new(request, self.transforms)?;
+        Ok(())
     }
 
     fn submit(

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::SoftwareSubmission;
 use super::commands::SoftwareCommands;
-use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
+use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
 use crate::process::CpuShader;
 use crate::view::ObjectTable;
 
@@ -33,6 +33,12 @@ pub(super) trait FrameRecording: Send + Sync {
     /// # Errors
     /// If a batch's mesh does not exist. This is a bug in Drawloom.
     fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
+
+    /// Replaces a view.
+    ///
+    /// # Errors
+    /// If the camera is out of reach.
+    fn replace_view(&mut self, request: &ViewRequest<'_>) -> Result<(), BackendError>;
 
     /// Draws all passes, and sets each fence when the passes before its place are drawn.
     ///

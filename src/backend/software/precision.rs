@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use glam::Vec3;
+
 use super::shader_inputs::{
     CameraPosition, ExactObject, UploadedObjects, exact_light, exact_view, light_as_uploaded, view_as_uploaded,
 };
@@ -30,8 +32,8 @@ pub(super) trait Precision: Real {
     /// One object, relative to a camera; `None` if there is none.
     fn object(objects: &Self::Objects, index: usize, camera: &CameraPosition) -> Option<ShaderObject<Self>>;
 
-    /// A view.
-    fn view(view: &RenderView, gpu_view: &GpuView, scene: &SceneRef<'_>) -> ShaderView<Self>;
+    /// A view in a scene with this ambient light.
+    fn view(view: &RenderView, gpu_view: &GpuView, ambient: Vec3) -> ShaderView<Self>;
 
     /// A light relative to a view's camera. `map` is the view that draws its shadow map.
     fn light(
@@ -63,7 +65,7 @@ impl Precision for f32 {
         objects.get(index, camera)
     }
 
-    fn view(view: &RenderView, gpu_view: &GpuView, _scene: &SceneRef<'_>) -> ShaderView<Self> {
+    fn view(view: &RenderView, gpu_view: &GpuView, _ambient: Vec3) -> ShaderView<Self> {
         view_as_uploaded(view, gpu_view)
     }
 
@@ -96,8 +98,8 @@ impl Precision for f64 {
         objects.get(index).map(|object| object.relative_to(camera))
     }
 
-    fn view(view: &RenderView, _gpu_view: &GpuView, scene: &SceneRef<'_>) -> ShaderView<Self> {
-        exact_view(view, scene)
+    fn view(view: &RenderView, _gpu_view: &GpuView, ambient: Vec3) -> ShaderView<Self> {
+        exact_view(view, ambient)
     }
 
     fn light(

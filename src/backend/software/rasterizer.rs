@@ -12,7 +12,6 @@ use super::frame_recording::{BeginFrame, FrameRecording};
 use super::materials::MaterialCache;
 use super::meshes::MeshCache;
 use super::precision::Precision;
-use super::shader_inputs::{CameraPosition, light_as_uploaded};
 use super::software_pass::{DepthWrites, SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
@@ -23,7 +22,6 @@ use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess,
 use crate::quality::VertexFormat;
 use crate::scene::ViewKind;
 use crate::task::catch;
-use crate::view::{FixedPosition, GpuLight, GpuView};
 
 /// Draws frames in one precision, and keeps meshes, materials and targets over frames.
 pub(super) struct Rasterizer<R: Precision> {
@@ -63,7 +61,9 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         shaders: &[CpuShader],
     ) -> Result<Box<dyn FrameRecording>, BackendError> {
         let FrameRequest { plan, views, passes, scene, rejections, .. } = *request;
-        let view_states = (0..views.len()).map(|view| view_state(request, view)).collect::<Result<_, _>>()?;
+        let transforms = request.quality.transforms;
+        let view_state = |view| ViewState::new(&request.view(view), transforms);
+        let view_states = (0..views.len()).map(view_state).collect::<Result<_, _>>()?;
         let targets = self.targets.lock().update(plan, views)?;
         let mip_schedule = MipSchedule::new(plan, views, (passes, request.sampled_views));
         let pass = |(index, &pass): (usize, &Pass)| {
@@ -84,6 +84,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         Ok(Box::new(TypedFrame {
             context: Arc::clone(&self.context),
             views: view_states,
+            transforms,
             passes,
             objects: R::objects(scene),
             columns,
@@ -108,34 +109,6 @@ pub(super) fn cpu_shaders_of(request: &FrameRequest<'_>) -> Result<Vec<CpuShader
         shader.ok_or_else(|| BackendError::NoCpuShader { process: process() })
     };
     request.plan.processes().iter().map(shader_of).collect()
-}
-
-/// # Errors
-/// If the camera is out of reach.
-fn view_state<R: Precision>(request: &FrameRequest<'_>, index: usize) -> Result<ViewState<R>, BackendError> {
-    let (view, lights, scene) = (&request.views[index], &request.light_tables[index], request.scene);
-    let out_of_reach = || BackendError::ViewOutOfReach { view: view.name().to_owned() };
-    let gpu_view = GpuView::new(view, scene, lights.light_count()).ok_or_else(out_of_reach)?;
-    let camera = CameraPosition {
-        exact: view.camera.position,
-        fixed: FixedPosition::from_halves(gpu_view.position_low, gpu_view.position_high),
-        transforms: request.quality.transforms,
-    };
-    let light = |(gpu_light, (light, map)): (&GpuLight, (usize, Option<usize>))| {
-        R::light(gpu_light, &request.lights[light], &camera, map.map(|map| &request.views[map]))
-    };
-    let of_layer = |(gpu_light, source): (&GpuLight, &Option<(usize, usize)>)| match *source {
-        Some((index, map)) => light((gpu_light, (index, Some(map)))),
-        None => light_as_uploaded(gpu_light),
-    };
-    let shader_view = R::view(view, &gpu_view, scene);
-    let (gpu_lights, by_layer) = lights.gpu_lights().split_at(lights.light_count());
-    Ok(ViewState {
-        shader_view,
-        lights: gpu_lights.iter().zip(lights.sources()).map(light).collect(),
-        lights_by_layer: by_layer.iter().zip(lights.layer_sources()).map(of_layer).collect(),
-        camera,
-    })
 }
 
 /// A pass, with the targets whose mip levels it leaves out of date.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::process::{ShaderLight, ShaderObject, ShaderView};
 use crate::quality::TransformPrecision;
@@ -97,7 +97,7 @@ impl ExactObject {
 
 /// A view as a device gets it.
 pub(super) fn view_as_uploaded(view: &RenderView, gpu_view: &GpuView) -> ShaderView<f32> {
-    let axis = |axis: glam::Vec3| Vector(axis.to_array());
+    let axis = |axis: Vec3| Vector(axis.to_array());
     ShaderView {
         clip_from_relative: gpu_view.clip_from_relative.to_cols_array_2d().map(Vector),
         right: axis(gpu_view.right),
@@ -113,7 +113,7 @@ pub(super) fn view_as_uploaded(view: &RenderView, gpu_view: &GpuView) -> ShaderV
 }
 
 /// A view computed from its camera, in f64.
-pub(super) fn exact_view(view: &RenderView, scene: &SceneRef<'_>) -> ShaderView<f64> {
+pub(super) fn exact_view(view: &RenderView, ambient: Vec3) -> ShaderView<f64> {
     let camera = &view.camera;
     let [right, up, forward] = view.precise_picture_axes().map(Vector3::of);
     ShaderView {
@@ -126,7 +126,7 @@ pub(super) fn exact_view(view: &RenderView, scene: &SceneRef<'_>) -> ShaderView<
         size: size_of(view),
         projection: camera.projection,
         clamps_near: clamps_near(view),
-        ambient: Vector3::of_single(scene.ambient),
+        ambient: Vector3::of_single(ambient),
     }
 }
 

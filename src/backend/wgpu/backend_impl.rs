@@ -15,7 +15,9 @@ use super::recording::{
 };
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::submission::WgpuSubmission;
-use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue};
+use crate::backend::{
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
+};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::Quality;
@@ -276,6 +278,16 @@ impl Backend for WgpuBackend {
             chosen: state.strategy_index,
             is_trial: state.is_trial,
         })
+    }
+
+    fn replace_view(&self, frame: &mut WgpuFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        let gpu_view = request.gpu_view()?;
+        let label = "a view whose camera is replaced";
+        let replace = || frame.buffers.replace_view(&self.uploads, &gpu_view, request);
+        // Not all may have been written.
+        with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
+            .flatten()
+            .inspect_err(|_| self.buffers.clear())
     }
 
     fn submit(

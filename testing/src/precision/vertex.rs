@@ -1,7 +1,7 @@
 //! The position of a vertex in a picture: as shaders compute it, from f32 world positions, and exact.
 
 use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
-use drawloom::scene::{Camera, Projection, Scene, ViewKind};
+use drawloom::scene::{Camera, Projection, ViewKind};
 use drawloom::view::{GpuObject, GpuView, RenderView};
 
 /// A vertex of an object in a view.
@@ -110,7 +110,7 @@ pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
 /// # Panics
 /// Panics if the camera is out of range.
 pub fn gpu_view_of(view: &RenderView) -> GpuView {
-    GpuView::new(view, &Scene::new().as_scene_ref(), 0).expect("the camera is within reach")
+    GpuView::new(view, Vec3::ZERO, 0).expect("the camera is within reach")
 }
 
 fn unit(orientation: Quat) -> DQuat {

@@ -67,7 +67,7 @@ impl VisibleScene {
         };
         self.lights.clear();
         self.lights.extend(scene.lights.iter().filter(reaches).map(|light| GpuLight::new(light, eye, None)));
-        self.view = Some(GpuView::new(&view, scene, self.lights.len()).ok_or(FAR)?);
+        self.view = Some(GpuView::new(&view, scene.ambient, self.lights.len()).ok_or(FAR)?);
         Ok(())
     }
 }

@@ -20,7 +20,7 @@ use crate::backend::wgpu::resources::{
     check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
-use crate::backend::{BackendError, FrameRequest};
+use crate::backend::{BackendError, FrameRequest, ViewRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
 use crate::view::GpuView;
@@ -195,6 +195,14 @@ impl FrameBuffers {
             }
         }
         Ok(())
+    }
+
+    /// Replaces a view by this one, and its lights by those of the request.
+    pub(crate) fn replace_view(&mut self, uploads: &UploadQueue, gpu_view: &GpuView, request: &ViewRequest<'_>) {
+        let Buffers { views, lights, view_ranges, .. } = &mut *self.buffers;
+        let ranges = &view_ranges[request.index];
+        views.overwrite(uploads, ranges.view.start, bytemuck::bytes_of(gpu_view));
+        lights.overwrite(uploads, ranges.lights.start, bytemuck::cast_slice(request.light_table.gpu_lights()));
     }
 
     /// Makes room for timestamps of the frame's passes. After an error the buffers are unusable.
@@ -394,7 +402,7 @@ impl Buffers {
     /// # Errors
     /// If a camera is out of reach.
     fn set_views(&mut self, request: &FrameRequest<'_>, max: u64) -> Result<(), BackendError> {
-        let FrameRequest { views, light_tables, scene, .. } = *request;
+        let FrameRequest { views, light_tables, .. } = *request;
         let ranges = &mut self.view_ranges;
         ViewRanges::keep(ranges, views);
         for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
@@ -406,9 +414,8 @@ impl Buffers {
         let (view_bytes, light_bytes) = (self.views.rewrite(), self.lights.rewrite());
         view_bytes.resize(end_of_views, 0);
         light_bytes.resize(end_of_lights, 0);
-        for ((ranges, view), lights) in ranges.iter().zip(views).zip(light_tables) {
-            let gpu_view = GpuView::new(view, scene, lights.light_count())
-                .ok_or_else(|| BackendError::ViewOutOfReach { view: view.name().to_owned() })?;
+        for (index, (ranges, lights)) in ranges.iter().zip(light_tables).enumerate() {
+            let gpu_view = request.view(index).gpu_view()?;
             view_bytes[ranges.view.start..][..size_of::<GpuView>()].copy_from_slice(bytemuck::bytes_of(&gpu_view));
             let lights: &[u8] = bytemuck::cast_slice(lights.gpu_lights());
             light_bytes[ranges.lights.start..][..lights.len()].copy_from_slice(lights);
