@@ -11,6 +11,7 @@ mod declaring;
 mod deferred;
 mod determinism;
 mod failing_process;
+mod late_latch;
 mod layers;
 mod levels_of_detail;
 mod mip_levels;
