@@ -28,6 +28,7 @@ mod history;
 mod image_distance;
 mod imported_targets;
 mod kept_processes;
+mod late_latch;
 mod levels_of_detail;
 mod light_cut_off;
 mod light_volumes;
@@ -92,6 +93,7 @@ fn main() {
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
+        (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),

@@ -102,15 +102,13 @@ mod tests {
 
     use super::*;
     use crate::backend::software::shader_inputs::{exact_view, light_as_uploaded};
-    use crate::scene::{Assets, Camera, ClipPlane, Light, SceneRef};
+    use crate::scene::{Camera, ClipPlane, Light};
     use crate::view::{GpuLight, RenderView};
 
     const SIZE: [u32; 2] = [160, 90];
 
     fn view_of(camera: &Camera) -> ShaderView<f64> {
-        let assets = Assets::default();
-        let scene = SceneRef::new(&assets);
-        exact_view(&RenderView::new(camera), &scene)
+        exact_view(&RenderView::new(camera), Vec3::ZERO)
     }
 
     fn light_bounds(camera: &Camera, position: DVec3, range: f32) -> LightBounds {
