@@ -83,7 +83,10 @@ fn check(recorded: &Camera, motion: CameraMotion, camera: &Camera) -> Result<(),
     if let Some(reason) = camera.pose_problem() {
         return Err(SceneError::InvalidCamera { camera: view(), reason }.into());
     }
-    let (moved, allowed) = (CameraMotion::between(recorded, camera), motion.with_rounding());
+    let (moved, allowed) = (
+        CameraMotion::between((recorded.position, recorded.orientation), (camera.position, camera.orientation)),
+        motion.with_rounding(),
+    );
     if moved.distance > allowed.distance || moved.angle > allowed.angle {
         let (distance, angle) = (moved.distance, moved.angle);
         return Err(LatchError::BeyondMotion { view: view(), distance, angle, allowed: motion });

@@ -177,7 +177,7 @@ impl Camera {
             reason
         } else if self.redraw == Redraw::Interval(0) {
             "it is redrawn every 0 frames"
-        } else if let Some(reason) = self.late_latch.and_then(|motion| motion.problem(self)) {
+        } else if let Some(reason) = self.late_latch_problem() {
             reason
         } else if let Some(reason) = self.projection_problem() {
             reason
@@ -195,6 +195,17 @@ impl Camera {
             Some("its orientation is not of unit length")
         } else {
             None
+        }
+    }
+
+    fn late_latch_problem(&self) -> Option<&'static str> {
+        let motion = self.late_latch?;
+        if self.kind == ViewKind::Shadow {
+            Some("a shadow map's camera cannot have a late_latch")
+        } else if !self.redraw.is_every_frame() {
+            Some("it has a late_latch and is not redrawn in every frame")
+        } else {
+            motion.problem()
         }
     }
 

@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use glam::DVec3;
-
-use super::Camera;
+use glam::{DVec3, Quat};
 
 /// How far a camera may move between the recording of a frame and its submission, so that
 /// [`Recorded::replace_camera`](crate::Recorded::replace_camera) may replace it by a newer one: late latching.
@@ -43,11 +41,12 @@ impl CameraMotion {
     }
 
     /// The motion that leads from one camera to another: how far they are apart, and the smallest angle by which one turns into the other.
-    pub(crate) fn between(one: &Camera, other: &Camera) -> PreciseMotion {
-        let [from, to] = [one, other].map(|camera| camera.orientation.as_dquat().normalize());
+    /// Each is a position and an orientation.
+    pub(crate) fn between(one: (DVec3, Quat), other: (DVec3, Quat)) -> PreciseMotion {
+        let [from, to] = [one.1, other.1].map(|orientation| orientation.as_dquat().normalize());
         let turn = from.inverse() * to;
         let angle = 2.0 * DVec3::new(turn.x, turn.y, turn.z).length().atan2(turn.w.abs());
-        PreciseMotion { distance: one.position.distance(other.position), angle }
+        PreciseMotion { distance: one.0.distance(other.0), angle }
     }
 
     /// The largest motion that is accepted, and that culling allows for. It exceeds these bounds by what orientations in f32, and positions
@@ -67,16 +66,12 @@ impl CameraMotion {
         Self { distance: distance + self.precise().moves_at(f64::from(metres)) as f32, angle }
     }
 
-    /// What is wrong with it for `camera`; `None` if nothing is.
-    pub(super) fn problem(self, camera: &Camera) -> Option<&'static str> {
+    /// What is wrong with it; `None` if nothing is.
+    pub(super) fn problem(self) -> Option<&'static str> {
         if !(0.0..=Self::MAX_DISTANCE).contains(&self.distance) {
             Some("the distance of its late_latch is not from 0 to 1,000 km")
         } else if !(self.angle >= 0.0 && self.angle.is_finite()) {
             Some("the angle of its late_latch is negative or not finite")
-        } else if camera.kind == super::ViewKind::Shadow {
-            Some("a shadow map's camera cannot have a late_latch")
-        } else if !camera.redraw.is_every_frame() {
-            Some("it has a late_latch and is not redrawn in every frame")
         } else {
             None
         }
@@ -103,8 +98,6 @@ const ROUNDING: f64 = 4e-6;
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
-    use glam::Quat;
-
     use super::*;
 
     #[test]
@@ -115,15 +108,12 @@ mod tests {
 
     #[test]
     fn the_motion_between_cameras_is_the_shortest() {
-        let one = Camera::looking_at("main", DVec3::new(1e9, 2.0, 3.0), DVec3::ZERO);
+        let one = (DVec3::new(1e9, 2.0, 3.0), Quat::from_rotation_y(2.0));
         for angle in [0.0, 1e-4, 0.5, 3.0_f32] {
             let turn = Quat::from_axis_angle(glam::Vec3::new(0.6, 0.0, 0.8), angle);
-            let mut other = Camera { orientation: one.orientation * turn, ..one.clone() };
-            other.position.z += 4.0;
             // Both signs of a quaternion are one orientation.
             for sign in [1.0, -1.0] {
-                let signed = Camera { orientation: other.orientation * sign, ..other.clone() };
-                let motion = CameraMotion::between(&one, &signed);
+                let motion = CameraMotion::between(one, (one.0 + DVec3::Z * 4.0, one.1 * turn * sign));
                 assert!((motion.distance - 4.0).abs() < 1e-6);
                 assert!((motion.angle - f64::from(angle)).abs() < 1e-6, "{} is not {angle}", motion.angle);
             }

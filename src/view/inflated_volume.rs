@@ -172,7 +172,7 @@ mod tests {
             let camera = latchable(camera, motion);
             let drawn = moved(&camera, motion, step, turn);
             let bounds = motion.with_rounding();
-            let between = CameraMotion::between(&camera, &drawn);
+            let between = CameraMotion::between((camera.position, camera.orientation), (drawn.position, drawn.orientation));
             prop_assert!(between.distance <= bounds.distance && between.angle <= bounds.angle, "{between:?}");
             let (near, far) = (f64::from(drawn.near), f64::from(drawn.far));
             let far = if far.is_finite() { far } else { near * 10_f64.powf(1.0 + exponent.abs() * 2.0) };
