@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some(CameraMotion::from_speeds(metres, degrees.to_radians(), Duration::from_millis(milliseconds)))
     };
     let allowances = [
-        Allowance { name: "none, with occlusion tests", motion: None, occlusion: Quality::balanced().occlusion },
+        Allowance { name: "none, with occlusion tests", motion: None, occlusion: Some(16) },
         Allowance { name: "none", motion: None, occlusion: None },
         Allowance { name: "0", motion: of(0.0, 0.0, 0), occlusion: None },
         Allowance { name: "5 m/s, 180°/s, 16 ms", motion: of(5.0, 180.0, 16), occlusion: None },
