@@ -197,6 +197,17 @@ pub enum BackendError {
     /// Pass times were requested from a backend that does not time passes.
     #[error("passes are not timed: see `WgpuBackend::time_passes`")]
     NotTimed,
+    /// A number of a [`StreamingBudget`](super::StreamingBudget) that is too small.
+    #[cfg(feature = "wgpu")]
+    #[error("a streaming budget with {field} = {value} is too small: it has to be at least {least}")]
+    InvalidStreamingBudget {
+        /// The field.
+        field: &'static str,
+        /// Its value, in bytes or nanoseconds.
+        value: u64,
+        /// The least possible one.
+        least: u64,
+    },
     /// Drawloom broke a rule between frame and backend. This is a bug in Drawloom.
     #[error("broken rule: {rule}")]
     BrokenRule {

@@ -46,8 +46,11 @@ type Texel = [f32; 4];
 /// Magnifies bilinearly; minifies with a tent filter.
 fn scaled(texture: &Texture, side: u32) -> Vec<Texel> {
     let (width, height) = (texture.width() as usize, texture.height() as usize);
-    let texels: Vec<Texel> =
-        texture.pixels().chunks_exact(4).map(|pixel| decoded([pixel[0], pixel[1], pixel[2], pixel[3]])).collect();
+    let texels: Vec<Texel> = texture.pixels().as_chunks().0.iter().copied().map(decoded).collect();
+    if [texture.width(), texture.height()] == [side; 2] {
+        // Every weight would be 1.
+        return texels;
+    }
     let columns = weights(width, side as usize);
     let rows = weights(height, side as usize);
     let mut result = Vec::with_capacity(rows.len() * columns.len());
@@ -88,12 +91,17 @@ fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
 
 fn halved(level: &[Texel], side: usize) -> Vec<Texel> {
     let half = side / 2;
-    let texel = |index: usize| {
-        let (x, y) = (index % half * 2, index / half * 2);
-        let corners = [y * side + x, y * side + x + 1, (y + 1) * side + x, (y + 1) * side + x + 1];
-        std::array::from_fn(|channel| corners.iter().map(|&corner| level[corner][channel]).sum::<f32>() * 0.25)
-    };
-    (0..half * half).map(texel).collect()
+    let mut result = Vec::with_capacity(half * half);
+    for rows in level.chunks_exact(2 * side) {
+        let (upper, lower) = rows.split_at(side);
+        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+        result.extend(pairs.map(|(upper, lower)| -> Texel {
+            std::array::from_fn(|channel| {
+                (upper[0][channel] + upper[1][channel] + lower[0][channel] + lower[1][channel]) * 0.25
+            })
+        }));
+    }
+    result
 }
 
 fn decoded(pixel: [u8; 4]) -> Texel {
@@ -105,15 +113,57 @@ fn decoded(pixel: [u8; 4]) -> Texel {
 }
 
 fn encoded(level: &[Texel]) -> Vec<u8> {
-    let byte = |value: f32| (value * 255.0 + 0.5) as u8;
-    let encode = |&[red, green, blue, alpha]: &Texel| {
-        [byte(linear_to_srgb(red)), byte(linear_to_srgb(green)), byte(linear_to_srgb(blue)), byte(alpha)]
-    };
-    level.iter().flat_map(encode).collect()
+    let (bytes, alpha) = (&*SRGB_BYTES, |value: f32| (value * 255.0 + 0.5) as u8);
+    let mut result = Vec::with_capacity(level.len() * 4);
+    for &[red, green, blue, opacity] in level {
+        result.extend([bytes.encode(red), bytes.encode(green), bytes.encode(blue), alpha(opacity)]);
+    }
+    result
 }
 
-fn linear_to_srgb(value: f32) -> f32 {
-    if value <= 0.003_130_8 { value * 12.92 } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 }
+static SRGB_BYTES: LazyLock<SrgbBytes> = LazyLock::new(SrgbBytes::new);
+
+/// Linear values as sRGB bytes, by search in a table: a power for each channel of each pixel would take most of the time of a chain.
+struct SrgbBytes {
+    /// The smallest value of each byte.
+    smallest: [f32; 256],
+    /// The byte of each multiple of 1 / [`CELLS`](Self::CELLS).
+    first: Vec<u8>,
+}
+
+impl SrgbBytes {
+    /// A byte covers more than half a cell, so the byte of a value is at most two above that of its cell.
+    const CELLS: usize = 4096;
+
+    fn new() -> Self {
+        let smallest = std::array::from_fn(|byte| {
+            // Positive floats are ordered as their bits are.
+            let (mut below, mut reached) = (0, 1.0_f32.to_bits());
+            while byte > 0 && reached - below > 1 {
+                let middle = below.midpoint(reached);
+                let bound =
+                    if usize::from(srgb_byte(f32::from_bits(middle))) < byte { &mut below } else { &mut reached };
+                *bound = middle;
+            }
+            if byte == 0 { 0.0 } else { f32::from_bits(reached) }
+        });
+        let first = (0..=Self::CELLS).map(|cell| srgb_byte(cell as f32 / Self::CELLS as f32)).collect();
+        Self { smallest, first }
+    }
+
+    fn encode(&self, value: f32) -> u8 {
+        let cell = (value * Self::CELLS as f32) as usize;
+        let mut byte = self.first[cell.min(Self::CELLS)];
+        while byte < u8::MAX && self.smallest[usize::from(byte) + 1] <= value {
+            byte += 1;
+        }
+        byte
+    }
+}
+
+fn srgb_byte(value: f32) -> u8 {
+    let encoded = if value <= 0.003_130_8 { value * 12.92 } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0 + 0.5) as u8
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -127,6 +177,16 @@ mod tests {
         let chain = mip_chain(&texture, 8);
         assert_eq!(chain.iter().map(Vec::len).collect::<Vec<_>>(), [256, 64, 16, 4]);
         assert_eq!(chain[0], pixels);
+    }
+
+    #[test]
+    fn the_table_has_the_bytes_of_the_formula() {
+        let mut random = fastrand::Rng::with_seed(8);
+        let around = SRGB_BYTES.smallest.into_iter().flat_map(|value| [value.next_down(), value, value.next_up()]);
+        let others = (0..200_000).map(|_| random.f32());
+        for value in around.chain(others).chain([0.0, -0.0, 1.0, 1.0_f32.next_up(), 2.0]) {
+            assert_eq!(SRGB_BYTES.encode(value), srgb_byte(value), "{value:e}");
+        }
     }
 
     #[test]

@@ -24,8 +24,12 @@ impl Warnings {
                 is_partial(known.reason) && known.reason == rejection.reason && known.count >= rejection.count
             };
             let is_reported = self.reported.iter().any(|known| known == rejection || is_part(known));
-            // A light that is switched off is no mistake.
-            if rejection.reason == RejectionReason::DarkLight || is_reported {
+            // A light that is switched off is no mistake, and what is streamed arrives.
+            let is_expected = matches!(
+                rejection.reason,
+                RejectionReason::DarkLight | RejectionReason::MeshNotResident | RejectionReason::TextureNotResident
+            );
+            if is_expected || is_reported {
                 continue;
             }
             let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);

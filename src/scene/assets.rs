@@ -22,6 +22,14 @@ pub struct Assets {
     pub(crate) meshes: Slots<Mesh>,
     pub(crate) materials: Slots<Material>,
     pub(crate) textures: Slots<Texture>,
+    priorities: Priorities,
+}
+
+/// By slot; 0 beyond the ends.
+#[derive(Debug, Default)]
+struct Priorities {
+    meshes: Vec<i32>,
+    textures: Vec<i32>,
 }
 
 impl Assets {
@@ -31,7 +39,9 @@ impl Assets {
     /// If the asset is invalid, or refers to an asset that is not in this collection.
     pub fn add<T: Asset>(&mut self, asset: T) -> Result<Handle<T>, SceneError> {
         asset.check(self)?;
-        Ok(T::slots_mut(self).insert(asset))
+        let handle = T::slots_mut(self).insert(asset);
+        self.store_priority(handle, 0);
+        Ok(handle)
     }
 
     /// Replaces an asset, for every object that refers to it.
@@ -60,6 +70,44 @@ impl Assets {
         T::slots(self).get(handle)
     }
 
+    /// Sets in which order a backend that [streams](crate::backend::Backend) brings meshes and textures to the device: those with a higher
+    /// priority first, once those that are in sight are there. It may change at any time, and changes nothing in pictures. It is 0 where
+    /// nothing is set; materials have none.
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn set_priority<T: Asset>(&mut self, handle: Handle<T>, priority: i32) -> Result<(), StaleHandle> {
+        T::slots(self).get(handle)?;
+        self.store_priority(handle, priority);
+        Ok(())
+    }
+
+    /// The priority of an asset.
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn priority<T: Asset>(&self, handle: Handle<T>) -> Result<i32, StaleHandle> {
+        T::slots(self).get(handle)?;
+        Ok(self.priority_of_slot::<T>(handle.index()))
+    }
+
+    /// The priority of the asset in a slot.
+    pub(crate) fn priority_of_slot<T: Asset>(&self, slot: u32) -> i32 {
+        T::priorities(self).and_then(|priorities| priorities.get(slot as usize)).copied().unwrap_or(0)
+    }
+
+    fn store_priority<T: Asset>(&mut self, handle: Handle<T>, priority: i32) {
+        let Some(priorities) = T::priorities_mut(self) else { return };
+        let slot = handle.index() as usize;
+        if slot >= priorities.len() {
+            if priority == 0 {
+                return;
+            }
+            priorities.resize(slot + 1, 0);
+        }
+        priorities[slot] = priority;
+    }
+
     /// All assets of one type, in slot order.
     pub fn iter<T: Asset>(&self) -> impl Iterator<Item = (Handle<T>, &T)> {
         T::slots(self).iter()
@@ -72,6 +120,15 @@ pub trait Asset: Sized + sealed::Sealed + 'static {
     fn slots(assets: &Assets) -> &Slots<Self>;
     #[doc(hidden)]
     fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
+    /// The priorities by slot; `None` for a type without.
+    #[doc(hidden)]
+    fn priorities(_assets: &Assets) -> Option<&Vec<i32>> {
+        None
+    }
+    #[doc(hidden)]
+    fn priorities_mut(_assets: &mut Assets) -> Option<&mut Vec<i32>> {
+        None
+    }
     #[doc(hidden)]
     fn check(&self, _assets: &Assets) -> Result<(), SceneError> {
         Ok(())
@@ -79,6 +136,14 @@ pub trait Asset: Sized + sealed::Sealed + 'static {
 }
 
 impl Asset for Mesh {
+    fn priorities(assets: &Assets) -> Option<&Vec<i32>> {
+        Some(&assets.priorities.meshes)
+    }
+
+    fn priorities_mut(assets: &mut Assets) -> Option<&mut Vec<i32>> {
+        Some(&mut assets.priorities.meshes)
+    }
+
     fn slots(assets: &Assets) -> &Slots<Self> {
         &assets.meshes
     }
@@ -106,6 +171,14 @@ impl Asset for Material {
 }
 
 impl Asset for Texture {
+    fn priorities(assets: &Assets) -> Option<&Vec<i32>> {
+        Some(&assets.priorities.textures)
+    }
+
+    fn priorities_mut(assets: &mut Assets) -> Option<&mut Vec<i32>> {
+        Some(&mut assets.priorities.textures)
+    }
+
     fn slots(assets: &Assets) -> &Slots<Self> {
         &assets.textures
     }

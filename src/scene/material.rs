@@ -1,5 +1,7 @@
 //! Materials and textures.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{MaterialValues, SceneError};
@@ -66,13 +68,13 @@ pub enum Blend {
     Subtractive = 3,
 }
 
-/// An RGBA image for a material.
+/// An RGBA image for a material. Clones share their pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     name: String,
     width: u32,
     height: u32,
-    pixels: Vec<u8>,
+    pixels: Arc<Vec<u8>>,
 }
 
 impl Texture {
@@ -90,7 +92,7 @@ impl Texture {
         if !sides.contains(&width) || !sides.contains(&height) || !fits(pixels.len()) {
             return Err(SceneError::InvalidTexture { texture: name, width, height, bytes: pixels.len() });
         }
-        Ok(Self { name, width, height, pixels })
+        Ok(Self { name, width, height, pixels: Arc::new(pixels) })
     }
 
     /// The name in reports.

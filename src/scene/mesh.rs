@@ -1,7 +1,6 @@
 //! Triangle meshes.
 
 use std::ops::Range;
-#[cfg(feature = "wgpu")]
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -11,20 +10,21 @@ use super::MeshBuffers;
 use super::vertex_attribute::MeshAttribute;
 use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, VertexAttribute};
 
-/// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise.
+/// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise. Clones share
+/// their vertices and indices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     name: String,
     topology: Topology,
-    vertices: Vec<Vertex>,
-    indices: Vec<u32>,
-    attributes: Vec<MeshAttribute>,
+    vertices: Arc<Vec<Vertex>>,
+    indices: Arc<Vec<u32>>,
+    attributes: Arc<Vec<MeshAttribute>>,
     bounds: Bounds,
     corners: [Vec3; 2],
     longest_edge: f32,
     culls_triangles: bool,
     /// The coarser levels, the finest first.
-    pub(super) levels: Vec<LevelOfDetail>,
+    pub(super) levels: Arc<Vec<LevelOfDetail>>,
     /// If it is not in `vertices` and `indices`.
     #[cfg(feature = "wgpu")]
     buffers: Option<Arc<MeshBuffers>>,
@@ -117,14 +117,14 @@ impl Mesh {
         let mut mesh = Self {
             name,
             topology,
-            vertices,
-            indices,
-            attributes: Vec::new(),
+            vertices: Arc::new(vertices),
+            indices: Arc::new(indices),
+            attributes: Arc::default(),
             bounds,
             corners,
             longest_edge: 0.0,
             culls_triangles: false,
-            levels: Vec::new(),
+            levels: Arc::default(),
             #[cfg(feature = "wgpu")]
             buffers: None,
         };
@@ -173,7 +173,7 @@ impl Mesh {
                 return Err(refused(format!("is not finite at vertex {}", number / usize::from(components))));
             }
         }
-        self.attributes.push(MeshAttribute { layout, bytes });
+        Arc::make_mut(&mut self.attributes).push(MeshAttribute { layout, bytes });
         Ok(self)
     }
 
@@ -186,7 +186,7 @@ impl Mesh {
     /// The attributes of another mesh with the same vertices, followed by ones that were added halfway between two others.
     pub(super) fn with_attributes_of(self, other: &Self, midpoint_ends: &[[u32; 2]]) -> Self {
         let attributes = other.attributes.iter().map(|attribute| attribute.subdivided(midpoint_ends)).collect();
-        Self { attributes, ..self }
+        Self { attributes: Arc::new(attributes), ..self }
     }
 
     /// Enables or disables triangle culling. If enabled, each frame tests every triangle in every view, and leaves out those
@@ -208,7 +208,8 @@ impl Mesh {
     /// The mesh and its levels as triangle lists.
     pub(super) fn into_list(mut self) -> Self {
         if self.topology == Topology::TriangleStrip {
-            let lists = self.levels.iter_mut().map(|level| &mut level.indices).chain([&mut self.indices]);
+            let (levels, indices) = (Arc::make_mut(&mut self.levels), Arc::make_mut(&mut self.indices));
+            let lists = levels.iter_mut().map(|level| &mut level.indices).chain([indices]);
             for indices in lists {
                 let all = 0..triangle_count(Topology::TriangleStrip, indices.len());
                 *indices = triangles_of(Topology::TriangleStrip, indices, all).flatten().collect();

@@ -1,5 +1,7 @@
 //! The levels of detail of a mesh.
 
+use std::sync::Arc;
+
 use super::mesh::{check_corner_count, triangle_count};
 use super::{LevelOfDetail, Mesh, SceneError};
 
@@ -30,7 +32,7 @@ impl Mesh {
     /// [`LevelOfDetail::MAX_COUNT`]; or if the mesh is [in the engine's own buffers](Self::from_buffers), whose indices the CPU does not
     /// know.
     pub fn with_levels(mut self, levels: impl IntoIterator<Item = LevelOfDetail>) -> Result<Self, SceneError> {
-        self.levels.clear();
+        self.levels = Arc::default();
         let (mut triangles, mut error) = (self.triangle_count(), 0.0);
         for (index, mut level) in (0..).zip(levels) {
             if let Some(problem) = self.level_problem(index, &level, triangles, error) {
@@ -38,7 +40,7 @@ impl Mesh {
             }
             (triangles, error) = (triangle_count(self.topology(), level.indices.len()), level.error());
             level.longest_edge = self.longest_edge_among(&level.indices);
-            self.levels.push(level);
+            Arc::make_mut(&mut self.levels).push(level);
         }
         Ok(self)
     }

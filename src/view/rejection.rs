@@ -21,6 +21,12 @@ impl Rejections {
         }
     }
 
+    /// Does the same for several of them.
+    pub fn count_all_once(&self, reason: RejectionReason, indices: impl Iterator<Item = usize>) {
+        let mut counted = self.counted_once.lock();
+        indices.filter(|index| counted.insert((reason, *index))).for_each(|index| self.count(reason, index));
+    }
+
     /// Counts an object, light or material.
     pub fn count(&self, reason: RejectionReason, index: usize) {
         self.by_reason[reason as usize].count(index);
@@ -78,13 +84,17 @@ pub enum RejectionReason {
     StaleTexture,
     /// A texture exceeds the device's limits; the material's plain colour is used.
     TextureLimit,
+    /// An object's mesh is not on the device yet, or not loaded yet, so the object is not drawn: it is streamed.
+    MeshNotResident,
+    /// A material's texture is not on the device yet, or not loaded yet; the material's plain colour is used.
+    TextureNotResident,
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
     /// objects are drawn as it says.
     UnknownObject,
 }
 
 impl RejectionReason {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 14] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -96,6 +106,8 @@ impl RejectionReason {
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
+        Self::MeshNotResident,
+        Self::TextureNotResident,
         Self::UnknownObject,
     ];
 
@@ -113,6 +125,8 @@ impl RejectionReason {
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",
+            Self::MeshNotResident => "object with a mesh that is yet to arrive",
+            Self::TextureNotResident => "material with a texture that is yet to arrive",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
         }
     }

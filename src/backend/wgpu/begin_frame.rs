@@ -60,6 +60,7 @@ impl WgpuBackend {
                 pipelines,
                 layouts,
                 meshes,
+                _textures: Arc::clone(&materials.token),
                 light_meshes,
                 targets,
                 storage_buffers,
@@ -130,7 +131,7 @@ impl WgpuBackend {
                     materials_bind_group: materials_bind_group.clone(),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
                     engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
-                    meshes: Arc::clone(meshes),
+                    meshes: meshes.number(),
                     pipelines: Arc::clone(pipelines),
                 });
             }

@@ -8,7 +8,7 @@ use parking_lot::Mutex;
 
 use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes, subdivision_of};
 use crate::backend::wgpu::pipelines::ProcessPipelines;
-use crate::backend::wgpu::resources::{MeshSnapshot, SubdividedMesh};
+use crate::backend::wgpu::resources::SubdividedMesh;
 use crate::command::Batch;
 
 /// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot determines the
@@ -19,7 +19,9 @@ pub(crate) struct BundleKey {
     pub(crate) materials_bind_group: wgpu::BindGroup,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
     pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
-    pub(crate) meshes: Arc<MeshSnapshot>,
+    /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being overwritten: they are not
+    /// replayed with another snapshot.
+    pub(crate) meshes: u64,
     pub(crate) pipelines: Arc<ProcessPipelines>,
 }
 
@@ -29,7 +31,7 @@ impl PartialEq for BundleKey {
             && self.materials_bind_group == other.materials_bind_group
             && self.process_bind_group == other.process_bind_group
             && self.engine_bind_group == other.engine_bind_group
-            && Arc::ptr_eq(&self.meshes, &other.meshes)
+            && self.meshes == other.meshes
             && Arc::ptr_eq(&self.pipelines, &other.pipelines)
     }
 }

@@ -27,7 +27,7 @@ impl IndirectArguments {
         *self.buffer.get_mut() = None;
     }
 
-    /// Uploads the arguments of all batches if they changed. Partial batches and meshes outside of the arenas have zeros.
+    /// Uploads the arguments of all batches if they changed. Partial batches and meshes outside of the pages have zeros.
     ///
     /// # Errors
     /// If a batch draws no mesh, or the device has no room.
@@ -42,20 +42,16 @@ impl IndirectArguments {
         let buffer = buffer.get_or_insert_with(|| MirroredBuffer::new("indirect draws", wgpu::BufferUsages::INDIRECT));
         let bytes = buffer.rewrite();
         for (index, batch) in list.batches.iter().enumerate() {
-            let arguments = match (batch.state.subdivision_level(), list.remaining(index)) {
-                (0, None) => {
-                    let mesh = meshes.mesh_range(batch)?;
-                    DrawIndexedIndirectArgs {
-                        index_count: mesh.index_count,
-                        instance_count: batch.count,
-                        first_index: mesh.first_index,
-                        base_vertex: mesh.base_vertex,
-                        first_instance: batch.first,
-                    }
-                }
-                // Drawn directly, because it has buffers of its own.
-                _ => DrawIndexedIndirectArgs::default(),
-            };
+            let is_whole = batch.state.subdivision_level() == 0 && list.remaining(index).is_none();
+            let mesh = if is_whole { meshes.mesh_range(batch)? } else { None };
+            // Otherwise it is drawn directly, because it has buffers of its own, or not at all.
+            let arguments = mesh.map_or_else(DrawIndexedIndirectArgs::default, |mesh| DrawIndexedIndirectArgs {
+                index_count: mesh.index_count,
+                instance_count: batch.count,
+                first_index: mesh.first_index,
+                base_vertex: mesh.base_vertex,
+                first_instance: batch.first,
+            });
             bytes.extend_from_slice(arguments.as_bytes());
         }
         buffer.upload(device, uploads).map(|_| ())

@@ -9,7 +9,7 @@ use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, LightMeshes, MeshSnapshot, StorageBuffers, ViewTarget, WgpuTargets,
+    BindGroupLayouts, LightMeshes, MeshSnapshot, SnapshotToken, StorageBuffers, ViewTarget, WgpuTargets,
 };
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::Pass;
@@ -22,6 +22,8 @@ pub struct WgpuFrame {
     pub(crate) pipelines: Arc<[Arc<ProcessPipelines>]>,
     pub(crate) layouts: BindGroupLayouts,
     pub(crate) meshes: Arc<MeshSnapshot>,
+    /// Keeps its textures from being overwritten.
+    pub(crate) _textures: Arc<SnapshotToken>,
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) storage_buffers: Arc<StorageBuffers>,

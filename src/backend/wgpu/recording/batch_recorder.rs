@@ -11,7 +11,7 @@ use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
 use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
 use crate::backend::wgpu::pipelines::PipelineVariant;
-use crate::backend::wgpu::resources::{SubdividedMesh, attribute_of};
+use crate::backend::wgpu::resources::{MeshPageIndices, SubdividedMesh, attribute_of};
 use crate::command::{Batch, DrawList};
 
 /// Records the batches of a pass.
@@ -27,7 +27,8 @@ pub(crate) struct BatchRecorder<'a> {
 
 impl<'a> BatchRecorder<'a> {
     /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` is
-    /// called for consecutive unculled, unsubdivided batches of one state whose meshes are in the arenas, and draws them.
+    /// called for consecutive unculled, unsubdivided batches of one state whose meshes are in the same pages, and draws them. Batches whose
+    /// meshes are not on the device draw nothing.
     ///
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.
@@ -38,7 +39,7 @@ impl<'a> BatchRecorder<'a> {
         mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
         self.set_bind_groups(encoder);
-        self.set_arenas(encoder)?;
+        let mut bound = None;
         let mut start = batches.start;
         let meshes = &self.frame.meshes;
         for run in self.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
@@ -48,24 +49,53 @@ impl<'a> BatchRecorder<'a> {
             let end = start + run.len();
             if variant.layout.is_some() {
                 self.draw_imported_meshes(encoder, run)?;
-                self.set_arenas(encoder)?;
+                bound = None;
             } else if run[0].state.subdivision_level() > 0 {
                 self.draw_subdivided(encoder, run)?;
-                self.set_arenas(encoder)?;
-            } else if self.list.is_whole() {
-                draw_run(encoder, start..end)?;
+                bound = None;
+            } else if meshes.has_one_page() {
+                self.draw_in_pages(encoder, start..end, &mut bound, &mut draw_run)?;
             } else {
-                self.draw_with_partial(encoder, start..end, &mut draw_run)?;
+                let mut first = start;
+                for in_same_pages in run.chunk_by(|one, next| meshes.pages(one) == meshes.pages(next)) {
+                    let next = first + in_same_pages.len();
+                    self.draw_in_pages(encoder, first..next, &mut bound, &mut draw_run)?;
+                    first = next;
+                }
             }
             start = end;
         }
         Ok(())
     }
 
-    /// Draws batches of one state, some of them partial. `draw_run` draws each run of whole batches.
+    /// Draws batches of one state whose meshes are in the same pages. `bound` are the pages whose buffers are set.
+    fn draw_in_pages<E: RenderEncoder<'a>>(
+        &self,
+        encoder: &mut E,
+        batches: Range<usize>,
+        bound: &mut Option<MeshPageIndices>,
+        draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        let Some(pages) = self.frame.meshes.pages(&self.list.batches[batches.start]) else {
+            // An error unless it is yet to arrive.
+            return self.frame.meshes.mesh_range(&self.list.batches[batches.start]).map(|_| ());
+        };
+        if *bound != Some(pages) {
+            self.set_pages(encoder, pages)?;
+            *bound = Some(pages);
+        }
+        if self.list.is_whole() {
+            draw_run(encoder, batches)
+        } else {
+            self.draw_with_partial(encoder, pages, batches, draw_run)
+        }
+    }
+
+    /// Draws batches of one state, some of them partial, whose meshes are in these pages. `draw_run` draws each run of whole batches.
     fn draw_with_partial<E: RenderEncoder<'a>>(
         &self,
         encoder: &mut E,
+        pages: MeshPageIndices,
         batches: Range<usize>,
         draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
@@ -78,7 +108,7 @@ impl<'a> BatchRecorder<'a> {
             };
             if !whole.is_empty() {
                 if mem::take(&mut binds_partial_indices) {
-                    self.set_index_arena(encoder);
+                    self.set_index_page(encoder, pages)?;
                 }
                 draw_run(encoder, whole)?;
             }
@@ -92,11 +122,12 @@ impl<'a> BatchRecorder<'a> {
                 encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
             }
             let batch = &self.list.batches[index];
-            let base_vertex = self.frame.meshes.mesh_range(batch)?.base_vertex;
-            encoder.draw_indexed(remaining, base_vertex, batch.first..batch.first + batch.count);
+            if let Some(mesh) = self.frame.meshes.mesh_range(batch)? {
+                encoder.draw_indexed(remaining, mesh.base_vertex, batch.first..batch.first + batch.count);
+            }
         }
         if binds_partial_indices {
-            self.set_index_arena(encoder);
+            self.set_index_page(encoder, pages)?;
         }
         if whole.is_empty() { Ok(()) } else { draw_run(encoder, whole) }
     }
@@ -107,9 +138,10 @@ impl<'a> BatchRecorder<'a> {
     /// If a mesh is missing. This is a bug in Drawloom.
     pub(crate) fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
         for batch in run {
-            let mesh = self.frame.meshes.mesh_range(batch)?;
-            let indices = mesh.first_index..mesh.first_index + mesh.index_count;
-            encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
+            if let Some(mesh) = self.frame.meshes.mesh_range(batch)? {
+                let indices = mesh.first_index..mesh.first_index + mesh.index_count;
+                encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
+            }
         }
         Ok(())
     }
@@ -157,17 +189,17 @@ impl<'a> BatchRecorder<'a> {
         }
     }
 
-    fn set_arenas(&self, encoder: &mut impl RenderEncoder<'a>) -> Result<(), BackendError> {
-        let meshes = &self.frame.meshes;
-        encoder.set_vertex_buffer(0, Some(meshes.vertices.slice(..)));
+    fn set_pages(&self, encoder: &mut impl RenderEncoder<'a>, pages: MeshPageIndices) -> Result<(), BackendError> {
+        let buffers = self.frame.meshes.vertex_buffers(pages)?;
+        encoder.set_vertex_buffer(0, Some(buffers.vertices.slice(..)));
         for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
-            encoder.set_vertex_buffer(slot, Some(meshes.attribute(attribute.layout)?.slice(..)));
+            encoder.set_vertex_buffer(slot, Some(attribute_of(&buffers.attributes, attribute.layout)?.slice(..)));
         }
-        self.set_index_arena(encoder);
-        Ok(())
+        self.set_index_page(encoder, pages)
     }
 
-    fn set_index_arena(&self, encoder: &mut impl RenderEncoder<'a>) {
-        encoder.set_index_buffer(self.frame.meshes.indices.slice(..), wgpu::IndexFormat::Uint32);
+    fn set_index_page(&self, encoder: &mut impl RenderEncoder<'a>, pages: MeshPageIndices) -> Result<(), BackendError> {
+        encoder.set_index_buffer(self.frame.meshes.index_buffer(pages)?.slice(..), wgpu::IndexFormat::Uint32);
+        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Buffers that are reallocated when they are too small.
 
-use super::arena::new_buffer;
+use super::buffers::new_buffer;
 use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 

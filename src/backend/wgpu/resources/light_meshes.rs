@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::arena::filled_buffer;
+use super::buffers::filled_buffer;
 use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::process::LightVolume;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::gpu_material::GpuMaterial;
+use super::snapshot_lifetimes::SnapshotToken;
 use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
 use crate::scene::{Assets, Material, MaterialLayout};
@@ -11,6 +12,8 @@ use crate::view::{RejectionReason, Rejections};
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
 #[derive(Clone)]
 pub(crate) struct MaterialSnapshot {
+    /// Keeps the layers of its textures from being overwritten.
+    pub(crate) token: Arc<SnapshotToken>,
     /// A [`GpuMaterial`] for each slot.
     pub(crate) materials: Arc<[u8]>,
     pub(crate) textures: Arc<MaterialTextures>,
@@ -45,6 +48,8 @@ struct Current {
     /// Identity and revision of the snapshot's materials, and of its textures.
     materials: (u64, u64),
     textures: (u64, u64),
+    /// How often texture arrays had moved.
+    moves: u64,
     snapshot: MaterialSnapshot,
 }
 
@@ -65,16 +70,14 @@ impl MaterialCache {
             Some(current) if current.textures == textures => {
                 MaterialSnapshot { materials: self.materials(assets), values: Vec::new(), ..current.snapshot }
             }
-            _ => {
+            before => {
+                let before = before.map(|current| (current.moves, current.snapshot.textures));
                 self.rejected_textures.clear();
                 self.textures.update(device, uploads, assets, &mut self.rejected_textures);
-                let samplers = [
-                    linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
-                    linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
-                ];
-                let arrays = self.textures.views(device).into();
-                let textures = Arc::new(MaterialTextures { arrays, samplers });
-                MaterialSnapshot { materials: self.materials(assets), textures, values: Vec::new() }
+                let same_arrays = before.filter(|(moves, _)| *moves == self.textures.moves());
+                let textures = same_arrays.map_or_else(|| self.bound_textures(device), |(_, textures)| textures);
+                let token = self.textures.begin_snapshot();
+                MaterialSnapshot { token, materials: self.materials(assets), textures, values: Vec::new() }
             }
         };
         for layout in types {
@@ -82,11 +85,20 @@ impl MaterialCache {
                 snapshot.values.push((*layout, values_of(assets, *layout)));
             }
         }
-        self.current = Some(Current { materials, textures, snapshot: snapshot.clone() });
+        let moves = self.textures.moves();
+        self.current = Some(Current { materials, textures, moves, snapshot: snapshot.clone() });
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             rejections.count(reason, index);
         }
         snapshot
+    }
+
+    fn bound_textures(&self, device: &wgpu::Device) -> Arc<MaterialTextures> {
+        let samplers = [
+            linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
+            linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
+        ];
+        Arc::new(MaterialTextures { arrays: self.textures.views(device).into(), samplers })
     }
 
     fn materials(&mut self, assets: &Assets) -> Arc<[u8]> {

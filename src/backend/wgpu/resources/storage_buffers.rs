@@ -1,6 +1,6 @@
 //! The buffers that processes share.
 
-use super::arena::new_buffer;
+use super::buffers::new_buffer;
 use super::growing_buffer::check_storage_binding_size;
 use crate::backend::BackendError;
 use crate::process::{BufferLayout, FramePlan};

@@ -1,7 +1,7 @@
 //! Subdivided meshes on the device.
 
-use super::arena::filled_buffer;
-use super::attribute_arenas::AttributeBuffers;
+use super::attribute_set::AttributeBuffers;
+use super::buffers::filled_buffer;
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::with_vertex_bytes;
 use crate::backend::BackendError;

@@ -1,8 +1,12 @@
 //! Textures on the device, in texture arrays by size. All arrays are bound at once, so no batch changes a binding.
 
+use std::sync::Arc;
+
+use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
+use super::texture_layers::{TextureLayers, layer_bytes, new_array, write_layer};
 use super::upload_queue::UploadQueue;
-use crate::backend::mip_generation::{ARRAY_SIDES, array_for, mip_chain};
-use crate::scene::{Assets, Texture};
+use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
+use crate::scene::Assets;
 use crate::view::RejectionReason;
 
 /// The array and layer of a texture.
@@ -17,22 +21,25 @@ impl TextureLocation {
     pub(crate) const NONE: Self = Self { array: ARRAY_SIDES.len() as u32, layer: 0 };
 }
 
-/// All texture arrays. Like arenas, they never overwrite a layer that a frame in flight may still read.
+/// All texture arrays. Like pages of meshes, they never overwrite a layer that a frame in flight may still read. An array that is full
+/// moves to a larger one, and the device copies its layers.
 #[derive(Default)]
 pub(crate) struct TextureArrays {
-    arrays: [TextureArray; ARRAY_SIDES.len()],
-    /// Of each texture, by slot.
-    locations: Vec<Option<TextureLocation>>,
+    arrays: [TextureLayers; ARRAY_SIDES.len()],
+    /// By slot.
+    textures: Vec<Option<ResidentTexture>>,
+    lifetimes: SnapshotLifetimes<TextureLocation>,
     identity: u64,
+    /// Counts how often an array was replaced.
+    moves: u64,
 }
 
-#[derive(Default)]
-struct TextureArray {
-    texture: Option<wgpu::Texture>,
-    /// Layers in use, garbage included.
-    used: u32,
-    /// Slot, revision and layer of each live texture.
-    layers: Vec<(u32, u64, u32)>,
+/// A texture on the device.
+#[derive(Clone, Copy)]
+struct ResidentTexture {
+    /// In the assets.
+    revision: u64,
+    location: TextureLocation,
 }
 
 impl TextureArrays {
@@ -44,109 +51,114 @@ impl TextureArrays {
         assets: &Assets,
         rejected: &mut Vec<(RejectionReason, usize)>,
     ) {
-        if self.identity != assets.textures.identity() {
-            *self = Self { identity: assets.textures.identity(), ..Self::default() };
+        self.retire_changed(assets);
+        self.free_unread();
+        let missing = |(handle, revision, texture)| {
+            let (slot, index): (u32, _) = (crate::handle::Handle::index(handle), array_for(texture));
+            self.textures[slot as usize].is_none().then_some((slot, revision, texture, index))
+        };
+        let missing: Vec<_> = assets.textures.iter_with_revision().filter_map(missing).collect();
+        for index in 0..ARRAY_SIDES.len() {
+            self.make_room(
+                device,
+                uploads.queue(),
+                index,
+                missing.iter().filter(|(.., other)| *other == index).count(),
+            );
         }
-        let max_layers = device.limits().max_texture_array_layers;
-        for (index, (array, side)) in self.arrays.iter_mut().zip(ARRAY_SIDES).enumerate() {
-            let mut textures: Vec<(u32, u64, &Texture)> = assets
-                .textures
-                .iter_with_revision()
-                .filter(|(_, _, texture)| array_for(texture) == index)
-                .map(|(handle, revision, texture)| (handle.index(), revision, texture))
-                .collect();
-            if textures.len() > max_layers as usize {
-                let beyond = textures.split_off(max_layers as usize);
-                rejected.extend(beyond.iter().map(|(slot, ..)| (RejectionReason::TextureLimit, *slot as usize)));
-            }
-            array.update(device, uploads, side, &textures, max_layers);
-        }
-        self.locations.clear();
-        self.locations.resize(assets.textures.slot_count(), None);
-        for (index, array) in (0..).zip(&self.arrays) {
-            for &(slot, _, layer) in &array.layers {
-                self.locations[slot as usize] = Some(TextureLocation { array: index, layer });
+        for (slot, revision, texture, index) in missing {
+            let array = &mut self.arrays[index];
+            match (array.take(), array.texture()) {
+                (Some(layer), Some(on_device)) => {
+                    write_layer(uploads, on_device, layer, texture);
+                    let location = TextureLocation { array: index as u32, layer };
+                    self.textures[slot as usize] = Some(ResidentTexture { revision, location });
+                }
+                _ => rejected.push((RejectionReason::TextureLimit, slot as usize)),
             }
         }
     }
 
-    /// The location of the texture in a slot; `None` if it was rejected.
+    /// Makes a snapshot of the textures as they are.
+    pub(crate) fn begin_snapshot(&mut self) -> Arc<SnapshotToken> {
+        self.lifetimes.begin_snapshot()
+    }
+
+    /// The location of the texture in a slot; `None` if it is not on the device.
     pub(crate) fn location(&self, slot: u32) -> Option<TextureLocation> {
-        self.locations.get(slot as usize).copied().flatten()
+        self.textures.get(slot as usize).copied().flatten().map(|texture| texture.location)
+    }
+
+    /// Counts how often an array was replaced. While it is the same, so are the views.
+    pub(crate) fn moves(&self) -> u64 {
+        self.moves
     }
 
     /// A view of each array; an empty array is a single pixel.
     pub(crate) fn views(&self, device: &wgpu::Device) -> [wgpu::TextureView; ARRAY_SIDES.len()] {
         self.arrays.each_ref().map(|array| {
-            let texture = array.texture.clone().unwrap_or_else(|| new_array(device, 1, 1));
+            let texture = array.texture().cloned().unwrap_or_else(|| new_array(device, 1, 1));
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
                 ..wgpu::TextureViewDescriptor::default()
             })
         })
     }
-}
 
-impl TextureArray {
-    fn update(
-        &mut self,
-        device: &wgpu::Device,
-        uploads: &UploadQueue,
-        side: u32,
-        textures: &[(u32, u64, &Texture)],
-        max_layers: u32,
-    ) {
-        self.layers.retain(|(slot, revision, _)| {
-            textures.iter().any(|(other, other_revision, _)| (other, other_revision) == (slot, revision))
-        });
-        if textures.is_empty() {
-            *self = Self::default();
-            return;
+    /// The size of all arrays in bytes.
+    pub(crate) fn resident_bytes(&self) -> u64 {
+        let arrays = self.arrays.iter().zip(ARRAY_SIDES);
+        arrays.map(|(array, side)| array.capacity() as u64 * layer_bytes(side)).sum()
+    }
+
+    /// Retires textures that changed, or were removed, since they were uploaded.
+    fn retire_changed(&mut self, assets: &Assets) {
+        if self.identity != assets.textures.identity() {
+            *self = Self {
+                identity: assets.textures.identity(),
+                lifetimes: SnapshotLifetimes::following(&self.lifetimes),
+                moves: self.moves + 1,
+                ..Self::default()
+            };
         }
-        let missing = textures.len() - self.layers.len();
-        let room = self.texture.as_ref().map_or(0, |texture| texture.depth_or_array_layers() - self.used);
-        if missing > room as usize {
-            // Twice the layers, so that a texture that changes every frame does not move the others every frame.
-            let layers = (textures.len() as u32 * 2).min(max_layers);
-            *self = Self { texture: Some(new_array(device, side, layers)), ..Self::default() };
-        }
-        let Some(array) = &self.texture else { return };
-        for &(slot, revision, texture) in textures {
-            if self.layers.iter().all(|(other, ..)| *other != slot) {
-                write_layer(uploads, array, self.used, side, texture);
-                self.layers.push((slot, revision, self.used));
-                self.used += 1;
+        self.textures.resize(assets.textures.slot_count().max(self.textures.len()), None);
+        for (slot, entry) in (0..).zip(&mut self.textures) {
+            let Some(texture) = entry else { continue };
+            let current = assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
+            if current != Some(texture.revision) {
+                self.lifetimes.retire(texture.location);
+                *entry = None;
             }
         }
     }
-}
 
-fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("textures"),
-        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
-        mip_level_count: side.ilog2() + 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8UnormSrgb,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    })
-}
+    /// Frees the layers of textures that are gone, as soon as no frame in flight may read them, and releases empty arrays.
+    fn free_unread(&mut self) {
+        for TextureLocation { array, layer } in self.lifetimes.reclaim() {
+            let layers = &mut self.arrays[array as usize];
+            layers.free(layer);
+            if layers.free_count() == layers.capacity() {
+                layers.release();
+                self.moves += 1;
+            }
+        }
+    }
 
-fn write_layer(uploads: &UploadQueue, array: &wgpu::Texture, layer: u32, side: u32, texture: &Texture) {
-    for (level, pixels) in (0..).zip(mip_chain(texture, side)) {
-        let side = side >> level;
-        uploads.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: array,
-                mip_level: level,
-                origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
-                aspect: wgpu::TextureAspect::All,
-            },
-            &pixels,
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(side * 4), rows_per_image: Some(side) },
-            wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
-        );
+    /// Makes room for so many further textures in an array, if the device allows as many layers.
+    fn make_room(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, index: usize, textures: usize) {
+        let array = &mut self.arrays[index];
+        let is_in_array = |location: &TextureLocation| location.array == index as u32;
+        let live = self.textures.iter().flatten().map(|texture| texture.location).filter(is_in_array);
+        let max_layers = device.limits().max_texture_array_layers as usize;
+        let has_retired = self.lifetimes.retired().any(is_in_array);
+        if textures <= array.free_count() || (array.capacity() == max_layers && !has_retired) {
+            return;
+        }
+        // Twice the layers, so that a texture that changes every frame does not move the others every frame.
+        let layers = ((live.clone().count() + textures) * 2).max(array.capacity()).min(max_layers);
+        array.move_to(device, queue, ARRAY_SIDES[index], layers as u32, live.map(|location| location.layer));
+        // Frames in flight read those of the array before.
+        self.lifetimes.forget_retired(is_in_array);
+        self.moves += 1;
     }
 }

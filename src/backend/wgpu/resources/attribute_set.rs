@@ -1,55 +1,62 @@
 //! Vertex attributes on the device: a buffer for each attribute that processes read.
 
-use super::arena::{filled_buffer, new_buffer};
+use super::buffers::{filled_buffer, new_buffer};
 use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::process::DeclaredAttribute;
 use crate::scene::{AttributeFormat, AttributeLayout, Mesh};
 
-/// The attributes of the vertices of all meshes: a buffer for each attribute that a process has read so far. A vertex has the same
-/// index there as in the arena of vertices.
-#[derive(Default)]
-pub(crate) struct AttributeArenas {
+/// The attributes that processes have read so far. A page of vertices has a buffer for each of them, in which a vertex has the same index as
+/// in the buffer of vertices.
+#[derive(Clone, Default)]
+pub(crate) struct AttributeSet {
     attributes: Vec<DeclaredAttribute>,
-    buffers: AttributeBuffers,
 }
 
 /// A buffer for each attribute.
 pub(crate) type AttributeBuffers = Vec<(AttributeLayout, wgpu::Buffer)>;
 
-impl AttributeArenas {
-    /// Adds the attributes that a plan's processes read. Returns whether one of them is new: then all meshes have to be written anew.
-    pub(crate) fn require(&mut self, attributes: &[DeclaredAttribute]) -> bool {
-        let mut changed = false;
-        for attribute in attributes.iter().filter(|attribute| !self.attributes.contains(attribute)).collect::<Vec<_>>()
-        {
-            self.attributes.retain(|known| known.layout.name != attribute.layout.name);
-            self.attributes.push(attribute.clone());
-            changed = true;
+impl AttributeSet {
+    /// With the attributes that a plan's processes read; `None` if they are there already. If one is new, all meshes have to be written
+    /// anew.
+    pub(crate) fn with(&self, attributes: &[DeclaredAttribute]) -> Option<Self> {
+        let is_new = |attribute: &&DeclaredAttribute| !self.attributes.contains(attribute);
+        let mut changed = None;
+        for attribute in attributes.iter().filter(is_new) {
+            let Self { attributes } = changed.get_or_insert_with(|| self.clone());
+            attributes.retain(|known| known.layout.name != attribute.layout.name);
+            attributes.push(attribute.clone());
         }
         changed
     }
 
-    /// Moves to new, empty buffers with room for this many vertices.
+    /// Buffers with room for this many vertices.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn reallocate(&mut self, device: &wgpu::Device, vertices: u64) -> Result<(), BackendError> {
-        self.buffers.clear();
-        for DeclaredAttribute { layout, .. } in &self.attributes {
+    pub(crate) fn new_buffers(&self, device: &wgpu::Device, vertices: u64) -> Result<AttributeBuffers, BackendError> {
+        let new = |DeclaredAttribute { layout, .. }: &DeclaredAttribute| {
             let (size, usage) = (vertices * layout.format.bytes() as u64, wgpu::BufferUsages::VERTEX);
-            let buffer = new_buffer(device, layout.name, size.max(16), usage | wgpu::BufferUsages::COPY_DST)?;
-            self.buffers.push((*layout, buffer));
-        }
-        Ok(())
+            Ok((*layout, new_buffer(device, layout.name, size.max(16), usage | wgpu::BufferUsages::COPY_DST)?))
+        };
+        self.attributes.iter().map(new).collect()
     }
 
-    /// Writes the attributes of a mesh whose first vertex has this index in the arena of vertices.
-    pub(crate) fn write(&self, uploads: &UploadQueue, mesh: &Mesh, first_vertex: u64) {
-        for (attribute, (layout, buffer)) in self.attributes.iter().zip(&self.buffers) {
-            let offset = first_vertex * layout.format.bytes() as u64;
-            with_values(mesh, attribute, |bytes| uploads.write_buffer(buffer, offset, bytes));
+    /// Calls `visit` with the buffer of each attribute, the size of a value, and the values that a mesh has.
+    pub(crate) fn for_each_value(
+        &self,
+        mesh: &Mesh,
+        buffers: &AttributeBuffers,
+        mut visit: impl FnMut(&wgpu::Buffer, u64, &[u8]),
+    ) {
+        for (attribute, (layout, buffer)) in self.attributes.iter().zip(buffers) {
+            with_values(mesh, attribute, |bytes| visit(buffer, layout.format.bytes() as u64, bytes));
         }
+    }
+
+    /// The size of a vertex's values of all attributes.
+    pub(crate) fn bytes_per_vertex(&self) -> u64 {
+        self.attributes.iter().map(|attribute| attribute.layout.format.bytes() as u64).sum()
     }
 
     /// The attributes of a mesh in buffers of its own.
@@ -68,10 +75,6 @@ impl AttributeArenas {
             Ok((layout, with_values(mesh, attribute, buffer)?))
         };
         self.attributes.iter().map(upload).collect()
-    }
-
-    pub(crate) fn buffers(&self) -> &AttributeBuffers {
-        &self.buffers
     }
 }
 

@@ -1,0 +1,212 @@
+//! The pages that meshes lie in, and how a mesh is written to them.
+
+use std::mem;
+use std::sync::Arc;
+
+use super::attribute_set::{AttributeBuffers, AttributeSet};
+use super::buffers::new_buffer;
+use super::page_set::{PageBuffers, PageRange, PageSet};
+use super::vertex_layout::vertex_stride;
+use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
+use crate::quality::VertexFormat;
+use crate::scene::Mesh;
+
+/// The buffers of a page of vertices. A vertex has the same index in all of them.
+#[derive(Clone)]
+pub(crate) struct VertexBuffers {
+    pub(crate) vertices: wgpu::Buffer,
+    pub(crate) attributes: AttributeBuffers,
+}
+
+/// Where a mesh lies: its vertices, and its indices followed by those of its coarser levels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeshLocation {
+    pub(crate) vertices: PageRange,
+    pub(crate) indices: PageRange,
+}
+
+/// How long new pages are, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PageSizes {
+    pub(crate) min: u64,
+    pub(crate) max: u64,
+}
+
+/// The pages of all meshes.
+#[derive(Default)]
+pub(crate) struct MeshPages {
+    pub(crate) format: VertexFormat,
+    pub(super) attributes: Arc<AttributeSet>,
+    vertices: PageSet<VertexBuffers>,
+    indices: PageSet<wgpu::Buffer>,
+}
+
+impl MeshPages {
+    /// Finds room for a mesh, or adds pages. A new page has room for everything that is about to come, of which there are so many bytes,
+    /// or for as much as all pages before it, within the page sizes.
+    pub(super) fn allocate(&mut self, mesh: &Mesh, expected: MeshBytes, sizes: PageSizes) -> MeshLocation {
+        let page_bytes = |expected: u64, existing: u64| expected.max(existing).clamp(sizes.min, sizes.max);
+        let stride = self.bytes_per_vertex();
+        let vertices = page_bytes(expected.vertices, self.vertices.length() * stride) / stride;
+        let indices = page_bytes(expected.indices, self.indices.length() * INDEX) / INDEX;
+        MeshLocation {
+            vertices: self.vertices.allocate(mesh.vertices().len() as u32, vertices as u32),
+            indices: self.indices.allocate(index_count(mesh) as u32, indices as u32),
+        }
+    }
+
+    /// Frees the memory of a mesh, and releases pages that are empty then.
+    pub(super) fn free(&mut self, location: MeshLocation) {
+        self.vertices.free(location.vertices);
+        self.indices.free(location.indices);
+    }
+
+    /// What writing a mesh to its location takes.
+    ///
+    /// # Errors
+    /// If there is no such page. This is a bug in Drawloom.
+    pub(super) fn target(&self, location: MeshLocation) -> Result<MeshTarget, BackendError> {
+        let missing = || broken_rule("a mesh lies in pages that exist");
+        let (vertices, vertex_count) = self.vertices.page(location.vertices.page).ok_or_else(missing)?;
+        let (indices, index_count) = self.indices.page(location.indices.page).ok_or_else(missing)?;
+        Ok(MeshTarget {
+            location,
+            format: self.format,
+            attributes: Arc::clone(&self.attributes),
+            vertices: Arc::clone(vertices),
+            indices: Arc::clone(indices),
+            lengths: [vertex_count, index_count],
+        })
+    }
+
+    /// The buffers of a page of vertices; `None` if they are not made yet.
+    pub(super) fn vertex_buffers(&self, page: u32) -> Option<&VertexBuffers> {
+        self.vertices.page(page)?.0.get()
+    }
+
+    /// The buffer of a page of indices; `None` if it is not made yet.
+    pub(super) fn index_buffer(&self, page: u32) -> Option<&wgpu::Buffer> {
+        self.indices.page(page)?.0.get()
+    }
+
+    /// What a mesh takes.
+    pub(super) fn bytes_of(&self, mesh: &Mesh) -> MeshBytes {
+        MeshBytes {
+            vertices: mesh.vertices().len() as u64 * self.bytes_per_vertex(),
+            indices: index_count(mesh) as u64 * INDEX,
+        }
+    }
+
+    /// The size of all pages in bytes.
+    pub(super) fn page_bytes(&self) -> u64 {
+        self.vertices.length() * self.bytes_per_vertex() + self.indices.length() * INDEX
+    }
+
+    /// The size of what is in use in them.
+    pub(super) fn used_bytes(&self) -> u64 {
+        self.vertices.used() * self.bytes_per_vertex() + self.indices.used() * INDEX
+    }
+
+    /// Drops all pages. Those that a snapshot refers to live on with it.
+    pub(super) fn clear(&mut self) {
+        (self.vertices, self.indices) = (PageSet::default(), PageSet::default());
+    }
+
+    fn bytes_per_vertex(&self) -> u64 {
+        vertex_stride(self.format) + self.attributes.bytes_per_vertex()
+    }
+}
+
+const INDEX: u64 = mem::size_of::<u32>() as u64;
+
+/// The indices of a mesh and of its coarser levels.
+fn index_count(mesh: &Mesh) -> usize {
+    mesh.indices().len() + mesh.levels().iter().map(|level| level.indices().len()).sum::<usize>()
+}
+
+/// What meshes take on the device, in bytes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct MeshBytes {
+    /// Of vertices and their attributes.
+    pub(crate) vertices: u64,
+    pub(crate) indices: u64,
+}
+
+impl MeshBytes {
+    pub(crate) fn total(self) -> u64 {
+        self.vertices + self.indices
+    }
+}
+
+impl std::iter::Sum for MeshBytes {
+    fn sum<I: Iterator<Item = Self>>(meshes: I) -> Self {
+        let add = |sum: Self, mesh: Self| Self {
+            vertices: sum.vertices + mesh.vertices,
+            indices: sum.indices + mesh.indices,
+        };
+        meshes.fold(Self::default(), add)
+    }
+}
+
+/// What writing a mesh takes. It does not refer to the pages, so that a job can write while a frame changes them.
+pub(crate) struct MeshTarget {
+    pub(crate) location: MeshLocation,
+    pub(crate) format: VertexFormat,
+    attributes: Arc<AttributeSet>,
+    vertices: PageBuffers<VertexBuffers>,
+    indices: PageBuffers<wgpu::Buffer>,
+    /// Of the pages, in vertices and in indices.
+    lengths: [u32; 2],
+}
+
+impl MeshTarget {
+    /// Makes the buffers of the pages if nothing was written to them yet.
+    ///
+    /// # Errors
+    /// If the device allows no buffer of that size.
+    pub(crate) fn create_buffers(&self, device: &wgpu::Device) -> Result<(), BackendError> {
+        let [vertex_count, index_count] = self.lengths.map(u64::from);
+        let usage = |usage: wgpu::BufferUsages| usage | wgpu::BufferUsages::COPY_DST;
+        if self.vertices.get().is_none() {
+            let (size, usage) = (vertex_count * vertex_stride(self.format), usage(wgpu::BufferUsages::VERTEX));
+            let vertices = new_buffer(device, "vertices", size.max(4), usage)?;
+            let attributes = self.attributes.new_buffers(device, vertex_count)?;
+            // Another thread may have been faster; its buffers are as good.
+            let _ = self.vertices.set(VertexBuffers { vertices, attributes });
+        }
+        if self.indices.get().is_none() {
+            let usage = usage(wgpu::BufferUsages::INDEX);
+            let _ = self.indices.set(new_buffer(device, "indices", (index_count * INDEX).max(4), usage)?);
+        }
+        Ok(())
+    }
+
+    /// Calls `write` with each piece of a mesh: the buffer, the offset in bytes, and the bytes. `vertices` are those of the mesh, in the
+    /// pages' format. The pieces are the same, in the same order, every time.
+    ///
+    /// # Errors
+    /// If the pages have no buffers. This is a bug in Drawloom.
+    pub(crate) fn for_each_piece(
+        &self,
+        mesh: &Mesh,
+        vertices: &[u8],
+        mut write: impl FnMut(&wgpu::Buffer, u64, &[u8]),
+    ) -> Result<(), BackendError> {
+        let missing = || broken_rule("a page has buffers before it is written to");
+        let (vertex_buffers, index_buffer) =
+            (self.vertices.get().ok_or_else(missing)?, self.indices.get().ok_or_else(missing)?);
+        let first = u64::from(self.location.vertices.start);
+        write(&vertex_buffers.vertices, first * vertex_stride(self.format), vertices);
+        self.attributes.for_each_value(mesh, &vertex_buffers.attributes, |buffer, stride, bytes| {
+            write(buffer, first * stride, bytes);
+        });
+        let mut offset = u64::from(self.location.indices.start) * INDEX;
+        let levels = mesh.levels().iter().map(|level| level.indices());
+        for indices in [mesh.indices()].into_iter().chain(levels) {
+            write(index_buffer, offset, bytemuck::cast_slice(indices));
+            offset += indices.len() as u64 * INDEX;
+        }
+        Ok(())
+    }
+}

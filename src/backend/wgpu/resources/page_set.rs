@@ -1,0 +1,140 @@
+//! Pages: buffers of which ranges are handed out.
+
+use std::sync::{Arc, OnceLock};
+
+use super::range_allocator::RangeAllocator;
+
+/// The buffers of a page. Whoever writes to it first makes them.
+pub(crate) type PageBuffers<B> = Arc<OnceLock<B>>;
+
+/// Pages with buffers `B`. A set grows by adding pages, so nothing that lies in one of them ever moves; a page that is empty is released.
+pub(crate) struct PageSet<B> {
+    /// By index, which stays the same while the page exists.
+    pages: Vec<Option<Page<B>>>,
+}
+
+struct Page<B> {
+    ranges: RangeAllocator,
+    length: u32,
+    buffers: PageBuffers<B>,
+}
+
+/// A range of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PageRange {
+    pub(crate) page: u32,
+    pub(crate) start: u32,
+    pub(crate) length: u32,
+}
+
+impl<B> Default for PageSet<B> {
+    fn default() -> Self {
+        Self { pages: Vec::new() }
+    }
+}
+
+impl<B> PageSet<B> {
+    /// A range of this length in the first page that has room. If none has, adds a page of `page_length`, or longer if the range is.
+    pub(super) fn allocate(&mut self, length: u32, page_length: u32) -> PageRange {
+        let found = self.allocate_in_pages(length);
+        found.unwrap_or_else(|| {
+            let page_length = page_length.max(length);
+            let mut ranges = RangeAllocator::new(page_length);
+            // It fits, because the page is as long.
+            let start = ranges.allocate(length).unwrap_or_default();
+            let page = Page { ranges, length: page_length, buffers: PageBuffers::default() };
+            let index = self.pages.iter().position(Option::is_none).unwrap_or(self.pages.len());
+            if index == self.pages.len() {
+                self.pages.push(None);
+            }
+            self.pages[index] = Some(page);
+            PageRange { page: index as u32, start, length }
+        })
+    }
+
+    /// A range of this length in the first page that has room, if one has.
+    pub(super) fn allocate_in_pages(&mut self, length: u32) -> Option<PageRange> {
+        let mut pages = (0..).zip(&mut self.pages);
+        pages.find_map(|(page, entry)| {
+            let start = entry.as_mut()?.ranges.allocate(length)?;
+            Some(PageRange { page, start, length })
+        })
+    }
+
+    /// Frees a range, and releases the page if nothing else is in it.
+    pub(super) fn free(&mut self, range: PageRange) {
+        let Some(entry) = self.pages.get_mut(range.page as usize) else { return };
+        if let Some(page) = entry {
+            page.ranges.free(range.start, range.length);
+            if page.ranges.is_empty() {
+                *entry = None;
+            }
+        }
+        while self.pages.last().is_some_and(Option::is_none) {
+            self.pages.pop();
+        }
+    }
+
+    /// The buffers of a page, and its length.
+    pub(super) fn page(&self, index: u32) -> Option<(&PageBuffers<B>, u32)> {
+        self.pages.get(index as usize)?.as_ref().map(|page| (&page.buffers, page.length))
+    }
+
+    /// The length of all pages.
+    pub(super) fn length(&self) -> u64 {
+        self.pages.iter().flatten().map(|page| u64::from(page.length)).sum()
+    }
+
+    /// The length of all ranges that are in use.
+    pub(super) fn used(&self) -> u64 {
+        self.pages.iter().flatten().map(|page| u64::from(page.ranges.used())).sum()
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn live_ranges_never_overlap_and_empty_pages_are_released() {
+        const PAGE: u32 = 100;
+        let mut random = fastrand::Rng::with_seed(3);
+        let (mut pages, mut live) = (PageSet::<()>::default(), Vec::<PageRange>::new());
+        for step in 0..5000 {
+            // It fills up, then empties, again and again.
+            if random.u32(..100) < if step / 500 % 2 == 0 { 70 } else { 30 } {
+                let length = if random.u32(..40) == 0 { PAGE * 3 } else { random.u32(1..60) };
+                let range = pages.allocate(length, PAGE);
+                let overlaps = |other: &&PageRange| {
+                    other.page == range.page
+                        && other.start < range.start + range.length
+                        && range.start < other.start + other.length
+                };
+                assert_eq!(live.iter().find(overlaps), None);
+                let (_, page_length) = pages.page(range.page).unwrap();
+                assert!(range.start + range.length <= page_length && page_length >= PAGE);
+                live.push(range);
+            } else if !live.is_empty() {
+                pages.free(live.swap_remove(random.usize(..live.len())));
+            }
+            let mut occupied: Vec<_> = live.iter().map(|range| range.page).collect();
+            occupied.sort_unstable();
+            occupied.dedup();
+            assert_eq!(pages.pages.iter().flatten().count(), occupied.len());
+            assert_eq!(pages.used(), live.iter().map(|range| u64::from(range.length)).sum::<u64>());
+        }
+        live.drain(..).for_each(|range| pages.free(range));
+        assert!(pages.pages.is_empty());
+    }
+
+    #[test]
+    fn a_range_longer_than_a_page_has_a_page_of_its_own() {
+        let mut pages = PageSet::<()>::default();
+        let large = pages.allocate(1000, 10);
+        assert_eq!((large, pages.length()), (PageRange { page: 0, start: 0, length: 1000 }, 1000));
+        let small = pages.allocate(1, 10);
+        assert_eq!((small.page, pages.length()), (1, 1010));
+        pages.free(large);
+        assert_eq!((pages.length(), pages.allocate(3, 10)), (10, PageRange { page: 1, start: 1, length: 3 }));
+    }
+}

@@ -1,0 +1,141 @@
+//! One texture array, and which of its layers are in use.
+
+use super::upload_queue::UploadQueue;
+use crate::backend::mip_generation::mip_chain;
+use crate::scene::Texture;
+
+/// A texture array of square layers with all mip levels.
+#[derive(Default)]
+pub(super) struct TextureLayers {
+    /// `None` while no layer is in use.
+    texture: Option<wgpu::Texture>,
+    /// By layer.
+    is_used: Vec<bool>,
+}
+
+impl TextureLayers {
+    /// A free layer, which is in use from now on; `None` if there is none.
+    pub(super) fn take(&mut self) -> Option<u32> {
+        let free = self.is_used.iter().position(|is_used| !is_used)?;
+        self.is_used[free] = true;
+        Some(free as u32)
+    }
+
+    /// Makes a layer free.
+    pub(super) fn free(&mut self, layer: u32) {
+        if let Some(is_used) = self.is_used.get_mut(layer as usize) {
+            *is_used = false;
+        }
+    }
+
+    pub(super) fn capacity(&self) -> usize {
+        self.is_used.len()
+    }
+
+    pub(super) fn free_count(&self) -> usize {
+        self.is_used.iter().filter(|is_used| !**is_used).count()
+    }
+
+    pub(super) fn texture(&self) -> Option<&wgpu::Texture> {
+        self.texture.as_ref()
+    }
+
+    /// Drops the texture. Snapshots keep it while they need it.
+    pub(super) fn release(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Moves to a texture with this many layers, at least as many as before. The device copies `live` layers; all others are free then. The
+    /// copy is submitted at once, before anything that reads it.
+    pub(super) fn move_to(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        side: u32,
+        layers: u32,
+        live: impl Iterator<Item = u32>,
+    ) {
+        let texture = new_array(device, side, layers);
+        let mut is_used = vec![false; layers as usize];
+        live.for_each(|layer| is_used[layer as usize] = true);
+        if let Some(before) = self.texture.as_ref().filter(|_| is_used.contains(&true)) {
+            let label = Some("textures move to a larger array");
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+            let mut first = 0;
+            for run in is_used.chunk_by(|one, next| one == next) {
+                if run[0] {
+                    copy_layers(&mut encoder, before, &texture, first, run.len() as u32);
+                }
+                first += run.len() as u32;
+            }
+            queue.submit([encoder.finish()]);
+        }
+        *self = Self { texture: Some(texture), is_used };
+    }
+}
+
+/// Copies layers to the same layers of another array, with all mip levels.
+fn copy_layers(
+    encoder: &mut wgpu::CommandEncoder,
+    source: &wgpu::Texture,
+    destination: &wgpu::Texture,
+    first: u32,
+    count: u32,
+) {
+    for mip_level in 0..source.mip_level_count() {
+        let side = source.width() >> mip_level;
+        let origin = wgpu::Origin3d { x: 0, y: 0, z: first };
+        let of = |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect: wgpu::TextureAspect::All };
+        let size = wgpu::Extent3d { width: side, height: side, depth_or_array_layers: count };
+        encoder.copy_texture_to_texture(of(source), of(destination), size);
+    }
+}
+
+/// An array of square layers, with all mip levels.
+pub(super) fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("textures"),
+        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
+        mip_level_count: side.ilog2() + 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// The size of a layer with all mip levels, in bytes.
+pub(super) fn layer_bytes(side: u32) -> u64 {
+    (0..=side.ilog2()).map(|level| u64::from(side >> level).pow(2) * 4).sum()
+}
+
+/// Uploads a texture with all mip levels.
+pub(super) fn write_layer(uploads: &UploadQueue, array: &wgpu::Texture, layer: u32, texture: &Texture) {
+    for (level, pixels) in (0..).zip(mip_chain(texture, array.width())) {
+        write_rows(uploads, array, (layer, level), 0, &pixels);
+    }
+}
+
+/// Writes whole rows of a mip level of a layer, from row `first` on.
+pub(super) fn write_rows(
+    uploads: &UploadQueue,
+    array: &wgpu::Texture,
+    (layer, mip_level): (u32, u32),
+    first: u32,
+    pixels: &[u8],
+) {
+    let side = array.width() >> mip_level;
+    let rows = pixels.len() as u32 / (side * 4);
+    uploads.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture: array,
+            mip_level,
+            origin: wgpu::Origin3d { x: 0, y: first, z: layer },
+            aspect: wgpu::TextureAspect::All,
+        },
+        pixels,
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(side * 4), rows_per_image: Some(rows) },
+        wgpu::Extent3d { width: side, height: rows, depth_or_array_layers: 1 },
+    );
+}
