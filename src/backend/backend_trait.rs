@@ -74,6 +74,16 @@ pub trait Backend: Send + Sync + 'static {
         Ok(())
     }
 
+    /// Whether there is work that a background job does between two frames, such as uploads of what is streamed.
+    fn has_background_work(&self) -> bool {
+        false
+    }
+
+    /// Does as much of that work as should be done between two frames. The renderer has a [background job](crate::task::Scheduler::background)
+    /// call it after a frame was recorded, unless the last such job still runs; a scheduler with a single worker has no time for such jobs, so
+    /// there the calling thread does it when a frame was recorded.
+    fn work_in_background(&self) {}
+
     /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the meshes, the frame draws
     /// none but the [used ones](crate::view::ObjectTable::used_meshes).
     ///

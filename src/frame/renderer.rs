@@ -79,6 +79,8 @@ pub struct Renderer<B: Backend> {
     choices: Vec<TuningChoice>,
     warnings: Warnings,
     column_check: ColumnCheck,
+    /// The latest job of the backend, if there was any.
+    background_work: Option<BackgroundJob<()>>,
 }
 
 impl<B: Backend> Renderer<B> {
@@ -106,6 +108,7 @@ impl<B: Backend> Renderer<B> {
             choices: Vec::new(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
+            background_work: None,
         }
     }
 
@@ -135,7 +138,10 @@ impl<B: Backend> Renderer<B> {
         let choices = std::mem::take(&mut self.choices);
         let recorded = self.record_frame(scene, choices, transparency);
         match recorded {
-            Ok(_) => self.tables.end_frame(),
+            Ok(_) => {
+                self.tables.end_frame();
+                self.start_background_work();
+            }
             Err(_) => {
                 self.tables.abandon_frame();
                 self.backend.discard_frame();
@@ -221,6 +227,20 @@ impl<B: Backend> Renderer<B> {
             }
             Ok(())
         })
+    }
+
+    /// Starts a job for what the backend does between frames, if there is something and the last one has ended.
+    fn start_background_work(&mut self) {
+        if !self.backend.has_background_work() {
+            return;
+        }
+        if self.scheduler.workers() == 1 {
+            return self.backend.work_in_background();
+        }
+        if self.background_work.as_ref().is_none_or(BackgroundJob::is_finished) {
+            let backend = Arc::clone(&self.backend);
+            self.background_work = Some(self.scheduler.background(move || backend.work_in_background()));
+        }
     }
 
     fn record_frame(

@@ -61,6 +61,7 @@ mod shared_encoders;
 mod software;
 mod stencil;
 mod strategies;
+mod streaming;
 mod target_formats;
 mod transforms;
 mod transient_targets;
@@ -127,6 +128,7 @@ fn main() {
         (stencil::CASES, Needs::Adapter),
         (shared_encoders::CASES, Needs::Adapter),
         (strategies::CASES, Needs::Adapter),
+        (streaming::CASES, Needs::Adapter),
         (transparency::CASES, Needs::Adapter),
         (shadow_bias::CASES, Needs::Adapter),
         (shadow_casters::CASES, Needs::Adapter),

@@ -13,6 +13,7 @@ use super::resources::{
     TargetCache, UploadQueue, new_buffer, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
+use super::streaming::{Streamer, StreamingBudget, StreamingStatistics};
 use super::timing::{DeviceClock, DeviceTiming};
 use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::backend::{Backend, BackendError, TargetMemory};
@@ -56,6 +57,8 @@ pub struct WgpuBackend {
     pub(super) device_timing: Option<DeviceTiming>,
     /// Whether targets share textures.
     pub(super) transient_targets: bool,
+    /// `None` if all that a frame needs is uploaded when it begins.
+    pub(super) streamer: Option<Streamer>,
 }
 
 impl WgpuBackend {
@@ -130,6 +133,7 @@ impl WgpuBackend {
             latest: Mutex::default(),
             device_timing: None,
             transient_targets: false,
+            streamer: None,
         })
     }
 
@@ -179,6 +183,43 @@ impl WgpuBackend {
     /// Which targets share a texture is decided when the plan, the cameras or the imports change, and costs nothing in other frames.
     pub fn transient_targets(self) -> Self {
         Self { transient_targets: true, ..self }
+    }
+
+    /// Streams meshes and textures: background jobs bring them to the device, and frames draw what is there (L 3.1, M 10.3).
+    ///
+    /// Without it, a frame uploads all that it needs when it begins, however long that takes. With it, a frame takes over what jobs have
+    /// uploaded since the frame before. Objects whose mesh is not on the device are not drawn, and counted as
+    /// [`MeshNotResident`](crate::view::RejectionReason::MeshNotResident); materials whose texture is not are drawn without it, and counted as
+    /// [`TextureNotResident`](crate::view::RejectionReason::TextureNotResident).
+    ///
+    /// First comes what the latest frame would have drawn, then all else that objects use, so that it is there before it comes into sight; in
+    /// both the [priority](crate::scene::Assets::set_priority) decides. If the budget is spent, what was drawn longest ago makes room. What is
+    /// in sight makes room only for what is in sight and has a higher priority: if frames draw more than the budget, a part of it is left out,
+    /// counted in [`WgpuBackend::streaming_statistics`], and warned of.
+    ///
+    /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the device, because it would
+    /// vanish otherwise, and meshes that are subdivided for paraboloids. When the format of vertices changes, or a plan first reads a vertex
+    /// attribute, all meshes come anew. Scenes at rest, once everything is there, have the pictures that they have without streaming.
+    ///
+    /// ```no_run
+    /// # use drawloom::{Renderer, Submitter, backend::{BackendError, StreamingBudget, WgpuBackend}, wgpu};
+    /// # fn stream(device: wgpu::Device, queue: wgpu::Queue) -> Result<WgpuBackend, BackendError> {
+    /// let budget = StreamingBudget { mesh_bytes: 32 << 20, texture_bytes: 32 << 20, ..StreamingBudget::default() };
+    /// let backend = WgpuBackend::new(device, queue)?.stream_resources(budget)?;
+    /// # Ok(backend)
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// If a number of the budget is too small, naming it.
+    pub fn stream_resources(self, budget: StreamingBudget) -> Result<Self, BackendError> {
+        budget.check()?;
+        Ok(Self { streamer: Some(Streamer::new(budget)), ..self })
+    }
+
+    /// What [streaming](WgpuBackend::stream_resources) has done, as of the frame that began last; `None` without it.
+    pub fn streaming_statistics(&self) -> Option<StreamingStatistics> {
+        self.streamer.as_ref().map(Streamer::statistics)
     }
 
     /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for example into a
@@ -244,7 +285,7 @@ impl WgpuBackend {
         self.uploads.queue()
     }
 
-    /// What the backend keeps on the device from frame to frame, beside the scene's meshes and textures.
+    /// What the backend keeps on the device from frame to frame.
     pub fn resources(&self) -> WgpuResources {
         let pipelines = self.pipelines.lock().pipeline_count();
         let TargetMemory { textures, bytes, dedicated_bytes } = self.targets.lock().current().memory();
@@ -257,6 +298,8 @@ impl WgpuBackend {
             dedicated_target_bytes: dedicated_bytes,
             buffers: buffer_sizes.iter().filter(|size| **size > 0).count(),
             buffer_bytes: buffer_sizes.iter().sum(),
+            mesh_bytes: self.meshes.lock().resident_bytes(),
+            texture_bytes: self.materials.lock().textures.resident_bytes(),
         }
     }
 
@@ -287,7 +330,7 @@ fn supports_indirect_buffers(device: &wgpu::Device) -> bool {
     matches!(with_error_scope(device, "indirect draws", create), Ok(Ok(_)))
 }
 
-/// What a [`WgpuBackend`] keeps on the device from frame to frame, beside the scene's meshes and textures.
+/// What a [`WgpuBackend`] keeps on the device from frame to frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WgpuResources {
     /// The number of pipelines of all render processes drawn so far.
@@ -303,4 +346,8 @@ pub struct WgpuResources {
     pub buffers: usize,
     /// The size of these buffers in bytes.
     pub buffer_bytes: u64,
+    /// The size of the pages that the scene's meshes lie in, in bytes.
+    pub mesh_bytes: u64,
+    /// The size of the arrays that the scene's textures lie in, in bytes.
+    pub texture_bytes: u64,
 }

@@ -14,15 +14,17 @@ use super::recording::{
     cached_bundle, encode_after_segments, encode_pass, encode_passes, encode_segment, record_bundle,
 };
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
+use super::streaming::Streamer;
 use super::submission::WgpuSubmission;
 use crate::backend::{
     Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
 };
-use crate::command::DrawState;
+use crate::command::{DrawList, DrawState};
 use crate::process::{Draws, FramePlan};
 use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
+use crate::view::RejectionReason;
 
 impl Backend for WgpuBackend {
     type Frame = WgpuFrame;
@@ -125,6 +127,9 @@ impl Backend for WgpuBackend {
     ) -> Result<(), BackendError> {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.batches.len(), list.bundle_count(), pass.strategy.part_count(list));
+        if self.streamer.is_some() {
+            mark_drawn(frame, request, list);
+        }
         let created = with_error_scope(&self.device, &pass.label, || {
             frame.buffers.write_object_indices(&self.uploads, index, list);
             pass.upload_partial_indices(&self.device, &self.uploads, list.remaining_indices())?;
@@ -219,6 +224,16 @@ impl Backend for WgpuBackend {
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
     }
 
+    fn has_background_work(&self) -> bool {
+        self.streamer.as_ref().is_some_and(Streamer::has_work)
+    }
+
+    fn work_in_background(&self) {
+        if let Some(streamer) = &self.streamer {
+            streamer.work(&self.device, &self.uploads);
+        }
+    }
+
     fn continues_previous_pass(&self, frame: &WgpuFrame, pass: usize) -> bool {
         frame.pass(pass).continues_previous
     }
@@ -305,6 +320,25 @@ impl Backend for WgpuBackend {
         })?;
         frame.buffers.keep_objects();
         Ok(submission)
+    }
+}
+
+/// Marks the meshes and materials of a list as drawn, and counts what is not on the device yet.
+fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
+    let (frame_use, meshes) = (&frame.frame_use, &frame.meshes);
+    for batch in &list.batches {
+        let objects = &list.objects[batch.first as usize..][..batch.count as usize];
+        frame_use.mark_mesh(batch.mesh);
+        if meshes.is_missing(batch) && batch.state.subdivision_level() == 0 {
+            let objects = objects.iter().map(|object| *object as usize);
+            request.rejections.count_all_once(RejectionReason::MeshNotResident, objects);
+        }
+        for &object in objects {
+            let material = request.scene.materials[object as usize].index();
+            if frame_use.mark_material(material) {
+                request.rejections.count_once(RejectionReason::TextureNotResident, material as usize);
+            }
+        }
     }
 }
 

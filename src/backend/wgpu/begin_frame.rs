@@ -10,6 +10,7 @@ use super::pass_bind_groups::update_bind_groups;
 use super::pipelines::ProcessPipelines;
 use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
+use super::streaming::{FrameUse, OnDevice, StreamedResources};
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -27,8 +28,7 @@ impl WgpuBackend {
         pipelines: Arc<[Arc<ProcessPipelines>]>,
         targets: Arc<WgpuTargets>,
     ) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, scene, rejections, .. } = *request;
-        let vertices = request.quality.vertices;
+        let FrameRequest { plan, draws, scene, .. } = *request;
         // From here on, so that what a frame uploads that cannot begin is not kept either.
         let pending_uploads = PendingUploads::new(&self.device, self.queue());
         let light_meshes = self.light_meshes(draws)?;
@@ -36,14 +36,9 @@ impl WgpuBackend {
         if self.meshes.lock().require_attributes(plan.attributes()) {
             self.subdivisions.clear();
         }
-        let (meshes, materials) = with_error_scope(&self.device, "meshes, materials and textures", || {
-            let used = request.objects.used_meshes();
-            let meshes = self.meshes.lock().update(&self.device, &self.uploads, scene.assets, used, vertices)?;
-            let types = plan.material_types();
-            let mut materials = self.materials.lock();
-            Ok((meshes, materials.update(&self.device, &self.uploads, scene.assets, types, rejections)))
-        })
-        .flatten()?;
+        let StreamedResources { meshes, materials, frame_use } =
+            with_error_scope(&self.device, "meshes, materials and textures", || self.update_resources(request))
+                .flatten()?;
         let storage_buffers = self.storage_buffers(plan)?;
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
@@ -61,6 +56,7 @@ impl WgpuBackend {
                 layouts,
                 meshes,
                 _textures: Arc::clone(&materials.token),
+                frame_use,
                 light_meshes,
                 targets,
                 storage_buffers,
@@ -73,6 +69,25 @@ impl WgpuBackend {
             self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?
+    }
+
+    /// The meshes, materials and textures of a frame: uploads what is missing or, if they are streamed, takes over what jobs have uploaded.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn update_resources(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
+        let FrameRequest { plan, scene, rejections, .. } = *request;
+        let (mut meshes, mut materials) = (self.meshes.lock(), self.materials.lock());
+        if let Some(streamer) = &self.streamer {
+            let (device, uploads) = (&self.device, &self.uploads);
+            let on_device = OnDevice { device, uploads, meshes: &mut meshes, materials: &mut materials };
+            return streamer.begin_frame(on_device, request);
+        }
+        let (used, vertices) = (request.objects.used_meshes(), request.quality.vertices);
+        let meshes = meshes.update(&self.device, &self.uploads, scene.assets, used, vertices)?;
+        let types = plan.material_types();
+        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, rejections);
+        Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
     }
 
     /// The buffers that a plan's processes share. If creation fails, existing buffers keep their content, and the next frame tries again.

@@ -11,6 +11,7 @@ use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back}
 use crate::backend::wgpu::resources::{
     BindGroupLayouts, LightMeshes, MeshSnapshot, SnapshotToken, StorageBuffers, ViewTarget, WgpuTargets,
 };
+use crate::backend::wgpu::streaming::FrameUse;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::Pass;
 
@@ -24,6 +25,8 @@ pub struct WgpuFrame {
     pub(crate) meshes: Arc<MeshSnapshot>,
     /// Keeps its textures from being overwritten.
     pub(crate) _textures: Arc<SnapshotToken>,
+    /// Where it marks what it draws.
+    pub(crate) frame_use: FrameUse,
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) storage_buffers: Arc<StorageBuffers>,

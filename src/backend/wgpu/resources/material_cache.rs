@@ -37,7 +37,9 @@ pub(crate) struct MaterialTextures {
 /// Keeps materials and textures, and uploads textures that changed since the last frame. Materials are uploaded by the buffers of a frame.
 #[derive(Default)]
 pub(crate) struct MaterialCache {
-    textures: TextureArrays,
+    pub(crate) textures: TextureArrays,
+    /// By material slot, whether its texture is not on the device.
+    lacks_texture: Arc<[bool]>,
     current: Option<Current>,
     /// Rejections that making the snapshot found. Every frame that uses the snapshot reports them.
     rejected_textures: Vec<(RejectionReason, usize)>,
@@ -63,8 +65,37 @@ impl MaterialCache {
         types: &[MaterialLayout],
         rejections: &Rejections,
     ) -> MaterialSnapshot {
-        let materials = (assets.materials.identity(), assets.materials.revision());
         let textures = (assets.textures.identity(), assets.textures.revision());
+        self.update_snapshot(device, assets, types, rejections, textures, |cache| {
+            cache.rejected_textures.clear();
+            cache.textures.update(device, uploads, assets, &mut cache.rejected_textures);
+        })
+    }
+
+    /// The same with the textures that are on the device; and by material slot, whether its texture is not.
+    pub(crate) fn update_streamed(
+        &mut self,
+        device: &wgpu::Device,
+        assets: &Assets,
+        types: &[MaterialLayout],
+        rejections: &Rejections,
+    ) -> (MaterialSnapshot, Arc<[bool]>) {
+        let textures = (assets.textures.identity(), self.textures.changes());
+        let snapshot = self.update_snapshot(device, assets, types, rejections, textures, |_| {});
+        (snapshot, Arc::clone(&self.lacks_texture))
+    }
+
+    /// The latest snapshot if nothing changed. If `textures` did, calls `update_textures`.
+    fn update_snapshot(
+        &mut self,
+        device: &wgpu::Device,
+        assets: &Assets,
+        types: &[MaterialLayout],
+        rejections: &Rejections,
+        textures: (u64, u64),
+        update_textures: impl FnOnce(&mut Self),
+    ) -> MaterialSnapshot {
+        let materials = (assets.materials.identity(), assets.materials.revision());
         let mut snapshot = match self.current.take() {
             Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
             Some(current) if current.textures == textures => {
@@ -72,8 +103,7 @@ impl MaterialCache {
             }
             before => {
                 let before = before.map(|current| (current.moves, current.snapshot.textures));
-                self.rejected_textures.clear();
-                self.textures.update(device, uploads, assets, &mut self.rejected_textures);
+                update_textures(self);
                 let same_arrays = before.filter(|(moves, _)| *moves == self.textures.moves());
                 let textures = same_arrays.map_or_else(|| self.bound_textures(device), |(_, textures)| textures);
                 let token = self.textures.begin_snapshot();
@@ -104,10 +134,13 @@ impl MaterialCache {
     fn materials(&mut self, assets: &Assets) -> Arc<[u8]> {
         self.rejected_materials.clear();
         let mut materials = vec![GpuMaterial::default(); assets.materials.slot_count().max(1)];
+        let mut lacks_texture = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let texture = self.texture_location(assets, handle.index(), material);
+            lacks_texture[handle.index() as usize] = material.texture.is_some() && texture.is_none();
             materials[handle.index() as usize] = GpuMaterial::new(material, texture);
         }
+        self.lacks_texture = lacks_texture.into();
         bytemuck::cast_slice(&materials).into()
     }
 

@@ -1,10 +1,11 @@
 //! The cache of meshes on the device.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::attribute_set::AttributeBuffers;
 use super::imported_meshes::ImportedMeshes;
-use super::mesh_pages::{MeshBytes, MeshLocation, MeshPages, PageSizes};
+use super::mesh_pages::{MeshBytes, MeshLocation, MeshPages, MeshTarget, PageSizes};
 use super::mesh_snapshot::{CoarserLevels, MeshPageIndices, MeshRange, MeshSnapshot};
 use super::snapshot_lifetimes::SnapshotLifetimes;
 use super::upload_queue::UploadQueue;
@@ -19,36 +20,52 @@ use crate::view::UsedMeshes;
 /// the device stays where it is: where there is no room, pages are added.
 #[derive(Default)]
 pub(crate) struct MeshCache {
-    pages: MeshPages,
+    pub(super) pages: MeshPages,
     /// By slot.
-    meshes: Vec<Option<ResidentMesh>>,
-    coarser_levels: CoarserLevels,
+    pub(super) meshes: Vec<Option<ResidentMesh>>,
+    pub(super) coarser_levels: CoarserLevels,
     /// The memory of meshes that are gone.
-    lifetimes: SnapshotLifetimes<MeshLocation>,
-    imported_meshes: ImportedMeshes,
+    pub(super) lifetimes: SnapshotLifetimes<MeshLocation>,
+    pub(super) imported_meshes: ImportedMeshes,
     /// What the snapshot is of.
-    current: Option<MeshVersion>,
-    snapshot: Option<Arc<MeshSnapshot>>,
+    pub(super) current: Option<MeshVersion>,
+    /// The latest one, if nothing has changed since.
+    pub(super) snapshot: Option<Arc<MeshSnapshot>>,
+    /// Identifies the pages: another one after they were cleared.
+    pub(super) epoch: Arc<()>,
+    /// The slots of the meshes that jobs are uploading to these pages.
+    pub(super) in_flight: HashSet<u32>,
 }
 
 /// A mesh on the device.
 #[derive(Clone, Copy)]
-struct ResidentMesh {
+pub(super) struct ResidentMesh {
     /// In the assets.
     revision: u64,
-    location: MeshLocation,
+    pub(super) location: MeshLocation,
     /// Of level 0.
     index_count: u32,
 }
 
 /// What decides which meshes a frame has.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct MeshVersion {
+pub(super) struct MeshVersion {
     /// Of the assets' meshes.
     identity: u64,
     revision: u64,
     /// The revision of the meshes that are used.
     used: u64,
+}
+
+impl MeshVersion {
+    pub(super) fn new(assets: &Assets, used: &UsedMeshes) -> Self {
+        let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
+        Self { identity, revision, used: used.revision() }
+    }
+
+    pub(super) fn has_same_assets(self, other: Self) -> bool {
+        self.identity == other.identity
+    }
 }
 
 impl MeshCache {
@@ -60,7 +77,6 @@ impl MeshCache {
         let Some(changed) = self.pages.attributes.with(attributes) else { return false };
         self.clear_meshes();
         self.pages.attributes = Arc::new(changed);
-        self.current = None;
         true
     }
 
@@ -90,15 +106,14 @@ impl MeshCache {
         vertices: VertexFormat,
     ) -> Result<Arc<MeshSnapshot>, BackendError> {
         self.free_unread();
-        let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
-        let requested = MeshVersion { identity, revision, used: used.revision() };
+        let requested = MeshVersion::new(assets, used);
         if let Some(snapshot) = &self.snapshot
             && self.current == Some(requested)
             && self.pages.format == vertices
         {
             return Ok(Arc::clone(snapshot));
         }
-        if self.pages.format != vertices || self.current.is_none_or(|current| current.identity != identity) {
+        if self.pages.format != vertices || self.current.is_none_or(|current| !current.has_same_assets(requested)) {
             // All vertices in a page have one size.
             self.clear_meshes();
             self.pages.format = vertices;
@@ -122,7 +137,9 @@ impl MeshCache {
     }
 
     /// Moves to new pages. Snapshots keep those that they refer to.
-    fn clear_meshes(&mut self) {
+    pub(super) fn clear_meshes(&mut self) {
+        (self.current, self.snapshot) = (None, None);
+        (self.epoch, self.in_flight) = (Arc::default(), HashSet::new());
         self.pages.clear();
         self.meshes.clear();
         self.coarser_levels.clear();
@@ -130,14 +147,15 @@ impl MeshCache {
     }
 
     /// Frees the memory of meshes that are gone, as soon as no frame in flight may read it.
-    fn free_unread(&mut self) {
+    pub(super) fn free_unread(&mut self) {
         for location in self.lifetimes.reclaim() {
             self.pages.free(location);
         }
     }
 
-    /// Retires the meshes that changed, or were removed, since they were uploaded.
-    fn retire_changed(&mut self, assets: &Assets, used: &UsedMeshes) {
+    /// Retires the meshes that changed, or were removed, since they were uploaded. Returns their slots.
+    pub(super) fn retire_changed(&mut self, assets: &Assets, used: &UsedMeshes) -> Vec<u32> {
+        let mut retired = Vec::new();
         self.meshes.resize(assets.meshes.slot_count().max(self.meshes.len()), None);
         for (slot, entry) in (0..).zip(&mut self.meshes) {
             let Some(mesh) = entry else { continue };
@@ -146,9 +164,11 @@ impl MeshCache {
                 self.lifetimes.retire(mesh.location);
                 self.coarser_levels.remove(&slot);
                 *entry = None;
+                retired.push(slot);
             }
         }
         self.meshes.truncate(assets.meshes.slot_count());
+        retired
     }
 
     /// Uploads the used meshes that are not on the device.
@@ -176,19 +196,32 @@ impl MeshCache {
             expected.vertices -= bytes.vertices;
             expected.indices -= bytes.indices;
             let target = self.pages.target(location)?;
-            target.create_buffers(device)?;
-            with_vertex_bytes(mesh, target.format, |vertices| {
-                target.for_each_piece(mesh, vertices, |buffer, offset, bytes| {
-                    uploads.write_buffer(buffer, offset, bytes);
-                })
-            })?;
-            self.add_resident(slot, revision, mesh, location);
+            self.write(device, uploads, (slot, revision, mesh), &target)?;
         }
         Ok(())
     }
 
+    /// Uploads a mesh to its location.
+    ///
+    /// # Errors
+    /// If the device has no room for its page.
+    pub(super) fn write(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        (slot, revision, mesh): (u32, u64, &Mesh),
+        target: &MeshTarget,
+    ) -> Result<(), BackendError> {
+        target.create_buffers(device)?;
+        with_vertex_bytes(mesh, target.format, |vertices| {
+            target.for_each_piece(mesh, vertices, |buffer, offset, bytes| uploads.write_buffer(buffer, offset, bytes))
+        })?;
+        self.add_resident(slot, revision, mesh, target.location);
+        Ok(())
+    }
+
     /// Adds a mesh that was written to its location.
-    fn add_resident(&mut self, slot: u32, revision: u64, mesh: &Mesh, location: MeshLocation) {
+    pub(super) fn add_resident(&mut self, slot: u32, revision: u64, mesh: &Mesh, location: MeshLocation) {
         let index_count = mesh.indices().len() as u32;
         let mut end = location.indices.start + index_count;
         let ranges = mesh.levels().iter().map(|level| {
@@ -203,7 +236,7 @@ impl MeshCache {
         self.meshes[slot as usize] = Some(ResidentMesh { revision, location, index_count });
     }
 
-    fn new_snapshot(&mut self) -> MeshSnapshot {
+    pub(super) fn new_snapshot(&mut self) -> MeshSnapshot {
         let (mut vertex_pages, mut index_pages) = (Vec::new(), Vec::new());
         let mut add = |MeshLocation { vertices, indices }: MeshLocation| {
             add_page(&mut vertex_pages, vertices.page, |page| self.pages.vertex_buffers(page).cloned());

@@ -56,6 +56,19 @@ impl MeshPages {
         }
     }
 
+    /// Finds room for a mesh, or adds pages as long as all of them take no more than `budget` bytes.
+    pub(super) fn allocate_within(&mut self, mesh: &Mesh, sizes: PageSizes, budget: u64) -> Option<MeshLocation> {
+        let (stride, count) = (self.bytes_per_vertex(), mesh.vertices().len() as u32);
+        let rest = budget.saturating_sub(self.page_bytes());
+        let vertices = allocate_within(&mut self.vertices, count, stride, sizes, rest)?;
+        let rest = budget.saturating_sub(self.page_bytes());
+        let indices = allocate_within(&mut self.indices, index_count(mesh) as u32, INDEX, sizes, rest);
+        if indices.is_none() {
+            self.vertices.free(vertices);
+        }
+        Some(MeshLocation { vertices, indices: indices? })
+    }
+
     /// Frees the memory of a mesh, and releases pages that are empty then.
     pub(super) fn free(&mut self, location: MeshLocation) {
         self.vertices.free(location.vertices);
@@ -98,14 +111,14 @@ impl MeshPages {
         }
     }
 
+    /// What a mesh at a location takes, in bytes.
+    pub(super) fn bytes_in(&self, MeshLocation { vertices, indices }: MeshLocation) -> u64 {
+        u64::from(vertices.length) * self.bytes_per_vertex() + u64::from(indices.length) * INDEX
+    }
+
     /// The size of all pages in bytes.
     pub(super) fn page_bytes(&self) -> u64 {
         self.vertices.length() * self.bytes_per_vertex() + self.indices.length() * INDEX
-    }
-
-    /// The size of what is in use in them.
-    pub(super) fn used_bytes(&self) -> u64 {
-        self.vertices.used() * self.bytes_per_vertex() + self.indices.used() * INDEX
     }
 
     /// Drops all pages. Those that a snapshot refers to live on with it.
@@ -116,6 +129,20 @@ impl MeshPages {
     fn bytes_per_vertex(&self) -> u64 {
         vertex_stride(self.format) + self.attributes.bytes_per_vertex()
     }
+}
+
+/// Finds room for `count` entries of `stride` bytes in the pages, or in a new page of at most `rest` bytes.
+fn allocate_within<B>(
+    pages: &mut PageSet<B>,
+    count: u32,
+    stride: u64,
+    sizes: PageSizes,
+    rest: u64,
+) -> Option<PageRange> {
+    pages.allocate_in_pages(count).or_else(|| {
+        let page_bytes = sizes.max.min(rest).max(u64::from(count) * stride);
+        (page_bytes <= rest).then(|| pages.allocate(count, (page_bytes / stride) as u32))
+    })
 }
 
 const INDEX: u64 = mem::size_of::<u32>() as u64;
@@ -161,6 +188,13 @@ pub(crate) struct MeshTarget {
 }
 
 impl MeshTarget {
+    /// What is written to it.
+    pub(crate) fn bytes(&self) -> u64 {
+        let MeshLocation { vertices, indices } = self.location;
+        let stride = vertex_stride(self.format) + self.attributes.bytes_per_vertex();
+        u64::from(vertices.length) * stride + u64::from(indices.length) * INDEX
+    }
+
     /// Makes the buffers of the pages if nothing was written to them yet.
     ///
     /// # Errors

@@ -84,11 +84,6 @@ impl<B> PageSet<B> {
     pub(super) fn length(&self) -> u64 {
         self.pages.iter().flatten().map(|page| u64::from(page.length)).sum()
     }
-
-    /// The length of all ranges that are in use.
-    pub(super) fn used(&self) -> u64 {
-        self.pages.iter().flatten().map(|page| u64::from(page.ranges.used())).sum()
-    }
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -121,7 +116,8 @@ mod tests {
             occupied.sort_unstable();
             occupied.dedup();
             assert_eq!(pages.pages.iter().flatten().count(), occupied.len());
-            assert_eq!(pages.used(), live.iter().map(|range| u64::from(range.length)).sum::<u64>());
+            let used: u64 = pages.pages.iter().flatten().map(|page| u64::from(page.ranges.used())).sum();
+            assert_eq!(used, live.iter().map(|range| u64::from(range.length)).sum::<u64>());
         }
         live.drain(..).for_each(|range| pages.free(range));
         assert!(pages.pages.is_empty());

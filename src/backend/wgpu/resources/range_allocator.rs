@@ -54,6 +54,7 @@ impl RangeAllocator {
     }
 
     /// The sum of all allocated ranges.
+    #[cfg(test)]
     pub(super) fn used(&self) -> u32 {
         self.used
     }

@@ -1,12 +1,14 @@
 //! Textures on the device, in texture arrays by size. All arrays are bound at once, so no batch changes a binding.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
 use super::texture_layers::{TextureLayers, layer_bytes, new_array, write_layer};
 use super::upload_queue::UploadQueue;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
-use crate::scene::Assets;
+use crate::handle::Handle;
+use crate::scene::{Assets, Texture};
 use crate::view::RejectionReason;
 
 /// The array and layer of a texture.
@@ -25,21 +27,30 @@ impl TextureLocation {
 /// moves to a larger one, and the device copies its layers.
 #[derive(Default)]
 pub(crate) struct TextureArrays {
-    arrays: [TextureLayers; ARRAY_SIDES.len()],
+    pub(super) arrays: [TextureLayers; ARRAY_SIDES.len()],
     /// By slot.
-    textures: Vec<Option<ResidentTexture>>,
-    lifetimes: SnapshotLifetimes<TextureLocation>,
-    identity: u64,
+    pub(super) textures: Vec<Option<ResidentTexture>>,
+    pub(super) lifetimes: SnapshotLifetimes<TextureLocation>,
+    pub(super) identity: u64,
+    /// Of the assets' textures, when it was last looked for those that are gone; `None` before.
+    pub(super) revision: Option<u64>,
     /// Counts how often an array was replaced.
     moves: u64,
+    /// Counts how often what is on the device, or where it is, changed.
+    pub(super) changes: u64,
+    /// Identifies the arrays: another one after all textures were dropped.
+    pub(super) epoch: Arc<()>,
+    /// The slots of the textures that jobs are uploading.
+    pub(super) in_flight: HashSet<u32>,
 }
 
 /// A texture on the device.
 #[derive(Clone, Copy)]
-struct ResidentTexture {
+pub(super) struct ResidentTexture {
+    pub(super) handle: Handle<Texture>,
     /// In the assets.
-    revision: u64,
-    location: TextureLocation,
+    pub(super) revision: u64,
+    pub(super) location: TextureLocation,
 }
 
 impl TextureArrays {
@@ -51,11 +62,12 @@ impl TextureArrays {
         assets: &Assets,
         rejected: &mut Vec<(RejectionReason, usize)>,
     ) {
-        self.retire_changed(assets);
+        let current = |slot| assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
+        self.retire_changed(assets, |texture| current(texture.handle.index()) != Some(texture.revision));
         self.free_unread();
-        let missing = |(handle, revision, texture)| {
-            let (slot, index): (u32, _) = (crate::handle::Handle::index(handle), array_for(texture));
-            self.textures[slot as usize].is_none().then_some((slot, revision, texture, index))
+        let missing = |(handle, revision, texture): (Handle<Texture>, _, _)| {
+            let is_missing = self.textures[handle.index() as usize].is_none();
+            is_missing.then(|| (handle, revision, texture, array_for(texture)))
         };
         let missing: Vec<_> = assets.textures.iter_with_revision().filter_map(missing).collect();
         for index in 0..ARRAY_SIDES.len() {
@@ -66,15 +78,16 @@ impl TextureArrays {
                 missing.iter().filter(|(.., other)| *other == index).count(),
             );
         }
-        for (slot, revision, texture, index) in missing {
+        for (handle, revision, texture, index) in missing {
+            let slot = handle.index() as usize;
             let array = &mut self.arrays[index];
             match (array.take(), array.texture()) {
                 (Some(layer), Some(on_device)) => {
                     write_layer(uploads, on_device, layer, texture);
                     let location = TextureLocation { array: index as u32, layer };
-                    self.textures[slot as usize] = Some(ResidentTexture { revision, location });
+                    self.textures[slot] = Some(ResidentTexture { handle, revision, location });
                 }
-                _ => rejected.push((RejectionReason::TextureLimit, slot as usize)),
+                _ => rejected.push((RejectionReason::TextureLimit, slot)),
             }
         }
     }
@@ -111,54 +124,72 @@ impl TextureArrays {
         arrays.map(|(array, side)| array.capacity() as u64 * layer_bytes(side)).sum()
     }
 
-    /// Retires textures that changed, or were removed, since they were uploaded.
-    fn retire_changed(&mut self, assets: &Assets) {
+    /// Retires textures that are out of date.
+    pub(super) fn retire_changed(&mut self, assets: &Assets, is_outdated: impl Fn(&ResidentTexture) -> bool) {
         if self.identity != assets.textures.identity() {
             *self = Self {
                 identity: assets.textures.identity(),
                 lifetimes: SnapshotLifetimes::following(&self.lifetimes),
                 moves: self.moves + 1,
+                changes: self.changes + 1,
                 ..Self::default()
             };
         }
         self.textures.resize(assets.textures.slot_count().max(self.textures.len()), None);
-        for (slot, entry) in (0..).zip(&mut self.textures) {
-            let Some(texture) = entry else { continue };
-            let current = assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
-            if current != Some(texture.revision) {
+        for entry in &mut self.textures {
+            if let Some(texture) = entry.take_if(|texture| is_outdated(texture)) {
                 self.lifetimes.retire(texture.location);
-                *entry = None;
+                self.changes += 1;
             }
         }
     }
 
     /// Frees the layers of textures that are gone, as soon as no frame in flight may read them, and releases empty arrays.
-    fn free_unread(&mut self) {
-        for TextureLocation { array, layer } in self.lifetimes.reclaim() {
-            let layers = &mut self.arrays[array as usize];
-            layers.free(layer);
-            if layers.free_count() == layers.capacity() {
-                layers.release();
-                self.moves += 1;
-            }
+    pub(super) fn free_unread(&mut self) {
+        for location in self.lifetimes.reclaim() {
+            self.free_layer(location);
+        }
+    }
+
+    /// Frees a layer, and releases its array if nothing else is in it.
+    pub(super) fn free_layer(&mut self, TextureLocation { array, layer }: TextureLocation) {
+        let layers = &mut self.arrays[array as usize];
+        layers.free(layer);
+        if layers.free_count() == layers.capacity() {
+            layers.release();
+            (self.moves, self.changes) = (self.moves + 1, self.changes + 1);
         }
     }
 
     /// Makes room for so many further textures in an array, if the device allows as many layers.
     fn make_room(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, index: usize, textures: usize) {
-        let array = &mut self.arrays[index];
-        let is_in_array = |location: &TextureLocation| location.array == index as u32;
-        let live = self.textures.iter().flatten().map(|texture| texture.location).filter(is_in_array);
+        let array = &self.arrays[index];
         let max_layers = device.limits().max_texture_array_layers as usize;
-        let has_retired = self.lifetimes.retired().any(is_in_array);
+        let has_retired = self.lifetimes.retired().any(|location| location.array == index as u32);
         if textures <= array.free_count() || (array.capacity() == max_layers && !has_retired) {
             return;
         }
         // Twice the layers, so that a texture that changes every frame does not move the others every frame.
-        let layers = ((live.clone().count() + textures) * 2).max(array.capacity()).min(max_layers);
-        array.move_to(device, queue, ARRAY_SIDES[index], layers as u32, live.map(|location| location.layer));
+        let layers = ((self.live_layers(index).count() + textures) * 2).max(array.capacity()).min(max_layers);
+        self.move_array(device, queue, index, layers as u32);
+    }
+
+    /// The layers of an array that textures are in.
+    pub(super) fn live_layers(&self, index: usize) -> impl Iterator<Item = u32> {
+        let locations = self.textures.iter().flatten().map(|texture| texture.location);
+        locations.filter(move |location| location.array == index as u32).map(|location| location.layer)
+    }
+
+    /// Moves the textures of an array to the first layers of a new one, with this many layers, at least as many as textures.
+    pub(super) fn move_array(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, index: usize, layers: u32) {
+        let live: Vec<_> = self.live_layers(index).collect();
+        self.arrays[index].move_to(device, queue, ARRAY_SIDES[index], layers, &live);
+        let moved = self.textures.iter_mut().flatten().filter(|texture| texture.location.array == index as u32);
+        for (texture, layer) in moved.zip(0..) {
+            texture.location.layer = layer;
+        }
         // Frames in flight read those of the array before.
-        self.lifetimes.forget_retired(is_in_array);
-        self.moves += 1;
+        self.lifetimes.forget_retired(|location| location.array == index as u32);
+        (self.moves, self.changes) = (self.moves + 1, self.changes + 1);
     }
 }

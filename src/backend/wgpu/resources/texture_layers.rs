@@ -45,47 +45,41 @@ impl TextureLayers {
         *self = Self::default();
     }
 
-    /// Moves to a texture with this many layers, at least as many as before. The device copies `live` layers; all others are free then. The
-    /// copy is submitted at once, before anything that reads it.
-    pub(super) fn move_to(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        side: u32,
-        layers: u32,
-        live: impl Iterator<Item = u32>,
-    ) {
+    /// Moves to a texture with this many layers; to none if that is 0. The device copies `live` layers to the first ones, in their order;
+    /// all others are free then. The copy is submitted at once, before anything that reads it.
+    pub(super) fn move_to(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, side: u32, layers: u32, live: &[u32]) {
+        if layers == 0 {
+            return self.release();
+        }
         let texture = new_array(device, side, layers);
-        let mut is_used = vec![false; layers as usize];
-        live.for_each(|layer| is_used[layer as usize] = true);
-        if let Some(before) = self.texture.as_ref().filter(|_| is_used.contains(&true)) {
-            let label = Some("textures move to a larger array");
+        if let Some(before) = self.texture.as_ref().filter(|_| !live.is_empty()) {
+            let label = Some("textures move to another array");
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             let mut first = 0;
-            for run in is_used.chunk_by(|one, next| one == next) {
-                if run[0] {
-                    copy_layers(&mut encoder, before, &texture, first, run.len() as u32);
-                }
+            for run in live.chunk_by(|one, next| one + 1 == *next) {
+                copy_layers(&mut encoder, (before, run[0]), (&texture, first), run.len() as u32);
                 first += run.len() as u32;
             }
             queue.submit([encoder.finish()]);
         }
+        let is_used = (0..layers as usize).map(|layer| layer < live.len()).collect();
         *self = Self { texture: Some(texture), is_used };
     }
 }
 
-/// Copies layers to the same layers of another array, with all mip levels.
+/// Copies so many layers, with all mip levels, from one layer on to those from another one on.
 fn copy_layers(
     encoder: &mut wgpu::CommandEncoder,
-    source: &wgpu::Texture,
-    destination: &wgpu::Texture,
-    first: u32,
+    source: (&wgpu::Texture, u32),
+    destination: (&wgpu::Texture, u32),
     count: u32,
 ) {
-    for mip_level in 0..source.mip_level_count() {
-        let side = source.width() >> mip_level;
-        let origin = wgpu::Origin3d { x: 0, y: 0, z: first };
-        let of = |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect: wgpu::TextureAspect::All };
+    for mip_level in 0..source.0.mip_level_count() {
+        let side = source.0.width() >> mip_level;
+        let of = |(texture, z)| {
+            let origin = wgpu::Origin3d { x: 0, y: 0, z };
+            wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect: wgpu::TextureAspect::All }
+        };
         let size = wgpu::Extent3d { width: side, height: side, depth_or_array_layers: count };
         encoder.copy_texture_to_texture(of(source), of(destination), size);
     }
@@ -106,7 +100,7 @@ pub(super) fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::
 }
 
 /// The size of a layer with all mip levels, in bytes.
-pub(super) fn layer_bytes(side: u32) -> u64 {
+pub(crate) fn layer_bytes(side: u32) -> u64 {
     (0..=side.ilog2()).map(|level| u64::from(side >> level).pow(2) * 4).sum()
 }
 
@@ -118,7 +112,7 @@ pub(super) fn write_layer(uploads: &UploadQueue, array: &wgpu::Texture, layer: u
 }
 
 /// Writes whole rows of a mip level of a layer, from row `first` on.
-pub(super) fn write_rows(
+pub(crate) fn write_rows(
     uploads: &UploadQueue,
     array: &wgpu::Texture,
     (layer, mip_level): (u32, u32),

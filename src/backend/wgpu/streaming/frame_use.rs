@@ -34,13 +34,6 @@ impl UseMarks {
     pub(crate) fn latest_use(&self, slot: u32) -> u64 {
         self.marks.get(slot as usize).map_or(0, |mark| mark.load(Ordering::Relaxed))
     }
-
-    /// Forgets the uses of a slot: something else is in it.
-    pub(crate) fn clear(&self, slot: u32) {
-        if let Some(mark) = self.marks.get(slot as usize) {
-            mark.store(0, Ordering::Relaxed);
-        }
-    }
 }
 
 /// Where a frame marks what it draws.
@@ -55,6 +48,15 @@ pub(crate) struct FrameUse {
 }
 
 impl FrameUse {
+    /// Marks a mesh that has arrived as if it had been drawn just before the frames that decide what is in sight. So what was drawn
+    /// earlier makes room first.
+    pub(super) fn mark_arrival(&self, slot: u32, frames_in_sight: u64) {
+        let before = self.frame.saturating_sub(frames_in_sight + 1);
+        if self.meshes.latest_use(slot) < before {
+            self.meshes.mark(slot, before);
+        }
+    }
+
     /// Marks the mesh in a slot.
     pub(crate) fn mark_mesh(&self, slot: u32) {
         self.meshes.mark(slot, self.frame);

@@ -1,0 +1,73 @@
+//! What may be uploaded from one frame to the next.
+
+use std::time::Instant;
+
+/// What may be uploaded until the next frame: so many bytes, until a time.
+pub(super) struct Allowance {
+    bytes: u64,
+    end: Instant,
+    has_begun: bool,
+}
+
+impl Allowance {
+    /// The bytes of a piece. wgpu holds a lock while it copies one, which a frame may wait for.
+    const PIECE: u64 = 1 << 18;
+
+    pub(super) fn new(bytes: u64, end: Instant) -> Self {
+        Self { bytes, end, has_begun: false }
+    }
+
+    /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first piece is allowed at any
+    /// time, so that something is uploaded even if the time is over before it begins.
+    pub(super) fn take(&mut self, bytes: u64, unit: u64) -> u64 {
+        let taken = bytes.min(Self::PIECE.max(unit)).min(self.bytes) / unit * unit;
+        if taken == 0 || self.is_late() {
+            return 0;
+        }
+        self.bytes -= taken;
+        self.has_begun = true;
+        taken
+    }
+
+    /// Whether the time is over, or there are too few bytes for any piece.
+    pub(super) fn is_over(&self) -> bool {
+        self.bytes < 4 || self.is_late()
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn is_late(&self) -> bool {
+        self.has_begun && Instant::now() >= self.end
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn pieces_are_whole_units_and_add_up_to_the_bytes() {
+        let mut allowance = Allowance::new(1_000_003, Instant::now() + Duration::from_secs(1000));
+        let mut sum = 0;
+        while !allowance.is_over() {
+            let taken = allowance.take(1 << 40, 12);
+            if taken == 0 {
+                break;
+            }
+            assert!(taken.is_multiple_of(12) && taken <= Allowance::PIECE);
+            sum += taken;
+        }
+        assert_eq!(sum, 1_000_003 / 12 * 12);
+        assert_eq!(sum + allowance.bytes(), 1_000_003);
+    }
+
+    #[test]
+    fn one_piece_is_allowed_when_the_time_is_over() {
+        let mut allowance = Allowance::new(100, Instant::now());
+        assert_eq!((allowance.take(8, 4), allowance.take(8, 4), allowance.is_over()), (8, 0, true));
+    }
+}

@@ -1,0 +1,72 @@
+//! The upload of a mesh, in pieces.
+
+use std::sync::Arc;
+
+use super::allowance::Allowance;
+use crate::backend::BackendError;
+use crate::backend::wgpu::resources::{MeshTarget, UploadQueue};
+use crate::quality::VertexFormat;
+use crate::scene::{Mesh, PackedVertex};
+
+/// A mesh on its way to the device.
+pub(crate) struct MeshUpload {
+    /// Which pages its target is in: those of a cache that was not cleared since.
+    pub(crate) epoch: Arc<()>,
+    pub(crate) slot: u32,
+    /// In the assets.
+    pub(crate) revision: u64,
+    pub(crate) mesh: Mesh,
+    pub(crate) target: MeshTarget,
+    packed: Vec<PackedVertex>,
+    /// Bytes.
+    written: u64,
+}
+
+impl MeshUpload {
+    pub(crate) fn new(epoch: Arc<()>, (slot, revision): (u32, u64), mesh: Mesh, target: MeshTarget) -> Self {
+        Self { epoch, slot, revision, mesh, target, packed: Vec::new(), written: 0 }
+    }
+
+    /// All that it uploads.
+    pub(super) fn bytes(&self) -> u64 {
+        self.target.bytes()
+    }
+
+    /// Uploads as much as is allowed. Returns whether all of it is uploaded.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(super) fn advance(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        allowance: &mut Allowance,
+    ) -> Result<bool, BackendError> {
+        self.target.create_buffers(device)?;
+        let vertices: &[u8] = match self.target.format {
+            VertexFormat::Full => bytemuck::cast_slice(self.mesh.vertices()),
+            VertexFormat::Packed => {
+                if self.packed.is_empty() {
+                    self.packed = self.mesh.packed_vertices();
+                }
+                bytemuck::cast_slice(&self.packed)
+            }
+        };
+        let (mut begin, mut written) = (0, self.written);
+        self.target.for_each_piece(&self.mesh, vertices, |buffer, offset, bytes| {
+            let end = begin + bytes.len() as u64;
+            while written < end {
+                let length = allowance.take(end - written, 4);
+                if length == 0 {
+                    break;
+                }
+                let first = (written - begin) as usize;
+                uploads.write_buffer(buffer, offset + first as u64, &bytes[first..first + length as usize]);
+                written += length;
+            }
+            begin = end;
+        })?;
+        self.written = written;
+        Ok(written == begin)
+    }
+}

@@ -1,0 +1,66 @@
+//! The upload of a texture, in pieces.
+
+use std::sync::Arc;
+
+use super::allowance::Allowance;
+use crate::backend::mip_generation::mip_chain;
+use crate::backend::wgpu::resources::{TextureLocation, UploadQueue, layer_bytes, write_rows};
+use crate::handle::Handle;
+use crate::scene::Texture;
+
+/// A texture on its way to the device.
+pub(crate) struct TextureUpload {
+    /// Which arrays its location is in: those of a cache that was not cleared since.
+    pub(crate) epoch: Arc<()>,
+    pub(crate) handle: Handle<Texture>,
+    /// In the assets.
+    pub(crate) revision: u64,
+    pub(crate) texture: Texture,
+    pub(crate) array: wgpu::Texture,
+    pub(crate) location: TextureLocation,
+    /// What is left of the mip levels, the last one first, and how many rows of the last one are written.
+    levels: Vec<Vec<u8>>,
+    rows: u32,
+}
+
+impl TextureUpload {
+    pub(crate) fn new(
+        epoch: Arc<()>,
+        (handle, revision): (Handle<Texture>, u64),
+        texture: Texture,
+        array: wgpu::Texture,
+        location: TextureLocation,
+    ) -> Self {
+        Self { epoch, handle, revision, texture, array, location, levels: Vec::new(), rows: 0 }
+    }
+
+    /// All that it uploads.
+    pub(super) fn bytes(&self) -> u64 {
+        layer_bytes(self.array.width())
+    }
+
+    /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded.
+    pub(super) fn advance(&mut self, uploads: &UploadQueue, allowance: &mut Allowance) -> bool {
+        if self.levels.is_empty() {
+            self.levels = mip_chain(&self.texture, self.array.width());
+            self.levels.reverse();
+        }
+        while let Some(level) = self.levels.last() {
+            let number = self.array.mip_level_count() - self.levels.len() as u32;
+            let row_bytes = u64::from(self.array.width() >> number) * 4;
+            let first = u64::from(self.rows) * row_bytes;
+            let length = allowance.take(level.len() as u64 - first, row_bytes);
+            if length == 0 {
+                return false;
+            }
+            let bytes = &level[first as usize..(first + length) as usize];
+            write_rows(uploads, &self.array, (self.location.layer, number), self.rows, bytes);
+            self.rows += (length / row_bytes) as u32;
+            if first + length == level.len() as u64 {
+                self.levels.pop();
+                self.rows = 0;
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,106 @@
+//! What background jobs upload.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use parking_lot::Mutex;
+
+use super::allowance::Allowance;
+use super::budget::StreamingBudget;
+use super::mesh_upload::MeshUpload;
+use super::texture_upload::TextureUpload;
+use crate::backend::BackendError;
+use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
+use crate::backend::wgpu::resources::UploadQueue;
+
+/// Something on its way to the device.
+pub(super) enum Upload {
+    Mesh(MeshUpload),
+    Texture(TextureUpload),
+}
+
+/// What background jobs upload, and what they have uploaded. Frames add to it and take from it when they begin; one job at a time does
+/// what was added.
+#[derive(Default)]
+pub(super) struct UploadJobs {
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: VecDeque<Upload>,
+    finished: Vec<(Upload, Result<(), BackendError>)>,
+    uploaded_bytes: u64,
+}
+
+impl UploadJobs {
+    /// Adds what jobs upload after everything else.
+    pub(super) fn add(&self, uploads: impl Iterator<Item = Upload>) {
+        self.state.lock().waiting.extend(uploads);
+    }
+
+    /// What was uploaded, or could not be.
+    pub(super) fn take_finished(&self) -> Vec<(Upload, Result<(), BackendError>)> {
+        std::mem::take(&mut self.state.lock().finished)
+    }
+
+    /// Whether something waits for a job.
+    pub(super) fn has_work(&self) -> bool {
+        !self.state.lock().waiting.is_empty()
+    }
+
+    /// The bytes of what waits for a job, whether a part of it is uploaded already or not.
+    pub(super) fn waiting_bytes(&self) -> u64 {
+        self.state.lock().waiting.iter().map(Upload::bytes).sum()
+    }
+
+    /// The bytes that jobs have uploaded so far.
+    pub(super) fn uploaded_bytes(&self) -> u64 {
+        self.state.lock().uploaded_bytes
+    }
+
+    /// Uploads what the budget allows between two frames.
+    pub(super) fn work(&self, device: &wgpu::Device, uploads: &UploadQueue, budget: &StreamingBudget) {
+        let end = Instant::now() + budget.upload_time_per_frame;
+        let mut allowance = Allowance::new(budget.upload_bytes_per_frame, end);
+        loop {
+            // The lock is not held meanwhile, so that a frame can begin.
+            let next = self.state.lock().waiting.pop_front();
+            let Some(mut upload) = next else { break };
+            let before = allowance.bytes();
+            let advance = || match &mut upload {
+                Upload::Mesh(mesh) => mesh.advance(device, uploads, &mut allowance),
+                Upload::Texture(texture) => Ok(texture.advance(uploads, &mut allowance)),
+            };
+            let label = "a streamed mesh or texture";
+            let advanced = with_error_scope(device, label, || catch_wgpu_panic(label, advance)).flatten().flatten();
+            let mut state = self.state.lock();
+            state.uploaded_bytes += before - allowance.bytes();
+            match advanced {
+                Ok(true) => state.finished.push((upload, Ok(()))),
+                Ok(false) => state.waiting.push_front(upload),
+                Err(error) => state.finished.push((upload, Err(error))),
+            }
+            if allowance.is_over() || matches!(state.waiting.front(), Some(next) if !next.can_advance(&allowance)) {
+                break;
+            }
+        }
+    }
+}
+
+impl Upload {
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Mesh(mesh) => mesh.bytes(),
+            Self::Texture(texture) => texture.bytes(),
+        }
+    }
+
+    /// Whether its next piece may fit into what is left.
+    fn can_advance(&self, allowance: &Allowance) -> bool {
+        match self {
+            Self::Mesh(_) => allowance.bytes() >= 4,
+            Self::Texture(texture) => allowance.bytes() >= u64::from(texture.array.width()) * 4,
+        }
+    }
+}
