@@ -5,7 +5,10 @@ use std::any::type_name;
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+use parking_lot::Mutex;
 
 /// A reference to a `T` in [`Slots`]. When that `T` is removed, the handle is stale: using it is an error, and never returns
 /// another `T`.
@@ -47,9 +50,54 @@ pub struct StaleHandle {
 pub struct Slots<T> {
     identity: u64,
     revision: u64,
+    /// The number of reserved slots that were filled.
+    arrivals: u64,
+    /// All slots but those at the end that are reserved and not filled yet.
     entries: Vec<Entry<T>>,
-    free: Vec<u32>,
+    free: Arc<Mutex<FreeSlots>>,
     length: usize,
+}
+
+/// The slots that can be handed out: on any thread, so that a handle can be made before its entry is there.
+#[derive(Debug, Default)]
+struct FreeSlots {
+    /// Each with its next generation.
+    slots: Vec<(u32, u32)>,
+    /// The number of slots that were ever handed out.
+    count: u32,
+}
+
+impl FreeSlots {
+    /// The index and generation of a free slot, which is not free any more.
+    ///
+    /// # Panics
+    /// If there are more than `u32::MAX` slots.
+    fn take(&mut self) -> (u32, u32) {
+        self.slots.pop().unwrap_or_else(|| {
+            let index = self.count;
+            self.count = index.checked_add(1).expect("more than u32::MAX entries");
+            (index, 0)
+        })
+    }
+}
+
+/// Makes handles of [`Slots`] on any thread, before their entries are there.
+#[derive(Debug)]
+pub(crate) struct SlotReserver<T> {
+    collection: u32,
+    free: Arc<Mutex<FreeSlots>>,
+    kind: PhantomData<fn() -> T>,
+}
+
+impl<T> SlotReserver<T> {
+    /// Reserves a slot. It stays reserved until [`Slots::fill`] or [`Slots::release`].
+    ///
+    /// # Panics
+    /// If there are more than `u32::MAX` slots.
+    pub(crate) fn reserve(&self) -> Handle<T> {
+        let (index, generation) = self.free.lock().take();
+        Handle { index, generation, collection: self.collection, kind: PhantomData }
+    }
 }
 
 impl<T> Slots<T> {
@@ -60,8 +108,9 @@ impl<T> Slots<T> {
             // Relaxed: only uniqueness matters; the counter publishes no other data.
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
             revision: 0,
+            arrivals: 0,
             entries: Vec::new(),
-            free: Vec::new(),
+            free: Arc::default(),
             length: 0,
         }
     }
@@ -71,19 +120,85 @@ impl<T> Slots<T> {
     /// # Panics
     /// If there are more than `u32::MAX` slots.
     pub fn insert(&mut self, value: T) -> Handle<T> {
+        let (index, generation) = self.free.lock().take();
+        self.store(index, value);
+        self.handle(index, generation)
+    }
+
+    /// Makes handles on other threads.
+    pub(crate) fn reserver(&self) -> SlotReserver<T> {
+        SlotReserver { collection: self.identity as u32, free: Arc::clone(&self.free), kind: PhantomData }
+    }
+
+    /// Whether a handle was reserved, and its entry is not there yet.
+    pub(crate) fn is_reserved(&self, handle: Handle<T>) -> bool {
+        self.belongs(handle)
+            && self
+                .entries
+                .get(handle.index as usize)
+                .is_none_or(|entry| entry.generation == handle.generation && entry.value.is_none())
+    }
+
+    /// Adds the entry of a reserved handle.
+    ///
+    /// # Errors
+    /// If the handle is not reserved any more.
+    pub(crate) fn fill(&mut self, handle: Handle<T>, value: T) -> Result<(), StaleHandle> {
+        if !self.is_reserved(handle) {
+            return Err(handle.stale());
+        }
+        self.arrivals += 1;
+        self.store(handle.index, value);
+        Ok(())
+    }
+
+    /// Frees the slot of a reserved handle, which is stale then.
+    ///
+    /// # Errors
+    /// If the handle is not reserved any more.
+    pub(crate) fn release(&mut self, handle: Handle<T>) -> Result<(), StaleHandle> {
+        if !self.is_reserved(handle) {
+            return Err(handle.stale());
+        }
+        self.revision += 1;
+        // What was described as yet to arrive is stale now.
+        self.arrivals += 1;
+        self.add_entries(handle.index);
+        self.retire(handle.index);
+        Ok(())
+    }
+
+    /// The number of reserved handles that were filled or released.
+    pub(crate) fn arrivals(&self) -> u64 {
+        self.arrivals
+    }
+
+    /// Adds entries up to that of a slot. Those that other threads have reserved meanwhile are empty.
+    fn add_entries(&mut self, index: u32) {
+        let revision = self.revision;
+        while self.entries.len() <= index as usize {
+            self.entries.push(Entry { generation: 0, revision, value: None });
+        }
+    }
+
+    fn store(&mut self, index: u32, value: T) {
         self.revision += 1;
         self.length += 1;
-        let revision = self.revision;
-        let index = self.free.pop().unwrap_or_else(|| {
-            let index = u32::try_from(self.entries.len()).expect("more than u32::MAX entries");
-            self.entries.push(Entry { generation: 0, revision, value: None });
-            index
-        });
+        self.add_entries(index);
         let entry = &mut self.entries[index as usize];
-        entry.revision = revision;
+        entry.revision = self.revision;
         entry.value = Some(value);
-        let generation = entry.generation;
-        self.handle(index, generation)
+    }
+
+    /// Begins the next generation of an empty slot. A slot without generations left is retired: reusing it would make a stale handle valid
+    /// again.
+    fn retire(&mut self, index: u32) {
+        let entry = &mut self.entries[index as usize];
+        entry.revision = self.revision;
+        entry.generation = entry.generation.saturating_add(1);
+        if entry.generation < u32::MAX {
+            self.free.lock().slots.push((index, entry.generation));
+        }
     }
 
     /// Removes an entry. Its handle is then stale.
@@ -96,19 +211,14 @@ impl<T> Slots<T> {
         let value = entry.value.take().ok_or_else(|| handle.stale())?;
         self.revision += 1;
         self.length -= 1;
-        entry.revision = self.revision;
-        // A slot without generations left is retired: reusing it would make a stale handle valid again.
-        if let Some(next) = entry.generation.checked_add(1) {
-            entry.generation = next;
-            self.free.push(handle.index);
-        }
+        self.retire(handle.index);
         Ok(value)
     }
 
     /// Returns an entry.
     ///
     /// # Errors
-    /// If the handle is stale.
+    /// If the handle is stale, or its entry is not there yet.
     pub fn get(&self, handle: Handle<T>) -> Result<&T, StaleHandle> {
         self.entries
             .get(handle.index as usize)
@@ -248,11 +358,43 @@ mod tests {
     fn a_slot_without_generations_left_is_retired() {
         let mut numbers = Slots::new();
         let handle = numbers.insert(1);
-        numbers.entries[0].generation = u32::MAX;
-        let last = Handle { generation: u32::MAX, ..handle };
+        numbers.entries[0].generation = u32::MAX - 1;
+        let last = Handle { generation: u32::MAX - 1, ..handle };
         assert_eq!(numbers.remove(last), Ok(1));
         assert_eq!(numbers.insert(2).index(), 1);
-        assert!(numbers.get(last).is_err());
+        assert!(numbers.get(last).is_err() && !numbers.is_reserved(last));
+    }
+
+    #[test]
+    fn reserved_handles_are_filled_in_any_order_among_others() {
+        let mut numbers = Slots::new();
+        let first = numbers.insert(1);
+        let reserver = numbers.reserver();
+        let reserved: Vec<_> = std::thread::scope(|scope| {
+            let threads: Vec<_> =
+                (0..4).map(|_| scope.spawn(|| (0..50).map(|_| reserver.reserve()).collect::<Vec<_>>())).collect();
+            threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+        });
+        let inserted = numbers.insert(2);
+        assert!(reserved.iter().all(|handle| numbers.is_reserved(*handle) && numbers.get(*handle).is_err()));
+        assert!(!numbers.is_reserved(first) && !numbers.is_reserved(inserted));
+        for (number, handle) in reserved.iter().enumerate().rev() {
+            let outcome =
+                if number % 3 == 0 { numbers.release(*handle) } else { numbers.fill(*handle, 10 + number as i32) };
+            assert_eq!(outcome, Ok(()));
+            assert!(!numbers.is_reserved(*handle));
+            assert!(numbers.fill(*handle, 0).is_err() && numbers.release(*handle).is_err());
+        }
+        assert_eq!((numbers.get(first), numbers.get(inserted)), (Ok(&1), Ok(&2)));
+        for (number, handle) in reserved.iter().enumerate() {
+            assert_eq!(numbers.get(*handle).ok().copied(), (number % 3 != 0).then_some(10 + number as i32));
+        }
+        // Released slots are used again, by both kinds of handles.
+        let again = reserver.reserve();
+        assert!(reserved.iter().any(|handle| handle.index() == again.index()));
+        assert_eq!(numbers.fill(again, 7), Ok(()));
+        assert_eq!((numbers.get(again), numbers.len()), (Ok(&7), 200 + 2 - 67 + 1));
+        assert!(!Slots::<i32>::new().is_reserved(again), "of another collection");
     }
 
     #[test]

@@ -27,7 +27,7 @@ impl Warnings {
             // A light that is switched off is no mistake, and what is streamed arrives.
             let is_expected = matches!(
                 rejection.reason,
-                RejectionReason::DarkLight | RejectionReason::MeshNotResident | RejectionReason::TextureNotResident
+                RejectionReason::DarkLight | RejectionReason::NotResident | RejectionReason::TextureNotResident
             );
             if is_expected || is_reported {
                 continue;

@@ -1,7 +1,10 @@
 //! The collection of meshes, materials and textures.
 
-use super::{Material, Mesh, SceneError, Texture};
+use super::{Arrivals, AssetLoader, Material, Mesh, SceneError, Texture};
+use std::sync::Arc;
+
 use crate::handle::{Handle, Slots, StaleHandle};
+use crate::task::Scheduler;
 
 /// Owns meshes, materials and textures. An engine with its own storage for objects keeps its assets here too, so that a
 /// frame uploads an asset only when it is new or has changed; and a mesh not before the first frame in which an object has it.
@@ -57,20 +60,65 @@ impl Assets {
     /// Removes an asset. The next frame rejects and reports objects that still refer to it.
     ///
     /// # Errors
-    /// If the handle is stale.
+    /// If the handle is stale, or the asset has not [arrived](Self::receive) yet: see [`Assets::unload`].
     pub fn remove<T: Asset>(&mut self, handle: Handle<T>) -> Result<T, StaleHandle> {
         T::slots_mut(self).remove(handle)
+    }
+
+    /// Makes what loads assets by background jobs. See [`AssetLoader`].
+    pub fn loader(&self, scheduler: &Arc<Scheduler>) -> AssetLoader {
+        AssetLoader::new(self, scheduler)
+    }
+
+    /// Adds what a loader has loaded since the last call: call it between two frames. The handles of what could not be loaded are stale from
+    /// then on.
+    pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
+        loader.receive(self)
+    }
+
+    /// Whether a handle is that of an asset that has not [arrived](Self::receive) yet.
+    pub fn is_pending<T: Asset>(&self, handle: Handle<T>) -> bool {
+        T::slots(self).is_reserved(handle)
+    }
+
+    /// Removes an asset, whether it has arrived or not. Returns it if it has; otherwise it is dropped when it is loaded.
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn unload<T: Asset>(&mut self, handle: Handle<T>) -> Result<Option<T>, StaleHandle> {
+        if self.is_pending(handle) {
+            return self.release(handle).map(|()| None);
+        }
+        self.remove(handle).map(Some)
+    }
+
+    /// Adds the asset of a handle that is pending.
+    ///
+    /// # Errors
+    /// If it is not pending.
+    pub(super) fn fill<T: Asset>(&mut self, handle: Handle<T>, priority: i32, asset: T) -> Result<(), StaleHandle> {
+        T::slots_mut(self).fill(handle, asset)?;
+        self.store_priority(handle, priority);
+        Ok(())
+    }
+
+    /// Makes a pending handle stale.
+    ///
+    /// # Errors
+    /// If it is not pending.
+    pub(super) fn release<T: Asset>(&mut self, handle: Handle<T>) -> Result<(), StaleHandle> {
+        T::slots_mut(self).release(handle)
     }
 
     /// Returns an asset.
     ///
     /// # Errors
-    /// If the handle is stale.
+    /// If the handle is stale, or the asset has not [arrived](Self::receive) yet.
     pub fn get<T: Asset>(&self, handle: Handle<T>) -> Result<&T, StaleHandle> {
         T::slots(self).get(handle)
     }
 
-    /// Sets in which order a backend that [streams](crate::backend::Backend) brings meshes and textures to the device: those with a higher
+    /// Sets in which order a backend that streams brings meshes and textures to the device: those with a higher
     /// priority first, once those that are in sight are there. It may change at any time, and changes nothing in pictures. It is 0 where
     /// nothing is set; materials have none.
     ///
@@ -115,11 +163,18 @@ impl Assets {
 }
 
 /// A type that [`Assets`] stores: [`Mesh`], [`Material`] and [`Texture`].
-pub trait Asset: Sized + sealed::Sealed + 'static {
+pub trait Asset: Sized + Send + sealed::Sealed + 'static {
     #[doc(hidden)]
     fn slots(assets: &Assets) -> &Slots<Self>;
     #[doc(hidden)]
     fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
+    /// A handle of an asset that is to be loaded.
+    #[doc(hidden)]
+    fn reserve(loader: &AssetLoader) -> Handle<Self>;
+    #[doc(hidden)]
+    fn as_mesh(_handle: Handle<Self>) -> Option<Handle<Mesh>> {
+        None
+    }
     /// The priorities by slot; `None` for a type without.
     #[doc(hidden)]
     fn priorities(_assets: &Assets) -> Option<&Vec<i32>> {
@@ -136,6 +191,14 @@ pub trait Asset: Sized + sealed::Sealed + 'static {
 }
 
 impl Asset for Mesh {
+    fn reserve(loader: &AssetLoader) -> Handle<Self> {
+        loader.reserve_mesh()
+    }
+
+    fn as_mesh(handle: Handle<Self>) -> Option<Handle<Mesh>> {
+        Some(handle)
+    }
+
     fn priorities(assets: &Assets) -> Option<&Vec<i32>> {
         Some(&assets.priorities.meshes)
     }
@@ -154,6 +217,10 @@ impl Asset for Mesh {
 }
 
 impl Asset for Material {
+    fn reserve(loader: &AssetLoader) -> Handle<Self> {
+        loader.reserve_material()
+    }
+
     fn slots(assets: &Assets) -> &Slots<Self> {
         &assets.materials
     }
@@ -163,7 +230,7 @@ impl Asset for Material {
     }
 
     fn check(&self, assets: &Assets) -> Result<(), SceneError> {
-        if let Some(texture) = self.texture {
+        if let Some(texture) = self.texture.filter(|texture| !assets.is_pending(*texture)) {
             assets.textures.get(texture)?;
         }
         if self.is_valid() { Ok(()) } else { Err(SceneError::InvalidMaterial { material: self.name.clone() }) }
@@ -171,6 +238,10 @@ impl Asset for Material {
 }
 
 impl Asset for Texture {
+    fn reserve(loader: &AssetLoader) -> Handle<Self> {
+        loader.reserve_texture()
+    }
+
     fn priorities(assets: &Assets) -> Option<&Vec<i32>> {
         Some(&assets.priorities.textures)
     }

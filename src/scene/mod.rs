@@ -3,6 +3,7 @@
 //! A frame reads a [`SceneRef`], which borrows slices. [`Scene`] owns such slices; an engine with storage of its own lends
 //! its own instead.
 
+mod asset_loader;
 mod assets;
 mod camera;
 mod camera_motion;
@@ -37,6 +38,7 @@ mod subdivision;
 mod transform;
 mod vertex_attribute;
 
+pub use asset_loader::{Arrivals, AssetLoader, LoadError};
 pub use assets::{Asset, Assets};
 pub(crate) use camera::child_name;
 pub use camera::{Camera, Projection, ViewKind};

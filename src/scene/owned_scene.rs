@@ -1,10 +1,13 @@
 //! A scene that owns its objects and assets.
 
+use std::collections::HashSet;
+
 use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Asset, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet, SceneError, SceneRef,
+    Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet,
+    SceneError, SceneRef,
 };
 use crate::handle::{Handle, Slots, StaleHandle};
 
@@ -263,6 +266,36 @@ impl Scene {
         Ok(())
     }
 
+    /// Adds what a loader has loaded since the last call, and sets the bounds of the objects whose meshes arrived. See [`Assets::receive`].
+    pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
+        let arrivals = self.assets.receive(loader);
+        if !arrivals.meshes.is_empty() {
+            let arrived: HashSet<_> = arrivals.meshes.iter().copied().collect();
+            for (mesh, bounds) in self.meshes.iter().zip(&mut self.bounds).filter(|(mesh, _)| arrived.contains(mesh)) {
+                if let Ok(mesh) = self.assets.get(*mesh) {
+                    *bounds = mesh.bounds();
+                }
+            }
+        }
+        arrivals
+    }
+
+    /// See [`Assets::unload`].
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn unload<T: Asset>(&mut self, handle: Handle<T>) -> Result<Option<T>, StaleHandle> {
+        self.assets.unload(handle)
+    }
+
+    /// See [`Assets::set_priority`].
+    ///
+    /// # Errors
+    /// If the handle is stale.
+    pub fn set_priority<T: Asset>(&mut self, handle: Handle<T>, priority: i32) -> Result<(), StaleHandle> {
+        self.assets.set_priority(handle, priority)
+    }
+
     /// See [`Assets::remove`].
     ///
     /// # Errors
@@ -279,8 +312,12 @@ impl Scene {
         if !transform_is_valid(object.position, object.orientation, object.scale) {
             return Err(SceneError::InvalidTransform { object: index });
         }
-        self.assets.get(object.material)?;
-        Ok(self.assets.get(object.mesh)?.bounds())
+        if !self.assets.is_pending(object.material) {
+            self.assets.get(object.material)?;
+        }
+        // The bounds of a mesh that has not arrived are set when it arrives.
+        let is_pending = self.assets.is_pending(object.mesh);
+        Ok(if is_pending { Bounds::default() } else { self.assets.get(object.mesh)?.bounds() })
     }
 }
 

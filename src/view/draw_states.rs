@@ -35,21 +35,25 @@ struct MeshEntry {
 struct AssetVersion {
     meshes: (u64, u64),
     materials: (u64, u64),
+    /// Counts the handles whose meshes and materials were loaded after they were made.
+    arrivals: u64,
 }
 
 impl DrawStates {
-    /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there before: no
-    /// object can have been described with one that is new.
+    /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there before, or was loaded
+    /// after its handle was made: no object can have been described with another one that is new.
     pub(super) fn update(&mut self, assets: &Assets) -> bool {
         let Assets { meshes, materials, .. } = assets;
         let version = AssetVersion {
             meshes: (meshes.identity(), meshes.revision()),
             materials: (materials.identity(), materials.revision()),
+            arrivals: meshes.arrivals() + materials.arrivals(),
         };
         if self.version == Some(version) {
             return false;
         }
-        self.version = Some(version);
+        let before = self.version.replace(version);
+        let has_arrivals = before.is_some_and(|before| before.arrivals != version.arrivals);
         let mut new_meshes = vec![None; meshes.slot_count()];
         for (mesh, revision, content) in meshes.iter_with_revision() {
             new_meshes[mesh.index() as usize] = Some(MeshEntry { mesh, topology: content.topology(), revision });
@@ -66,7 +70,7 @@ impl DrawStates {
         self.set_types(types);
         let changed = has_changed(&self.meshes, &new_meshes) || has_changed(&self.materials, &new_materials);
         (self.meshes, self.materials) = (new_meshes, new_materials);
-        changed
+        changed || has_arrivals
     }
 
     fn set_types(&mut self, types: Vec<Option<MaterialLayout>>) {

@@ -124,6 +124,8 @@ pub(super) fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> Rejection
         RejectionReason::InvalidTransform
     } else if FixedPosition::new(scene.positions[object]).is_none() {
         RejectionReason::OutOfReach
+    } else if scene.assets.is_pending(scene.meshes[object]) || scene.assets.is_pending(scene.materials[object]) {
+        RejectionReason::NotResident
     } else if scene.assets.get(scene.meshes[object]).is_err() {
         RejectionReason::StaleMesh
     } else if scene.assets.get(scene.materials[object]).is_err() {

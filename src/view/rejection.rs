@@ -84,8 +84,9 @@ pub enum RejectionReason {
     StaleTexture,
     /// A texture exceeds the device's limits; the material's plain colour is used.
     TextureLimit,
-    /// An object's mesh is not on the device yet, or not loaded yet, so the object is not drawn: it is streamed.
-    MeshNotResident,
+    /// An object's mesh is not on the device yet, because it is streamed, or its mesh or
+    /// material is not [loaded](crate::scene::AssetLoader) yet. The object is not drawn.
+    NotResident,
     /// A material's texture is not on the device yet, or not loaded yet; the material's plain colour is used.
     TextureNotResident,
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
@@ -106,7 +107,7 @@ impl RejectionReason {
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
-        Self::MeshNotResident,
+        Self::NotResident,
         Self::TextureNotResident,
         Self::UnknownObject,
     ];
@@ -125,7 +126,7 @@ impl RejectionReason {
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",
-            Self::MeshNotResident => "object with a mesh that is yet to arrive",
+            Self::NotResident => "object with a mesh or material that is yet to arrive",
             Self::TextureNotResident => "material with a texture that is yet to arrive",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
         }

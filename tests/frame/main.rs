@@ -14,6 +14,7 @@ mod failing_process;
 mod late_latch;
 mod layers;
 mod levels_of_detail;
+mod loading;
 mod mip_levels;
 mod null_backend;
 mod object_filter;
@@ -28,6 +29,8 @@ mod sampled_histories;
 mod sampled_layers;
 mod sampled_views;
 mod shadow_interval;
+#[cfg(feature = "wgpu")]
+mod streaming;
 mod targets;
 mod timeline;
 mod triangles;

@@ -210,13 +210,13 @@ fn streamed() -> Result<(), Failed> {
             let mut fixture = streamed_fixture(budget, workers)?;
             let recorded = fixture.record(&scene)?;
             let reasons: Vec<_> = recorded.statistics().rejections.iter().map(|rejection| rejection.reason).collect();
-            if !reasons.contains(&RejectionReason::MeshNotResident) {
+            if !reasons.contains(&RejectionReason::NotResident) {
                 return Err(format!("{name}: the first frame has {reasons:?}").into());
             }
             drop(recorded);
             let submitted = draw_until_resident(&mut fixture, &scene)?;
             let missing = submitted.statistics.rejections.iter().any(|rejection| {
-                [RejectionReason::MeshNotResident, RejectionReason::TextureNotResident].contains(&rejection.reason)
+                [RejectionReason::NotResident, RejectionReason::TextureNotResident].contains(&rejection.reason)
             });
             if missing {
                 return Err(format!("{name}: {:?}", submitted.statistics.rejections).into());

@@ -21,7 +21,7 @@ pub(super) struct MaterialCache {
     current: Option<[(u64, u64); 2]>,
     table: Arc<MaterialTable>,
     /// The materials whose texture was removed, which every frame reports.
-    stale: Vec<usize>,
+    stale: Vec<(RejectionReason, usize)>,
 }
 
 impl MaterialCache {
@@ -36,8 +36,8 @@ impl MaterialCache {
             self.rebuild(assets);
             self.current = Some(wanted);
         }
-        for &material in &self.stale {
-            rejections.count(RejectionReason::StaleTexture, material);
+        for &(reason, material) in &self.stale {
+            rejections.count(reason, material);
         }
         Arc::clone(&self.table)
     }
@@ -58,7 +58,10 @@ impl MaterialCache {
             let slot = handle.index() as usize;
             let chain = material.texture.and_then(|texture| {
                 if assets.get(texture).is_err() {
-                    self.stale.push(slot);
+                    let is_pending = assets.is_pending(texture);
+                    let reason =
+                        if is_pending { RejectionReason::TextureNotResident } else { RejectionReason::StaleTexture };
+                    self.stale.push((reason, slot));
                     return None;
                 }
                 self.chain(assets, texture.index())

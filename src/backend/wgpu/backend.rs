@@ -189,7 +189,7 @@ impl WgpuBackend {
     ///
     /// Without it, a frame uploads all that it needs when it begins, however long that takes. With it, a frame takes over what jobs have
     /// uploaded since the frame before. Objects whose mesh is not on the device are not drawn, and counted as
-    /// [`MeshNotResident`](crate::view::RejectionReason::MeshNotResident); materials whose texture is not are drawn without it, and counted as
+    /// [`NotResident`](crate::view::RejectionReason::NotResident); materials whose texture is not are drawn without it, and counted as
     /// [`TextureNotResident`](crate::view::RejectionReason::TextureNotResident).
     ///
     /// First comes what the latest frame would have drawn, then all else that objects use, so that it is there before it comes into sight; in

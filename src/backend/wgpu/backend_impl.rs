@@ -331,7 +331,7 @@ fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
         frame_use.mark_mesh(batch.mesh);
         if meshes.is_missing(batch) && batch.state.subdivision_level() == 0 {
             let objects = objects.iter().map(|object| *object as usize);
-            request.rejections.count_all_once(RejectionReason::MeshNotResident, objects);
+            request.rejections.count_all_once(RejectionReason::NotResident, objects);
         }
         for &object in objects {
             let material = request.scene.materials[object as usize].index();

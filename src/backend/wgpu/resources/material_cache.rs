@@ -137,7 +137,8 @@ impl MaterialCache {
         let mut lacks_texture = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let texture = self.texture_location(assets, handle.index(), material);
-            lacks_texture[handle.index() as usize] = material.texture.is_some() && texture.is_none();
+            let is_loaded = material.texture.is_some_and(|texture| assets.get(texture).is_ok());
+            lacks_texture[handle.index() as usize] = is_loaded && texture.is_none();
             materials[handle.index() as usize] = GpuMaterial::new(material, texture);
         }
         self.lacks_texture = lacks_texture.into();
@@ -147,7 +148,9 @@ impl MaterialCache {
     fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {
         let texture = material.texture?;
         if assets.get(texture).is_err() {
-            self.rejected_materials.push((RejectionReason::StaleTexture, slot as usize));
+            let is_pending = assets.is_pending(texture);
+            let reason = if is_pending { RejectionReason::TextureNotResident } else { RejectionReason::StaleTexture };
+            self.rejected_materials.push((reason, slot as usize));
             return None;
         }
         self.textures.location(texture.index())

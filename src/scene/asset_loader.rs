@@ -1,0 +1,249 @@
+//! Assets that are loaded by background jobs, and whose handles can be used at once (L 3.1, M 10.3).
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::error::Error;
+use std::fmt;
+use std::mem;
+use std::sync::{Arc, Weak};
+
+use parking_lot::Mutex;
+
+use super::{Asset, Assets, Material, Mesh, Texture};
+use crate::handle::{Handle, SlotReserver};
+use crate::task::{Scheduler, catch};
+
+/// Loads meshes, materials and textures by [background jobs](Scheduler::background). A handle can be made on any thread and used at once; its
+/// content arrives with [`Assets::receive`]. Clones load for the same assets.
+///
+/// Until its mesh and its material have arrived, an object is not drawn, and counted as
+/// [`NotResident`](crate::view::RejectionReason::NotResident); a material whose texture has not arrived has its plain colour.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use drawloom::glam::DVec3;
+/// use drawloom::scene::{AssetLoader, Material, Mesh, RenderObject, Scene, SceneError, Topology, Vertex};
+/// use drawloom::task::Scheduler;
+///
+/// let scheduler = Arc::new(Scheduler::new(2)?);
+/// let mut scene = Scene::new();
+/// let loader: AssetLoader = scene.assets().loader(&scheduler);
+/// // On any thread: what takes long is in the closure.
+/// let mesh = loader.load("triangle", 0, || -> Result<Mesh, SceneError> {
+///     let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+///     let corners = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)];
+///     Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])
+/// });
+/// let material = scene.add(Material::default())?;
+/// scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+/// // Between two frames:
+/// while scene.assets().is_pending(mesh) {
+///     let arrivals = scene.receive(&loader);
+///     arrivals.errors.iter().for_each(|error| eprintln!("{error}"));
+///     # std::thread::yield_now();
+/// }
+/// assert_eq!(scene.assets().get(mesh)?.name(), "triangle");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct AssetLoader {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    /// Weak, because its queue holds jobs that hold this.
+    scheduler: Weak<Scheduler>,
+    meshes: SlotReserver<Mesh>,
+    materials: SlotReserver<Material>,
+    textures: SlotReserver<Texture>,
+    /// What is to be loaded, the most important first. Each has a background job, which loads the first one, whichever that is by then.
+    waiting: Mutex<Waiting>,
+    arrived: Mutex<Vec<Arrival>>,
+}
+
+#[derive(Default)]
+struct Waiting {
+    loads: BinaryHeap<Load>,
+    count: u64,
+}
+
+/// Something to load.
+struct Load {
+    /// The oldest of equal priorities first.
+    order: (i32, Reverse<u64>),
+    run: Box<dyn FnOnce() -> Arrival + Send>,
+}
+
+/// Adds what was loaded to the assets.
+type Arrival = Box<dyn FnOnce(&mut Assets, &mut Arrivals) + Send>;
+
+/// Any error.
+type BoxedError = Box<dyn Error + Send + Sync>;
+
+/// What has arrived since the last call of [`Assets::receive`].
+#[derive(Debug, Default)]
+pub struct Arrivals {
+    /// The meshes that arrived.
+    pub meshes: Vec<Handle<Mesh>>,
+    /// The number of meshes, materials and textures that arrived.
+    pub count: usize,
+    /// What could not be loaded. The handles are stale now.
+    pub errors: Vec<LoadError>,
+}
+
+/// Something that could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[error("`{name}` cannot be loaded: {source}")]
+pub struct LoadError {
+    /// The name that [`AssetLoader::load`] was called with.
+    pub name: String,
+    /// Why not: the error of the closure, its [panic](crate::task::JobPanic), or a [`SceneError`](super::SceneError) about what it returned.
+    pub source: BoxedError,
+}
+
+impl AssetLoader {
+    pub(super) fn new(assets: &Assets, scheduler: &Arc<Scheduler>) -> Self {
+        Self {
+            shared: Arc::new(Shared {
+                scheduler: Arc::downgrade(scheduler),
+                meshes: assets.meshes.reserver(),
+                materials: assets.materials.reserver(),
+                textures: assets.textures.reserver(),
+                waiting: Mutex::default(),
+                arrived: Mutex::default(),
+            }),
+        }
+    }
+
+    /// Has a background job call `load`, those with a higher priority first, and returns the handle of what it will return. `name` is for
+    /// errors. The asset has the same priority in [streaming](Assets::set_priority) when it arrives.
+    ///
+    /// With a single worker, no job runs in the background: then [`Assets::receive`] calls `load`. If the scheduler is gone, this call does.
+    pub fn load<T: Asset, E: Into<BoxedError>>(
+        &self,
+        name: impl Into<String>,
+        priority: i32,
+        load: impl FnOnce() -> Result<T, E> + Send + 'static,
+    ) -> Handle<T> {
+        let (name, handle) = (name.into(), T::reserve(self));
+        let run = move || -> Arrival {
+            let loaded = match catch(load) {
+                Ok(loaded) => loaded.map_err(Into::into),
+                Err(panic) => Err(panic.into()),
+            };
+            Box::new(move |assets, arrivals| arrivals.add(assets, handle, (name, priority), loaded))
+        };
+        {
+            let mut waiting = self.shared.waiting.lock();
+            let order = (priority, Reverse(waiting.count));
+            waiting.count += 1;
+            waiting.loads.push(Load { order, run: Box::new(run) });
+        }
+        match self.shared.scheduler.upgrade() {
+            Some(scheduler) if scheduler.workers() > 1 => {
+                let shared = Arc::clone(&self.shared);
+                // What it returns is in `arrived`.
+                drop(scheduler.background(move || shared.load_next()));
+            }
+            Some(_) => {}
+            None => self.shared.load_next(),
+        }
+        handle
+    }
+
+    /// The number of assets that wait for a job, which may be running.
+    pub fn waiting(&self) -> usize {
+        self.shared.waiting.lock().loads.len()
+    }
+
+    pub(super) fn reserve_mesh(&self) -> Handle<Mesh> {
+        self.shared.meshes.reserve()
+    }
+
+    pub(super) fn reserve_material(&self) -> Handle<Material> {
+        self.shared.materials.reserve()
+    }
+
+    pub(super) fn reserve_texture(&self) -> Handle<Texture> {
+        self.shared.textures.reserve()
+    }
+
+    /// Adds what has arrived.
+    pub(super) fn receive(&self, assets: &mut Assets) -> Arrivals {
+        let has_background = self.shared.scheduler.upgrade().is_some_and(|scheduler| scheduler.workers() > 1);
+        if !has_background {
+            self.shared.load_next();
+        }
+        let mut arrivals = Arrivals::default();
+        for arrival in mem::take(&mut *self.shared.arrived.lock()) {
+            arrival(assets, &mut arrivals);
+        }
+        arrivals
+    }
+}
+
+impl fmt::Debug for AssetLoader {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("AssetLoader").field("waiting", &self.waiting()).finish_non_exhaustive()
+    }
+}
+
+impl Shared {
+    fn load_next(&self) {
+        let next = self.waiting.lock().loads.pop();
+        if let Some(Load { run, .. }) = next {
+            let arrival = run();
+            self.arrived.lock().push(arrival);
+        }
+    }
+}
+
+impl Arrivals {
+    /// Adds an asset that was loaded. One whose handle was [unloaded](Assets::unload) meanwhile is dropped.
+    fn add<T: Asset>(
+        &mut self,
+        assets: &mut Assets,
+        handle: Handle<T>,
+        (name, priority): (String, i32),
+        loaded: Result<T, BoxedError>,
+    ) {
+        if !assets.is_pending(handle) {
+            return;
+        }
+        let checked = loaded.and_then(|asset| asset.check(assets).map(|()| asset).map_err(BoxedError::from));
+        let added = match checked {
+            Ok(asset) => assets.fill(handle, priority, asset).is_ok(),
+            Err(source) => {
+                self.errors.push(LoadError { name, source });
+                // It is pending.
+                let _ = assets.release(handle);
+                false
+            }
+        };
+        if added {
+            self.count += 1;
+            self.meshes.extend(T::as_mesh(handle));
+        }
+    }
+}
+
+impl PartialEq for Load {
+    fn eq(&self, other: &Self) -> bool {
+        self.order == other.order
+    }
+}
+
+impl Eq for Load {}
+
+impl PartialOrd for Load {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Load {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.order.cmp(&other.order)
+    }
+}

@@ -1,0 +1,231 @@
+//! Streaming on wgpu's noop backend: budgets, order, and what makes room.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use drawloom::backend::{BackendError, StreamingBudget, StreamingStatistics, WgpuBackend};
+use drawloom::glam::DVec3;
+use drawloom::handle::Handle;
+use drawloom::process::Deferred;
+use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
+use drawloom::task::Scheduler;
+use drawloom::view::RejectionReason;
+use drawloom::{FrameStatistics, Renderer, Submitter};
+use drawloom_testing::adapter;
+
+/// The bytes of each mesh of the world: in a page of 64 KiB are two.
+const VERTICES: usize = 1000;
+const BYTES: u64 = VERTICES as u64 * 32 + 3 * 4;
+
+struct World {
+    renderer: Renderer<WgpuBackend>,
+    submitter: Submitter<WgpuBackend>,
+    scene: Scene,
+    meshes: Vec<Handle<Mesh>>,
+}
+
+fn mesh(number: usize) -> Mesh {
+    let vertex = |index| Vertex { position: [(index % 2) as f32, (index % 3) as f32, 0.0], ..Vertex::default() };
+    let vertices = (0..VERTICES).map(vertex).collect();
+    Mesh::new(number.to_string(), Topology::TriangleList, vertices, vec![0, 1, 2]).unwrap()
+}
+
+impl World {
+    /// A row of objects along x, 10 m apart, each with a mesh of its own, in front of a camera that sees one or two of them. There is
+    /// one worker, so that what happens does not depend on time.
+    fn new(count: usize, budget: StreamingBudget) -> Self {
+        let (device, queue) = adapter::noop_device().unwrap();
+        let backend = WgpuBackend::new(device, queue).unwrap().stream_resources(budget).unwrap();
+        let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+        let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        let mut scene = Scene::new();
+        let material = scene.add(Material::default()).unwrap();
+        let meshes: Vec<_> = (0..count).map(|number| scene.add(mesh(number)).unwrap()).collect();
+        for (number, mesh) in meshes.iter().enumerate() {
+            let position = DVec3::X * number as f64 * 10.0;
+            scene.add_object(RenderObject::new(*mesh, material, position)).unwrap();
+        }
+        let mut world = Self { renderer, submitter, scene, meshes };
+        world.look_at(0.0);
+        world
+    }
+
+    fn look_at(&mut self, object: f64) {
+        let target = DVec3::new(object * 10.0 + 0.5, 1.0, 0.0);
+        self.scene.cameras = vec![Camera::looking_at("main", target + DVec3::Z * 5.0, target)];
+    }
+
+    fn frame(&mut self) -> (FrameStatistics, StreamingStatistics) {
+        let recorded = self.renderer.record(self.scene.as_scene_ref()).unwrap();
+        let statistics = self.submitter.submit(recorded).unwrap().statistics;
+        (statistics, self.renderer.backend().streaming_statistics().unwrap())
+    }
+
+    /// The number of objects that the next frame leaves out.
+    fn missing(&mut self) -> usize {
+        let (statistics, _) = self.frame();
+        let missing = statistics.rejections.iter().find(|rejection| rejection.reason == RejectionReason::NotResident);
+        missing.map_or(0, |missing| missing.count)
+    }
+
+    fn frames(&mut self, count: usize) -> StreamingStatistics {
+        (0..count).map(|_| self.frame().1).last().unwrap()
+    }
+}
+
+fn budget(meshes: u64) -> StreamingBudget {
+    StreamingBudget {
+        mesh_bytes: meshes,
+        texture_bytes: StreamingBudget::MIN_BYTES,
+        upload_bytes_per_frame: 70_000,
+        upload_time_per_frame: Duration::from_secs(10),
+    }
+}
+
+#[test]
+fn a_budget_that_is_too_small_is_refused_by_name() {
+    let good = StreamingBudget::default();
+    good.check().unwrap();
+    let cases = [
+        ("mesh_bytes", StreamingBudget { mesh_bytes: 1000, ..good }),
+        ("texture_bytes", StreamingBudget { texture_bytes: 0, ..good }),
+        ("upload_bytes_per_frame", StreamingBudget { upload_bytes_per_frame: 100, ..good }),
+        ("upload_time_per_frame", StreamingBudget { upload_time_per_frame: Duration::ZERO, ..good }),
+    ];
+    for (name, budget) in cases {
+        let (device, queue) = adapter::noop_device().unwrap();
+        match WgpuBackend::new(device, queue).unwrap().stream_resources(budget) {
+            Err(BackendError::InvalidStreamingBudget { field, .. }) => assert_eq!(field, name),
+            other => panic!("{name}: {:?}", other.err()),
+        }
+    }
+}
+
+#[test]
+fn what_is_in_sight_comes_first_then_what_has_a_higher_priority() {
+    let mut world = World::new(40, budget(8 << 20));
+    // The first frame knows what is in sight only when it is recorded.
+    world.look_at(30.0);
+    assert!(world.missing() >= 1);
+    for (number, mesh) in world.meshes.clone().into_iter().enumerate() {
+        world.scene.set_priority(mesh, if number == 20 { 5 } else { 0 }).unwrap();
+    }
+    // Two frames of uploads wait at most, then comes what is in sight.
+    let arrived = (1..10).find(|_| world.missing() == 0).unwrap();
+    assert!(arrived <= 5, "{arrived} frames");
+    world.look_at(20.0);
+    assert_eq!(world.missing(), 0, "it has the highest priority");
+    let resident = world.frames(60);
+    assert_eq!((resident.requested, resident.in_flight, resident.meshes), (0, 0, 40));
+    for object in 0..40 {
+        world.look_at(f64::from(object));
+        assert_eq!(world.missing(), 0);
+    }
+}
+
+#[test]
+fn budgets_hold_in_every_frame_of_a_flight_and_what_is_in_sight_arrives() {
+    let budget = budget(1 << 20);
+    let mut world = World::new(200, budget);
+    let (mut uploaded, mut arrived) = (0, 0);
+    for step in 0..1600 {
+        world.look_at(f64::from(step) / 8.0);
+        let (statistics, streaming) = world.frame();
+        assert!(streaming.mesh_bytes <= budget.mesh_bytes, "{streaming:?}");
+        assert!(streaming.uploaded_bytes - uploaded <= budget.upload_bytes_per_frame, "{streaming:?}");
+        assert_eq!(streaming.over_budget, 0);
+        uploaded = streaming.uploaded_bytes;
+        arrived += usize::from(statistics.rejections.is_empty());
+    }
+    let streaming = world.frames(1);
+    assert!(streaming.evictions > 150 && streaming.uploaded_bytes > 180 * BYTES, "{streaming:?}");
+    assert!(arrived > 600, "{arrived} of 1600 frames were complete");
+    world.frames(12);
+    assert_eq!(world.missing(), 0);
+}
+
+#[test]
+fn what_was_seen_longest_ago_makes_room() {
+    // Room for 30 meshes, more or less.
+    let mut world = World::new(60, budget(StreamingBudget::MIN_BYTES));
+    // All others are less important than what was seen, so that they do not fill the room.
+    let visit = |world: &mut World, objects: &[usize]| {
+        for &object in objects {
+            world.look_at(object as f64);
+            world.frames(12);
+            assert_eq!(world.missing(), 0, "object {object}");
+        }
+    };
+    let first: Vec<_> = (0..12).collect();
+    let second: Vec<_> = (20..32).collect();
+    visit(&mut world, &first);
+    visit(&mut world, &second);
+    // The second ones were seen last. Those of neither are still to come or were never seen.
+    visit(&mut world, &[50, 52]);
+    for object in second {
+        world.look_at(object as f64);
+        assert_eq!(world.missing(), 0, "object {object}");
+    }
+}
+
+#[test]
+fn frames_that_draw_more_than_the_budget_keep_what_they_have_and_count_the_rest() {
+    let budget = budget(StreamingBudget::MIN_BYTES);
+    let mut world = World::new(100, budget);
+    let far = DVec3::new(500.0, 1.0, 900.0);
+    world.scene.cameras = vec![Camera::looking_at("main", far, DVec3::new(500.0, 1.0, 0.0))];
+    let before = world.frames(80);
+    assert!(before.over_budget > 0 && before.meshes > 20, "{before:?}");
+    assert!(world.missing() > 40);
+    let after = world.frames(40);
+    assert_eq!((after.evictions, after.uploaded_bytes), (before.evictions, before.uploaded_bytes), "nothing thrashes");
+    // What is more important replaces what is less.
+    let important = world.meshes[99];
+    world.scene.set_priority(important, 1).unwrap();
+    world.frames(20);
+    world.look_at(99.0);
+    assert_eq!(world.missing(), 0);
+}
+
+#[test]
+fn what_no_longer_exists_is_freed_and_its_uploads_are_dropped() {
+    let mut world = World::new(40, budget(8 << 20));
+    world.frames(3);
+    for mesh in world.meshes.clone() {
+        world.scene.remove(mesh).unwrap();
+    }
+    let streaming = world.frames(4);
+    assert_eq!((streaming.meshes, streaming.mesh_bytes, streaming.requested, streaming.in_flight), (0, 0, 0, 0));
+}
+
+#[test]
+fn textures_of_several_sizes_share_their_budget() {
+    let layer = |side: u64| side * side * 4 * 4 / 3;
+    let budget = StreamingBudget { texture_bytes: 24 * layer(256), ..budget(1 << 20) };
+    let mut world = World::new(64, StreamingBudget { upload_bytes_per_frame: 1 << 20, ..budget });
+    let mesh = world.meshes[0];
+    world.scene = Scene::new();
+    let mesh = {
+        let _ = mesh;
+        world.scene.add(self::mesh(0)).unwrap()
+    };
+    for number in 0..64 {
+        let side = if number < 40 { 64 } else { 512 };
+        let texture = Texture::new("plain", side, side, vec![200; (side * side * 4) as usize]).unwrap();
+        let texture = world.scene.add(texture).unwrap();
+        let material = world.scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
+        let position = DVec3::X * f64::from(number) * 10.0;
+        world.scene.add_object(RenderObject::new(mesh, material, position)).unwrap();
+    }
+    for pass in [0, 1] {
+        for step in 0..64 {
+            // To and fro.
+            let object = if pass == 0 { step } else { 63 - step };
+            world.look_at(f64::from(object));
+            let streaming = world.frames(12);
+            assert!(streaming.texture_bytes <= budget.texture_bytes, "{streaming:?}");
+            let (statistics, _) = world.frame();
+            assert_eq!(statistics.rejections, [], "object {object} in pass {pass}");
+        }
+    }
+}
