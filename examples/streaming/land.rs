@@ -8,10 +8,10 @@ pub const WATER: f32 = 0.0;
 /// The height of the land in metres.
 pub fn height(x: f64, z: f64) -> f32 {
     let hills = octaves(x / 420.0, z / 420.0, 5, 1) * 70.0;
-    let mountains = ridges(x / 900.0, z / 900.0, 5);
+    let mountains = ridges(x / 1300.0, z / 1300.0, 5);
     // Mountains stand in ranges, with plains between them.
     let range = smooth(-0.15, 0.45, octaves(x / 1900.0, z / 1900.0, 2, 77));
-    (hills + mountains * mountains * 330.0 * range + 14.0) as f32
+    (hills + mountains * mountains * 190.0 * range + 12.0) as f32
 }
 
 /// The colour of the ground at a place of this height, whose normal points up as far as `up`. Linear.
@@ -24,7 +24,7 @@ pub fn ground(x: f64, z: f64, height: f32, up: f32) -> Vec3 {
     let snow = Vec3::new(0.86, 0.89, 0.95);
     let steep = 1.0 - share(0.72, 0.86, up + coarse * 0.08);
     let grown = sand.lerp(meadow, share(1.0, 5.0, height - WATER + coarse * 3.0));
-    let is_snow = share(125.0, 165.0, height + coarse * 26.0) * share(0.6, 0.78, up);
+    let is_snow = share(96.0, 128.0, height + coarse * 26.0) * share(0.6, 0.78, up);
     let color = grown.lerp(stone, steep).lerp(snow, is_snow);
     color * (1.0 + fine * 0.28)
 }

@@ -24,12 +24,11 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use drawloom::Renderer;
 use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
-use drawloom::{FrameStatistics, Renderer};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -95,7 +94,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         submitted.submission.wait()?;
         let elapsed = begin.elapsed();
         let streaming = renderer.backend().streaming_statistics().ok_or("the backend streams")?;
-        let missing = missing_objects(&submitted.statistics);
+        // What is in sight and not on the device, and what is near and not even made.
+        let missing = streaming.wanted + world.pending_nearby();
         recorder.add(Sample { time, frame: elapsed, streaming, missing, made_bytes: world.made_bytes() });
         progress.set_position((share * 1000.0) as u64);
         progress.set_message(format!("{} MB made", world.made_bytes() / 1_000_000));
@@ -127,12 +127,6 @@ fn budget(arguments: &Arguments) -> StreamingBudget {
         upload_bytes_per_frame: 2 << 20,
         upload_time_per_frame: Duration::from_millis(3),
     }
-}
-
-/// The objects in sight that a frame leaves out, because their mesh is yet to arrive.
-fn missing_objects(statistics: &FrameStatistics) -> usize {
-    let missing = statistics.rejections.iter().find(|rejection| rejection.reason == RejectionReason::NotResident);
-    missing.map_or(0, |missing| missing.count)
 }
 
 fn progress_bar(arguments: &Arguments) -> ProgressBar {

@@ -49,9 +49,9 @@ impl Plants {
                 let size = 5.0 + 6.0 * random(5) as f32;
                 let kind = (random(6) * 2.999) as usize;
                 (self.tree, self.trees[kind], Vec3::new(size * 0.34, size, size * 0.34), 0.3)
-            } else if ground > WATER - 1.0 && random(7) < 0.07 + f64::from(slope) * 0.1 {
+            } else if ground > WATER - 1.0 && slope < 0.8 && random(7) < 0.07 + f64::from(slope) * 0.1 {
                 let size = 0.5 + 2.4 * random(8).powi(3) as f32;
-                (self.rock, self.stone, Vec3::new(size * 1.3, size * 0.8, size), size * 0.3)
+                (self.rock, self.stone, Vec3::new(size * 1.3, size * 0.8, size), size * (0.2 + slope))
             } else {
                 continue;
             };

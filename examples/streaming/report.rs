@@ -15,7 +15,7 @@ pub struct Sample {
     /// From the update of the world until the device was done.
     pub frame: Duration,
     pub streaming: StreamingStatistics,
-    /// Objects in sight that were left out.
+    /// Meshes and textures in sight that were not on the device, and nearby tiles that were not made yet.
     pub missing: usize,
     /// Bytes of all tiles that were begun so far.
     pub made_bytes: u64,
@@ -38,7 +38,7 @@ pub struct Report {
     /// What the tiles of the flight would take on the device together.
     world_bytes: u64,
     evictions: u64,
-    /// Frames that left out objects in sight, after the first second.
+    /// Frames in which something was missing, after the first second.
     incomplete_frames: usize,
 }
 

@@ -11,8 +11,14 @@ pub const SIDE: f64 = 64.0;
 /// Quads along a side.
 const QUADS: usize = 64;
 
+/// Corners of quads along a side.
+const SIDE_CORNERS: usize = QUADS + 1;
+
 /// Pixels along a side of the texture.
 const PIXELS: usize = 256;
+
+/// So many pixels around the tile show what is beyond it. Coarse mip levels blend an edge of the texture with the opposite one.
+const MARGIN: f32 = 8.0;
 
 /// A tile's column and row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -48,6 +54,7 @@ pub const BYTES: u64 = {
 /// The heights and normals of a tile at the corners of its quads.
 struct Surface {
     heights: Vec<f32>,
+    normals: Vec<Vec3>,
 }
 
 impl Surface {
@@ -59,7 +66,16 @@ impl Surface {
         let [x, z] = tile.corner();
         let corners = (0..Self::CORNERS * Self::CORNERS).map(|index| (index % Self::CORNERS, index / Self::CORNERS));
         let place = |number: usize| (number as f64 - 1.0) * Self::STEP;
-        Self { heights: corners.map(|(column, row)| height(x + place(column), z + place(row))).collect() }
+        let heights: Vec<_> = corners.map(|(column, row)| height(x + place(column), z + place(row))).collect();
+        let normal = |index: usize| {
+            let at = |right: usize, down: usize| {
+                heights[(index / SIDE_CORNERS + down) * Self::CORNERS + index % SIDE_CORNERS + right]
+            };
+            let (along_x, along_z) = (at(2, 1) - at(0, 1), at(1, 2) - at(1, 0));
+            Vec3::new(-along_x, 2.0 * Self::STEP as f32, -along_z).normalize()
+        };
+        let normals = (0..SIDE_CORNERS * SIDE_CORNERS).map(normal).collect();
+        Self { heights, normals }
     }
 
     /// The height of a corner.
@@ -68,14 +84,13 @@ impl Surface {
     }
 
     fn normal(&self, column: usize, row: usize) -> Vec3 {
-        let at = |right: usize, down: usize| self.heights[(row + down) * Self::CORNERS + column + right];
-        let (along_x, along_z) = (at(2, 1) - at(0, 1), at(1, 2) - at(1, 0));
-        Vec3::new(-along_x, 2.0 * Self::STEP as f32, -along_z).normalize()
+        self.normals[row * SIDE_CORNERS + column]
     }
 
-    /// The height, and how far the normal points up, between corners. From 0 to 1 across the tile.
+    /// The height, and how far the normal points up, between corners. From 0 to 1 across the tile; beyond it, those
+    /// of its edge.
     fn sample(&self, u: f64, v: f64) -> [f32; 2] {
-        let (x, z) = (u * QUADS as f64, v * QUADS as f64);
+        let [x, z] = [u, v].map(|share| share.clamp(0.0, 1.0) * QUADS as f64);
         let (column, row) = ((x as usize).min(QUADS - 1), (z as usize).min(QUADS - 1));
         let (right, down) = ((x - column as f64) as f32, (z - row as f64) as f32);
         let corner = |column, row| Vec3::new(self.height(column, row), self.normal(column, row).y, 0.0);
@@ -91,15 +106,15 @@ impl Surface {
 /// If it is no valid mesh.
 pub fn mesh(tile: TileIndex) -> Result<Mesh, SceneError> {
     let surface = Surface::new(tile);
-    let side = QUADS + 1;
+    let side = SIDE_CORNERS;
     let vertex = |index: usize| {
         let (column, row) = (index % side, index / side);
         let along = |number: usize| (number as f64 * Surface::STEP) as f32;
         Vertex {
             position: [along(column), surface.height(column, row), along(row)],
             normal: surface.normal(column, row).to_array(),
-            // Half a pixel inside, so that the texture's edge does not show its opposite one.
-            uv: [column, row].map(|number| inset(number as f32 / QUADS as f32)),
+            uv: [column, row]
+                .map(|number| (MARGIN + number as f32 / QUADS as f32 * (PIXELS as f32 - 2.0 * MARGIN)) / PIXELS as f32),
         }
     };
     let quad = |index: usize| {
@@ -112,11 +127,6 @@ pub fn mesh(tile: TileIndex) -> Result<Mesh, SceneError> {
     Mesh::new(format!("tile {} {}", tile.x, tile.z), Topology::TriangleList, vertices, indices)
 }
 
-fn inset(share: f32) -> f32 {
-    let edge = 0.5 / PIXELS as f32;
-    edge + share * (1.0 - 2.0 * edge)
-}
-
 /// The colours of a tile.
 ///
 /// # Errors
@@ -127,8 +137,8 @@ pub fn texture(tile: TileIndex) -> Result<Texture, SceneError> {
     let mut pixels = Vec::with_capacity(PIXELS * PIXELS * 4);
     for row in 0..PIXELS {
         for column in 0..PIXELS {
-            // The outermost pixels' centres are on the tile's edge, as those of the neighbour's.
-            let [u, v] = [column, row].map(|number| number as f64 / (PIXELS - 1) as f64);
+            let across = PIXELS as f64 - 2.0 * f64::from(MARGIN);
+            let [u, v] = [column, row].map(|number| (number as f64 + 0.5 - f64::from(MARGIN)) / across);
             let [height, up] = surface.sample(u, v);
             let color = ground(x + u * SIDE, z + v * SIDE, height, up);
             pixels.extend(color.to_array().map(srgb));
@@ -138,7 +148,7 @@ pub fn texture(tile: TileIndex) -> Result<Texture, SceneError> {
     Texture::new(format!("ground {} {}", tile.x, tile.z), PIXELS as u32, PIXELS as u32, pixels)
 }
 
-/// A linear value as an sRGB byte, within a step.
+/// A linear value as an sRGB byte, within a step or two.
 fn srgb(linear: f32) -> u8 {
-    (linear.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8
+    (linear.clamp(0.0, 1.0).sqrt() * 255.0 + 0.5) as u8
 }

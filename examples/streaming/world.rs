@@ -32,11 +32,14 @@ struct Tile {
     texture: Handle<Texture>,
     material: Handle<Material>,
     objects: Vec<ObjectHandle>,
+    is_nearby: bool,
 }
 
 impl World {
     /// In metres. Haze hides where the tiles end.
     const RADIUS: f64 = 440.0;
+    /// In metres. Land that is farther is half hidden by haze.
+    const NEARBY: f64 = 250.0;
     /// Tiles behind the camera stay for so long, so that it may turn a little.
     const BEHIND: f64 = 90.0;
     /// The engine begins at most so many tiles in a frame.
@@ -81,7 +84,8 @@ impl World {
         for (priority, tile) in missing.into_iter().take(Self::TILES_PER_FRAME) {
             self.begin(tile, priority)?;
         }
-        for (&index, tile) in &self.tiles {
+        for (&index, tile) in &mut self.tiles {
+            tile.is_nearby = near.offset(index).length() < Self::NEARBY;
             let priority = near.priority(index);
             // Those on their way have none yet.
             let _ = self.scene.set_priority(tile.mesh, priority);
@@ -96,6 +100,12 @@ impl World {
     /// The bytes of all tiles that were begun.
     pub fn made_bytes(&self) -> u64 {
         self.made
+    }
+
+    /// The number of tiles of the last update that are near, and not made yet.
+    pub fn pending_nearby(&self) -> usize {
+        let is_pending = |tile: &&Tile| self.scene.assets().is_pending(tile.mesh);
+        self.tiles.values().filter(|tile| tile.is_nearby).filter(is_pending).count()
     }
 
     /// The tiles that are needed, and not begun, with their priorities.
@@ -127,7 +137,7 @@ impl World {
         for plant in self.plants.on(index) {
             objects.push(self.scene.add_object(plant)?);
         }
-        self.tiles.insert(index, Tile { mesh, texture, material, objects });
+        self.tiles.insert(index, Tile { mesh, texture, material, objects, is_nearby: false });
         self.made += tile::BYTES;
         Ok(())
     }

@@ -57,7 +57,7 @@ struct Shared {
     meshes: SlotReserver<Mesh>,
     materials: SlotReserver<Material>,
     textures: SlotReserver<Texture>,
-    /// What is to be loaded, the most important first. Each has a background job, which loads the first one, whichever that is by then.
+    /// What is to be loaded, the most important first.
     waiting: Mutex<Waiting>,
     arrived: Mutex<Vec<Arrival>>,
 }
@@ -65,7 +65,11 @@ struct Shared {
 #[derive(Default)]
 struct Waiting {
     loads: BinaryHeap<Load>,
+    /// The number of calls of [`AssetLoader::load`] so far.
     count: u64,
+    /// Background jobs that are queued or run. Each loads one thing, then queues the next job, so that other background jobs need not
+    /// wait until everything is loaded.
+    jobs: usize,
 }
 
 /// Something to load.
@@ -141,12 +145,7 @@ impl AssetLoader {
             waiting.loads.push(Load { order, run: Box::new(run) });
         }
         match self.shared.scheduler.upgrade() {
-            Some(scheduler) if scheduler.workers() > 1 => {
-                let shared = Arc::clone(&self.shared);
-                // What it returns is in `arrived`.
-                drop(scheduler.background(move || shared.load_next()));
-            }
-            Some(_) => {}
+            Some(scheduler) => Shared::queue_job(&self.shared, &scheduler),
             None => self.shared.load_next(),
         }
         handle
@@ -190,6 +189,25 @@ impl fmt::Debug for AssetLoader {
 }
 
 impl Shared {
+    /// Queues a background job if something waits for one, and not every worker but the first has one.
+    fn queue_job(shared: &Arc<Self>, scheduler: &Scheduler) {
+        let mut waiting = shared.waiting.lock();
+        if waiting.jobs >= waiting.loads.len().min(scheduler.workers() - 1) {
+            return;
+        }
+        waiting.jobs += 1;
+        drop(waiting);
+        let shared = Arc::clone(shared);
+        // What it returns is in `arrived`.
+        drop(scheduler.background(move || {
+            shared.load_next();
+            shared.waiting.lock().jobs -= 1;
+            if let Some(scheduler) = shared.scheduler.upgrade() {
+                Self::queue_job(&shared, &scheduler);
+            }
+        }));
+    }
+
     fn load_next(&self) {
         let next = self.waiting.lock().loads.pop();
         if let Some(Load { run, .. }) = next {
