@@ -9,8 +9,9 @@ use std::sync::{Arc, Weak};
 
 use parking_lot::Mutex;
 
-use super::{Asset, Assets, Material, Mesh, Texture};
-use crate::handle::{Handle, SlotReserver};
+use super::assets::AssetReservers;
+use super::{Asset, Assets, Mesh};
+use crate::handle::Handle;
 use crate::task::{Scheduler, catch};
 
 /// Loads meshes, materials and textures by [background jobs](Scheduler::background). A handle can be made on any thread and used at once; its
@@ -54,9 +55,7 @@ pub struct AssetLoader {
 struct Shared {
     /// Weak, because its queue holds jobs that hold this.
     scheduler: Weak<Scheduler>,
-    meshes: SlotReserver<Mesh>,
-    materials: SlotReserver<Material>,
-    textures: SlotReserver<Texture>,
+    slots: AssetReservers,
     /// What is to be loaded, the most important first.
     waiting: Mutex<Waiting>,
     arrived: Mutex<Vec<Arrival>>,
@@ -107,13 +106,11 @@ pub struct LoadError {
 }
 
 impl AssetLoader {
-    pub(super) fn new(assets: &Assets, scheduler: &Arc<Scheduler>) -> Self {
+    fn new(assets: &Assets, scheduler: &Arc<Scheduler>) -> Self {
         Self {
             shared: Arc::new(Shared {
                 scheduler: Arc::downgrade(scheduler),
-                meshes: assets.meshes.reserver(),
-                materials: assets.materials.reserver(),
-                textures: assets.textures.reserver(),
+                slots: AssetReservers::new(assets),
                 waiting: Mutex::default(),
                 arrived: Mutex::default(),
             }),
@@ -130,7 +127,7 @@ impl AssetLoader {
         priority: i32,
         load: impl FnOnce() -> Result<T, E> + Send + 'static,
     ) -> Handle<T> {
-        let (name, handle) = (name.into(), T::reserve(self));
+        let (name, handle) = (name.into(), T::reserve(&self.shared.slots));
         let run = move || -> Arrival {
             let loaded = match catch(load) {
                 Ok(loaded) => loaded.map_err(Into::into),
@@ -156,20 +153,8 @@ impl AssetLoader {
         self.shared.waiting.lock().loads.len()
     }
 
-    pub(super) fn reserve_mesh(&self) -> Handle<Mesh> {
-        self.shared.meshes.reserve()
-    }
-
-    pub(super) fn reserve_material(&self) -> Handle<Material> {
-        self.shared.materials.reserve()
-    }
-
-    pub(super) fn reserve_texture(&self) -> Handle<Texture> {
-        self.shared.textures.reserve()
-    }
-
     /// Adds what has arrived.
-    pub(super) fn receive(&self, assets: &mut Assets) -> Arrivals {
+    fn receive(&self, assets: &mut Assets) -> Arrivals {
         let has_background = self.shared.scheduler.upgrade().is_some_and(|scheduler| scheduler.workers() > 1);
         if !has_background {
             self.shared.load_next();
@@ -179,6 +164,19 @@ impl AssetLoader {
             arrival(assets, &mut arrivals);
         }
         arrivals
+    }
+}
+
+impl Assets {
+    /// Makes what loads assets by background jobs. See [`AssetLoader`].
+    pub fn loader(&self, scheduler: &Arc<Scheduler>) -> AssetLoader {
+        AssetLoader::new(self, scheduler)
+    }
+
+    /// Adds what a loader has loaded since the last call: call it between two frames. The handles of what could not be loaded are stale from
+    /// then on.
+    pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
+        loader.receive(self)
     }
 }
 

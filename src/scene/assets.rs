@@ -1,10 +1,7 @@
 //! The collection of meshes, materials and textures.
 
-use super::{Arrivals, AssetLoader, Material, Mesh, SceneError, Texture};
-use std::sync::Arc;
-
-use crate::handle::{Handle, Slots, StaleHandle};
-use crate::task::Scheduler;
+use super::{Material, Mesh, SceneError, Texture};
+use crate::handle::{Handle, SlotReserver, Slots, StaleHandle};
 
 /// Owns meshes, materials and textures. An engine with its own storage for objects keeps its assets here too, so that a
 /// frame uploads an asset only when it is new or has changed; and a mesh not before the first frame in which an object has it.
@@ -63,17 +60,6 @@ impl Assets {
     /// If the handle is stale, or the asset has not [arrived](Self::receive) yet: see [`Assets::unload`].
     pub fn remove<T: Asset>(&mut self, handle: Handle<T>) -> Result<T, StaleHandle> {
         T::slots_mut(self).remove(handle)
-    }
-
-    /// Makes what loads assets by background jobs. See [`AssetLoader`].
-    pub fn loader(&self, scheduler: &Arc<Scheduler>) -> AssetLoader {
-        AssetLoader::new(self, scheduler)
-    }
-
-    /// Adds what a loader has loaded since the last call: call it between two frames. The handles of what could not be loaded are stale from
-    /// then on.
-    pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
-        loader.receive(self)
     }
 
     /// Whether a handle is that of an asset that has not [arrived](Self::receive) yet.
@@ -162,6 +148,21 @@ impl Assets {
     }
 }
 
+/// Makes handles of assets on any thread, before the assets are there.
+#[derive(Debug)]
+pub struct AssetReservers {
+    meshes: SlotReserver<Mesh>,
+    materials: SlotReserver<Material>,
+    textures: SlotReserver<Texture>,
+}
+
+impl AssetReservers {
+    pub(super) fn new(assets: &Assets) -> Self {
+        let Assets { meshes, materials, textures, .. } = assets;
+        Self { meshes: meshes.reserver(), materials: materials.reserver(), textures: textures.reserver() }
+    }
+}
+
 /// A type that [`Assets`] stores: [`Mesh`], [`Material`] and [`Texture`].
 pub trait Asset: Sized + Send + sealed::Sealed + 'static {
     #[doc(hidden)]
@@ -170,7 +171,7 @@ pub trait Asset: Sized + Send + sealed::Sealed + 'static {
     fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
     /// A handle of an asset that is to be loaded.
     #[doc(hidden)]
-    fn reserve(loader: &AssetLoader) -> Handle<Self>;
+    fn reserve(slots: &AssetReservers) -> Handle<Self>;
     #[doc(hidden)]
     fn as_mesh(_handle: Handle<Self>) -> Option<Handle<Mesh>> {
         None
@@ -191,8 +192,8 @@ pub trait Asset: Sized + Send + sealed::Sealed + 'static {
 }
 
 impl Asset for Mesh {
-    fn reserve(loader: &AssetLoader) -> Handle<Self> {
-        loader.reserve_mesh()
+    fn reserve(slots: &AssetReservers) -> Handle<Self> {
+        slots.meshes.reserve()
     }
 
     fn as_mesh(handle: Handle<Self>) -> Option<Handle<Mesh>> {
@@ -217,8 +218,8 @@ impl Asset for Mesh {
 }
 
 impl Asset for Material {
-    fn reserve(loader: &AssetLoader) -> Handle<Self> {
-        loader.reserve_material()
+    fn reserve(slots: &AssetReservers) -> Handle<Self> {
+        slots.materials.reserve()
     }
 
     fn slots(assets: &Assets) -> &Slots<Self> {
@@ -238,8 +239,8 @@ impl Asset for Material {
 }
 
 impl Asset for Texture {
-    fn reserve(loader: &AssetLoader) -> Handle<Self> {
-        loader.reserve_texture()
+    fn reserve(slots: &AssetReservers) -> Handle<Self> {
+        slots.textures.reserve()
     }
 
     fn priorities(assets: &Assets) -> Option<&Vec<i32>> {

@@ -77,7 +77,7 @@ fn disc(corners: u32, wave: f32) -> Mesh {
 
 fn checker(name: &str, side: u32, color: [u8; 3]) -> Texture {
     let pixel = |index: u32| {
-        let is_light = (index % side / 4 + index / side / 4) % 2 == 0;
+        let is_light = (index % side / 4 + index / side / 4).is_multiple_of(2);
         let [red, green, blue] = color.map(|channel| if is_light { channel } else { channel / 3 });
         [red, green, blue, 255]
     };

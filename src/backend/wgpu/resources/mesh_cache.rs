@@ -70,7 +70,7 @@ impl MeshVersion {
 
 impl MeshCache {
     /// Without streaming a scene at rest has few pages, whatever its size.
-    const PAGE_SIZES: PageSizes = PageSizes { min: 1 << 16, max: 32 << 20 };
+    const PAGE_SIZES: PageSizes = PageSizes { min: 1 << 16, max: 8 << 20 };
 
     /// Adds the attributes that a plan's processes read. Returns whether one of them is new.
     pub(crate) fn require_attributes(&mut self, attributes: &[DeclaredAttribute]) -> bool {

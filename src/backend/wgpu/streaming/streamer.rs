@@ -2,7 +2,6 @@
 
 use std::collections::BinaryHeap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use parking_lot::Mutex;
 
@@ -28,7 +27,6 @@ pub(crate) struct Streamer {
     jobs: UploadJobs,
     /// Of the frame that began last.
     latest: Mutex<Latest>,
-    is_over_budget: AtomicBool,
 }
 
 #[derive(Default)]
@@ -72,7 +70,7 @@ impl Streamer {
     const MAX_WAITING_FRAMES: u64 = 2;
 
     pub(crate) fn new(budget: StreamingBudget) -> Self {
-        Self { budget, jobs: UploadJobs::default(), latest: Mutex::default(), is_over_budget: AtomicBool::new(false) }
+        Self { budget, jobs: UploadJobs::default(), latest: Mutex::default() }
     }
 
     /// Begins a frame with what is on the device.
@@ -97,8 +95,8 @@ impl Streamer {
         let requests = uses.requests(on_device.meshes, &on_device.materials.textures, assets, used);
         statistics.requested = requests.len();
         statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
+        let was_over_budget = statistics.over_budget > 0;
         statistics.over_budget = self.place(&mut on_device, assets, &uses, requests, statistics)?;
-        let was_over_budget = self.is_over_budget.swap(statistics.over_budget > 0, Ordering::Relaxed);
         if statistics.over_budget > 0 && !was_over_budget {
             let count = statistics.over_budget;
             tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
