@@ -84,6 +84,11 @@ pub trait Backend: Send + Sync + 'static {
     /// there the calling thread does it when a frame was recorded.
     fn work_in_background(&self) {}
 
+    /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes that it uploaded.
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        let _ = count;
+    }
+
     /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the meshes, the frame draws
     /// none but the [used ones](crate::view::ObjectTable::used_meshes).
     ///

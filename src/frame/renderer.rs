@@ -346,6 +346,7 @@ impl<B: Backend> Renderer<B> {
         let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
+        self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value));
         let memory = (uploaded, self.backend.target_memory(&frame));
         let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
         self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));

@@ -12,8 +12,10 @@
 //!   parts are joined to it.
 //! - **Physically based materials out of the box.** The shipped materials are diffuse, emissive and textured. `examples/gltf` has
 //!   metallic and rough ones as an engine's own material type.
-//! - **Ray tracing, global illumination, streaming of meshes and textures.** An engine can add passes for the first two. Meshes and
-//!   textures are uploaded within the frame that first draws them, which takes long for many at once.
+//! - **Ray tracing and global illumination.** An engine can add passes for both.
+//! - **Streaming by itself.** Meshes and textures are uploaded within the frame that first draws them, which takes long for many at once,
+//!   unless an engine [sets a budget](crate::backend::WgpuBackend::stream_resources). Which parts of a world are loaded is its own
+//!   decision: see `examples/streaming`. Mip levels and levels of detail are streamed with their texture and mesh, not one by one.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how many frames it keeps.
 //! - **Recursion by itself.** A mirror in a mirror, or a portal in a portal, is as deep as the engine has cameras for it. Each has one clip
 //!   plane, and none without perspective. A directional light's shadow map covers what main cameras see, not what only mirrors show.

@@ -188,6 +188,20 @@ fn frames_that_draw_more_than_the_budget_keep_what_they_have_and_count_the_rest(
 }
 
 #[test]
+fn the_timeline_counts_what_is_on_the_device_and_what_is_requested() {
+    let mut world = World::new(10, budget(1 << 20));
+    world.renderer.scheduler().timeline().start();
+    let last = world.frames(30);
+    let log = world.renderer.scheduler().timeline().take();
+    let latest =
+        |name: &str| log.counters.iter().filter(|counter| counter.name == name).map(|counter| counter.value).last();
+    assert_eq!(latest("bytes resident"), Some(last.resident_bytes() as f64));
+    assert_eq!((latest("streaming requests"), latest("streaming evictions")), (Some(0.0), Some(0.0)));
+    let first = log.counters.iter().find(|counter| counter.name == "streaming requests");
+    assert!(first.is_some_and(|counter| counter.value >= 9.0), "{first:?}");
+}
+
+#[test]
 fn what_no_longer_exists_is_freed_and_its_uploads_are_dropped() {
     let mut world = World::new(40, budget(8 << 20));
     world.frames(3);
@@ -203,12 +217,8 @@ fn textures_of_several_sizes_share_their_budget() {
     let layer = |side: u64| side * side * 4 * 4 / 3;
     let budget = StreamingBudget { texture_bytes: 24 * layer(256), ..budget(1 << 20) };
     let mut world = World::new(64, StreamingBudget { upload_bytes_per_frame: 1 << 20, ..budget });
-    let mesh = world.meshes[0];
     world.scene = Scene::new();
-    let mesh = {
-        let _ = mesh;
-        world.scene.add(self::mesh(0)).unwrap()
-    };
+    let mesh = world.scene.add(mesh(0)).unwrap();
     for number in 0..64 {
         let side = if number < 40 { 64 } else { 512 };
         let texture = Texture::new("plain", side, side, vec![200; (side * side * 4) as usize]).unwrap();

@@ -152,7 +152,7 @@ fn changing_meshes() -> Result<(), Failed> {
     let material = scene.as_scene_ref().materials[0];
     for step in 0..10 {
         let mesh = match step {
-            // The arenas grow, and what they hold moves.
+            // There are further pages.
             4 => cube().subdivided(0.02, 100_000),
             _ if step % 2 == 0 => cube(),
             _ => square(Topology::TriangleList),

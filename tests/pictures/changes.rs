@@ -77,7 +77,7 @@ fn assets_change() -> Result<(), Failed> {
         }
         previous = picture;
     }
-    // More meshes than the first arenas hold, so that everything moves.
+    // More meshes than the first pages hold.
     for _ in 0..400 {
         let new = scene.add(cube())?;
         let material = scene.add(Material::default())?;

@@ -25,7 +25,7 @@ use crate::fixture::Fixture;
 use crate::strategies::{device, expect, strategies};
 
 pub const CASES: &[Case] = &[
-    ("a_mesh_in_the_engines_buffers_looks_like_one_in_the_arenas", same_picture),
+    ("a_mesh_in_the_engines_buffers_looks_like_one_in_the_pages", same_picture),
     ("every_strategy_draws_meshes_in_the_engines_buffers", every_strategy),
     ("meshes_in_the_engines_buffers_come_and_go", replacing_meshes),
     ("without_normals_a_mesh_in_the_engines_buffers_is_flat", without_normals),
@@ -139,7 +139,7 @@ fn separate_streams(vertices: &[Vertex], buffer: impl Fn(&[u8], BufferUsages) ->
     ]
 }
 
-/// The meshes of a scene in the arenas, with the colours that those of [`imported`] have, and others.
+/// The meshes of a scene in the pages, with the colours that those of [`imported`] have, and others.
 fn colored(scene: Scene) -> Scene {
     with_meshes(scene, |mesh| {
         let (count, plain) = (mesh.vertices().len(), mesh.clone());
@@ -182,11 +182,11 @@ fn moved_to_device(scene: Scene, layout: BufferLayout, first: usize) -> Result<S
 
 fn same_picture() -> Result<(), Failed> {
     for layout in BUFFER_LAYOUTS {
-        let mut arenas = field(300);
+        let mut in_pages = field(300);
         if let BufferLayout::Interleaved = layout {
-            arenas = colored(arenas);
+            in_pages = colored(in_pages);
         }
-        let expected = pictures(&mut fixture()?, &arenas)?;
+        let expected = pictures(&mut fixture()?, &in_pages)?;
         for first in [0, 1, 2] {
             let scene = moved_to_device(with_meshes(field(300), Mesh::clone), layout, first)?;
             // Meshes that are not moved keep the colours of the others.
@@ -211,7 +211,7 @@ fn same_picture() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Every mesh three times, so that there are several layouts of each state. The first of the three is in the arenas.
+/// Every mesh three times, so that there are several layouts of each state. The first of the three is in the pages.
 fn with_copies(layouts: Option<[BufferLayout; 2]>) -> Result<Scene, Failed> {
     let (device, _) = device()?;
     let mut scene = field(90);
@@ -471,7 +471,7 @@ fn too_large() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Reads seven attributes, which meshes in the arenas have in eight vertex buffers, and draws one of them as a colour.
+/// Reads seven attributes, which meshes in the pages have in eight vertex buffers, and draws one of them as a colour.
 struct Seven;
 
 const SEVEN: [VertexAttribute<[f32; 3]>; 7] = [
@@ -524,7 +524,7 @@ fn few_vertex_buffers() -> Result<(), Failed> {
     let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue)?).process(Seven).output("coloured");
     let (renderer, submitter) = builder.quality(quality()).build(Arc::new(Scheduler::new(2)?))?;
     let mut fixture = Fixture { renderer, submitter };
-    // As meshes in the arenas with normals and texture coordinates of 0.
+    // As meshes in the pages with normals and texture coordinates of 0.
     let bare = |mesh: &Mesh| {
         let vertices = mesh.vertices().iter().map(|vertex| Vertex { normal: [0.0; 3], uv: [0.0; 2], ..*vertex });
         Mesh::new(mesh.name(), mesh.topology(), vertices.collect(), mesh.indices().to_vec()).unwrap()

@@ -49,7 +49,7 @@ impl Backend for WgpuBackend {
         quality: &Quality,
     ) -> Result<(), BackendError> {
         for ((planned, draws), states) in plan.processes().iter().zip(draws).zip(states) {
-            let variants = || states.iter().map(|state| PipelineVariant::of_arenas(*state));
+            let variants = || states.iter().map(|state| PipelineVariant::of_pages(*state));
             let label = shader_label(&planned.name);
             let found = self.pipelines.lock().find(plan, planned, draws, quality).cloned();
             // No lock is held while the driver compiles, so that frames go on meanwhile.
@@ -222,6 +222,14 @@ impl Backend for WgpuBackend {
         };
         let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
         commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
+    }
+
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        if let Some(statistics) = self.streaming_statistics() {
+            count("bytes resident", statistics.resident_bytes() as f64);
+            count("streaming requests", (statistics.requested + statistics.in_flight) as f64);
+            count("streaming evictions", statistics.evictions as f64);
+        }
     }
 
     fn has_background_work(&self) -> bool {

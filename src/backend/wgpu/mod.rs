@@ -1,6 +1,6 @@
 //! The wgpu backend.
 //!
-//! Vertices and indices lie in shared arenas, all objects lie in one storage buffer, and state is set once per run of
+//! Vertices and indices lie in pages that many meshes share, all objects lie in one storage buffer, and state is set once per run of
 //! batches that share it.
 //! Measurements chose this layout: recording it is cheap and scales with threads.
 //!

@@ -12,7 +12,7 @@ use crate::backend::wgpu::resources::SubdividedMesh;
 use crate::command::Batch;
 
 /// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot determines the
-/// meshes' ranges in the arenas.
+/// meshes' ranges in their pages.
 #[derive(Clone)]
 pub(crate) struct BundleKey {
     pub(crate) frame_bind_group: wgpu::BindGroup,

@@ -9,19 +9,19 @@ use crate::command::{Batch, DrawState};
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct PipelineVariant {
     pub(crate) state: DrawState,
-    /// `None` for meshes in the crate's arenas.
+    /// `None` for meshes in the crate's pages.
     pub(crate) layout: Option<Arc<VertexStreamLayouts>>,
 }
 
 impl PipelineVariant {
-    /// That of a state, for meshes in the crate's arenas.
-    pub(crate) fn of_arenas(state: DrawState) -> Self {
+    /// That of a state, for meshes in the crate's pages.
+    pub(crate) fn of_pages(state: DrawState) -> Self {
         Self { state: state.pipeline_state(), layout: None }
     }
 
     /// The one that draws a batch.
     pub(crate) fn of_batch(meshes: &MeshSnapshot, batch: &Batch) -> Self {
         let layout = meshes.imported_meshes.get(batch.mesh).map(|mesh| Arc::clone(&mesh.layout));
-        Self { layout, ..Self::of_arenas(batch.state) }
+        Self { layout, ..Self::of_pages(batch.state) }
     }
 }

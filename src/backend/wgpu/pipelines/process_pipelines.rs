@@ -112,7 +112,7 @@ impl ProcessPipelines {
             tuners,
         };
         if let Some(state) = pipelines.key.state {
-            pipelines.insert(pipelines.create(device, PipelineVariant::of_arenas(state))?);
+            pipelines.insert(pipelines.create(device, PipelineVariant::of_pages(state))?);
         }
         Ok(pipelines)
     }
@@ -270,8 +270,8 @@ impl ProcessPipelines {
             (VertexSource::Procedural(primitive), _) => (primitive_topology(primitive), None),
             (_, Topology::TriangleList) => (wgpu::PrimitiveTopology::TriangleList, None),
             (_, Topology::TriangleStrip) => {
-                let of_arenas = Some(wgpu::IndexFormat::Uint32);
-                let format = variant.layout.as_ref().map_or(of_arenas, |layout| layout.strip_index_format);
+                let of_pages = Some(wgpu::IndexFormat::Uint32);
+                let format = variant.layout.as_ref().map_or(of_pages, |layout| layout.strip_index_format);
                 (wgpu::PrimitiveTopology::TriangleStrip, format)
             }
         };
@@ -405,7 +405,7 @@ mod tests {
             ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
 
         let [first, second] = [Cull::Back, Cull::Nothing]
-            .map(|cull| PipelineVariant::of_arenas(DrawState::new(Topology::TriangleList, cull, Blend::None)));
+            .map(|cull| PipelineVariant::of_pages(DrawState::new(Topology::TriangleList, cull, Blend::None)));
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {
             let of_frame = || {

@@ -18,7 +18,7 @@ struct VertexBuffer {
 }
 
 impl VertexBuffers {
-    /// Those of meshes in the crate's arenas, or of shaders that need no mesh.
+    /// Those of meshes in the crate's pages, or of shaders that need no mesh.
     pub(super) fn new(source: VertexSource, own: &[DeclaredAttribute]) -> Self {
         let shipped = match source {
             VertexSource::Meshes(format) => {

@@ -120,12 +120,12 @@ impl ImportedMeshes {
         self.meshes.is_empty()
     }
 
-    /// The mesh in a slot; `None` if that is in the arenas.
+    /// The mesh in a slot; `None` if that is in the pages.
     pub(crate) fn get(&self, slot: u32) -> Option<&ImportedMesh> {
         self.meshes.get(&slot)
     }
 
-    /// Whether the meshes in two slots have equal layouts. Two meshes in the arenas always have.
+    /// Whether the meshes in two slots have equal layouts. Two meshes in the pages always have.
     pub(crate) fn have_equal_layouts(&self, one: u32, other: u32) -> bool {
         match (self.get(one), self.get(other)) {
             (None, None) => true,
