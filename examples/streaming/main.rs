@@ -118,14 +118,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
 const WARM_UP_FRAMES: usize = 12;
 
-/// Two fifths of the memory for meshes, the rest for textures; and uploads of 60 MB a second at the rate of the frames.
+/// Two fifths of the memory for meshes, the rest for textures. Uploads keep up with the flight at eight frames a second.
 fn budget(arguments: &Arguments) -> StreamingBudget {
     let bytes = u64::from(arguments.budget) << 20;
     StreamingBudget {
         mesh_bytes: bytes * 2 / 5,
         texture_bytes: bytes * 3 / 5,
-        upload_bytes_per_frame: 2 << 20,
-        upload_time_per_frame: Duration::from_millis(3),
+        upload_bytes_per_frame: 4 << 20,
+        upload_time_per_frame: Duration::from_millis(8),
     }
 }
 
