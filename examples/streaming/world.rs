@@ -22,6 +22,7 @@ pub struct World {
     pub scene: Scene,
     loader: AssetLoader,
     tiles: HashMap<TileIndex, Tile>,
+    tile_of_mesh: HashMap<Handle<Mesh>, TileIndex>,
     plants: Plants,
     water: ObjectHandle,
     made: u64,
@@ -66,7 +67,7 @@ impl World {
         })?;
         let water = scene.add_object(RenderObject::new(water, material, DVec3::ZERO))?;
         let loader = scene.assets().loader(scheduler);
-        Ok(Self { scene, loader, tiles: HashMap::new(), plants, water, made: 0 })
+        Ok(Self { scene, loader, tiles: HashMap::new(), tile_of_mesh: HashMap::new(), plants, water, made: 0 })
     }
 
     /// Takes what has arrived, begins tiles ahead of the camera, and drops those behind it. Returns what could not be made.
@@ -75,6 +76,7 @@ impl World {
     /// If the scene refuses something.
     pub fn update(&mut self, flight: &Flight, time: f64) -> Result<Vec<LoadError>, Box<dyn Error>> {
         let arrivals = self.scene.receive(&self.loader);
+        arrivals.meshes.iter().try_for_each(|mesh| self.plant(*mesh))?;
         let camera = flight.camera(time);
         let forward = camera.orientation.as_dquat() * DVec3::NEG_Z;
         let near = Nearness { position: camera.position, forward };
@@ -89,7 +91,7 @@ impl World {
             let priority = near.priority(index);
             // Those on their way have none yet.
             let _ = self.scene.set_priority(tile.mesh, priority);
-            let _ = self.scene.set_priority(tile.texture, priority);
+            let _ = self.scene.set_priority(tile.texture, priority - 150);
         }
         let mut water = self.scene.object(self.water)?;
         water.position = DVec3::new(camera.position.x, f64::from(WATER), camera.position.z);
@@ -122,7 +124,8 @@ impl World {
     fn begin(&mut self, index: TileIndex, priority: i32) -> Result<(), SceneError> {
         let name = |kind| format!("{kind} of tile {} {}", index.x, index.z);
         let mesh = self.loader.load(name("mesh"), priority, move || tile::mesh(index));
-        let texture = self.loader.load(name("texture"), priority - 1, move || tile::texture(index));
+        // Land without colours is better than none.
+        let texture = self.loader.load(name("texture"), priority - 150, move || tile::texture(index));
         // What is seen until the texture arrives.
         let diffuse = Vec3::ONE;
         let material = self.scene.add(Material {
@@ -133,12 +136,20 @@ impl World {
         })?;
         let [x, z] = index.corner();
         let land = RenderObject::new(mesh, material, DVec3::new(x, 0.0, z));
-        let mut objects = vec![self.scene.add_object(land)?];
-        for plant in self.plants.on(index) {
-            objects.push(self.scene.add_object(plant)?);
-        }
+        let objects = vec![self.scene.add_object(land)?];
+        self.tile_of_mesh.insert(mesh, index);
         self.tiles.insert(index, Tile { mesh, texture, material, objects, is_nearby: false });
         self.made += tile::BYTES;
+        Ok(())
+    }
+
+    /// Adds what stands on a tile whose mesh has arrived.
+    fn plant(&mut self, mesh: Handle<Mesh>) -> Result<(), SceneError> {
+        let Some(index) = self.tile_of_mesh.get(&mesh) else { return Ok(()) };
+        let Some(tile) = self.tiles.get_mut(index) else { return Ok(()) };
+        for plant in self.plants.on(*index) {
+            tile.objects.push(self.scene.add_object(plant)?);
+        }
         Ok(())
     }
 
@@ -149,6 +160,7 @@ impl World {
             for object in tile.objects {
                 self.scene.remove_object(object)?;
             }
+            self.tile_of_mesh.remove(&tile.mesh);
             // One that could not be made is gone already.
             let _ = self.scene.unload(tile.mesh);
             let _ = self.scene.unload(tile.texture);
