@@ -193,8 +193,7 @@ fn the_timeline_counts_what_is_on_the_device_and_what_is_requested() {
     world.renderer.scheduler().timeline().start();
     let last = world.frames(30);
     let log = world.renderer.scheduler().timeline().take();
-    let latest =
-        |name: &str| log.counters.iter().filter(|counter| counter.name == name).map(|counter| counter.value).last();
+    let latest = |name: &str| log.counters.iter().rfind(|counter| counter.name == name).map(|counter| counter.value);
     assert_eq!(latest("bytes resident"), Some(last.resident_bytes() as f64));
     assert_eq!((latest("streaming requests"), latest("streaming evictions")), (Some(0.0), Some(0.0)));
     let first = log.counters.iter().find(|counter| counter.name == "streaming requests");
