@@ -14,6 +14,7 @@
 //! Nobody waits in vain either for a fence that can no longer be set: it is [abandoned](FenceError::Abandoned) when its setter is dropped, also by
 //! a panic, or with the frame that would have set it.
 
+mod device_progress;
 mod error;
 mod setter;
 mod state;
@@ -24,8 +25,9 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
+pub use device_progress::DeviceProgress;
 pub use error::{FenceError, FenceWait};
-pub use setter::{DeviceProgress, FenceSetter};
+pub use setter::FenceSetter;
 
 use self::state::{FenceState, Outcome};
 use self::waits::list_wait;

@@ -1,9 +1,10 @@
-//! The setter of a fence, and the device that it may be set by.
+//! The setter of a fence.
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use super::device_progress::DeviceProgress;
 use super::state::{FenceState, Outcome};
 
 /// Sets one fence, once. If it is dropped instead, the fence is [abandoned](super::FenceError::Abandoned).
@@ -44,20 +45,5 @@ impl Drop for FenceSetter {
 impl fmt::Debug for FenceSetter {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_struct("FenceSetter").field("name", &self.name()).finish()
-    }
-}
-
-/// A device on its way to the place of a fence.
-pub trait DeviceProgress: Send + Sync + 'static {
-    /// Waits until the device has reached the place, at most as long as `limit`, and has the device call back for all that it has done.
-    ///
-    /// # Errors
-    /// Returns the device's message if it has failed, so that the fence will never be set.
-    fn advance(&self, limit: Duration) -> Result<(), String>;
-}
-
-impl<D: DeviceProgress + ?Sized> DeviceProgress for Arc<D> {
-    fn advance(&self, limit: Duration) -> Result<(), String> {
-        (**self).advance(limit)
     }
 }

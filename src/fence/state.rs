@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use parking_lot::{Condvar, Mutex};
 
-use super::setter::DeviceProgress;
+use super::device_progress::DeviceProgress;
 use crate::unwind::catch;
 
 /// How a fence ended.

@@ -14,7 +14,8 @@ pub use buffering::Buffering;
 pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
 pub use slot::FrameSlot;
 
-use self::queues::{AwaitedFrame, LoopQueues};
+use self::queues::LoopQueues;
+use self::slot::{AwaitedFrame, FrameQueues};
 use super::{FramePlace, Renderer, Submitter};
 use crate::backend::Backend;
 use crate::task::catch;
@@ -62,7 +63,7 @@ where
 {
     /// `None` once it is handed back.
     renderer: Option<Renderer<B>>,
-    queues: Arc<LoopQueues<B>>,
+    queues: Arc<FrameQueues<B>>,
     threads: Vec<JoinHandle<()>>,
     /// The number of frames begun.
     begun: u64,
@@ -81,7 +82,7 @@ where
     /// - [`FrameLoopError::ForeignSubmitter`] if the submitter is not the renderer's.
     /// - [`FrameLoopError::Thread`] if the OS starts no thread.
     pub fn new(renderer: Renderer<B>, submitter: Submitter<B>, buffering: Buffering) -> Result<Self, FrameLoopError> {
-        if !submitter.submits_for(&renderer) {
+        if !submitter.submits_to(renderer.backend()) {
             return Err(FrameLoopError::ForeignSubmitter);
         }
         let queues = Arc::new(LoopQueues::new(buffering, Self::DEVICE_LIMIT));
@@ -94,7 +95,7 @@ where
         Ok(frames)
     }
 
-    fn spawn(&mut self, name: &str, work: impl FnOnce(&LoopQueues<B>) + Send + 'static) -> Result<(), FrameLoopError> {
+    fn spawn(&mut self, name: &str, work: impl FnOnce(&FrameQueues<B>) + Send + 'static) -> Result<(), FrameLoopError> {
         let queues = Arc::clone(&self.queues);
         let thread = thread::Builder::new().name(name.to_owned()).spawn(move || work(&queues));
         self.threads.push(thread.map_err(|error: io::Error| FrameLoopError::Thread(error))?);
@@ -161,7 +162,7 @@ where
 }
 
 /// The device thread: submits frames in the order in which they come.
-fn submit_frames<B: Backend>(submitter: &Submitter<B>, queues: &LoopQueues<B>)
+fn submit_frames<B: Backend>(submitter: &Submitter<B>, queues: &FrameQueues<B>)
 where
     B::Submission: Send,
 {
@@ -188,7 +189,7 @@ where
 }
 
 /// The completion thread: waits until the device has drawn the frames, one after the other.
-fn await_frames<B: Backend>(queues: &LoopQueues<B>)
+fn await_frames<B: Backend>(queues: &FrameQueues<B>)
 where
     B::Submission: Send,
 {

@@ -41,6 +41,7 @@ mod view_cost;
 mod view_filter;
 mod view_levels;
 mod view_occlusion;
+mod view_queues;
 mod view_times;
 mod view_visibility;
 mod views;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::latched_views::LatchedViews;
 use super::view_cache::InFlight;
-use super::{FrameError, FramePlace, FrameStatistics, LatchError, Renderer, SubmitError};
+use super::{FrameError, FramePlace, FrameStatistics, LatchError, SubmitError};
 use crate::backend::{Backend, FrameFence, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
@@ -259,9 +259,9 @@ impl<B: Backend> Submitter<B> {
         &self.backend
     }
 
-    /// Whether it submits the frames of this renderer.
-    pub(super) fn submits_for(&self, renderer: &Renderer<B>) -> bool {
-        std::ptr::eq(&raw const *self.backend, renderer.backend())
+    /// Whether it submits to this backend.
+    pub(super) fn submits_to(&self, backend: &B) -> bool {
+        std::ptr::eq(&raw const *self.backend, backend)
     }
 
     /// What a submitter on another thread is made of, in place of this one.

@@ -18,10 +18,11 @@ use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
 use super::view_cache::ViewCache;
 use super::view_filter::count_unknown_objects;
+use super::view_queues::view_queues;
 use super::views::FrameViews;
 use super::warnings::Warnings;
 use super::{BuildError, FrameError, FrameStatistics, Granularity};
-use crate::backend::{Backend, BackendError, FrameRequest, ViewQueue};
+use crate::backend::{Backend, FrameRequest};
 use crate::command::DrawList;
 use crate::graph::RunError;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
@@ -488,19 +489,4 @@ fn error_of_pass<B: Backend>(
         RunError::Panicked { node, message } => RunError::Panicked { node: name_failed(node), message },
         other => other,
     }
-}
-
-/// One queue for each view, its passes in the order of the plan.
-fn view_queues<B: Backend>(
-    request: &FrameRequest<'_>,
-    recordings: &mut [PassRecording<B>],
-) -> Result<Vec<ViewQueue<B::Commands>>, FrameError> {
-    // A process has at most one pass in a view.
-    let empty = |view| ViewQueue { view, passes: Vec::with_capacity(request.plan.processes().len()) };
-    let mut queues: Vec<_> = (0..request.views.len()).map(empty).collect();
-    for (&pass, recording) in request.passes.iter().zip(recordings) {
-        let missing = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
-        queues[pass.view_index].passes.push((pass, recording.take().ok_or_else(missing)?));
-    }
-    Ok(queues)
 }

@@ -166,6 +166,18 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         self.inner.prepare(worker, frame, pass)
     }
 
+    fn has_background_work(&self) -> bool {
+        self.inner.has_background_work()
+    }
+
+    fn work_in_background(&self) {
+        self.inner.work_in_background();
+    }
+
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        self.inner.counters(count);
+    }
+
     fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
         self.inner.replace_view(frame, request)
     }

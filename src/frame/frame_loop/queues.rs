@@ -1,74 +1,34 @@
-//! What the threads of a frame loop share: the frames on their way from one to the next.
+//! What the threads of a frame loop share: queues of frames, whatever these are at each station.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use parking_lot::{Condvar, Mutex};
 
-use super::{Buffering, FinishedFrame, FrameLoopError, FrameSlot};
-use crate::backend::Backend;
-use crate::fence::Fence;
-use crate::frame::{Recorded, Submitted};
+use super::Buffering;
 
-/// What the engine does when a frame is submitted.
-type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
-
-/// A frame on its way to the device thread.
-pub(super) struct RecordedFrame<B: Backend>
-where
-    B::Submission: Send,
-{
-    pub(super) slot: FrameSlot<B>,
-    pub(super) recorded: Recorded<B>,
-    pub(super) after: AfterSubmission<B>,
-    pub(super) recorded_at: Instant,
-}
-
-/// A frame on its way to the completion thread.
-pub(super) struct AwaitedFrame<B: Backend>
-where
-    B::Submission: Send,
-{
-    pub(super) slot: FrameSlot<B>,
-    pub(super) recorded_at: Instant,
-    /// Begin and end of the submission.
-    pub(super) start: Instant,
-    pub(super) end: Instant,
-    /// With the fence at the frame's end.
-    pub(super) outcome: Result<(Submitted<B>, Fence), FrameLoopError>,
-}
-
-/// The frames of a loop, and who may begin another one.
-pub(super) struct LoopQueues<B: Backend>
-where
-    B::Submission: Send,
-{
-    state: Mutex<State<B>>,
+/// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.
+pub(super) struct LoopQueues<Recorded, Awaited, Finished> {
+    state: Mutex<State<Recorded, Awaited, Finished>>,
     /// Notified at each change: no more than three threads wait.
     changed: Condvar,
 }
 
-struct State<B: Backend>
-where
-    B::Submission: Send,
-{
+struct State<Recorded, Awaited, Finished> {
     buffering: Buffering,
     device_limit: Duration,
     /// Slots that are taken.
     in_flight: usize,
-    recorded: VecDeque<RecordedFrame<B>>,
-    awaited: VecDeque<AwaitedFrame<B>>,
-    finished: Vec<FinishedFrame<B>>,
+    recorded: VecDeque<Recorded>,
+    awaited: VecDeque<Awaited>,
+    finished: Vec<Finished>,
     /// No frame comes after those in `recorded`.
     is_closed: bool,
     /// No frame comes after those in `awaited`.
     is_submission_over: bool,
 }
 
-impl<B: Backend> LoopQueues<B>
-where
-    B::Submission: Send,
-{
+impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
     pub(super) fn new(buffering: Buffering, device_limit: Duration) -> Self {
         let state = State {
             buffering,
@@ -84,7 +44,7 @@ where
     }
 
     /// Waits for a free slot and takes it, with the frames that have finished.
-    pub(super) fn take_slot(&self) -> Vec<FinishedFrame<B>> {
+    pub(super) fn take_slot(&self) -> Vec<Finished> {
         let mut state = self.state.lock();
         while state.in_flight >= state.buffering.frames_in_flight() {
             self.changed.wait(&mut state);
@@ -97,12 +57,12 @@ where
         self.change(|state| state.in_flight -= 1);
     }
 
-    pub(super) fn take_finished(&self) -> Vec<FinishedFrame<B>> {
+    pub(super) fn take_finished(&self) -> Vec<Finished> {
         std::mem::take(&mut self.state.lock().finished)
     }
 
     /// Adds a frame for the device thread. After the loop has ended there is none, and the frame is dropped.
-    pub(super) fn add_recorded(&self, frame: RecordedFrame<B>) {
+    pub(super) fn add_recorded(&self, frame: Recorded) {
         let mut state = self.state.lock();
         if state.is_closed {
             // Dropping it frees its slot, which locks.
@@ -116,20 +76,20 @@ where
     }
 
     /// Waits for the next frame to submit; `None` when the loop ends.
-    pub(super) fn next_to_submit(&self) -> Option<RecordedFrame<B>> {
+    pub(super) fn next_to_submit(&self) -> Option<Recorded> {
         self.next(|state| state.recorded.pop_front(), |state| state.is_closed)
     }
 
-    pub(super) fn add_awaited(&self, frame: AwaitedFrame<B>) {
+    pub(super) fn add_awaited(&self, frame: Awaited) {
         self.change(|state| state.awaited.push_back(frame));
     }
 
     /// Waits for the next frame that the device draws; `None` when the loop ends.
-    pub(super) fn next_to_await(&self) -> Option<AwaitedFrame<B>> {
+    pub(super) fn next_to_await(&self) -> Option<Awaited> {
         self.next(|state| state.awaited.pop_front(), |state| state.is_submission_over)
     }
 
-    pub(super) fn add_finished(&self, frame: FinishedFrame<B>) {
+    pub(super) fn add_finished(&self, frame: Finished) {
         self.change(|state| state.finished.push(frame));
     }
 
@@ -159,13 +119,17 @@ where
         self.change(|state| state.device_limit = limit);
     }
 
-    fn change(&self, change: impl FnOnce(&mut State<B>)) {
+    fn change(&self, change: impl FnOnce(&mut State<Recorded, Awaited, Finished>)) {
         change(&mut self.state.lock());
         self.changed.notify_all();
     }
 
     /// Waits until `take` finds something, or `is_over`.
-    fn next<T>(&self, take: impl Fn(&mut State<B>) -> Option<T>, is_over: impl Fn(&State<B>) -> bool) -> Option<T> {
+    fn next<T>(
+        &self,
+        take: impl Fn(&mut State<Recorded, Awaited, Finished>) -> Option<T>,
+        is_over: impl Fn(&State<Recorded, Awaited, Finished>) -> bool,
+    ) -> Option<T> {
         let mut state = self.state.lock();
         loop {
             if let Some(taken) = take(&mut state) {

@@ -1,11 +1,16 @@
-//! A frame's place among the frames in flight.
+//! A frame's place among the frames in flight, which it holds on its way.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::queues::{LoopQueues, RecordedFrame};
+use super::finished_frame::{FinishedFrame, FrameLoopError};
+use super::queues::LoopQueues;
 use crate::backend::Backend;
+use crate::fence::Fence;
 use crate::frame::{Recorded, Submitted};
+
+/// The queues of a loop.
+pub(super) type FrameQueues<B> = LoopQueues<RecordedFrame<B>, AwaitedFrame<B>, FinishedFrame<B>>;
 
 /// A frame's place among the frames in flight. It is free again when the device has drawn the frame, or when this is dropped.
 #[must_use = "a slot is freed when it is dropped"]
@@ -13,7 +18,7 @@ pub struct FrameSlot<B: Backend>
 where
     B::Submission: Send,
 {
-    queues: Arc<LoopQueues<B>>,
+    queues: Arc<FrameQueues<B>>,
     number: u64,
     begun: Instant,
     waited: Duration,
@@ -23,7 +28,7 @@ impl<B: Backend> FrameSlot<B>
 where
     B::Submission: Send,
 {
-    pub(super) fn new(queues: Arc<LoopQueues<B>>, number: u64, begun: Instant, waited: Duration) -> Self {
+    pub(super) fn new(queues: Arc<FrameQueues<B>>, number: u64, begun: Instant, waited: Duration) -> Self {
         Self { queues, number, begun, waited }
     }
 
@@ -63,4 +68,32 @@ where
     fn drop(&mut self) {
         self.queues.free_slot();
     }
+}
+
+/// What the engine does when a frame is submitted.
+type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
+
+/// A frame on its way to the device thread.
+pub(super) struct RecordedFrame<B: Backend>
+where
+    B::Submission: Send,
+{
+    pub(super) slot: FrameSlot<B>,
+    pub(super) recorded: Recorded<B>,
+    pub(super) after: AfterSubmission<B>,
+    pub(super) recorded_at: Instant,
+}
+
+/// A frame on its way to the completion thread.
+pub(super) struct AwaitedFrame<B: Backend>
+where
+    B::Submission: Send,
+{
+    pub(super) slot: FrameSlot<B>,
+    pub(super) recorded_at: Instant,
+    /// Begin and end of the submission.
+    pub(super) start: Instant,
+    pub(super) end: Instant,
+    /// With the fence at the frame's end.
+    pub(super) outcome: Result<(Submitted<B>, Fence), FrameLoopError>,
 }
