@@ -25,7 +25,7 @@ pub struct Bars {
     pub series: Vec<String>,
     /// The name of each group, and the value of each series; NaN for no bar.
     pub groups: Vec<(String, Vec<f64>)>,
-    /// A mark across the bars of each group; NaN for no mark.
+    /// A mark across the bars of each group; NaN for no mark, and empty for none at all.
     pub marks: Vec<f64>,
     /// The legend of the marks.
     pub mark_name: String,

@@ -16,7 +16,7 @@ pub fn draw(path: &Path, rows: &[Row]) -> Result<(), Failure> {
         Panel::Bars(Bars {
             title: title.to_owned(),
             series: Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
-            marks: vec![f64::NAN; groups.len()],
+            marks: Vec::new(),
             groups,
             mark_name: String::new(),
             line: 0.0,
