@@ -163,6 +163,9 @@ fn speckled() -> Result<Texture, Failure> {
     Ok(Texture::new("speckled", 256, 256, (0..256 * 256).flat_map(pixel).collect())?)
 }
 
+/// An object, its mesh, and its material and texture if these are its own.
+type Added = (ObjectHandle, Handle<Mesh>, Option<(Handle<Material>, Handle<Texture>)>);
+
 /// A scene, and how things are added to it.
 struct World {
     renderer: Renderer<WgpuBackend>,
@@ -172,7 +175,7 @@ struct World {
     shared_mesh: Handle<Mesh>,
     texture: Texture,
     material: Handle<Material>,
-    objects: VecDeque<(ObjectHandle, Handle<Mesh>, Option<(Handle<Material>, Handle<Texture>)>)>,
+    objects: VecDeque<Added>,
     added: usize,
 }
 

@@ -66,9 +66,11 @@ struct Waiting {
     loads: BinaryHeap<Load>,
     /// The number of calls of [`AssetLoader::load`] so far.
     count: u64,
-    /// Background jobs that are queued or run. Each loads one thing, then queues the next job, so that other background jobs need not
-    /// wait until everything is loaded.
-    jobs: usize,
+    /// Background jobs that have not begun. Each loads one thing, then queues the next job, so that other background jobs need not wait until
+    /// everything is loaded.
+    queued_jobs: usize,
+    /// Background jobs that have begun. What they load no longer waits.
+    running_jobs: usize,
 }
 
 /// Something to load.
@@ -120,7 +122,8 @@ impl AssetLoader {
     /// Has a background job call `load`, those with a higher priority first, and returns the handle of what it will return. `name` is for
     /// errors. The asset has the same priority in [streaming](Assets::set_priority) when it arrives.
     ///
-    /// With a single worker, no job runs in the background: then [`Assets::receive`] calls `load`. If the scheduler is gone, this call does.
+    /// With a single worker, no job runs in the background: then each call of [`Assets::receive`] loads one asset. If the scheduler is gone,
+    /// each call of this function loads one, the most urgent of those that wait.
     pub fn load<T: Asset, E: Into<BoxedError>>(
         &self,
         name: impl Into<String>,
@@ -129,8 +132,9 @@ impl AssetLoader {
     ) -> Handle<T> {
         let (name, handle) = (name.into(), T::reserve(&self.shared.slots));
         let run = move || -> Arrival {
-            let loaded = match catch(load) {
-                Ok(loaded) => loaded.map_err(Into::into),
+            // The conversion of the error is the engine's code as well.
+            let loaded = match catch(|| load().map_err(Into::into)) {
+                Ok(loaded) => loaded,
                 Err(panic) => Err(panic.into()),
             };
             Box::new(move |assets, arrivals| arrivals.add(assets, handle, (name, priority), loaded))
@@ -148,7 +152,7 @@ impl AssetLoader {
         handle
     }
 
-    /// The number of assets that wait for a job, which may be running.
+    /// The number of assets whose loading has not begun.
     pub fn waiting(&self) -> usize {
         self.shared.waiting.lock().loads.len()
     }
@@ -187,19 +191,25 @@ impl fmt::Debug for AssetLoader {
 }
 
 impl Shared {
-    /// Queues a background job if something waits for one, and not every worker but the first has one.
+    /// Queues a background job if more loads wait than jobs are queued for them, and not every worker but the first has a job.
     fn queue_job(shared: &Arc<Self>, scheduler: &Scheduler) {
         let mut waiting = shared.waiting.lock();
-        if waiting.jobs >= waiting.loads.len().min(scheduler.workers() - 1) {
+        let jobs = waiting.queued_jobs + waiting.running_jobs;
+        if waiting.queued_jobs >= waiting.loads.len() || jobs >= scheduler.workers() - 1 {
             return;
         }
-        waiting.jobs += 1;
+        waiting.queued_jobs += 1;
         drop(waiting);
         let shared = Arc::clone(shared);
         // What it returns is in `arrived`.
         drop(scheduler.background(move || {
+            {
+                let mut waiting = shared.waiting.lock();
+                waiting.queued_jobs -= 1;
+                waiting.running_jobs += 1;
+            }
             shared.load_next();
-            shared.waiting.lock().jobs -= 1;
+            shared.waiting.lock().running_jobs -= 1;
             if let Some(scheduler) = shared.scheduler.upgrade() {
                 Self::queue_job(&shared, &scheduler);
             }

@@ -105,11 +105,11 @@ impl Assets {
     }
 
     /// Sets in which order a backend that streams brings meshes and textures to the device: those with a higher
-    /// priority first, once those that are in sight are there. It may change at any time, and changes nothing in pictures. It is 0 where
-    /// nothing is set; materials have none.
+    /// priority first, once those that are in sight are there. It may change at any time. If not everything in sight fits into the streaming budget, it
+    /// also decides what is left out. It is 0 where nothing is set; materials have none.
     ///
     /// # Errors
-    /// If the handle is stale.
+    /// If the handle is stale, or the asset has not [arrived](Self::receive) yet.
     pub fn set_priority<T: Asset>(&mut self, handle: Handle<T>, priority: i32) -> Result<(), StaleHandle> {
         T::slots(self).get(handle)?;
         self.store_priority(handle, priority);

@@ -199,3 +199,38 @@ fn a_loader_whose_scheduler_is_gone_loads_at_once() {
     let mesh = loader.load("cube", 0, cube_of("cube"));
     assert_eq!(scene.receive(&loader).meshes, [mesh]);
 }
+
+#[test]
+fn a_slow_load_does_not_hold_up_another_one_while_workers_idle() {
+    let mut engine = Engine::new(3);
+    let (other_has_begun, begun) = mpsc::channel::<()>();
+    engine.loader.load("slow", 0, move || {
+        // It ends only when the other one has begun; if that never comes, this is an error.
+        let waited = begun.recv_timeout(std::time::Duration::from_secs(20));
+        waited.map(|()| cube()).map_err(|error| error.to_string())
+    });
+    while engine.loader.waiting() > 0 {
+        std::thread::yield_now();
+    }
+    engine.loader.load("other", 0, move || {
+        other_has_begun.send(()).map_err(|error| error.to_string())?;
+        Ok::<_, String>(cube())
+    });
+    assert_eq!(engine.receive(2).errors.len(), 0);
+}
+
+#[test]
+fn an_error_whose_conversion_panics_is_told_and_others_load() {
+    struct Panics;
+    impl From<Panics> for Box<dyn std::error::Error + Send + Sync> {
+        fn from(_: Panics) -> Self {
+            std::panic::resume_unwind(Box::new("as planned"))
+        }
+    }
+    let mut engine = Engine::new(2);
+    engine.loader.load("panics", 0, || Err::<Mesh, _>(Panics));
+    engine.loader.load("loads", 0, cube_of("loads"));
+    let arrivals = engine.receive(2);
+    assert_eq!(arrivals.count, 1);
+    assert!(arrivals.errors[0].to_string().contains("as planned"), "{}", arrivals.errors[0]);
+}

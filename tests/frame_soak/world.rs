@@ -54,7 +54,7 @@ impl World {
     pub fn change(&mut self, random: &mut Random) -> bool {
         match random.below(12) {
             0 | 1 if self.objects.len() < MAX_OBJECTS => self.add_object(random),
-            0 | 1 | 2 if self.objects.len() > 1 => {
+            0..=2 if self.objects.len() > 1 => {
                 let object = self.objects.swap_remove(random.below(self.objects.len()));
                 self.scene.remove_object(object).unwrap();
             }

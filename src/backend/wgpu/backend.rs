@@ -197,9 +197,11 @@ impl WgpuBackend {
     /// in sight makes room only for what is in sight and has a higher priority: if frames draw more than the budget, a part of it is left out,
     /// counted in [`WgpuBackend::streaming_statistics`], and warned of.
     ///
-    /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the device, because it would
-    /// vanish otherwise, and meshes that are subdivided for paraboloids. When the format of vertices changes, or a plan first reads a vertex
-    /// attribute, all meshes come anew. Scenes at rest, once everything is there, have the pictures that they have without streaming.
+    /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the device, if the budget has
+    /// room for both, as it would vanish for some frames otherwise, and meshes that are subdivided for paraboloids. When the format of vertices changes, or a plan first reads a vertex
+    /// attribute, all meshes come anew. Scenes at rest, once everything is there, have the pictures that they have without streaming. Views that [not every
+    /// frame draws](crate::scene::Redraw) are not drawn anew because something arrived: they need a frame of
+    /// [`Redraw::EveryFrame`](crate::scene::Redraw::EveryFrame) then.
     ///
     /// ```no_run
     /// # use drawloom::{Renderer, Submitter, backend::{BackendError, StreamingBudget, WgpuBackend}, wgpu};
