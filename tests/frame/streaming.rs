@@ -238,3 +238,19 @@ fn textures_of_several_sizes_share_their_budget() {
         }
     }
 }
+
+#[test]
+fn a_texture_that_goes_before_it_is_on_the_device_is_told_as_gone() {
+    let mut world = World::new(1, budget(8 << 20));
+    let texture = Texture::new("gone", 2, 2, vec![255; 16]).unwrap();
+    let texture = world.scene.add(texture).unwrap();
+    let material = world.scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
+    world.scene.add_object(RenderObject::new(world.meshes[0], material, DVec3::ZERO)).unwrap();
+    let reasons =
+        |world: &mut World| -> Vec<_> { world.frame().0.rejections.iter().map(|rejection| rejection.reason).collect() };
+    assert!(reasons(&mut world).contains(&RejectionReason::TextureNotResident));
+    world.scene.remove(texture).unwrap();
+    let after = reasons(&mut world);
+    assert!(after.contains(&RejectionReason::StaleTexture), "{after:?}");
+    assert!(!after.contains(&RejectionReason::TextureNotResident), "{after:?}");
+}

@@ -80,7 +80,8 @@ impl MaterialCache {
         types: &[MaterialLayout],
         rejections: &Rejections,
     ) -> (MaterialSnapshot, Arc<[bool]>) {
-        let textures = (assets.textures.identity(), self.textures.changes());
+        // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on the device.
+        let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
         let snapshot = self.update_snapshot(device, assets, types, rejections, textures, |_| {});
         (snapshot, Arc::clone(&self.lacks_texture))
     }
