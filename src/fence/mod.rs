@@ -22,7 +22,6 @@ mod waits;
 
 use std::fmt;
 use std::sync::Arc;
-use std::thread;
 use std::time::{Duration, Instant};
 
 pub use device_progress::DeviceProgress;
@@ -30,7 +29,7 @@ pub use error::{FenceError, FenceWait};
 pub use setter::FenceSetter;
 
 use self::state::{FenceState, Outcome};
-use self::waits::list_wait;
+pub(crate) use self::waits::list_wait;
 
 /// Something that happens once, on the CPU or on a device, and that others wait for.
 ///
@@ -90,7 +89,7 @@ impl Fence {
         }
         match self.state.outcome() {
             Some(Outcome::Set(time)) => Some(time),
-            Some(Outcome::Abandoned) | None => None,
+            Some(Outcome::Abandoned | Outcome::Failed(_)) | None => None,
         }
     }
 
@@ -101,8 +100,7 @@ impl Fence {
     /// - [`FenceError::Abandoned`] if nothing can set the fence any more.
     /// - [`FenceError::Device`] if the device that would set it fails.
     pub fn wait(&self, limit: Duration) -> Result<(), FenceError> {
-        let thread = thread::current();
-        self.wait_as(limit, || format!("thread {:?}", thread.name().unwrap_or("without a name")))
+        self.wait_as(limit, current_thread)
     }
 
     /// [Waits](Self::wait) on behalf of someone, whom errors of other waits name.
@@ -121,12 +119,12 @@ impl Fence {
                 Some(progress) => {
                     let advanced = progress.advance(left);
                     // Another thread may be about to call back for what this one waited for.
-                    match (self.state.wait(left.min(CALLBACK_TIME), true), advanced) {
-                        (None, Err(message)) => {
-                            return Err(FenceError::Device { fence: self.name().to_owned(), message });
-                        }
-                        (outcome, _) => outcome,
+                    let outcome = self.state.wait(left.min(CALLBACK_TIME), true);
+                    if let (None, Err(message)) = (&outcome, advanced) {
+                        // From now on, for all who wait or are called back.
+                        self.state.finish(Outcome::Failed(message.into()));
                     }
+                    outcome.or_else(|| self.state.outcome())
                 }
                 None => self.state.wait(left, false),
             };
@@ -140,9 +138,10 @@ impl Fence {
         }
     }
 
-    /// Calls back when the fence is set or abandoned, or at once if it is already. The callback runs on the thread that finds out: the one that sets
+    /// Calls back when the fence is set or abandoned, or somebody who waits for it finds that its device has failed; at once, if that has
+    /// happened. The callback runs on the thread that finds out: the one that sets
     /// a fence or drops its setter; for a fence of a device, one that polls the device, waits for it or submits to it. It should be
-    /// short, and hold no lock that such a thread may hold. If it panics, the panic goes no further.
+    /// short, hold no lock that such a thread may hold, and not use the device: a submission may be under way. If it panics, the panic goes no further.
     pub fn on_set(&self, callback: impl FnOnce(Result<(), FenceError>) + Send + 'static) {
         let fence = self.clone();
         self.state.call_back(Box::new(move |outcome| callback(fence.result(outcome))));
@@ -152,12 +151,21 @@ impl Fence {
         match outcome {
             Outcome::Set(_) => Ok(()),
             Outcome::Abandoned => Err(FenceError::Abandoned { fence: self.name().to_owned() }),
+            Outcome::Failed(message) => {
+                Err(FenceError::Device { fence: self.name().to_owned(), message: message.to_string() })
+            }
         }
     }
 }
 
+/// What lists of waits call this thread.
+pub(crate) fn current_thread() -> String {
+    let thread = std::thread::current();
+    thread.name().map_or_else(|| format!("thread {:?}", thread.id()), |name| format!("thread {name:?}"))
+}
+
 /// The time between the end of a device's work and the callback for it, on another thread.
-const CALLBACK_TIME: Duration = Duration::from_millis(1);
+const CALLBACK_TIME: Duration = Duration::from_micros(50);
 
 impl fmt::Debug for Fence {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

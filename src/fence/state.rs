@@ -10,10 +10,12 @@ use super::device_progress::DeviceProgress;
 use crate::unwind::catch;
 
 /// How a fence ended.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Outcome {
     Set(Instant),
     Abandoned,
+    /// The device says why.
+    Failed(Arc<str>),
 }
 
 type Callback = Box<dyn FnOnce(Outcome) + Send>;
@@ -44,7 +46,7 @@ impl FenceState {
     }
 
     pub(super) fn outcome(&self) -> Option<Outcome> {
-        self.current.lock().outcome
+        self.current.lock().outcome.clone()
     }
 
     pub(super) fn progress(&self) -> Option<&dyn DeviceProgress> {
@@ -58,12 +60,12 @@ impl FenceState {
             if current.outcome.is_some() {
                 return;
             }
-            current.outcome = Some(outcome);
+            current.outcome = Some(outcome.clone());
             std::mem::take(&mut current.callbacks)
         };
         self.changed.notify_all();
         for callback in callbacks {
-            self.call(callback, outcome);
+            self.call(callback, outcome.clone());
         }
     }
 
@@ -80,14 +82,14 @@ impl FenceState {
         let mut current = self.current.lock();
         let goes_on = |current: &mut Current| current.outcome.is_none() && self.progress.get().is_some() == had_device;
         self.changed.wait_while_for(&mut current, goes_on, limit);
-        current.outcome
+        current.outcome.clone()
     }
 
     /// Calls back when the fence ends; now, if it has ended.
     pub(super) fn call_back(&self, callback: Callback) {
         let ended = {
             let mut current = self.current.lock();
-            match current.outcome {
+            match current.outcome.clone() {
                 Some(outcome) => Some((callback, outcome)),
                 None => {
                     current.callbacks.push(callback);

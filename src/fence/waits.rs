@@ -16,12 +16,12 @@ struct Wait {
 }
 
 /// A wait that is listed until this is dropped.
-pub(super) struct ListedWait {
+pub(crate) struct ListedWait {
     number: u64,
 }
 
 /// Lists a wait.
-pub(super) fn list_wait(waiter: String, fence: &str) -> ListedWait {
+pub(crate) fn list_wait(waiter: String, fence: &str) -> ListedWait {
     let mut waits = WAITS.lock();
     let number = waits.last().map_or(0, |(number, _)| number + 1);
     waits.push((number, Wait { waiter, fence: fence.to_owned(), since: Instant::now() }));

@@ -15,10 +15,11 @@ pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
 pub use slot::FrameSlot;
 
 use self::queues::LoopQueues;
-use self::slot::{AwaitedFrame, FrameQueues};
+use self::slot::{AwaitedFrame, FrameQueues, Submission};
 use super::{FramePlace, Renderer, Submitter};
-use crate::backend::Backend;
-use crate::task::catch;
+use crate::backend::{Backend, BackendError};
+use crate::fence::FenceError;
+use crate::task::{JobPanic, catch};
 
 /// Keeps a few frames in flight: it owns the device thread, which submits recorded frames, and keeps the engine from running further ahead of
 /// the device than its [`Buffering`] says (S figures 9.1 and 9.2). An engine may use it, or call [`Submitter::submit`] where it likes.
@@ -105,7 +106,8 @@ where
     /// Begins a frame: waits until fewer frames are in flight than the buffering allows, and returns a slot for one, with the frames that
     /// finished since the last call, in their order. A frame that is dropped instead of submitted frees its slot.
     ///
-    /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of the device, allow.
+    /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of the device, allow. A slot
+    /// that the engine holds counts as a frame in flight: to begin another frame while it holds all of them is to wait for itself.
     pub fn begin(&mut self) -> (FrameSlot<B>, Vec<FinishedFrame<B>>) {
         let start = Instant::now();
         let finished = self.queues.take_slot();
@@ -170,19 +172,14 @@ where
         let (slot, mut recorded, after) = (frame.slot, frame.recorded, frame.after);
         let start = Instant::now();
         let submit = || {
-            let drawn = recorded.fence_at(FramePlace::End).map_err(|error| error.to_string())?;
-            let submitted = submitter.submit(recorded);
-            if let Ok(submitted) = &submitted {
-                after(submitted);
-            }
-            Ok((submitted, drawn))
+            let drawn = recorded.fence_at(FramePlace::End)?;
+            let submitted = submitter.submit(recorded)?;
+            // The device draws the frame, whatever the engine's code does.
+            let called =
+                catch(|| after(&submitted)).map_err(|JobPanic { message }| FrameLoopError::Panicked { message });
+            Ok((submitted, drawn, called))
         };
-        let outcome = match catch(submit) {
-            Ok(Ok((Ok(submitted), drawn))) => Ok((submitted, drawn)),
-            Ok(Ok((Err(error), _))) => Err(FrameLoopError::Submit(error)),
-            Ok(Err(message)) => Err(FrameLoopError::Panicked { message }),
-            Err(panic) => Err(FrameLoopError::Panicked { message: panic.message }),
-        };
+        let outcome = submit();
         queues.add_awaited(AwaitedFrame { slot, recorded_at: frame.recorded_at, start, end: Instant::now(), outcome });
     }
     queues.end_submission();
@@ -195,10 +192,17 @@ where
 {
     while let Some(AwaitedFrame { slot, recorded_at, start, end, outcome }) = queues.next_to_await() {
         let mut drawn_at = end;
-        let outcome = outcome.and_then(|(submitted, drawn)| {
-            drawn.wait(queues.device_limit())?;
+        let mut wait = |(submitted, drawn, called): Submission<B>| {
+            match drawn.wait(queues.device_limit()) {
+                Err(FenceError::Device { message, .. }) => return Err(BackendError::DeviceLost { message }.into()),
+                other => other?,
+            }
             drawn_at = drawn.set_at().unwrap_or(end).max(end);
-            Ok(submitted)
+            called.map(|()| submitted)
+        };
+        // A backend's code runs here, and no other frame may wait for ever because of it.
+        let outcome = outcome.and_then(|submission| {
+            catch(|| wait(submission)).unwrap_or_else(|JobPanic { message }| Err(FrameLoopError::Panicked { message }))
         });
         let times = FrameTimes {
             waited: slot.waited(),

@@ -175,3 +175,16 @@ fn a_wait_that_began_before_the_device_was_known_lets_it_advance() {
     *device.setter.lock() = Some(setter);
     waiter.join().unwrap().unwrap();
 }
+
+#[test]
+fn a_device_that_fails_is_told_to_all_and_for_good() {
+    let (fence, device) = stepped(1, true);
+    let (calls, called) = channel();
+    fence.on_set(move |outcome| calls.send(outcome).unwrap());
+    let failed = Err(FenceError::Device { fence: "device".to_owned(), message: "it is lost".to_owned() });
+    assert_eq!(fence.wait(LONG), failed);
+    assert_eq!(called.recv().unwrap(), failed);
+    // What a device calls back for when it is dropped is not done.
+    device.setter.lock().take().unwrap().set();
+    assert_eq!((fence.wait(LONG), fence.is_set()), (failed, false));
+}

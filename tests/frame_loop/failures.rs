@@ -11,25 +11,6 @@ use drawloom_testing::simulated_device::SimulatedDevice;
 use crate::{LONG, renderer, simulated};
 
 #[test]
-fn a_frame_that_is_not_submitted_is_told_once_and_the_next_one_is_drawn() {
-    let scene = field(5);
-    let mut frames = simulated(Duration::ZERO, Buffering::Double);
-    for number in 1..=4 {
-        let (slot, _) = frames.begin();
-        let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
-        if number == 2 {
-            let (setter, fence) = Fence::new("never");
-            drop(setter);
-            recorded.submit_after(&fence, LONG);
-        }
-        slot.submit(recorded);
-    }
-    // `begin` told of some of them; what matters is told of those that are left as well.
-    let (_, finished) = frames.finish();
-    assert!(finished.iter().all(|frame| frame.outcome.is_ok() == (frame.number != 2)));
-}
-
-#[test]
 fn every_failure_is_told_with_its_frame() {
     let scene = field(5);
     let mut frames = simulated(Duration::ZERO, Buffering::Triple);
@@ -115,4 +96,17 @@ fn a_submitter_of_another_renderer_is_refused() {
     let (_renderer, other) = renderer(NullBackend, 1);
     let error = FrameLoop::new(one, other, Buffering::Double).err();
     assert!(matches!(error, Some(FrameLoopError::ForeignSubmitter)));
+}
+
+#[test]
+fn a_frame_whose_callback_panics_keeps_its_slot_until_it_is_drawn() {
+    let scene = field(5);
+    let mut frames = simulated(Duration::from_millis(40), Buffering::SameFrame);
+    let (slot, _) = frames.begin();
+    let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
+    let drawn = recorded.fence_at(drawloom::FramePlace::End).unwrap();
+    slot.submit_then(recorded, |_| std::panic::resume_unwind(Box::new("as planned")));
+    let (_slot, finished) = frames.begin();
+    assert!(drawn.is_set(), "the slot was free while the device drew");
+    assert!(matches!(&finished[0].outcome, Err(FrameLoopError::Panicked { .. })));
 }

@@ -3,6 +3,7 @@
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
+use drawloom::backend::BackendError;
 use drawloom::fence::FenceError;
 use drawloom::glam::DVec3;
 use drawloom::scene::Scene;
@@ -96,8 +97,10 @@ fn lost_device() -> Result<(), Failed> {
         Ok(()) | Err(FenceError::Device { .. } | FenceError::Abandoned { .. }) => {}
         Err(error) => return Err(format!("the frame in flight: {error}").into()),
     }
-    // Submitting to a lost device reports nothing by itself.
-    let _ = fixture.submit(recorded);
+    match fixture.submitter.submit(recorded) {
+        Err(error) if matches!(error.backend_error(), Some(BackendError::DeviceLost { .. })) => {}
+        other => return Err(format!("the frame behind it: {:?}", other.err()).into()),
+    }
     for fence in never_drawn {
         match fence.wait(LONG) {
             Err(FenceError::Device { .. } | FenceError::Abandoned { .. }) => {}

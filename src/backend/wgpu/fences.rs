@@ -24,8 +24,8 @@ struct SubmissionProgress {
 
 impl DeviceProgress for SubmissionProgress {
     fn advance(&self, limit: Duration) -> Result<(), String> {
-        /// Drivers count nanoseconds in 64 bits.
-        const MAX_WAIT: Duration = Duration::from_hours(1);
+        /// While wgpu waits it holds a lock that presenting and destroying resources need, so it does not wait for long at a time.
+        const MAX_WAIT: Duration = Duration::from_millis(1);
         let poll_type = if limit.is_zero() {
             wgpu::PollType::Poll
         } else {

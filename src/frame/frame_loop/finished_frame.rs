@@ -3,9 +3,9 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use crate::backend::Backend;
+use crate::backend::{Backend, BackendError};
 use crate::fence::FenceError;
-use crate::frame::{SubmitError, Submitted};
+use crate::frame::{FrameError, SubmitError, Submitted};
 
 /// A frame that the device has drawn, or that failed after it was recorded.
 pub struct FinishedFrame<B: Backend> {
@@ -59,13 +59,32 @@ pub enum FrameLoopError {
     /// The frame was not submitted.
     #[error(transparent)]
     Submit(#[from] SubmitError),
-    /// The device did not finish the frame: it failed, or took longer than its [limit](super::FrameLoop::set_device_limit).
+    /// No fence can be set at the frame's end.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The device was lost before it had drawn the frame.
+    #[error("the device did not finish the frame: {0}")]
+    Device(#[from] BackendError),
+    /// The device took longer for the frame than its [limit](super::FrameLoop::set_device_limit).
     #[error("the device did not finish the frame: {0}")]
     Unfinished(#[from] FenceError),
-    /// Code of the engine's panicked while the frame was submitted.
-    #[error("the submission of the frame panicked: {message}")]
+    /// What the engine does [after the submission](super::FrameSlot::submit_then) panicked, or the backend while the device drew.
+    #[error("the engine's code or the backend panicked after the submission of the frame: {message}")]
     Panicked {
         /// What the panic said.
         message: String,
     },
+}
+
+impl FrameLoopError {
+    /// What the backend or its device says, if that is why the frame is lost: after [`BackendError::DeviceLost`] the engine
+    /// [finishes](super::FrameLoop::finish) the loop, and [replaces the backend](crate::Renderer::replace_backend).
+    pub fn backend_error(&self) -> Option<&BackendError> {
+        match self {
+            Self::Submit(error) => error.backend_error(),
+            Self::Frame(error) => error.backend_error(),
+            Self::Device(error) => Some(error),
+            Self::ForeignSubmitter | Self::Thread(_) | Self::Unfinished(_) | Self::Panicked { .. } => None,
+        }
+    }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use parking_lot::{Condvar, Mutex};
 
 use super::Buffering;
+use crate::fence::{current_thread, list_wait};
 
 /// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.
 pub(super) struct LoopQueues<Recorded, Awaited, Finished> {
@@ -46,8 +47,12 @@ impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
     /// Waits for a free slot and takes it, with the frames that have finished.
     pub(super) fn take_slot(&self) -> Vec<Finished> {
         let mut state = self.state.lock();
-        while state.in_flight >= state.buffering.frames_in_flight() {
-            self.changed.wait(&mut state);
+        if state.in_flight >= state.buffering.frames_in_flight() {
+            // Whoever waits too long for what comes after this is told of this wait, too.
+            let _listed = list_wait(current_thread(), "a slot of the frame loop");
+            while state.in_flight >= state.buffering.frames_in_flight() {
+                self.changed.wait(&mut state);
+            }
         }
         state.in_flight += 1;
         std::mem::take(&mut state.finished)

@@ -94,6 +94,8 @@ where
     /// Begin and end of the submission.
     pub(super) start: Instant,
     pub(super) end: Instant,
-    /// With the fence at the frame's end.
-    pub(super) outcome: Result<(Submitted<B>, Fence), FrameLoopError>,
+    pub(super) outcome: Result<Submission<B>, FrameLoopError>,
 }
+
+/// A frame that was submitted, the fence at its end, and whether the engine's code panicked after its submission.
+pub(super) type Submission<B> = (Submitted<B>, Fence, Result<(), FrameLoopError>);
