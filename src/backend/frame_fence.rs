@@ -13,7 +13,8 @@ pub struct FrameFence {
 }
 
 impl FrameFence {
-    /// Sets the fences whose places come after this many passes at most, of fences that are in the order of their places. For devices that have done what is submitted when the call returns.
+    /// Sets the fences whose places come after this many passes at most, of fences that are in the order of their places. For devices that have
+    /// done what is submitted when the call returns.
     ///
     /// ```
     /// # use drawloom::backend::FrameFence;

@@ -1,6 +1,5 @@
 //! What a fence and its setter share.
 
-use std::fmt;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -109,11 +108,5 @@ impl FenceState {
                 || tracing::error!(target: "drawloom", fence = self.name, message, "the callback of a fence panicked"),
             );
         }
-    }
-}
-
-impl fmt::Debug for FenceState {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("FenceState").field("name", &self.name).finish_non_exhaustive()
     }
 }

@@ -5,14 +5,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use drawloom::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
-};
+use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use drawloom::command::DrawState;
 use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
 use drawloom::task::Worker;
-use drawloom::timeline::{Labels, TuningChoice};
+
+use crate::forwarded_calls::forward_unchanged_calls;
 
 /// Passes calls on to another backend, counts them, and fails one of them.
 ///
@@ -209,12 +208,10 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     type Commands = B::Commands;
     type Submission = B::Submission;
 
+    forward_unchanged_calls!();
+
     fn adapter_name(&self) -> String {
         self.inner.adapter_name()
-    }
-
-    fn uploaded_bytes(&self) -> u64 {
-        self.inner.uploaded_bytes()
     }
 
     fn prepare_pipelines(
@@ -233,26 +230,6 @@ impl<B: Backend> Backend for FaultyBackend<B> {
         self.inner.begin(request)
     }
 
-    fn discard_frame(&self) {
-        self.inner.discard_frame();
-    }
-
-    fn forget_histories(&self) {
-        self.inner.forget_histories();
-    }
-
-    fn imports_targets_of(&self, view: &str) -> bool {
-        self.inner.imports_targets_of(view)
-    }
-
-    fn objects_epoch(&self, frame: &B::Frame) -> u64 {
-        self.inner.objects_epoch(frame)
-    }
-
-    fn target_memory(&self, frame: &B::Frame) -> TargetMemory {
-        self.inner.target_memory(frame)
-    }
-
     fn upload_objects(
         &self,
         worker: &Worker,
@@ -267,26 +244,6 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         self.call(CallKind::Prepare, Some(pass))?;
         self.inner.prepare(worker, frame, pass)
-    }
-
-    fn has_background_work(&self) -> bool {
-        self.inner.has_background_work()
-    }
-
-    fn work_in_background(&self) {
-        self.inner.work_in_background();
-    }
-
-    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
-        self.inner.counters(count);
-    }
-
-    fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        self.inner.replace_view(frame, request)
-    }
-
-    fn part_count(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> usize {
-        self.inner.part_count(frame, pass)
     }
 
     fn record(
@@ -331,10 +288,6 @@ impl<B: Backend> Backend for FaultyBackend<B> {
             return self.inner.finish_together(worker, frame, &passes[half..], &mut parts[half..], emit);
         }
         self.inner.finish_together(worker, frame, passes, parts, emit)
-    }
-
-    fn recording_choice(&self, frame: &B::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
-        self.inner.recording_choice(frame, pass, labels)
     }
 
     fn submit(

@@ -9,6 +9,7 @@ pub mod culling;
 pub mod draw_lists;
 pub mod fault_injection;
 pub mod feedback;
+mod forwarded_calls;
 pub mod mip_levels;
 pub mod precision;
 pub mod random;

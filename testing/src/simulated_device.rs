@@ -2,19 +2,18 @@
 
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
-};
+use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use drawloom::command::DrawState;
 use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
 use drawloom::task::Worker;
-use drawloom::timeline::{Labels, TuningChoice};
+
+use crate::forwarded_calls::forward_unchanged_calls;
 
 /// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
 /// Its passes take equal shares of that time.
@@ -96,6 +95,8 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
     type Commands = B::Commands;
     type Submission = B::Submission;
 
+    forward_unchanged_calls!();
+
     fn submit(
         &self,
         frame: B::Frame,
@@ -114,10 +115,6 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
     }
 
-    fn uploaded_bytes(&self) -> u64 {
-        self.inner.uploaded_bytes()
-    }
-
     fn prepare_pipelines(
         &self,
         plan: &FramePlan,
@@ -132,26 +129,6 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         self.inner.begin(request)
     }
 
-    fn discard_frame(&self) {
-        self.inner.discard_frame();
-    }
-
-    fn forget_histories(&self) {
-        self.inner.forget_histories();
-    }
-
-    fn imports_targets_of(&self, view: &str) -> bool {
-        self.inner.imports_targets_of(view)
-    }
-
-    fn objects_epoch(&self, frame: &B::Frame) -> u64 {
-        self.inner.objects_epoch(frame)
-    }
-
-    fn target_memory(&self, frame: &B::Frame) -> TargetMemory {
-        self.inner.target_memory(frame)
-    }
-
     fn upload_objects(
         &self,
         worker: &Worker,
@@ -164,26 +141,6 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
 
     fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         self.inner.prepare(worker, frame, pass)
-    }
-
-    fn has_background_work(&self) -> bool {
-        self.inner.has_background_work()
-    }
-
-    fn work_in_background(&self) {
-        self.inner.work_in_background();
-    }
-
-    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
-        self.inner.counters(count);
-    }
-
-    fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        self.inner.replace_view(frame, request)
-    }
-
-    fn part_count(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> usize {
-        self.inner.part_count(frame, pass)
     }
 
     fn record(
@@ -220,9 +177,5 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         emit: &mut dyn FnMut(B::Commands),
     ) -> Result<(), BackendError> {
         self.inner.finish_together(worker, frame, passes, parts, emit)
-    }
-
-    fn recording_choice(&self, frame: &B::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
-        self.inner.recording_choice(frame, pass, labels)
     }
 }

@@ -1,0 +1,65 @@
+//! What backends that wrap another one have in common.
+
+/// The methods of [`Backend`](drawloom::backend::Backend) that a wrapper of the backend `inner` passes on as they are.
+macro_rules! forward_unchanged_calls {
+    () => {
+        fn uploaded_bytes(&self) -> u64 {
+            self.inner.uploaded_bytes()
+        }
+
+        fn discard_frame(&self) {
+            self.inner.discard_frame();
+        }
+
+        fn forget_histories(&self) {
+            self.inner.forget_histories();
+        }
+
+        fn imports_targets_of(&self, view: &str) -> bool {
+            self.inner.imports_targets_of(view)
+        }
+
+        fn objects_epoch(&self, frame: &B::Frame) -> u64 {
+            self.inner.objects_epoch(frame)
+        }
+
+        fn target_memory(&self, frame: &B::Frame) -> ::drawloom::backend::TargetMemory {
+            self.inner.target_memory(frame)
+        }
+
+        fn has_background_work(&self) -> bool {
+            self.inner.has_background_work()
+        }
+
+        fn work_in_background(&self) {
+            self.inner.work_in_background();
+        }
+
+        fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+            self.inner.counters(count);
+        }
+
+        fn replace_view(
+            &self,
+            frame: &mut B::Frame,
+            request: &::drawloom::backend::ViewRequest<'_>,
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.replace_view(frame, request)
+        }
+
+        fn part_count(&self, frame: &B::Frame, pass: &::drawloom::backend::PassRequest<'_>) -> usize {
+            self.inner.part_count(frame, pass)
+        }
+
+        fn recording_choice(
+            &self,
+            frame: &B::Frame,
+            pass: usize,
+            labels: &::std::sync::Arc<::drawloom::timeline::Labels>,
+        ) -> Option<::drawloom::timeline::TuningChoice> {
+            self.inner.recording_choice(frame, pass, labels)
+        }
+    };
+}
+
+pub(crate) use forward_unchanged_calls;
