@@ -15,7 +15,7 @@ pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
 pub use slot::FrameSlot;
 
 use self::queues::LoopQueues;
-use self::slot::{AwaitedFrame, FrameQueues, Submission};
+use self::slot::{AwaitedFrame, DeviceTask, FrameQueues, Submission};
 use super::{FramePlace, Renderer, Submitter};
 use crate::backend::{Backend, BackendError};
 use crate::fence::FenceError;
@@ -91,7 +91,7 @@ where
         let mut frames = Self { renderer: Some(renderer), queues, threads: Vec::new(), begun: 0 };
         // The submitter itself cannot leave its thread, which is what makes that the device thread; what it submits to can.
         let (backend, timeline) = submitter.into_parts();
-        frames.spawn("drawloom device", move |queues| submit_frames(&Submitter::new(backend, timeline), queues))?;
+        frames.spawn("drawloom device", move |queues| submit_frames(Submitter::new(backend, timeline), queues))?;
         frames.spawn("drawloom completion", await_frames)?;
         Ok(frames)
     }
@@ -137,6 +137,16 @@ where
         self.queues.set_device_limit(limit);
     }
 
+    /// Puts another backend in the place of this one, from the next frame on, and waits for nothing: see [`Renderer::replace_backend`], which
+    /// also says what is left to the engine. Frames that were recorded before still go to the backend before, if they are handed over before
+    /// this call; a frame of it that comes later is reported as lost, with
+    /// [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame). Several frames in flight report one lost device, each for itself, so
+    /// an engine replaces a device once and ignores what frames with smaller [numbers](FrameSlot::number) report of the one before.
+    pub fn replace_backend(&mut self, backend: B) {
+        let (backend, timeline) = self.renderer().replace_backend(backend).into_parts();
+        self.queues.add_task(DeviceTask::ReplaceBackend(backend, timeline));
+    }
+
     /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since the last
     /// [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is dropped.
     pub fn finish(mut self) -> (Renderer<B>, Vec<FinishedFrame<B>>) {
@@ -164,11 +174,18 @@ where
 }
 
 /// The device thread: submits frames in the order in which they come.
-fn submit_frames<B: Backend>(submitter: &Submitter<B>, queues: &FrameQueues<B>)
+fn submit_frames<B: Backend>(mut submitter: Submitter<B>, queues: &FrameQueues<B>)
 where
     B::Submission: Send,
 {
-    while let Some(frame) = queues.next_to_submit() {
+    while let Some(task) = queues.next_task() {
+        let frame = match task {
+            DeviceTask::Submit(frame) => frame,
+            DeviceTask::ReplaceBackend(backend, timeline) => {
+                submitter = Submitter::new(backend, timeline);
+                continue;
+            }
+        };
         let (slot, mut recorded, after) = (frame.slot, frame.recorded, frame.after);
         let start = Instant::now();
         let submit = || {

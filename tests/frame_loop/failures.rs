@@ -91,6 +91,38 @@ fn a_frame_that_fails_while_it_is_recorded_frees_its_slot() {
 }
 
 #[test]
+fn another_backend_takes_over_while_frames_of_the_one_before_are_in_flight() {
+    let scene = field(5);
+    let backend = || SimulatedDevice::new(NullBackend, Duration::from_millis(5));
+    let (renderer, submitter) = renderer(backend(), 2);
+    let mut frames = FrameLoop::new(renderer, submitter, Buffering::Triple).unwrap();
+    let mut all = Vec::new();
+    let mut late = None;
+    for number in 1..=5 {
+        let (slot, finished) = frames.begin();
+        all.extend(finished);
+        let recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
+        match number {
+            2 => late = Some((slot, recorded)),
+            3 => {
+                // Recorded and handed over before, so it goes to the backend before.
+                slot.submit(recorded);
+                frames.replace_backend(backend());
+                let (slot, recorded) = late.take().unwrap();
+                slot.submit(recorded);
+            }
+            _ => slot.submit(recorded),
+        }
+    }
+    all.extend(frames.finish().1);
+    all.sort_by_key(|frame| frame.number);
+    let outcomes: Vec<_> = all.iter().map(|frame| frame.outcome.as_ref().err()).collect();
+    let [None, Some(FrameLoopError::Submit(SubmitError::ForeignFrame)), None, None, None] = outcomes[..] else {
+        panic!("{outcomes:?}");
+    };
+}
+
+#[test]
 fn a_submitter_of_another_renderer_is_refused() {
     let (one, _submitter) = renderer(NullBackend, 1);
     let (_renderer, other) = renderer(NullBackend, 1);

@@ -79,8 +79,7 @@ type SoakLoop = FrameLoop<FaultyBackend<WgpuBackend>>;
 
 /// Draws the world.
 pub struct Engine {
-    /// `None` only while another device takes the place of one that is lost.
-    frames: Option<SoakLoop>,
+    frames: SoakLoop,
     world: World,
     panics: Arc<AtomicBool>,
     in_flight: usize,
@@ -100,11 +99,7 @@ impl Engine {
         let (renderer, submitter) =
             Renderer::builder(open()).deferred(Deferred::to_picture()).process(process).build(scheduler).unwrap();
         let frames = FrameLoop::new(renderer, submitter, Buffering::Double).unwrap();
-        Self { frames: Some(frames), world: World::new(), panics, in_flight: 0, totals: Totals::default() }
-    }
-
-    fn frames(&mut self) -> &mut SoakLoop {
-        self.frames.as_mut().expect("it is there between frames")
+        Self { frames, world: World::new(), panics, in_flight: 0, totals: Totals::default() }
     }
 
     /// Changes the world or a setting, and draws a frame; now and then one in which something fails.
@@ -113,12 +108,12 @@ impl Engine {
         match random.below(400) {
             0 => {
                 let quality = [Quality::fast(), Quality::balanced(), Quality::exact()][random.below(3)];
-                self.frames().renderer().set_quality(quality).unwrap();
+                self.frames.renderer().set_quality(quality).unwrap();
                 self.totals.qualities += 1;
             }
             1..5 => {
                 let buffering = Buffering::ALL[random.below(3)];
-                self.frames().set_buffering(buffering);
+                self.frames.set_buffering(buffering);
                 self.totals.bufferings += 1;
             }
             5 | 6 => {
@@ -136,13 +131,12 @@ impl Engine {
 
     /// Draws a frame. Those that finished meanwhile have no error.
     fn draw(&mut self) -> Result<(), FrameError> {
-        let frames = self.frames.as_mut().expect("it is there between frames");
-        let (slot, finished) = frames.begin();
+        let (slot, finished) = self.frames.begin();
         self.in_flight -= finished.len();
         for frame in finished {
             frame.outcome.unwrap();
         }
-        let recorded = frames.renderer().record(self.world.scene.as_scene_ref())?;
+        let recorded = self.frames.renderer().record(self.world.scene.as_scene_ref())?;
         slot.submit(recorded);
         self.in_flight += 1;
         self.totals.frames += 1;
@@ -154,7 +148,7 @@ impl Engine {
     fn drain(&mut self) -> Vec<FinishedFrame<FaultyBackend<WgpuBackend>>> {
         let mut all = Vec::new();
         while all.len() < self.in_flight {
-            let (slot, finished) = self.frames().begin();
+            let (slot, finished) = self.frames.begin();
             all.extend(finished);
             drop(slot);
             if all.len() < self.in_flight {
@@ -194,7 +188,7 @@ impl Engine {
         let fault = faults[random.below(faults.len())].clone();
         let is_delay = matches!(fault, Fault::Delay(_));
         let kind = CallKind::ALL[random.below(CallKind::ALL.len())];
-        self.frames().renderer().backend().inject(kind, random.below(4), fault);
+        self.frames.renderer().backend().inject(kind, random.below(4), fault);
         let recorded = self.draw();
         let mut errors: Vec<Option<bool>> = Vec::new();
         if let Err(error) = &recorded {
@@ -209,7 +203,7 @@ impl Engine {
                 Err(error) => panic!("not a submission's error: {error}"),
             }
         }
-        let backend = self.frames().renderer().backend();
+        let backend = self.frames.renderer().backend();
         let came = backend.failed_call();
         backend.clear();
         let expected = usize::from(came.is_some() && !is_delay);
@@ -223,20 +217,15 @@ impl Engine {
 
     /// Another device takes the place of one that is lost.
     fn replace_device(&mut self) {
-        let frames = self.frames.take().expect("it is there between frames");
-        let buffering = frames.buffering();
-        let (mut renderer, finished) = frames.finish();
-        assert!(finished.is_empty());
-        let submitter = renderer.replace_backend(open());
-        self.frames = Some(FrameLoop::new(renderer, submitter, buffering).unwrap());
+        self.frames.replace_backend(open());
         self.totals.losses += 1;
     }
 
     /// Makes everything as it was at first, and waits for all frames.
     pub fn rest(&mut self) {
         self.world.reset();
-        self.frames().renderer().set_quality(Quality::balanced()).unwrap();
-        self.frames().set_buffering(Buffering::Double);
+        self.frames.renderer().set_quality(Quality::balanced()).unwrap();
+        self.frames.set_buffering(Buffering::Double);
         for _ in 0..150 {
             self.draw().unwrap();
         }

@@ -78,7 +78,7 @@ pub enum FrameLoopError {
 
 impl FrameLoopError {
     /// What the backend or its device says, if that is why the frame is lost: after [`BackendError::DeviceLost`] the engine
-    /// [finishes](super::FrameLoop::finish) the loop, and [replaces the backend](crate::Renderer::replace_backend).
+    /// [replaces the backend](super::FrameLoop::replace_backend).
     pub fn backend_error(&self) -> Option<&BackendError> {
         match self {
             Self::Submit(error) => error.backend_error(),

@@ -9,33 +9,34 @@ use super::Buffering;
 use crate::fence::{current_thread, list_wait};
 
 /// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.
-pub(super) struct LoopQueues<Recorded, Awaited, Finished> {
-    state: Mutex<State<Recorded, Awaited, Finished>>,
+/// `Task` is what the device thread does.
+pub(super) struct LoopQueues<Task, Awaited, Finished> {
+    state: Mutex<State<Task, Awaited, Finished>>,
     /// Notified at each change: no more than three threads wait.
     changed: Condvar,
 }
 
-struct State<Recorded, Awaited, Finished> {
+struct State<Task, Awaited, Finished> {
     buffering: Buffering,
     device_limit: Duration,
     /// Slots that are taken.
     in_flight: usize,
-    recorded: VecDeque<Recorded>,
+    tasks: VecDeque<Task>,
     awaited: VecDeque<Awaited>,
     finished: Vec<Finished>,
-    /// No frame comes after those in `recorded`.
+    /// No task comes after those in `tasks`.
     is_closed: bool,
     /// No frame comes after those in `awaited`.
     is_submission_over: bool,
 }
 
-impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
+impl<Task, Awaited, Finished> LoopQueues<Task, Awaited, Finished> {
     pub(super) fn new(buffering: Buffering, device_limit: Duration) -> Self {
         let state = State {
             buffering,
             device_limit,
             in_flight: 0,
-            recorded: VecDeque::new(),
+            tasks: VecDeque::new(),
             awaited: VecDeque::new(),
             finished: Vec::new(),
             is_closed: false,
@@ -66,23 +67,23 @@ impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
         std::mem::take(&mut self.state.lock().finished)
     }
 
-    /// Adds a frame for the device thread. After the loop has ended there is none, and the frame is dropped.
-    pub(super) fn add_recorded(&self, frame: Recorded) {
+    /// Adds a task for the device thread. After the loop has ended there is none, and the task is dropped.
+    pub(super) fn add_task(&self, task: Task) {
         let mut state = self.state.lock();
         if state.is_closed {
-            // Dropping it frees its slot, which locks.
+            // Dropping a frame frees its slot, which locks.
             drop(state);
-            drop(frame);
+            drop(task);
             return;
         }
-        state.recorded.push_back(frame);
+        state.tasks.push_back(task);
         drop(state);
         self.changed.notify_all();
     }
 
-    /// Waits for the next frame to submit; `None` when the loop ends.
-    pub(super) fn next_to_submit(&self) -> Option<Recorded> {
-        self.next(|state| state.recorded.pop_front(), |state| state.is_closed)
+    /// Waits for the device thread's next task; `None` when the loop ends.
+    pub(super) fn next_task(&self) -> Option<Task> {
+        self.next(|state| state.tasks.pop_front(), |state| state.is_closed)
     }
 
     pub(super) fn add_awaited(&self, frame: Awaited) {
@@ -98,7 +99,7 @@ impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
         self.change(|state| state.finished.push(frame));
     }
 
-    /// Ends the loop when the frames that are recorded are submitted.
+    /// Ends the loop when all tasks are done.
     pub(super) fn close(&self) {
         self.change(|state| state.is_closed = true);
     }
@@ -124,7 +125,7 @@ impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
         self.change(|state| state.device_limit = limit);
     }
 
-    fn change(&self, change: impl FnOnce(&mut State<Recorded, Awaited, Finished>)) {
+    fn change(&self, change: impl FnOnce(&mut State<Task, Awaited, Finished>)) {
         change(&mut self.state.lock());
         self.changed.notify_all();
     }
@@ -132,8 +133,8 @@ impl<Recorded, Awaited, Finished> LoopQueues<Recorded, Awaited, Finished> {
     /// Waits until `take` finds something, or `is_over`.
     fn next<T>(
         &self,
-        take: impl Fn(&mut State<Recorded, Awaited, Finished>) -> Option<T>,
-        is_over: impl Fn(&State<Recorded, Awaited, Finished>) -> bool,
+        take: impl Fn(&mut State<Task, Awaited, Finished>) -> Option<T>,
+        is_over: impl Fn(&State<Task, Awaited, Finished>) -> bool,
     ) -> Option<T> {
         let mut state = self.state.lock();
         loop {

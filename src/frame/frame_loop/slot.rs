@@ -8,9 +8,10 @@ use super::queues::LoopQueues;
 use crate::backend::Backend;
 use crate::fence::Fence;
 use crate::frame::{Recorded, Submitted};
+use crate::timeline::Timeline;
 
 /// The queues of a loop.
-pub(super) type FrameQueues<B> = LoopQueues<RecordedFrame<B>, AwaitedFrame<B>, FinishedFrame<B>>;
+pub(super) type FrameQueues<B> = LoopQueues<DeviceTask<B>, AwaitedFrame<B>, FinishedFrame<B>>;
 
 /// A frame's place among the frames in flight. It is free again when the device has drawn the frame, or when this is dropped.
 #[must_use = "a slot is freed when it is dropped"]
@@ -57,7 +58,7 @@ where
     pub fn submit_then(self, recorded: Recorded<B>, after: impl FnOnce(&Submitted<B>) + Send + 'static) {
         let queues = Arc::clone(&self.queues);
         let frame = RecordedFrame { slot: self, recorded, after: Box::new(after), recorded_at: Instant::now() };
-        queues.add_recorded(frame);
+        queues.add_task(DeviceTask::Submit(frame));
     }
 }
 
@@ -72,6 +73,16 @@ where
 
 /// What the engine does when a frame is submitted.
 type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
+
+/// What the device thread does next.
+pub(super) enum DeviceTask<B: Backend>
+where
+    B::Submission: Send,
+{
+    Submit(RecordedFrame<B>),
+    /// Go on with another backend: what a submitter on that thread is made of.
+    ReplaceBackend(Arc<B>, Arc<Timeline>),
+}
 
 /// A frame on its way to the device thread.
 pub(super) struct RecordedFrame<B: Backend>
