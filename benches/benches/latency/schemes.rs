@@ -25,6 +25,31 @@ const UPDATE: Duration = Duration::from_millis(2);
 const FRAMES: usize = 40;
 const FIRST_FRAMES: usize = 5;
 
+/// How long the simulated device takes for frames.
+struct SimulatedTime {
+    name: &'static str,
+    device_time: Duration,
+    /// The time of each eighth frame.
+    each_8th: Duration,
+}
+
+impl SimulatedTime {
+    const fn constant(name: &'static str, device_time: Duration) -> Self {
+        Self { name, device_time, each_8th: device_time }
+    }
+}
+
+const SIMULATED_TIMES: [SimulatedTime; 4] = [
+    SimulatedTime::constant("1 ms", Duration::from_millis(1)),
+    SimulatedTime::constant("2.5 ms", Duration::from_micros(2_500)),
+    SimulatedTime::constant("6 ms", Duration::from_millis(6)),
+    SimulatedTime {
+        name: "2 ms, each 8th 8 ms",
+        device_time: Duration::from_millis(2),
+        each_8th: Duration::from_millis(8),
+    },
+];
+
 #[derive(Serialize)]
 pub struct Row {
     pub device: String,
@@ -44,18 +69,12 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
     let mut rows = Vec::new();
     match backend {
         BackendName::Noop => {
-            for (name, device_time) in [("1 ms", 1), ("2.5 ms", 2), ("6 ms", 6), ("2 ms, each 8th 8 ms", 2)] {
-                let boxes = if quick { 100 } else { 4_000 };
-                let device_time = match name {
-                    "2.5 ms" => Duration::from_micros(2_500),
-                    _ => Duration::from_millis(device_time),
-                };
+            let boxes = if quick { 100 } else { 4_000 };
+            for SimulatedTime { name, device_time, each_8th } in SIMULATED_TIMES {
+                let time_of = |frame: usize| if frame.is_multiple_of(8) { each_8th } else { device_time };
                 let open = || {
                     let device = SimulatedDevice::new(BackendName::Noop.open()?, device_time);
-                    let all = (turns + 1) * FRAMES;
-                    let long = |frame: usize| Duration::from_millis(if frame.is_multiple_of(8) { 8 } else { 2 });
-                    let times = name.contains("8th").then(|| (0..all).map(long)).into_iter().flatten();
-                    Ok(device.with_next_times(times))
+                    Ok(device.with_next_times((0..(turns + 1) * FRAMES).map(time_of)))
                 };
                 rows.extend(of_device(name, open, SimulatedDevice::inner, boxes, turns, progress)?);
             }

@@ -97,13 +97,20 @@ impl WgpuBackend {
         fences: Vec<(usize, FenceSetter)>,
     ) -> Result<(), BackendError> {
         let mut submitted = 0;
+        let mut latest = None;
         for (count, setter) in fences {
-            // An error scope of its own, as a fence must not be set for what the device has refused.
-            let part = commands.take(count - submitted);
-            let index = with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
-            check_device(&self.device)?;
+            let index = match latest {
+                Some(index) if count == submitted => index,
+                _ => {
+                    // An error scope of its own, as a fence must not be set for what the device has refused.
+                    let part = commands.take(count - submitted);
+                    let index = with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
+                    check_device(&self.device)?;
+                    index
+                }
+            };
             set_when_done(&self.device, self.queue(), &index, setter);
-            submitted = count;
+            (submitted, latest) = (count, Some(index));
         }
         Ok(())
     }
