@@ -58,7 +58,7 @@ where
     pub fn submit_then(self, recorded: Recorded<B>, after: impl FnOnce(&Submitted<B>) + Send + 'static) {
         let queues = Arc::clone(&self.queues);
         let frame = RecordedFrame { slot: self, recorded, after: Box::new(after), recorded_at: Instant::now() };
-        queues.add_task(DeviceTask::Submit(frame));
+        queues.add_task(DeviceTask::Submit(Box::new(frame)));
     }
 }
 
@@ -79,7 +79,7 @@ pub(super) enum DeviceTask<B: Backend>
 where
     B::Submission: Send,
 {
-    Submit(RecordedFrame<B>),
+    Submit(Box<RecordedFrame<B>>),
     /// Go on with another backend: what a submitter on that thread is made of.
     ReplaceBackend(Arc<B>, Arc<Timeline>),
 }
