@@ -21,6 +21,8 @@ pub struct FrameStatistics {
     pub views: Vec<ViewStatistics>,
     /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is not drawn.
     pub view_times: Vec<Duration>,
+    /// What the frame did with the scene's [pieces](crate::scene::Piece).
+    pub pieces: PieceStatistics,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
     /// The memory of the frame's targets. The software backend does not tell.
@@ -43,8 +45,12 @@ pub struct ViewStatistics {
     /// How many frames before this one it was drawn: 0 if this frame draws it. Else all figures below are 0: see
     /// [`Redraw`](crate::scene::Redraw).
     pub age: u32,
-    /// Objects it sees.
+    /// Objects it sees, and all those that it executes with pieces.
     pub visible: usize,
+    /// Pieces that it executes.
+    pub pieces: usize,
+    /// The objects of these pieces.
+    pub objects_of_pieces: usize,
     /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
     pub occluded: usize,
     /// Lights that reach it.
@@ -61,6 +67,17 @@ pub struct ViewStatistics {
     /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) is 0 or no mesh
     /// has levels.
     pub levels_of_detail: Option<LevelStatistics>,
+}
+
+/// What a frame did with the scene's [pieces](crate::scene::Piece), which is the number of pieces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PieceStatistics {
+    /// That were recorded by earlier frames, so that views may execute them.
+    pub executable: usize,
+    /// That this frame records.
+    pub recorded: usize,
+    /// With an object that is reported as changed.
+    pub changed: usize,
 }
 
 /// The triangles of objects at their levels of detail, over all processes of a view, before any are subdivided or culled.
@@ -123,6 +140,7 @@ impl FrameStatistics {
             lights: request.lights.len(),
             views,
             view_times: tables.view_times.times().collect(),
+            pieces: tables.pieces.statistics(),
             uploaded,
             targets,
             stages,
@@ -135,11 +153,14 @@ impl FrameStatistics {
 impl ViewStatistics {
     /// The statistics of a view, by index, before its passes are counted.
     fn without_passes(index: usize, view: &RenderView, tables: &FrameTables) -> Self {
+        let visibility = &tables.visibility[index];
         Self {
             name: view.name().to_owned(),
             kind: view.kind(),
             age: view.age,
-            visible: tables.visibility[index].set.count(),
+            visible: visibility.set.count() + visibility.pieces.object_count(),
+            pieces: visibility.pieces.executed().len(),
+            objects_of_pieces: visibility.pieces.object_count(),
             occluded: tables.occlusion[index].hidden(),
             lights: tables.lights[index].light_count(),
             commands: 0,
@@ -152,7 +173,7 @@ impl ViewStatistics {
 
     fn add_pass(&mut self, table: &PassTable, assets: &Assets) {
         let list = table.list.read();
-        self.commands += list.objects.len();
+        self.commands += list.drawn_count();
         self.batches += list.batches.len();
         self.bundles += list.bundle_count();
         self.culled_triangles += table.triangles.read().culled();
