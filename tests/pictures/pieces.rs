@@ -8,8 +8,9 @@ use drawloom::backend::{
 };
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::{Changes, LayerMask, Piece, RenderObject, Scene, SceneRef};
+use drawloom::scene::{Changes, Piece, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, RendererBuilder, Submitted, Submitter};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
@@ -18,13 +19,20 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::device;
+use crate::sampled_views::{MIRROR, SURFACE};
 use crate::strategies::{expect, many_batches};
 
 pub const CASES: &[Case] = &[
     ("pieces_of_a_changing_world_do_not_change_its_pictures", || changing_world(|| on_the_device(Ok))),
-    ("pieces_of_a_changing_world_do_not_change_its_pictures_in_software", || changing_world(in_software)),
-    ("pieces_change_no_shadow_mirror_or_light", || everything(|| on_the_device(Ok))),
-    ("pieces_change_no_shadow_mirror_or_light_in_software", || everything(in_software)),
+    ("pieces_of_a_changing_world_do_not_change_its_pictures_in_software", || {
+        changing_world(|| in_software_with(|builder| builder))
+    }),
+    ("pieces_change_no_shadow_mirror_or_light", || {
+        everything(|| on_the_device_with(Ok, |builder| builder.process(MIRROR)))
+    }),
+    ("pieces_change_no_shadow_mirror_or_light_in_software", || {
+        everything(|| in_software_with(|builder| builder.process(MIRROR)))
+    }),
     ("no_strategy_changes_the_picture_of_pieces", strategies),
 ];
 
@@ -39,7 +47,8 @@ impl<B: Backend> Painter<B> {
     /// The pictures of all cameras, and how many pieces all views executed.
     fn draw(&mut self, scene: SceneRef<'_>) -> Result<(Vec<Picture>, usize), Failed> {
         let submitted = self.submitter.submit(self.renderer.record(scene)?)?;
-        let pictures = (0..scene.cameras.len()).map(|view| (self.read)(&submitted, view));
+        let main = scene.cameras.iter().enumerate().filter(|(_, camera)| camera.kind == ViewKind::Main);
+        let pictures = main.map(|(view, _)| (self.read)(&submitted, view));
         let executed = submitted.statistics.views.iter().map(|view| view.pieces).sum();
         Ok((pictures.collect::<Result<_, _>>()?, executed))
     }
@@ -56,26 +65,33 @@ impl<B: Backend> Painter<B> {
     }
 }
 
-fn build<B: Backend>(
-    builder: RendererBuilder<B>,
-    scheduler: Arc<Scheduler>,
-) -> Result<(Renderer<B>, Submitter<B>), Failed> {
-    Ok(builder.deferred(Deferred::to_picture()).build(scheduler)?)
+/// The shipped processes with small shadow maps.
+fn deferred() -> Deferred {
+    Deferred::to_picture().shadow_maps(Some(ShadowMaps { side: 48, ..ShadowMaps::default() }))
 }
 
 fn on_the_device(
     with: impl FnOnce(WgpuBackend) -> Result<WgpuBackend, BackendError>,
 ) -> Result<Painter<WgpuBackend>, Failed> {
+    on_the_device_with(with, |builder| builder)
+}
+
+fn on_the_device_with(
+    with: impl FnOnce(WgpuBackend) -> Result<WgpuBackend, BackendError>,
+    build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+) -> Result<Painter<WgpuBackend>, Failed> {
     let (device, queue) = device().ok_or("there is no graphics adapter")?;
-    let builder = Renderer::builder(with(WgpuBackend::new(device, queue)?)?);
-    let (renderer, submitter) = build(builder, Arc::new(Scheduler::new(2)?))?;
+    let builder = Renderer::builder(with(WgpuBackend::new(device, queue)?)?).deferred(deferred());
+    let (renderer, submitter) = build(builder).build(Arc::new(Scheduler::new(2)?))?;
     Ok(Painter { renderer, submitter, read: |submitted, view| Ok(submitted.submission.read(view, "picture")?) })
 }
 
-fn in_software() -> Result<Painter<SoftwareBackend>, Failed> {
+fn in_software_with(
+    build: impl FnOnce(RendererBuilder<SoftwareBackend>) -> RendererBuilder<SoftwareBackend>,
+) -> Result<Painter<SoftwareBackend>, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
-    let (renderer, submitter) = build(builder, scheduler)?;
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred());
+    let (renderer, submitter) = build(builder).build(scheduler)?;
     Ok(Painter { renderer, submitter, read: |submitted, view| Ok(submitted.submission.read(view, "picture")?) })
 }
 
@@ -122,7 +138,8 @@ fn changing_world<B: Backend>(new: fn() -> Result<Painter<B>, Failed>) -> Result
 /// Lights of all kinds with shadow maps, a mirror, and blended objects.
 fn everything<B: Backend>(new: fn() -> Result<Painter<B>, Failed>) -> Result<(), Failed> {
     let (mut with, mut plain) = (new()?, new()?);
-    let mut scene = everything_with_mirror(LayerMask::layer(1));
+    let mut scene = everything_with_mirror(SURFACE);
+    scene.cameras.iter_mut().for_each(|camera| camera.size = [48, 32]);
     let objects = scene.as_scene_ref().object_count();
     scene.pieces = (0..objects as u32)
         .step_by(3)
