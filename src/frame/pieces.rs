@@ -394,6 +394,11 @@ impl PieceTable {
         PieceStatistics { executable, recorded: self.recording.len(), changed }
     }
 
+    /// The name of one of the pieces that this frame records, by index among them.
+    pub(super) fn recorded_name(&self, index: usize) -> &str {
+        &self.pieces[self.recording[index] as usize].piece.name
+    }
+
     /// Records one of the pieces that this frame records, by index among them. `is_recordable` says whether objects with the mesh in a slot may be
     /// recorded, and `can_merge` whether they become one draw.
     pub(super) fn record(

@@ -352,6 +352,7 @@ impl<B: Backend> Renderer<B> {
         self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value));
         let memory = (uploaded, self.backend.target_memory(&frame));
         let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
+        statistics.count_pieces(self.scheduler.timeline());
         self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);

@@ -7,7 +7,7 @@ use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
-use crate::timeline::{FrameTuning, TuningSubject};
+use crate::timeline::{FrameTuning, Timeline, TuningSubject};
 use crate::view::{Rejection, RenderView};
 
 /// Statistics of a frame.
@@ -119,6 +119,17 @@ impl FrameStatistics {
     pub fn rungs(&self) -> impl Iterator<Item = (&str, usize)> {
         let choices = self.tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::Rung);
         choices.filter_map(|choice| Some((choice.labels.view.as_deref()?, choice.chosen)))
+    }
+
+    /// Tells a timeline what the frame did with pieces, if the scene has any.
+    pub(super) fn count_pieces(&self, timeline: &Timeline) {
+        if self.pieces != PieceStatistics::default() {
+            let executed = self.views.iter().map(|view| view.pieces).sum::<usize>();
+            let objects = self.views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
+            timeline.count("pieces recorded", self.pieces.recorded as f64);
+            timeline.count("pieces executed", executed as f64);
+            timeline.count("objects of executed pieces", objects as f64);
+        }
     }
 
     /// The statistics of a frame whose stages have run.

@@ -7,15 +7,17 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::Quality;
+use drawloom::report::{FrameReport, SchedulerCosts};
 use drawloom::scene::{
     Blend, Camera, Changes, Light, Material, ObjectFilter, ObjectSet, Piece, RenderObject, Scene, SceneError, SceneRef,
 };
 use drawloom::task::Scheduler;
+use drawloom::timeline::Log;
 use drawloom::view::RejectionReason;
 use drawloom::{FrameError, FrameStatistics, PieceStatistics, Renderer, Submitter};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
-use drawloom_testing::scenes::{cube, field};
+use drawloom_testing::scenes::cube;
 use proptest::prelude::*;
 
 fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -275,4 +277,38 @@ fn pieces_that_contradict_each_other_are_errors_and_the_next_frame_is_right() {
     rows.scene.pieces[2].name = "row 2".to_owned();
     assert_eq!(rows.frame(Changes::NONE), [0, ROWS, 0, 0]);
     assert_eq!(rows.frame(Changes::NONE), [ROWS, 0, 0, ROWS - 1]);
+}
+
+#[test]
+fn a_timeline_has_slices_of_the_pieces_that_a_frame_records_and_executes() {
+    let mut rows = Rows::new();
+    let log = |rows: &mut Rows| {
+        rows.renderer.scheduler().timeline().start();
+        rows.frame(Changes::NONE);
+        rows.renderer.scheduler().timeline().take()
+    };
+    let width_of = |log: &Log, stage: &str| {
+        let nodes = log.runs[0].graph.nodes.iter().enumerate();
+        let of_stage = nodes.filter(|(_, node)| node.labels.stage.as_deref() == Some(stage));
+        of_stage.map(|(index, _)| log.runs[0].width(index)).sum::<usize>()
+    };
+    let counter = |log: &Log, name: &str| {
+        log.counters.iter().find(|counter| counter.name == name).map_or(f64::NAN, |counter| counter.value)
+    };
+    let recording = log(&mut rows);
+    assert_eq!(width_of(&recording, "record pieces"), ROWS);
+    let mut names: Vec<_> = recording.spans.iter().map(|span| span.name.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names[1..], (0..ROWS).map(|row| format!("record piece \"row {row}\"")).collect::<Vec<_>>());
+    assert_eq!(counter(&recording, "pieces recorded"), ROWS as f64);
+    // In the first frame that executes them, and where nothing is made anew.
+    for _ in 0..3 {
+        let executing = log(&mut rows);
+        assert_eq!((width_of(&executing, "record pieces"), width_of(&executing, "execute pieces")), (0, 1));
+        assert_eq!(executing.spans.len(), 1, "{:?}", executing.spans);
+        assert_eq!(counter(&executing, "pieces executed"), ROWS as f64);
+        assert_eq!(counter(&executing, "objects of executed pieces"), (ROWS * IN_ROW) as f64);
+        let report = FrameReport::new(&executing, executing.frames[0].number, &SchedulerCosts::ZERO).unwrap();
+        assert!(report.slack.iter().any(|slack| slack.name.contains("execute pieces")), "{:?}", report.slack);
+    }
 }

@@ -32,7 +32,11 @@ impl<B: Backend> Stage<B> for RecordPieces {
         let tables = frame.tables;
         let changes_by_view =
             |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.cullable_meshes.contains(mesh);
+        let timeline = job.worker.timeline();
         for index in job.items {
+            // A slice of its own, by name.
+            let name = || format!("record piece {:?}", tables.pieces.recorded_name(index));
+            let _span = timeline.is_on().then(|| timeline.span(name()));
             let is_recordable = |mesh| !changes_by_view(mesh);
             tables.pieces.record(index, frame.request.scene, &tables.objects, is_recordable, |_| frame.instancing);
         }
@@ -62,10 +66,15 @@ impl<B: Backend> Stage<B> for ExecutePieces {
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        usize::from(frame.has_pieces(self.pass) && !frame.keeps_list(self.pass))
+        let executed = frame.tables.visibility[frame.view_index_of(self.pass)].pieces.executed();
+        // A kept list executes them as well: the stage is there in every frame that does, for the timeline.
+        usize::from(frame.has_pieces(self.pass) && (!executed.is_empty() || !frame.keeps_list(self.pass)))
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        if frame.keeps_list(self.pass) {
+            return Ok(());
+        }
         let table = &frame.tables.passes[self.pass];
         let pieces = &frame.tables.visibility[frame.view_index_of(self.pass)].pieces;
         if let Some(selection) = table.selection {
