@@ -20,6 +20,7 @@ mod occluders;
 mod occlusion_control;
 mod pass_recording;
 mod pass_runs;
+mod piece_statistics;
 mod pieces;
 mod plan_cache;
 mod recorded;
@@ -58,8 +59,9 @@ pub use frame_place::FramePlace;
 pub use granularity::Granularity;
 #[cfg(feature = "report")]
 pub(crate) use job_size::job_size;
+pub use piece_statistics::PieceStatistics;
 pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
-pub use statistics::{FrameStatistics, LevelStatistics, PieceStatistics, StageTimes, ViewStatistics};
+pub use statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};
 pub use view_budget::ViewBudget;
 pub use warm_up::WarmUp;

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::statistics::PieceStatistics;
+use super::piece_statistics::PieceStatistics;
 use crate::command::{BinnedSegment, DrawList, ListPieces, Selection, Version};
 use crate::scene::{Changes, Piece, SceneError, SceneRef};
 use crate::view::{GroupBounds, ObjectTable, ObjectWord, SelectionFilter, bin_objects, recordable_objects, set_bits};

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::piece_statistics::PieceStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
@@ -67,17 +68,6 @@ pub struct ViewStatistics {
     /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) is 0 or no mesh
     /// has levels.
     pub levels_of_detail: Option<LevelStatistics>,
-}
-
-/// What a frame did with the scene's [pieces](crate::scene::Piece), which is the number of pieces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PieceStatistics {
-    /// That were recorded by earlier frames, so that views may execute them.
-    pub executable: usize,
-    /// That this frame records.
-    pub recorded: usize,
-    /// With an object that is reported as changed.
-    pub changed: usize,
 }
 
 /// The triangles of objects at their levels of detail, over all processes of a view, before any are subdivided or culled.

@@ -57,7 +57,7 @@ impl<B: Backend> Stage<B> for ExecutePieces {
             group: StageGroup::Instance,
             chunking: Chunking::PerItem,
             cost_kind: "execute pieces",
-            depends_on_occlusion: false,
+            depends_on_occlusion: true,
         }
     }
 
