@@ -103,8 +103,9 @@ pub use backend::ViewQueue;
 pub use bytemuck;
 pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, FinishedFrame, FrameError, FrameLoop, FrameLoopError, FramePlace,
-    FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics, Recorded, Renderer,
-    RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp,
+    FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics, PieceStatistics, Recorded,
+    Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
+    ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

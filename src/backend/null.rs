@@ -128,13 +128,14 @@ impl Backend for NullBackend {
         &PassRequest { pass, list, .. }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
         ensure(frame.passes.contains(&pass), || format!("prepared passes belong to the frame, but {pass:?} does not"))?;
-        let before = frame.prepared.lock().insert(pass, list.objects.len());
+        let before = frame.prepared.lock().insert(pass, list.drawn_count());
         ensure(before.is_none(), || format!("each pass is prepared once, but {pass:?} is prepared again"))?;
         let commands = list.commands().count();
         ensure(commands == 0 || commands == list.objects.len(), || "a list has one object per command".to_owned())?;
         let ordered = list.commands().is_sorted_by_key(|command| (command.key, command.object));
         ensure(ordered, || "commands are sorted by key and object".to_owned())?;
-        let out_of_range = list.objects.iter().find(|&&object| object as usize >= frame.object_count);
+        let drawn = list.batches.iter().flat_map(|batch| &list.objects[batch.first as usize..][..batch.count as usize]);
+        let out_of_range = drawn.clone().find(|&&object| object as usize >= frame.object_count);
         ensure(out_of_range.is_none(), || format!("drawn objects are in the scene, but {out_of_range:?} is not"))
     }
 
@@ -177,19 +178,18 @@ impl Backend for NullBackend {
                 format!("a pass without commands has no bundles, but one of {:?} has", process.name())
             })?;
         }
-        let mut end = 0;
-        for bundle in &*bundles {
-            ensure(bundle.objects.start == end, || "bundles are finished in order".to_owned())?;
-            end = bundle.objects.end;
-        }
+        let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
+        let in_order = bundles.iter().map(|bundle| bundle.objects.start).eq(first_objects);
+        ensure(in_order, || "bundles are finished in order".to_owned())?;
+        let objects = bundles.iter().map(|bundle| bundle.objects.len()).sum();
         let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
-        ensure(end == prepared, || format!("all prepared objects are recorded, but {end} of {prepared} are"))?;
+        ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
         Ok(NullPass {
             process: process.name().to_owned(),
             view: pass.view_index,
             bundles: bundles.len(),
             batches: bundles.iter().map(|bundle| bundle.batches).sum(),
-            objects: end,
+            objects,
             triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
             lights: match &request.draws[pass.process_index] {
                 Draws::Lights(lights) => request.light_tables[pass.view_index].range(lights.class).len(),
@@ -235,7 +235,7 @@ fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<Null
     })?;
     let start = batches[0].first;
     let (mut end, mut triangles) = (start, 0);
-    for (index, batch) in (bundle * DrawList::BATCHES_PER_BUNDLE..).zip(batches) {
+    for (index, batch) in list.bundle_range(bundle).zip(batches) {
         ensure(batch.first == end && batch.count > 0, || {
             format!("batches have no gaps or overlaps, but there is one at object {end}")
         })?;

@@ -30,6 +30,8 @@ pub struct FrameRequest<'a> {
     pub scene: &'a SceneRef<'a>,
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
+    /// The most objects that a draw list has: all of the scene, and once more those of its pieces.
+    pub list_capacity: usize,
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.

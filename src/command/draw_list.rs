@@ -1,7 +1,8 @@
 //! What one pass draws.
 
-use std::ops::{DerefMut, Range};
+use std::ops::{Deref, DerefMut, Range};
 
+use super::list_pieces::ListPieces;
 use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
@@ -11,15 +12,18 @@ pub struct DrawList {
     /// keep their memory for later frames.
     commands: Vec<Vec<RenderCommand>>,
     bucket_count: usize,
-    /// The batches in draw order.
+    /// The batches in draw order: those of the pieces that the view executes, then all others.
     pub batches: Vec<Batch>,
-    /// The object index of each command: the 4 bytes per object that a pass uploads.
+    /// What batches draw: the object index of each command, which are the 4 bytes per object that a pass uploads. Those of
+    /// [pieces](crate::scene::Piece) come first, also of pieces that the view does not execute.
     pub objects: Vec<u32>,
+    /// Which of the objects and batches belong to pieces.
+    pieces: ListPieces,
     /// The corners of the remaining triangles of partial batches, three per triangle.
     remaining_indices: Vec<u32>,
     /// The indices of partial batches, ascending, each with its range of `remaining_indices`.
     partial_batches: Vec<(u32, Range<u32>)>,
-    /// The version of batches and objects.
+    /// The version of batches and objects, without the objects of pieces.
     version: Version,
 }
 
@@ -41,10 +45,16 @@ impl DrawList {
 
     /// Removes everything and keeps the memory.
     pub fn clear(&mut self) {
+        self.pieces.clear();
+        self.clear_own();
+    }
+
+    /// Removes everything but what belongs to pieces.
+    pub(crate) fn clear_own(&mut self) {
         self.version = Version::default();
         self.bucket_count = 0;
-        self.batches.clear();
-        self.objects.clear();
+        self.batches.truncate(self.pieces.batch_count());
+        self.objects.truncate(self.pieces.object_count());
         self.remaining_indices.clear();
         self.partial_batches.clear();
     }
@@ -86,12 +96,16 @@ impl DrawList {
         can_merge: impl Fn(u32) -> bool,
     ) {
         if let [segment] = segments {
-            let mut index = 0;
+            let (mut index, first) = (0, self.objects.len());
             while let Some((run, objects)) = segment.run(index) {
-                self.push_batches(bins, run, objects, &can_merge);
+                self.push_batches(bins, run, first + objects.start..first + objects.end, &can_merge);
                 index += 1;
             }
-            std::mem::swap(&mut self.objects, segment.by_bin_mut());
+            if first == 0 {
+                std::mem::swap(&mut self.objects, segment.by_bin_mut());
+            } else {
+                self.objects.extend_from_slice(segment.by_bin_mut());
+            }
             return;
         }
         debug_assert!(segments.len() <= Self::MAX_SEGMENTS);
@@ -155,10 +169,9 @@ impl DrawList {
 
     /// Whether every batch of a bundle draws its whole mesh.
     pub fn bundle_is_whole(&self, bundle: usize) -> bool {
-        let first = (bundle * Self::BATCHES_PER_BUNDLE) as u32;
-        let next_partial = self.partial_batches.partition_point(|(batch, _)| *batch < first);
-        let end = first + Self::BATCHES_PER_BUNDLE as u32;
-        self.partial_batches.get(next_partial).is_none_or(|(batch, _)| *batch >= end)
+        let Range { start, end } = self.bundle_range(bundle);
+        let next_partial = self.partial_batches.partition_point(|(batch, _)| (*batch as usize) < start);
+        self.partial_batches.get(next_partial).is_none_or(|(batch, _)| *batch as usize >= end)
     }
 
     /// The sorted commands; none if the pass orders its objects by bin.
@@ -166,9 +179,61 @@ impl DrawList {
         self.commands[..self.bucket_count].iter().flatten()
     }
 
-    /// The number of bundles that the batches fill.
+    /// The number of objects that the batches draw.
+    pub fn drawn_count(&self) -> usize {
+        self.pieces.drawn_count() + self.own_objects().len()
+    }
+
+    /// The objects of the batches that belong to no piece.
+    pub fn own_objects(&self) -> Range<usize> {
+        self.pieces.object_count()..self.objects.len()
+    }
+
+    /// What belongs to pieces.
+    pub fn pieces(&self) -> &ListPieces {
+        &self.pieces
+    }
+
+    /// Replaces the objects of pieces, unless they are those of this version. `copy` is called with memory for `objects` of them, which may have
+    /// numbers of bundles below `slots`.
+    pub(crate) fn set_piece_objects(
+        &mut self,
+        version: Version,
+        (objects, slots): (usize, usize),
+        copy: impl FnOnce(&mut [u32]),
+    ) {
+        self.clear_own();
+        if self.pieces.set_objects(version, (objects, slots)) {
+            self.batches.clear();
+            self.objects.clear();
+            self.objects.resize(objects, 0);
+            copy(&mut self.objects);
+        }
+    }
+
+    /// Replaces the pieces that are executed, unless they are those of this version. Each has the index of its first object among those of
+    /// pieces, the number of its first bundle, and its list.
+    pub(crate) fn execute_pieces<L: Deref<Target = Self>>(
+        &mut self,
+        version: Version,
+        pieces: impl Iterator<Item = (usize, usize, L)>,
+    ) {
+        self.clear_own();
+        if !self.pieces.set_executed(version) {
+            return;
+        }
+        self.batches.clear();
+        for (first, first_slot, piece) in pieces {
+            let batches = piece.batches.iter().map(|batch| Batch { first: first as u32 + batch.first, ..*batch });
+            self.batches.extend(batches);
+            self.pieces.push(piece.objects.len(), piece.batches.len(), first_slot);
+        }
+    }
+
+    /// The number of bundles that the batches fill. No bundle has batches of two pieces.
     pub fn bundle_count(&self) -> usize {
-        self.batches.len().div_ceil(Self::BATCHES_PER_BUNDLE)
+        let own = self.batches.len() - self.pieces.batch_count();
+        self.pieces.bundle_count() + own.div_ceil(Self::BATCHES_PER_BUNDLE)
     }
 
     /// The batches of one bundle.
@@ -176,8 +241,35 @@ impl DrawList {
     /// # Panics
     /// If `index` is [`DrawList::bundle_count`] or more.
     pub fn bundle(&self, index: usize) -> &[Batch] {
-        let start = index * Self::BATCHES_PER_BUNDLE;
-        &self.batches[start..self.batches.len().min(start + Self::BATCHES_PER_BUNDLE)]
+        &self.batches[self.bundle_range(index)]
+    }
+
+    /// The indices of the batches of one bundle.
+    ///
+    /// # Panics
+    /// If `index` is [`DrawList::bundle_count`] or more.
+    pub fn bundle_range(&self, index: usize) -> Range<usize> {
+        match index.checked_sub(self.pieces.bundle_count()) {
+            None => self.pieces.bundle_range(index),
+            Some(own) => {
+                let start = self.pieces.batch_count() + own * Self::BATCHES_PER_BUNDLE;
+                start..self.batches.len().min(start + Self::BATCHES_PER_BUNDLE)
+            }
+        }
+    }
+
+    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of a piece does not depend on which other pieces the view
+    /// executes.
+    pub fn bundle_slot(&self, index: usize) -> usize {
+        match index.checked_sub(self.pieces.bundle_count()) {
+            None => self.pieces.bundle_slot(index),
+            Some(own) => self.pieces.slot_count() + own,
+        }
+    }
+
+    /// More than the number of every bundle.
+    pub fn bundle_slot_count(&self) -> usize {
+        self.pieces.slot_count() + self.bundle_count() - self.pieces.bundle_count()
     }
 }
 
@@ -186,6 +278,7 @@ impl PartialEq for DrawList {
         self.batches == other.batches
             && self.objects == other.objects
             && (&self.remaining_indices, &self.partial_batches) == (&other.remaining_indices, &other.partial_batches)
+            && self.pieces == other.pieces
             && self.commands().eq(other.commands())
     }
 }

@@ -63,6 +63,11 @@ impl<B: Backend> FrameContext<'_, B> {
         self.tables.passes[pass].orders_by_bin
     }
 
+    /// Whether the draw list of a pass has a place for pieces.
+    pub(super) fn has_pieces(&self, pass: usize) -> bool {
+        !self.tables.pieces.is_empty() && self.orders_by_bin(pass)
+    }
+
     /// What the draw list of a pass is made from, once its view's visible set is complete.
     pub(super) fn list_inputs(&self, pass: usize) -> ListInputs {
         let view_index = self.view_index_of(pass);
@@ -71,6 +76,9 @@ impl<B: Backend> FrameContext<'_, B> {
         let filter = SelectionFilter::new(objects, self.request.scene, selection);
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
+            pieces: self
+                .has_pieces(pass)
+                .then(|| [self.tables.pieces.version(selection), self.tables.visibility[view_index].pieces.version()]),
             levels: self.levels_of_detail(view_index).map(ObjectLevels::version),
             selection,
             layers: (!filter.ignores_layers()).then(|| objects.epoch()),

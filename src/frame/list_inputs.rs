@@ -12,6 +12,9 @@ use crate::view::RenderView;
 pub(super) struct ListInputs {
     /// The version of the view's visible set.
     pub(super) visible: Version,
+    /// The versions of the lists of pieces and of the pieces that the view executes; `None` for a scene without pieces, or a pass that orders
+    /// its objects by depth.
+    pub(super) pieces: Option<[Version; 2]>,
     /// The version of the levels of detail in the view; `None` if all are 0.
     pub(super) levels: Option<Version>,
     pub(super) selection: Selection,

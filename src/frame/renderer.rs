@@ -281,6 +281,7 @@ impl<B: Backend> Renderer<B> {
             culls_triangles,
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
+            has_pieces: !scene.pieces.is_empty(),
         };
         let graph = self.graphs.get(&plan, &draws, &views, options)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
@@ -297,6 +298,7 @@ impl<B: Backend> Renderer<B> {
             sampled_views: &graph.sampled_views,
             scene,
             objects: &self.tables.objects,
+            list_capacity: scene.object_count() + self.tables.pieces.listed_objects(),
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
@@ -350,6 +352,7 @@ impl<B: Backend> Renderer<B> {
         self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value));
         let memory = (uploaded, self.backend.target_memory(&frame));
         let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
+        statistics.count_pieces(self.scheduler.timeline());
         self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);

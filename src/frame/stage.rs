@@ -82,6 +82,8 @@ pub(super) struct StageNeeds {
     pub(super) culls_triangles: bool,
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
+    /// Whether the scene has pieces.
+    pub(super) has_pieces: bool,
 }
 
 impl StageNeeds {

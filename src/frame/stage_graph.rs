@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::FrameError;
 use super::list_inputs::orders_by_bin;
 use super::occlusion_control::OcclusionControl;
+use super::pieces::ListConditions;
 use super::stage::{Stage, StageNeeds, StageNode};
 use super::stage_tuning::{StageTuning, TuningLabels};
 use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
@@ -69,6 +70,8 @@ pub(super) struct StageOptions {
     pub(super) chooses_levels: bool,
     /// The order of opaque objects.
     pub(super) opaque_order: DepthKey,
+    /// Whether the scene has pieces.
+    pub(super) has_pieces: bool,
 }
 
 /// What decides which stages a view has.
@@ -168,6 +171,7 @@ impl<B: Backend> StageGraph<B> {
             tests_occlusion: false,
             culls_triangles: false,
             chooses_levels: false,
+            has_pieces: key.options.has_pieces,
         };
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
@@ -181,6 +185,7 @@ impl<B: Backend> StageGraph<B> {
                 tests_occlusion: occlusion[pass.view_index].is_possible(),
                 culls_triangles: key.options.culls_triangles,
                 chooses_levels: key.options.chooses_levels,
+                has_pieces: key.options.has_pieces,
             };
             // The stages of a view stand right before those of its first pass: a serial run has what they write in its
             // caches.
@@ -257,7 +262,7 @@ impl<B: Backend> StageGraph<B> {
         quality: &Quality,
         workers: usize,
     ) -> Result<(), FrameError> {
-        let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order } = self.key.options;
+        let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order, .. } = self.key.options;
         tables.set_keys(&self.table_keys, views);
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
@@ -267,6 +272,8 @@ impl<B: Backend> StageGraph<B> {
             let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
             table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
         }
+        let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
+        tables.begin_pieces(scene, conditions, &self.passes)?;
         if self.tuning.occlusion.iter().any(OcclusionControl::is_possible) {
             tables.occluder_meshes.sync(scene.assets, tables.objects.used_meshes());
         }
@@ -279,16 +286,21 @@ impl<B: Backend> StageGraph<B> {
             tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
             if self.view_draws_commands[index] {
                 let tests_occlusion = tables.occlusion[index].is_on();
-                let (visibility, objects) = (&mut tables.visibility[index], &tables.objects);
-                visibility.begin_frame(view, objects, scene.assets, quality.culling, tests_occlusion).map_err(
-                    |panic| FrameError::FilterPanicked { view: view.name().to_owned(), message: panic.message },
-                )?;
+                let version = tables.version(index);
+                let (visibility, objects) = (&mut tables.visibility[index], (&tables.objects, &tables.pieces));
+                let begun =
+                    visibility.begin_frame(view, objects, scene.assets, quality.culling, tests_occlusion, version);
+                begun.map_err(|panic| FrameError::FilterPanicked {
+                    view: view.name().to_owned(),
+                    message: panic.message,
+                })?;
                 if let Some(levels) = tables.levels.get_mut(index) {
                     let selector = LevelSelector::new(view, quality);
                     levels.begin_frame(selector, &tables.visibility[index], tables.objects.len());
                 }
             } else {
-                tables.visibility[index].clear();
+                let version = tables.version(index);
+                tables.visibility[index].clear(version);
             }
         }
         Ok(())

@@ -5,10 +5,12 @@
 
 mod of_frame;
 mod of_pass;
+mod of_pieces;
 mod of_view;
 
 use of_frame::{Bins, Objects, Upload};
 use of_pass::{Bin, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
+use of_pieces::{ExecutePieces, RecordPieces};
 use of_view::{CoarseDepth, Compact, Levels, Occluders, Occlusion, Visibility};
 
 use super::stage::Stage;
@@ -16,7 +18,7 @@ use crate::backend::Backend;
 
 /// The stages that a frame has once.
 pub(super) fn stages_of_frame<B: Backend>() -> Vec<Box<dyn Stage<B>>> {
-    vec![Box::new(Objects), Box::new(Bins), Box::new(Upload)]
+    vec![Box::new(Objects), Box::new(Bins), Box::new(Upload), Box::new(RecordPieces)]
 }
 
 /// The stages of one view, by index.
@@ -39,6 +41,7 @@ pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> 
         Box::new(Sort { pass }),
         Box::new(Instance { pass }),
         Box::new(Bin { pass }),
+        Box::new(ExecutePieces { pass }),
         Box::new(Join { pass }),
         Box::new(Triangles { pass }),
         Box::new(Prepare { pass }),

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use super::piece_statistics::PieceStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
-use crate::timeline::{FrameTuning, TuningSubject};
+use crate::timeline::{FrameTuning, Timeline, TuningSubject};
 use crate::view::{Rejection, RenderView};
 
 /// Statistics of a frame.
@@ -21,6 +22,8 @@ pub struct FrameStatistics {
     pub views: Vec<ViewStatistics>,
     /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is not drawn.
     pub view_times: Vec<Duration>,
+    /// What the frame did with the scene's [pieces](crate::scene::Piece).
+    pub pieces: PieceStatistics,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
     /// The memory of the frame's targets. The software backend does not tell.
@@ -43,8 +46,12 @@ pub struct ViewStatistics {
     /// How many frames before this one it was drawn: 0 if this frame draws it. Else all figures below are 0: see
     /// [`Redraw`](crate::scene::Redraw).
     pub age: u32,
-    /// Objects it sees.
+    /// Objects it sees, and all those that it executes with pieces.
     pub visible: usize,
+    /// Pieces that it executes.
+    pub pieces: usize,
+    /// The objects of these pieces.
+    pub objects_of_pieces: usize,
     /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
     pub occluded: usize,
     /// Lights that reach it.
@@ -104,6 +111,17 @@ impl FrameStatistics {
         choices.filter_map(|choice| Some((choice.labels.view.as_deref()?, choice.chosen)))
     }
 
+    /// Tells a timeline what the frame did with pieces, if the scene has any.
+    pub(super) fn count_pieces(&self, timeline: &Timeline) {
+        if self.pieces != PieceStatistics::default() {
+            let executed = self.views.iter().map(|view| view.pieces).sum::<usize>();
+            let objects = self.views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
+            timeline.count("pieces recorded", self.pieces.recorded as f64);
+            timeline.count("pieces executed", executed as f64);
+            timeline.count("objects of executed pieces", objects as f64);
+        }
+    }
+
     /// The statistics of a frame whose stages have run.
     pub(super) fn new(
         request: &FrameRequest<'_>,
@@ -123,6 +141,7 @@ impl FrameStatistics {
             lights: request.lights.len(),
             views,
             view_times: tables.view_times.times().collect(),
+            pieces: tables.pieces.statistics(),
             uploaded,
             targets,
             stages,
@@ -135,11 +154,14 @@ impl FrameStatistics {
 impl ViewStatistics {
     /// The statistics of a view, by index, before its passes are counted.
     fn without_passes(index: usize, view: &RenderView, tables: &FrameTables) -> Self {
+        let visibility = &tables.visibility[index];
         Self {
             name: view.name().to_owned(),
             kind: view.kind(),
             age: view.age,
-            visible: tables.visibility[index].set.count(),
+            visible: visibility.set.count() + visibility.pieces.object_count(),
+            pieces: visibility.pieces.executed().len(),
+            objects_of_pieces: visibility.pieces.object_count(),
             occluded: tables.occlusion[index].hidden(),
             lights: tables.lights[index].light_count(),
             commands: 0,
@@ -152,7 +174,7 @@ impl ViewStatistics {
 
     fn add_pass(&mut self, table: &PassTable, assets: &Assets) {
         let list = table.list.read();
-        self.commands += list.objects.len();
+        self.commands += list.drawn_count();
         self.batches += list.batches.len();
         self.bundles += list.bundle_count();
         self.culled_triangles += table.triangles.read().culled();

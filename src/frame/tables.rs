@@ -6,6 +6,7 @@ use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
 use super::list_inputs::ListInputs;
+use super::pieces::{ListConditions, PieceTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::triangle_culling::{CullableMeshes, PassTriangles};
 use super::view_levels::ViewLevels;
@@ -13,14 +14,18 @@ use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
 use crate::chunked_array::ChunkedArray;
-use crate::command::{BinnedSegment, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version};
-use crate::scene::Light;
+use crate::command::{
+    BinnedSegment, Blending, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version,
+};
+use crate::process::Pass;
+use crate::scene::{Light, SceneError, SceneRef};
 use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
+    pub(super) pieces: PieceTable,
     /// Whether an object needs transparency.
     pub(super) blended_object: BlendedObjectWitness,
     /// The thread time of each view.
@@ -76,6 +81,25 @@ impl FrameTables {
         self.sort_scratch.resize_with(workers, Mutex::default);
     }
 
+    /// Begins a frame of a scene's pieces. The tables of these passes have begun it already.
+    ///
+    /// # Errors
+    /// If the pieces contradict each other.
+    pub(super) fn begin_pieces(
+        &mut self,
+        scene: &SceneRef<'_>,
+        conditions: ListConditions,
+        passes: &[Pass],
+    ) -> Result<(), SceneError> {
+        self.visibility.iter_mut().for_each(|view| view.may_execute_pieces = true);
+        for (pass, table) in passes.iter().zip(&self.passes) {
+            let draws_in_order = |selection: Selection| !table.orders_by_bin && selection.blending != Blending::Blended;
+            self.visibility[pass.view_index].may_execute_pieces &= !table.selection.is_some_and(draws_in_order);
+        }
+        let selections = self.passes.iter().filter(|table| table.orders_by_bin).filter_map(|table| table.selection);
+        self.pieces.begin_frame(scene, conditions, selections)
+    }
+
     /// Ends a frame that succeeded: what it derived holds for the next one.
     pub(super) fn end_frame(&mut self) {
         self.objects.end_frame();
@@ -94,6 +118,7 @@ impl FrameTables {
     /// Makes the next frame derive everything anew.
     pub(super) fn invalidate(&mut self) {
         self.objects.invalidate();
+        self.pieces.invalidate();
         self.visibility.iter_mut().for_each(ViewVisibility::invalidate);
         self.passes.iter_mut().for_each(PassTable::invalidate);
     }

@@ -1,8 +1,11 @@
 //! What a view sees, kept from frame to frame.
 
+use std::array;
 use std::ops::Range;
 
+use super::pieces::PieceTable;
 use super::view_filter::ViewFilter;
+use super::view_pieces::ViewPieces;
 use crate::command::Version;
 use crate::quality::CullingVolume;
 use crate::scene::{Assets, ObjectList};
@@ -17,6 +20,9 @@ pub(super) struct ViewVisibility {
     /// `None` where the next frame must test all objects.
     tested_with: Option<TestedWith>,
     filter: ViewFilter,
+    /// Whether all passes of the view may execute pieces.
+    pub(super) may_execute_pieces: bool,
+    pub(super) pieces: ViewPieces,
     tests: TestScope,
 }
 
@@ -27,6 +33,8 @@ struct TestedWith {
     volume: CullingVolume,
     /// The revision of the view's filter.
     filter: u64,
+    /// The revision of the objects that pieces exclude.
+    excluded: u64,
     objects: usize,
     epoch: u64,
 }
@@ -68,24 +76,32 @@ impl TestScope {
 const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
 
 impl ViewVisibility {
-    /// Begins a frame of a view that draws commands: decides which objects it tests.
+    /// Begins a frame of a view that draws commands: decides which pieces it executes, and which objects it tests. The version is one that no
+    /// other view gets.
     ///
     /// # Errors
     /// If the predicate of the view's filter panics.
     pub(super) fn begin_frame(
         &mut self,
         view: &RenderView,
-        table: &ObjectTable,
+        (table, pieces): (&ObjectTable, &PieceTable),
         assets: &Assets,
         volume: CullingVolume,
         tests_occlusion: bool,
+        version: Version,
     ) -> Result<(), JobPanic> {
         self.filter.update(&view.camera.filter, assets)?;
-        let (frustum, filter) = (view.frustum.clone(), self.filter.revision());
-        let now = TestedWith { frustum, volume, filter, objects: table.len(), epoch: table.epoch() };
+        if self.may_execute_pieces && !tests_occlusion && !pieces.is_empty() {
+            self.pieces.find(pieces, &view.frustum, volume, &self.filter, version);
+        } else {
+            self.pieces.clear(version);
+        }
+        let (frustum, filter, excluded) =
+            (view.frustum.clone(), self.filter.revision(), self.pieces.excluded_revision());
+        let now = TestedWith { frustum, volume, filter, excluded, objects: table.len(), epoch: table.epoch() };
         let is_same_view = |before: &TestedWith| {
-            (&before.frustum, before.volume, before.filter, before.objects)
-                == (&now.frustum, now.volume, now.filter, now.objects)
+            (&before.frustum, before.volume, before.filter, before.excluded, before.objects)
+                == (&now.frustum, now.volume, now.filter, now.excluded, now.objects)
         };
         self.tests = match &self.tested_with {
             _ if tests_occlusion => TestScope::All,
@@ -104,7 +120,8 @@ impl ViewVisibility {
     }
 
     /// Empties the set of a view that draws no commands.
-    pub(super) fn clear(&mut self) {
+    pub(super) fn clear(&mut self, version: Version) {
+        self.pieces.clear(version);
         self.tested_with = None;
         self.set.reset(0);
     }
@@ -134,28 +151,37 @@ impl ViewVisibility {
     ) {
         if self.tests == TestScope::Changed {
             for (word, mask) in indices.map(|index| self.tests.word(index, table)) {
-                self.set.replace(word, mask, self.visible_among(word, mask, table, frustum, volume));
+                let tested = mask & !self.pieces.excluded(word);
+                self.set.replace(word, mask, self.visible_among(word, tested, table, frustum, volume));
             }
             return;
         }
         if let ObjectList::Only(set) = self.filter.objects() {
             // Words without listed objects stay empty, and need no work.
             for (word, mask) in set.masks(indices) {
-                self.set.replace(word, u64::MAX, self.visible_among(word, mask, table, frustum, volume));
+                let tested = mask & !self.pieces.excluded(word);
+                self.set.replace(word, u64::MAX, self.visible_among(word, tested, table, frustum, volume));
             }
             return;
         }
         let blocks = indices.start / WORDS_PER_BLOCK..indices.end.div_ceil(WORDS_PER_BLOCK);
         let test_block = |index: usize, overlap: Overlap| {
-            let (first, block) = (index * WORDS_PER_BLOCK, table.block(index));
+            let first = index * WORDS_PER_BLOCK;
+            let excluded: [_; WORDS_PER_BLOCK] = array::from_fn(|word| self.pieces.excluded(first + word));
+            if excluded == [u64::MAX; WORDS_PER_BLOCK] {
+                return;
+            }
+            let block = table.block(index);
             let words = indices.start.max(first) - first..(indices.end - first).min(WORDS_PER_BLOCK);
             let put = |word: usize, bits: u64| {
                 self.set.replace(first + word, u64::MAX, self.filter.pass(bits, first + word, &block));
             };
             if overlap == Overlap::Inside {
-                words.for_each(|word| put(word, block.drawable(word)));
-            } else {
+                words.for_each(|word| put(word, block.drawable(word) & !excluded[word]));
+            } else if excluded == [0; WORDS_PER_BLOCK] {
                 block.visible_words(frustum, volume, words, put);
+            } else {
+                words.for_each(|word| put(word, block.visible_among(frustum, volume, word, !excluded[word])));
             }
         };
         // The set is empty, so blocks outside need no more work.

@@ -164,6 +164,20 @@ pub enum SceneError {
         /// Their name.
         column: &'static str,
     },
+    /// Two [pieces](super::Piece) of the same name.
+    #[error("the scene has two pieces {piece:?}")]
+    RepeatedPiece {
+        /// Their name.
+        piece: String,
+    },
+    /// An object that is in two [pieces](super::Piece).
+    #[error("object {object} is in the pieces {:?} and {:?}, and can be in one only", pieces[0], pieces[1])]
+    SharedObject {
+        /// Its index.
+        object: usize,
+        /// The names of the pieces.
+        pieces: [String; 2],
+    },
     /// A stale handle.
     #[error(transparent)]
     StaleHandle(#[from] StaleHandle),

@@ -30,6 +30,7 @@ mod object_filter;
 mod object_set;
 mod owned_scene;
 mod packed_vertex;
+mod piece;
 mod redraw;
 mod scene_ref;
 #[cfg(feature = "meshopt")]
@@ -63,6 +64,7 @@ pub use object_filter::{ObjectFilter, ObjectList};
 pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use packed_vertex::PackedVertex;
+pub use piece::Piece;
 pub use redraw::Redraw;
 pub use scene_ref::SceneRef;
 pub(crate) use transform::is_unit;

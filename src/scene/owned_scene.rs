@@ -6,7 +6,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet,
+    Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet, Piece,
     SceneError, SceneRef,
 };
 use crate::handle::{Handle, Slots, StaleHandle};
@@ -36,6 +36,8 @@ pub struct Scene {
     pub ambient: Vec3,
     /// The radiance of the background, linear.
     pub background: Vec3,
+    /// Objects that stand still together, and that views execute as a whole.
+    pub pieces: Vec<Piece>,
     assets: Assets,
     /// The index of each object in the arrays below.
     indices: Slots<usize>,
@@ -96,6 +98,7 @@ impl Scene {
             layers: &self.layers,
             columns: &[],
             changes: Changes::Unknown,
+            pieces: &self.pieces,
             assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,

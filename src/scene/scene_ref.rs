@@ -4,7 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, SceneError,
+    Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, Piece, SceneError,
 };
 use crate::handle::Handle;
 
@@ -37,6 +37,8 @@ pub struct SceneRef<'a> {
     pub columns: &'a [ColumnValues<'a>],
     /// Which objects changed since the last frame.
     pub changes: Changes<'a>,
+    /// Objects that stand still together, and that views execute as a whole.
+    pub pieces: &'a [Piece],
     /// The assets that the handles refer to.
     pub assets: &'a Assets,
     /// The lights.
@@ -72,6 +74,7 @@ impl<'a> SceneRef<'a> {
             layers: &[],
             columns: &[],
             changes: Changes::Unknown,
+            pieces: &[],
             assets,
             lights: &[],
             cameras: &[],

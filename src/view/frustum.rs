@@ -19,7 +19,7 @@ use crate::scene::Camera;
 pub struct Frustum {
     pub(super) origin: DVec3,
     /// The view direction, of unit length.
-    forward: Vec3,
+    pub(super) forward: Vec3,
     /// The left and right planes, and the bottom and top planes.
     pub(super) sides: [SidePlanes; 2],
     /// A point c with `forward · c + near ≥ 0` is not before the near plane. In metres, with tolerance.

@@ -69,7 +69,7 @@ impl GroupBounds {
     }
 
     /// Replaces the bounds of a group by those around all groups of another level.
-    pub(super) fn set_union(&mut self, group: usize, parts: &Self) {
+    pub(crate) fn set_union(&mut self, group: usize, parts: &Self) {
         self.radii[group] = parts.radii.into_iter().fold(f64::NEG_INFINITY, f64::max);
         for axis in 0..3 {
             self.lows[axis][group] = parts.lows[axis].into_iter().fold(f64::INFINITY, f64::min);
@@ -134,6 +134,23 @@ impl Frustum {
     /// errors are negligible, and the margin of 64u(N + r) + 4u|o|, of the largest N and r in the group, exceeds all of it.
     pub(crate) fn overlaps(&self, bounds: &GroupBounds) -> [Overlap; GroupBounds::GROUPS] {
         overlaps(self, bounds)
+    }
+
+    /// Whether a sphere of a group may lie beyond the far plane as a whole, so that [`Frustum::intersects_spheres`] does not find it.
+    pub(crate) fn may_end_before(&self, bounds: &GroupBounds, group: usize) -> bool {
+        if self.far.is_infinite() {
+            return false;
+        }
+        let (low, high) = (bounds.lows.map(|axis| axis[group]), bounds.highs.map(|axis| axis[group]));
+        let (mut farthest, mut norm) = (0.0, 0.0);
+        for axis in 0..3 {
+            let corners = [low[axis], high[axis]].map(|corner| corner - self.origin.to_array()[axis]);
+            let forward = f64::from(self.forward.to_array()[axis]);
+            farthest += f64::max(corners[0] * forward, corners[1] * forward);
+            norm += f64::max(corners[0].abs(), corners[1].abs());
+        }
+        let tolerance = 4.0 * f64::from(ROUNDING_TOLERANCE) * (norm + bounds.radii[group].abs());
+        farthest > f64::from(self.far) * (1.0 - f64::from(ROUNDING_TOLERANCE)) - tolerance
     }
 }
 

@@ -21,6 +21,7 @@ mod object_filter;
 mod object_table;
 mod occlusion;
 mod order;
+mod pieces;
 mod quality;
 mod redraw;
 mod requirements;

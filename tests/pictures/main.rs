@@ -37,6 +37,7 @@ mod materials;
 mod mip_levels;
 mod multisampling;
 mod object_filter;
+mod pieces;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -108,6 +109,7 @@ fn main() {
         (mip_levels::CASES, Needs::Adapter),
         (multisampling::CASES, Needs::Adapter),
         (object_filter::CASES, Needs::Adapter),
+        (pieces::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),

@@ -63,7 +63,7 @@ fn expect_same(found: &[Picture], expected: &[Picture], when: &str) -> Result<()
 }
 
 /// A wavy disc of so many corners around its centre.
-fn disc(corners: u32, wave: f32) -> Mesh {
+pub fn disc(corners: u32, wave: f32) -> Mesh {
     let corner = |number: u32| {
         let angle = number as f32 / corners as f32 * std::f32::consts::TAU;
         let position = [angle.cos(), angle.sin(), (angle * wave).sin() * 0.1];

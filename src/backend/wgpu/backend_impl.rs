@@ -135,7 +135,7 @@ impl Backend for WgpuBackend {
             pass.upload_partial_indices(&self.device, &self.uploads, list.remaining_indices())?;
             self.subdivide(frame, request, list)?;
             match pass.strategy.recording {
-                RecordingStrategy::CachedBundles => pass.bundle_cache.set_bundle_count(list.bundle_count()),
+                RecordingStrategy::CachedBundles => pass.bundle_cache.set_bundle_count(list.bundle_slot_count()),
                 RecordingStrategy::Indirect => {
                     let upload = || pass.indirect_arguments.upload(&self.device, &self.uploads, &frame.meshes, list);
                     pass.timing.time_serial(upload)?;

@@ -227,7 +227,7 @@ impl<B: Backend> Stage<B> for Join {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "join",
-            after: &["instance", "bin"],
+            after: &["instance", "execute pieces", "bin"],
             group: StageGroup::Instance,
             chunking: Chunking::PerItem,
             cost_kind: "join",
@@ -243,7 +243,11 @@ impl<B: Backend> Stage<B> for Join {
         let table = &frame.tables.passes[self.pass];
         let can_merge = |mesh| frame.can_merge(self.pass, mesh);
         let mut list = table.list.write();
-        list.clear();
+        if frame.has_pieces(self.pass) {
+            list.clear_own();
+        } else {
+            list.clear();
+        }
         *table.list_inputs.write() = None;
         if frame.orders_by_bin(self.pass) {
             let mut segments =

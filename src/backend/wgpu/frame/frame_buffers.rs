@@ -153,15 +153,16 @@ impl FrameBuffers {
         buffers.set_passes(request);
         let limits = device.limits();
         let objects = request.scene.object_count().max(1);
+        let listed = request.list_capacity.max(1);
         let light_bytes = request.light_tables.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
-        for bytes in [objects * 4, light_bytes] {
+        for bytes in [listed * 4, light_bytes] {
             check_storage_binding_size(device, bytes)?;
         }
         buffers.set_views(request, limits.max_storage_buffer_binding_size)?;
-        let object_lists = buffers.allot_object_lists(limits.max_buffer_size / (objects as u64 * 4));
+        let object_lists = buffers.allot_object_lists(limits.max_buffer_size / (listed as u64 * 4));
         let max_stride =
             limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / object_lists.max(1) as u64);
-        buffers.object_indices_stride = size_with_headroom(buffers.object_indices_stride, objects * 4, max_stride);
+        buffers.object_indices_stride = size_with_headroom(buffers.object_indices_stride, listed * 4, max_stride);
 
         let mut reallocated = buffers.objects.reserve(device, request.plan.columns(), objects)?;
         if reallocated {
@@ -191,7 +192,7 @@ impl FrameBuffers {
             pass.frame_bind_group = Some(bind_group);
             pass.frame_ranges = ranges;
             if !has_list {
-                *pass.uploaded_list.get_mut() = Version::default();
+                *pass.uploaded_lists.get_mut() = [Version::default(); 2];
             }
         }
         Ok(())
@@ -294,13 +295,19 @@ impl FrameBuffers {
         if !state.draws_commands {
             return;
         }
-        let mut uploaded = state.uploaded_list.write();
-        if list.version() != Version::default() && *uploaded == list.version() {
-            return;
+        let mut uploaded = state.uploaded_lists.write();
+        let start = state.frame_ranges.object_indices.start;
+        let parts = [(list.pieces().version(), 0..list.own_objects().start), (list.version(), list.own_objects())];
+        for (uploaded, (version, objects)) in uploaded.iter_mut().zip(parts) {
+            if version == Version::default() || *uploaded != version {
+                *uploaded = version;
+                if objects.is_empty() {
+                    continue;
+                }
+                let bytes = bytemuck::cast_slice(&list.objects[objects.clone()]);
+                self.buffers.object_indices.write(uploads, start + objects.start * size_of::<u32>(), bytes);
+            }
         }
-        *uploaded = list.version();
-        let offset = state.frame_ranges.object_indices.start;
-        self.buffers.object_indices.write(uploads, offset, bytemuck::cast_slice(&list.objects));
     }
 }
 

@@ -71,8 +71,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) process_bind_group: Option<CachedBindGroup>,
     /// `@group(3)`: the columns and the engine's own resources that the process reads.
     pub(crate) engine_bind_group: Option<CachedBindGroup>,
-    /// The version of the draw list whose objects the buffers hold.
-    pub(crate) uploaded_list: RwLock<Version>,
+    /// The versions of the objects that the buffers hold: of those of pieces in the draw list, and of the others.
+    pub(crate) uploaded_lists: RwLock<[Version; 2]>,
     pub(crate) strategy: PassStrategy,
     /// The strategy's index in the backend's set, and whether the frame only tries it.
     pub(crate) strategy_index: usize,
@@ -109,7 +109,7 @@ impl Default for WgpuPassState {
             frame_ranges: FrameRanges::default(),
             process_bind_group: None,
             engine_bind_group: None,
-            uploaded_list: RwLock::default(),
+            uploaded_lists: RwLock::default(),
             strategy: PassStrategy { recording: RecordingStrategy::Direct, encoding: EncodingStrategy::PerPass },
             strategy_index: 0,
             is_trial: false,

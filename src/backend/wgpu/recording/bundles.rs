@@ -14,7 +14,8 @@ pub(crate) fn cached_bundle(frame: &WgpuFrame, pass: usize, list: &DrawList, bun
     if !is_cacheable(pass, list, bundle) || pass.strategy.encoder_count(list.bundle_count()) > 1 {
         return None;
     }
-    let bundle = pass.bundle_cache.get(bundle, list.bundle(bundle), &frame.buffers.subdivided().read())?;
+    let bundle =
+        pass.bundle_cache.get(list.bundle_slot(bundle), list.bundle(bundle), &frame.buffers.subdivided().read())?;
     pass.timing.count_bundle(true);
     Some(WgpuPart(RecordedPart::Bundle(bundle)))
 }
@@ -36,13 +37,13 @@ pub(crate) fn record_bundle(
         pass.timing.count_bundle(false);
         return new_bundle(device, frame, pass, list, bundle, &subdivided);
     }
-    let cached = pass.bundle_cache.get(bundle, batches, &subdivided);
+    let cached = pass.bundle_cache.get(list.bundle_slot(bundle), batches, &subdivided);
     pass.timing.count_bundle(cached.is_some());
     if let Some(cached) = cached {
         return Ok(cached);
     }
     let recorded = new_bundle(device, frame, pass, list, bundle, &subdivided)?;
-    pass.bundle_cache.insert(bundle, batches, &subdivided, recorded.clone());
+    pass.bundle_cache.insert(list.bundle_slot(bundle), batches, &subdivided, recorded.clone());
     Ok(recorded)
 }
 
@@ -66,8 +67,7 @@ fn new_bundle(
     let indices = pass.partial_indices.read();
     let partial_indices = indices.buffer();
     let recorder = BatchRecorder { frame, pass, list, pipelines: &variants, subdivided, partial_indices };
-    let first = bundle * DrawList::BATCHES_PER_BUNDLE;
-    let batches = first..first + list.bundle(bundle).len();
+    let batches = list.bundle_range(bundle);
     recorder.draw(&mut encoder, batches, |encoder, run| recorder.draw_each(encoder, &list.batches[run]))?;
     Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(&pass.label) }))
 }

@@ -33,8 +33,10 @@ pub(crate) fn record_batches(
     let indices = pass.partial_indices.read();
     let partial_indices = indices.buffer();
     let recorder = BatchRecorder { frame, pass, list, pipelines: &pipelines, subdivided: &subdivided, partial_indices };
-    let (first, end) = (bundles.start * DrawList::BATCHES_PER_BUNDLE, bundles.end * DrawList::BATCHES_PER_BUNDLE);
-    let batches = first..end.min(list.batches.len());
+    let batches = match bundles.clone().next_back() {
+        Some(last) => list.bundle_range(bundles.start).start..list.bundle_range(last).end,
+        None => 0..0,
+    };
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
     set_stencil_reference(&mut render_pass, frame, request, index);
     if batches.is_empty() {

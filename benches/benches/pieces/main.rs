@@ -1,0 +1,193 @@
+//! What pieces save: frames of many objects that stand still, and some that move.
+//!
+//!     cargo bench -p drawloom-benches --bench pieces
+//!     cargo bench -p drawloom-benches --bench pieces -- --quick
+//!
+//! Measured is one frame on wgpu's `noop` device and on one worker, from the hand-over of the scene to the return of submit. Blocks of boxes of
+//! 16 meshes stand on a plain, and 1,000 boxes move in each frame. One process draws them. The contenders are drawn in turn, in an order of its own
+//! in each round:
+//!
+//! - *pieces*: each block is a piece;
+//! - *without*: the same scene without pieces. Its renderer keeps what it can, and caches bundles where it measures that this is cheaper;
+//! - *by hand*: a loop of wgpu calls that executes the ready bundles of the blocks in sight. It tests no other object, and draws all that move.
+//!
+//! `target/drawloom/pieces.json` has the same.
+
+mod by_hand;
+mod world;
+
+use std::error::Error;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Parser;
+use drawloom::backend::WgpuBackend;
+use drawloom::command::Selection;
+use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, Submitter};
+use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::harness::{Harness, Rounds, progress_bar};
+use drawloom_benches::results;
+use drawloom_benches::statistics::median_duration;
+use drawloom_benches::stopwatch::timed_frame;
+use drawloom_benches::table::Table;
+use drawloom_testing::adapter;
+use serde::Serialize;
+
+use by_hand::ByHand;
+use world::{Cameras, World};
+
+#[derive(Serialize)]
+struct Row {
+    cameras: &'static str,
+    objects: usize,
+    pieces: usize,
+    /// Objects that all views draw, with pieces and without, in the last frame.
+    drawn: [usize; 2],
+    /// Draws of all views, likewise.
+    draws: [usize; 2],
+    /// With pieces, without, and by hand.
+    microseconds: [f64; 3],
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = ExtentArguments::parse();
+    // Trials of recording strategies are over after some hundred frames.
+    let (rounds, sizes): (_, &[(usize, usize)]) = if arguments.is_quick() {
+        (Rounds { warm_up: 4, measured: 3 }, &[(4, 100)])
+    } else {
+        (Rounds { warm_up: 200, measured: 801 }, &[(40, 250), (400, 250), (100, 1_000), (25, 4_000)])
+    };
+    let progress = progress_bar("frames");
+    let mut rows = Vec::new();
+    for &(blocks, in_block) in sizes {
+        for cameras in Cameras::ALL {
+            let mut contenders = [
+                Contender::Drawloom(Box::new(Runner::new(cameras, blocks, in_block, true)?)),
+                Contender::Drawloom(Box::new(Runner::new(cameras, blocks, in_block, false)?)),
+                Contender::ByHand(Box::new(ByHand::new(World::new(cameras, blocks, in_block)?)?)),
+            ];
+            let times =
+                Harness::new(rounds, &progress).measure(&mut contenders, |contender, _round| contender.frame())?;
+            let [with, without] = [0, 1].map(|index| match &contenders[index] {
+                Contender::Drawloom(runner) => [runner.drawn, runner.draws],
+                Contender::ByHand(_) => [0; 2],
+            });
+            let microseconds = [0, 1, 2].map(|index| median_duration(times[index].iter().copied()).as_secs_f64() * 1e6);
+            rows.push(Row {
+                cameras: cameras.name(),
+                objects: blocks * in_block + World::MOVING,
+                pieces: blocks,
+                drawn: [with[0], without[0]],
+                draws: [with[1], without[1]],
+                microseconds,
+            });
+        }
+    }
+    progress.finish_and_clear();
+
+    let titles = [
+        "cameras",
+        "objects",
+        "pieces",
+        "drawn",
+        "draws",
+        "pieces, µs",
+        "without, µs",
+        "by hand, µs",
+        "without ÷ pieces",
+    ];
+    let mut table = Table::new(&titles);
+    for Row { cameras, objects, pieces, drawn, draws, microseconds: [with, without, by_hand] } in &rows {
+        table.row([
+            (*cameras).to_owned(),
+            objects.to_string(),
+            pieces.to_string(),
+            format!("{} and {}", drawn[0], drawn[1]),
+            format!("{} and {}", draws[0], draws[1]),
+            format!("{with:.1}"),
+            format!("{without:.1}"),
+            format!("{by_hand:.1}"),
+            format!("{:.2}", without / with),
+        ]);
+    }
+    table.print();
+    if !arguments.is_quick() {
+        results::write_json("pieces.json", &rows)?;
+    }
+    Ok(())
+}
+
+enum Contender {
+    Drawloom(Box<Runner>),
+    ByHand(Box<ByHand>),
+}
+
+impl Contender {
+    fn frame(&mut self) -> Result<Duration, Box<dyn Error>> {
+        match self {
+            Self::Drawloom(runner) => runner.frame(),
+            Self::ByHand(loop_by_hand) => loop_by_hand.frame(),
+        }
+    }
+}
+
+/// Draws all opaque objects in one colour.
+struct Plain;
+
+impl RenderProcess for Plain {
+    fn name(&self) -> &str {
+        "plain"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.clears_depth("depth of plain", Format::Depth32Float);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @vertex
+            fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
+                return clip_position(relative_position(drawn_object(in.instance), in.position));
+            }
+            @fragment
+            fn fragment() -> @location(0) vec4<f32> {
+                return vec4<f32>(1.0);
+            }";
+        Draws::Commands(CommandDraws { shader, selection: Selection::OPAQUE, ..CommandDraws::default() })
+    }
+}
+
+/// A renderer and its world.
+struct Runner {
+    renderer: Renderer<WgpuBackend>,
+    submitter: Submitter<WgpuBackend>,
+    world: World,
+    drawn: usize,
+    draws: usize,
+}
+
+impl Runner {
+    fn new(cameras: Cameras, blocks: usize, in_block: usize, has_pieces: bool) -> Result<Self, Box<dyn Error>> {
+        let (device, queue) = adapter::noop_device()?;
+        let builder = Renderer::builder(WgpuBackend::new(device, queue)?).process(Plain).output("plain");
+        let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
+        let mut world = World::new(cameras, blocks, in_block)?;
+        if !has_pieces {
+            world.scene.pieces.clear();
+        }
+        Ok(Self { renderer, submitter, world, drawn: 0, draws: 0 })
+    }
+
+    fn frame(&mut self) -> Result<Duration, Box<dyn Error>> {
+        self.world.step();
+        let scene = self.world.as_scene_ref();
+        let (submitted, time) = timed_frame(&mut self.renderer, &self.submitter, scene, |_| Ok(()))?;
+        let views = &submitted.statistics.views;
+        self.drawn = views.iter().map(|view| view.commands).sum();
+        self.draws = views.iter().map(|view| view.batches).sum();
+        Ok(time.cpu)
+    }
+}

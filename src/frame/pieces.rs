@@ -1,0 +1,476 @@
+//! The pieces of a scene, recorded once and kept (L 3.2): what each process draws of them, for all views.
+//!
+//! ```text
+//!             no object changed              the frame succeeded
+//!   changed ────────────────────▶ recording ─────────────────────▶ recorded
+//!      ▲                                                              │
+//!      └──────────────────────────────────────────────────────────────┘
+//!         an object, mesh or material of it changed, or a frame failed
+//! ```
+//!
+//! Only recorded pieces are executed. Before the jobs of a frame run, the table decides which these are, so views know which objects to leave out
+//! of their tests.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::ops::Range;
+
+use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
+
+use super::piece_statistics::PieceStatistics;
+use crate::command::{BinnedSegment, DrawList, ListPieces, Selection, Version};
+use crate::scene::{Changes, Piece, SceneError, SceneRef};
+use crate::view::{GroupBounds, ObjectTable, ObjectWord, SelectionFilter, bin_objects, recordable_objects, set_bits};
+
+/// The pieces of a scene.
+#[derive(Debug, Default)]
+pub(super) struct PieceTable {
+    /// By index in the scene.
+    pieces: Vec<KnownPiece>,
+    /// By object: the index of its piece, or [`NO_PIECE`].
+    owners: Vec<u32>,
+    /// The objects of recorded pieces that need no test: a mask for each word.
+    recorded_words: Vec<u64>,
+    /// The bounds of the pieces, in groups.
+    bounds: Vec<GroupBounds>,
+    /// What the recorded lists are of: all selections that passes with bins have had.
+    selections: Vec<Selection>,
+    /// What else all lists depend on.
+    conditions: Option<ListConditions>,
+    /// Identity and revision of the meshes and materials in the frame before.
+    assets: [(u64, u64); 2],
+    /// The indices of the pieces that this frame records.
+    recording: Vec<u32>,
+    /// The end of all places in lists: see [`KnownPiece::objects`] and [`KnownPiece::first_slot`].
+    objects_end: usize,
+    slots_end: usize,
+    /// Counts how often another object became, or ceased to be, one of a recorded piece.
+    revision: u64,
+    /// Counts how often lists or their places changed.
+    lists_revision: u64,
+}
+
+/// What all lists of pieces depend on, beside their objects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ListConditions {
+    pub(super) culls_triangles: bool,
+    pub(super) chooses_levels: bool,
+    /// Whether objects have layers of their own.
+    pub(super) has_layers: bool,
+}
+
+/// A piece, and what is recorded of it.
+#[derive(Debug)]
+struct KnownPiece {
+    piece: Piece,
+    /// Its place among the objects of all pieces in draw lists, long enough for all its objects.
+    objects: Range<usize>,
+    /// The number of its first bundle.
+    first_slot: usize,
+    is_recorded: bool,
+    /// Whether an object of it changed in this frame.
+    has_changed: bool,
+    recorded: RwLock<RecordedPiece>,
+}
+
+/// What is recorded of a piece.
+#[derive(Debug, Default)]
+struct RecordedPiece {
+    /// The objects that are recorded; others are drawn as if they were in no piece.
+    words: Vec<ObjectWord>,
+    /// Their number.
+    count: usize,
+    bounds: GroupBounds,
+    /// One for each selection.
+    lists: Vec<DrawList>,
+    /// The revisions of the meshes and materials that its objects have, by slot; `None` for an empty slot.
+    meshes: Vec<(u32, Option<u64>)>,
+    materials: Vec<(u32, Option<u64>)>,
+    scratch: BinnedSegment,
+}
+
+impl KnownPiece {
+    /// It is not recorded any more. Returns whether it was.
+    fn lose(&mut self, recorded_words: &mut [u64]) -> bool {
+        let was_recorded = std::mem::take(&mut self.is_recorded);
+        if was_recorded {
+            for &(word, mask) in &self.recorded.get_mut().words {
+                // The scene may have fewer objects than before.
+                if let Some(recorded) = recorded_words.get_mut(word) {
+                    *recorded &= !mask;
+                }
+            }
+        }
+        was_recorded
+    }
+
+    /// What is drawn of it, by the index of the selection.
+    fn list(&self, selection: usize) -> Option<MappedRwLockReadGuard<'_, DrawList>> {
+        RwLockReadGuard::try_map(self.recorded.read(), |recorded| recorded.lists.get(selection)).ok()
+    }
+}
+
+const NO_PIECE: u32 = u32::MAX;
+
+/// More selections than this are forgotten, because most of them are of passes that are gone.
+const MAX_SELECTIONS: usize = 32;
+
+/// As long as the places of pieces that are gone are fewer than this, and fewer than those in use, they stay empty.
+const MAX_UNUSED_PLACES: usize = 4096;
+
+impl PieceTable {
+    /// Begins a frame, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
+    ///
+    /// # Errors
+    /// If two pieces have the same name or share an object.
+    pub(super) fn begin_frame(
+        &mut self,
+        scene: &SceneRef<'_>,
+        conditions: ListConditions,
+        selections: impl Iterator<Item = Selection>,
+    ) -> Result<(), SceneError> {
+        self.complete();
+        if scene.pieces.is_empty() && self.pieces.is_empty() {
+            return Ok(());
+        }
+        self.pieces.iter_mut().for_each(|known| known.has_changed = false);
+        if let Err(error) = self.sync(scene) {
+            *self = Self { revision: self.revision + 1, lists_revision: self.lists_revision + 1, ..Self::default() };
+            return Err(error);
+        }
+        if self.conditions.replace(conditions) != Some(conditions) {
+            self.invalidate();
+        }
+        self.add_selections(selections);
+        self.find_changed_objects(scene.changes);
+        self.find_changed_assets(scene);
+        if scene.changes != Changes::Unknown {
+            let is_due = |(_, known): &(u32, &KnownPiece)| !known.is_recorded && !known.has_changed;
+            self.recording.extend((0..).zip(&self.pieces).filter(is_due).map(|(index, _)| index));
+        }
+        Ok(())
+    }
+
+    /// Makes all pieces be recorded anew.
+    pub(super) fn invalidate(&mut self) {
+        self.recording.clear();
+        (0..self.pieces.len()).for_each(|piece| self.lose(piece));
+    }
+
+    /// What the frame before recorded is recorded: it succeeded.
+    fn complete(&mut self) {
+        if self.recording.is_empty() {
+            return;
+        }
+        self.revision += 1;
+        self.lists_revision += 1;
+        for index in std::mem::take(&mut self.recording) {
+            let known = &mut self.pieces[index as usize];
+            known.is_recorded = true;
+            let recorded = known.recorded.get_mut();
+            let (group, place) = (index as usize / GroupBounds::GROUPS, index as usize % GroupBounds::GROUPS);
+            self.bounds[group].set_union(place, &recorded.bounds);
+            for &(word, mask) in &recorded.words {
+                self.recorded_words[word] |= mask;
+            }
+        }
+    }
+
+    /// A piece is not recorded any more.
+    fn lose(&mut self, piece: usize) {
+        if self.pieces[piece].lose(&mut self.recorded_words) {
+            self.revision += 1;
+        }
+    }
+
+    /// Takes over the pieces of a scene. Those that it had keep what is recorded.
+    fn sync(&mut self, scene: &SceneRef<'_>) -> Result<(), SceneError> {
+        let objects = scene.object_count();
+        let before = self.owners.len();
+        for piece in 0..self.pieces.len() {
+            // Objects that are gone, or new at indices that it lists.
+            if self.has_object_in(piece, before.min(objects)..before.max(objects)) {
+                self.pieces[piece].has_changed = true;
+                self.lose(piece);
+            }
+        }
+        self.owners.resize(objects, NO_PIECE);
+        self.recorded_words.resize(objects.div_ceil(WORD), 0);
+        if self.pieces.iter().map(|known| &known.piece).eq(scene.pieces) {
+            return (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects));
+        }
+        let mut known: HashMap<_, _> = self.pieces.drain(..).map(|known| (known.piece.name.clone(), known)).collect();
+        self.owners.fill(NO_PIECE);
+        let mut names = HashMap::new();
+        for (index, piece) in scene.pieces.iter().enumerate() {
+            if names.insert(piece.name.as_str(), index).is_some() {
+                return Err(SceneError::RepeatedPiece { piece: piece.name.clone() });
+            }
+            let next = match known.entry(piece.name.clone()) {
+                Entry::Occupied(known) if known.get().piece.objects == piece.objects => known.remove(),
+                _ => self.new_piece(piece),
+            };
+            self.pieces.push(next);
+            self.claim(index, 0..objects)?;
+        }
+        for mut gone in known.into_values() {
+            gone.lose(&mut self.recorded_words);
+        }
+        self.compact_places();
+        self.bounds.clear();
+        self.bounds.resize_with(self.pieces.len().div_ceil(GroupBounds::GROUPS), GroupBounds::default);
+        for (index, known) in self.pieces.iter_mut().enumerate().filter(|(_, known)| known.is_recorded) {
+            let bounds = &known.recorded.get_mut().bounds;
+            self.bounds[index / GroupBounds::GROUPS].set_union(index % GroupBounds::GROUPS, bounds);
+        }
+        // The indices of pieces changed.
+        self.revision += 1;
+        self.lists_revision += 1;
+        Ok(())
+    }
+
+    fn has_object_in(&self, piece: usize, objects: Range<usize>) -> bool {
+        !objects.is_empty()
+            && self.pieces[piece]
+                .piece
+                .objects
+                .iter_from(objects.start)
+                .next()
+                .is_some_and(|object| (object as usize) < objects.end)
+    }
+
+    /// A piece with a place behind all others.
+    fn new_piece(&mut self, piece: &Piece) -> KnownPiece {
+        let count = piece.objects.len();
+        let known = KnownPiece {
+            piece: piece.clone(),
+            objects: self.objects_end..self.objects_end + count,
+            first_slot: self.slots_end,
+            is_recorded: false,
+            has_changed: false,
+            recorded: RwLock::default(),
+        };
+        self.objects_end += count;
+        self.slots_end += ListPieces::max_bundles(count);
+        known
+    }
+
+    /// Gives all pieces new places if too many are unused.
+    fn compact_places(&mut self) {
+        let used: usize = self.pieces.iter().map(|known| known.objects.len()).sum();
+        if self.objects_end - used <= used.max(MAX_UNUSED_PLACES) {
+            return;
+        }
+        (self.objects_end, self.slots_end) = (0, 0);
+        for known in &mut self.pieces {
+            let count = known.objects.len();
+            (known.objects, known.first_slot) = (self.objects_end..self.objects_end + count, self.slots_end);
+            self.objects_end += count;
+            self.slots_end += ListPieces::max_bundles(count);
+        }
+    }
+
+    /// Notes a piece's objects among a range of the scene's.
+    fn claim(&mut self, piece: usize, objects: Range<usize>) -> Result<(), SceneError> {
+        let of_piece = self.pieces[piece].piece.objects.iter_from(objects.start).map(|object| object as usize);
+        for object in of_piece.take_while(|object| *object < objects.end) {
+            let other = std::mem::replace(&mut self.owners[object], piece as u32);
+            if other != NO_PIECE {
+                let pieces = [other as usize, piece].map(|piece| self.pieces[piece].piece.name.clone());
+                return Err(SceneError::SharedObject { object, pieces });
+            }
+        }
+        Ok(())
+    }
+
+    /// If a selection is new, all pieces are recorded for it.
+    fn add_selections(&mut self, selections: impl Iterator<Item = Selection>) {
+        let mut is_new = false;
+        for selection in selections {
+            if !self.selections.contains(&selection) {
+                if self.selections.len() == MAX_SELECTIONS && !is_new {
+                    self.selections.clear();
+                }
+                is_new = true;
+                self.selections.push(selection);
+            }
+        }
+        if is_new {
+            self.invalidate();
+        }
+    }
+
+    fn find_changed_objects(&mut self, changes: Changes<'_>) {
+        match changes {
+            Changes::Unknown => self.invalidate(),
+            Changes::Objects(objects) => objects.iter().for_each(|&object| self.change(object as usize)),
+            Changes::Ranges(ranges) => {
+                for range in ranges {
+                    (range.start as usize..(range.end as usize).min(self.owners.len()))
+                        .for_each(|object| self.change(object));
+                }
+            }
+        }
+    }
+
+    fn change(&mut self, object: usize) {
+        if let Some(&owner) = self.owners.get(object).filter(|owner| **owner != NO_PIECE) {
+            self.pieces[owner as usize].has_changed = true;
+            self.lose(owner as usize);
+        }
+    }
+
+    /// Finds the pieces with a mesh or material that changed.
+    fn find_changed_assets(&mut self, scene: &SceneRef<'_>) {
+        let (meshes, materials) = (&scene.assets.meshes, &scene.assets.materials);
+        let now = [(meshes.identity(), meshes.revision()), (materials.identity(), materials.revision())];
+        let before = std::mem::replace(&mut self.assets, now);
+        if before == now {
+            return;
+        }
+        let are_others = before.map(|(identity, _)| identity) != now.map(|(identity, _)| identity);
+        for piece in 0..self.pieces.len() {
+            let recorded = self.pieces[piece].recorded.get_mut();
+            let is_same_mesh =
+                |&(slot, revision): &(u32, _)| meshes.get_with_revision(slot).map(|(now, _)| now) == revision;
+            let is_same_material =
+                |&(slot, revision): &(u32, _)| materials.get_with_revision(slot).map(|(now, _)| now) == revision;
+            let are_same = recorded.meshes.iter().all(is_same_mesh) && recorded.materials.iter().all(is_same_material);
+            if are_others || !are_same {
+                self.lose(piece);
+            }
+        }
+    }
+
+    /// Whether the scene has no pieces.
+    pub(super) fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// Counts how often another object became, or ceased to be, one of a recorded piece.
+    pub(super) fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// The recorded pieces, by index.
+    pub(super) fn recorded(&self) -> impl Iterator<Item = usize> {
+        (0..self.pieces.len()).filter(|piece| self.pieces[*piece].is_recorded)
+    }
+
+    /// The bounds of all pieces, in groups of [`GroupBounds::GROUPS`].
+    pub(super) fn bounds(&self) -> &[GroupBounds] {
+        &self.bounds
+    }
+
+    /// The objects that are executed if all recorded pieces are: a mask for each word.
+    pub(super) fn recorded_words(&self) -> &[u64] {
+        &self.recorded_words
+    }
+
+    /// Calls `visit` with the objects of a recorded piece that are executed.
+    pub(super) fn visit_words(&self, piece: usize, visit: impl FnMut(&ObjectWord)) {
+        self.pieces[piece].recorded.read().words.iter().for_each(visit);
+    }
+
+    /// The number of objects of all pieces that may stand in a draw list.
+    pub(super) fn listed_objects(&self) -> usize {
+        self.objects_end
+    }
+
+    /// The number of pieces that this frame records.
+    pub(super) fn recording_count(&self) -> usize {
+        self.recording.len()
+    }
+
+    /// The number of objects that are executed with a piece.
+    pub(super) fn object_count(&self, piece: u32) -> usize {
+        self.pieces[piece as usize].recorded.read().count
+    }
+
+    /// What the frame did with pieces.
+    pub(super) fn statistics(&self) -> PieceStatistics {
+        let executable = self.pieces.iter().filter(|known| known.is_recorded).count();
+        let changed = self.pieces.iter().filter(|known| known.has_changed).count();
+        PieceStatistics { executable, recorded: self.recording.len(), changed }
+    }
+
+    /// The name of one of the pieces that this frame records, by index among them.
+    pub(super) fn recorded_name(&self, index: usize) -> &str {
+        &self.pieces[self.recording[index] as usize].piece.name
+    }
+
+    /// Records one of the pieces that this frame records, by index among them. `is_recordable` says whether objects with the mesh in a slot may be
+    /// recorded, and `can_merge` whether they become one draw.
+    pub(super) fn record(
+        &self,
+        index: usize,
+        scene: &SceneRef<'_>,
+        table: &ObjectTable,
+        is_recordable: impl Fn(u32) -> bool,
+        can_merge: impl Fn(u32) -> bool,
+    ) {
+        let known = &self.pieces[self.recording[index] as usize];
+        let RecordedPiece { words, count, bounds, lists, meshes, materials, scratch } = &mut *known.recorded.write();
+        *bounds = recordable_objects(table, &known.piece.objects, is_recordable, words);
+        *count = words.iter().map(|(_, mask)| mask.count_ones() as usize).sum();
+        lists.resize_with(self.selections.len(), DrawList::default);
+        for (&selection, list) in self.selections.iter().zip(lists) {
+            bin_objects(table, words, selection, SelectionFilter::new(table, scene, selection), scratch);
+            list.clear();
+            list.join_bins(&mut [&mut *scratch], &table.bins(), &can_merge);
+        }
+        let objects =
+            || known.piece.objects.iter().map(|object| object as usize).take_while(|object| *object < table.len());
+        collect_slots(meshes, objects().map(|object| scene.meshes[object].index()), |slot| {
+            scene.assets.meshes.get_with_revision(slot).map(|(revision, _)| revision)
+        });
+        collect_slots(materials, objects().map(|object| scene.materials[object].index()), |slot| {
+            scene.assets.materials.get_with_revision(slot).map(|(revision, _)| revision)
+        });
+    }
+
+    /// The version of what a process with a selection draws of pieces.
+    pub(super) fn version(&self, selection: Selection) -> Version {
+        let index = self.selections.iter().position(|known| *known == selection).unwrap_or(self.selections.len());
+        Version { frame: self.lists_revision + 1, index }
+    }
+
+    /// Makes a draw list have what a process with a selection draws of some pieces, whose version is `executed`.
+    pub(super) fn execute(&self, selection: Selection, pieces: &[u32], executed: Version, list: &mut DrawList) {
+        let version = self.version(selection);
+        list.set_piece_objects(version, (self.objects_end, self.slots_end), |objects| {
+            for known in self.pieces.iter().filter(|known| known.is_recorded) {
+                if let Some(piece) = known.list(version.index) {
+                    objects[known.objects.start..][..piece.objects.len()].copy_from_slice(&piece.objects);
+                }
+            }
+        });
+        let executed_pieces = pieces.iter().filter_map(|piece| {
+            let known = &self.pieces[*piece as usize];
+            Some((known.objects.start, known.first_slot, known.list(version.index)?))
+        });
+        list.execute_pieces(executed, executed_pieces);
+    }
+}
+
+/// Makes `slots` the different ones of some slots, with their revisions.
+fn collect_slots(
+    slots: &mut Vec<(u32, Option<u64>)>,
+    all: impl Iterator<Item = u32>,
+    revision_of: impl Fn(u32) -> Option<u64>,
+) {
+    slots.clear();
+    let mut seen: Vec<u64> = Vec::new();
+    for slot in all {
+        let (word, bit) = (slot as usize / WORD, 1 << (slot as usize % WORD));
+        if word >= seen.len() {
+            seen.resize(word + 1, 0);
+        }
+        seen[word] |= bit;
+    }
+    for (word, &mask) in seen.iter().enumerate() {
+        slots.extend(set_bits(mask).map(|bit| (word * WORD + bit) as u32).map(|slot| (slot, revision_of(slot))));
+    }
+}
+
+const WORD: usize = u64::BITS as usize;

@@ -1,0 +1,85 @@
+//! The stages of pieces: recorded once, executed by passes.
+
+use super::super::context::FrameContext;
+use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
+use super::super::stage_clock::StageGroup;
+use crate::backend::{Backend, BackendError};
+
+/// Records pieces, for all views: makes what each process draws of them. An item is a piece that has to be recorded.
+pub(super) struct RecordPieces;
+
+impl<B: Backend> Stage<B> for RecordPieces {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "record pieces",
+            after: &["bins"],
+            group: StageGroup::Sort,
+            chunking: Chunking::PerItem,
+            cost_kind: "record pieces",
+            depends_on_occlusion: false,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.has_pieces
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        frame.tables.pieces.recording_count()
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+        let tables = frame.tables;
+        let changes_by_view =
+            |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.cullable_meshes.contains(mesh);
+        let timeline = job.worker.timeline();
+        for index in job.items {
+            // A slice of its own, by name.
+            let name = || format!("record piece {:?}", tables.pieces.recorded_name(index));
+            let _span = timeline.is_on().then(|| timeline.span(name()));
+            let is_recordable = |mesh| !changes_by_view(mesh);
+            tables.pieces.record(index, frame.request.scene, &tables.objects, is_recordable, |_| frame.instancing);
+        }
+        Ok(())
+    }
+}
+
+/// Puts what a pass draws of the pieces that its view sees into the draw list.
+pub(super) struct ExecutePieces {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for ExecutePieces {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "execute pieces",
+            after: &["bin"],
+            group: StageGroup::Instance,
+            chunking: Chunking::PerItem,
+            cost_kind: "execute pieces",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.orders_by_bin && needs.has_pieces
+    }
+
+    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
+        let executed = frame.tables.visibility[frame.view_index_of(self.pass)].pieces.executed();
+        // A kept list executes them as well: the stage is there in every frame that does, for the timeline.
+        usize::from(frame.has_pieces(self.pass) && (!executed.is_empty() || !frame.keeps_list(self.pass)))
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        if frame.keeps_list(self.pass) {
+            return Ok(());
+        }
+        let table = &frame.tables.passes[self.pass];
+        let pieces = &frame.tables.visibility[frame.view_index_of(self.pass)].pieces;
+        if let Some(selection) = table.selection {
+            frame.tables.pieces.execute(selection, pieces.executed(), pieces.version(), &mut table.list.write());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+//! Pieces of a scene, which frames and views execute as a whole.
+
+use super::ObjectSet;
+
+/// A piece of the scene: objects that stand still together, such as a room's furniture, a block of a city, or a forest. It is recorded once,
+/// and executed by every view that sees any of it, in this frame and in later ones: L 3.2's command buffers, which other contexts execute.
+///
+/// A piece that a view executes costs that view one culling test, and no visibility, sort or merge of its objects; the backend keeps its
+/// bundles and what it has uploaded. In exchange a view that sees a corner of a piece draws all of it. So a piece is worth it if its objects are
+/// seen together: some hundreds or thousands of them, close to each other.
+///
+/// Pieces change no picture, except where surfaces of two objects lie at the same depth: objects of pieces are drawn before the others. What cannot
+/// be executed is drawn as if it were in no piece:
+///
+/// - blended objects, which need an order; objects whose mesh has levels of detail that views choose from; objects whose
+///   [triangles are culled](super::Mesh::with_triangle_culling);
+/// - a piece with an object that [changed](super::SceneRef::changes), until the first frame in which none of them does. That frame
+///   records the piece anew; the next one executes it. In frames that report [`Changes::Unknown`](super::Changes::Unknown) any object may have
+///   changed, so an engine that wants pieces executed reports its changes;
+/// - all pieces in a view whose opaque objects are ordered by [depth](crate::quality::Quality::opaque_order) or by
+///   [the engine](crate::command::DrawOrder), in maps of paraboloids, and while a view tests for
+///   [occlusion](crate::quality::Quality::occlusion), which finds hidden objects one by one;
+/// - a piece of which a view's [filter](super::Camera::filter) shows only some objects, and one that reaches beyond the
+///   [far plane](super::Camera::far) of a perspective view.
+///
+/// ```
+/// use drawloom::glam::{DVec3, Vec3};
+/// use drawloom::scene::{Changes, Material, Mesh, Piece, RenderObject, Scene, SceneRef};
+///
+/// let mut scene = Scene::new();
+/// let (chair, wood) = (scene.add(Mesh::cuboid("chair", Vec3::new(0.4, 0.9, 0.4))?)?, scene.add(Material::default())?);
+/// let mut chairs = Vec::new();
+/// for seat in 0..200 {
+///     chairs.push(scene.add_object(RenderObject::new(chair, wood, DVec3::X * f64::from(seat)))?);
+/// }
+/// scene.pieces.push(Piece::new("hall", scene.object_set(chairs)?));
+/// // Nothing changed since the frame before.
+/// let frame = SceneRef { changes: Changes::Objects(&[]), ..scene.as_scene_ref() };
+/// assert_eq!(frame.pieces[0].objects.len(), 200);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// Its name, which no other piece of the scene has.
+    pub name: String,
+    /// Its objects, by index, none of which is in another piece. Those at which the scene has no object are counted as
+    /// [`RejectionReason::UnknownObject`](crate::view::RejectionReason::UnknownObject). If an object moves to another index, the engine makes the
+    /// set again.
+    pub objects: ObjectSet,
+}
+
+impl Piece {
+    /// A piece of these objects.
+    pub fn new(name: impl Into<String>, objects: ObjectSet) -> Self {
+        Self { name: name.into(), objects }
+    }
+}
