@@ -1,0 +1,97 @@
+//! What a helper does for one view: at most one step runs, and at most one source waits for it.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::selection::LayerTextures;
+use crate::backend::{Picture, ReadBack};
+use crate::scene::Camera;
+
+/// The pixels of a frame on their way to the step.
+pub(super) struct Source {
+    /// The number of the frame.
+    pub(super) number: u64,
+    /// The camera that it was drawn with.
+    pub(super) camera: Camera,
+    pub(super) read_back: Box<dyn ReadBack>,
+}
+
+/// What a step computed of a frame.
+pub(super) struct HelperResult {
+    /// The number of the frame.
+    pub(super) number: u64,
+    pub(super) camera: Camera,
+    pub(super) picture: Arc<Picture>,
+    /// `None` if the backend has none.
+    pub(super) textures: Option<LayerTextures>,
+}
+
+/// What a helper does for one view.
+pub(super) struct ViewWork {
+    pub(super) view: String,
+    /// The newest source whose pixels have arrived, and when they did.
+    arrived: Option<(Source, Instant)>,
+    /// When the pixels arrived of which the step is being computed, or is about to be.
+    running: Option<Instant>,
+    pub(super) latest: Option<Arc<HelperResult>>,
+    /// Whether the latest attempt failed, so that only the first of several failures in a row is told.
+    has_failed: bool,
+    pub(super) computed: u64,
+    pub(super) skipped: u64,
+    pub(super) latest_took: Duration,
+}
+
+impl ViewWork {
+    pub(super) fn new(view: String) -> Self {
+        Self {
+            view,
+            arrived: None,
+            running: None,
+            latest: None,
+            has_failed: false,
+            computed: 0,
+            skipped: 0,
+            latest_took: Duration::ZERO,
+        }
+    }
+
+    /// The pixels of a source have arrived. Returns the source that waited before, which is left out.
+    pub(super) fn arrive(&mut self, source: Source, now: Instant) -> Option<Source> {
+        let (replaced, _) = self.arrived.replace((source, now))?;
+        self.skipped += 1;
+        Some(replaced)
+    }
+
+    /// Whether a source waits, and nobody works on another one.
+    pub(super) fn may_start(&self) -> bool {
+        self.arrived.is_some() && self.running.is_none()
+    }
+
+    /// Takes the source that waits, if there is one and nobody works on another one.
+    pub(super) fn start(&mut self) -> Option<Source> {
+        if self.running.is_some() {
+            return None;
+        }
+        let (source, arrived) = self.arrived.take()?;
+        self.running = Some(arrived);
+        Some(source)
+    }
+
+    /// The step has ended, with this result if it did not fail. Returns whether a failure is to be told, and the result that is of no use any
+    /// more.
+    pub(super) fn finish(&mut self, result: Option<Arc<HelperResult>>) -> (bool, Option<Arc<HelperResult>>) {
+        let took = self.running.take().map_or(Duration::ZERO, |arrived| arrived.elapsed());
+        let Some(result) = result else { return (self.fail(), None) };
+        self.computed += 1;
+        self.latest_took = took;
+        self.has_failed = false;
+        // Frames arrive in their order, unless the engine submits them in another one.
+        let is_newer = self.latest.as_ref().is_none_or(|latest| latest.number < result.number);
+        (false, if is_newer { self.latest.replace(result) } else { Some(result) })
+    }
+
+    /// Something failed. Returns whether that is to be told.
+    pub(super) fn fail(&mut self) -> bool {
+        !std::mem::replace(&mut self.has_failed, true)
+    }
+}
