@@ -27,6 +27,7 @@
 //! takes; a worker in the middle of it takes no part in recording. On a device that is not busy the same step as a process is faster, and not
 //! late: `cargo bench -p drawloom-benches --bench helper_post` compares them.
 
+mod bloom;
 #[cfg(feature = "software")]
 mod cpu_shader;
 mod error;
@@ -41,6 +42,7 @@ mod statistics;
 mod step;
 mod view_work;
 
+pub use bloom::Bloom;
 pub use error::{HelperError, HelperErrorReason};
 pub use layer::{HelperBlend, HelperLayer, HelperReprojection};
 pub use post_helper::PostHelper;
