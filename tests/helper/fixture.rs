@@ -5,7 +5,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, Picture, SoftwareBackend, SoftwareSubmission, WgpuBackend, WgpuSubmission};
-use drawloom::helper::{HelperFrame, HelperSource, HelperStatistics, HelperStep, PostHelper};
+use drawloom::helper::{HelperSource, HelperStatistics, HelperStep, PostHelper};
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder, Submitter, wgpu};

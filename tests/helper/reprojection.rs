@@ -125,7 +125,11 @@ fn shown(camera: &Camera, clip: DVec2, depth: f64) -> Shown {
             (depth - 1.0 + normal.dot(toward) / largest) * largest / -offset
         }
     };
-    if inverse_distance > 0.0 { Shown::At(camera.position + toward / inverse_distance) } else { Shown::InDirection(toward) }
+    if inverse_distance > 0.0 {
+        Shown::At(camera.position + toward / inverse_distance)
+    } else {
+        Shown::InDirection(toward)
+    }
 }
 
 /// Where a camera shows something, in clip space; `None` if that is behind it.
@@ -152,7 +156,8 @@ fn looked_up<B: DrawingBackend>() -> Result<(), Failed> {
     let mut random = Random::new();
     // Of pixels that the layer shows, does not show, that are behind its camera, and infinitely far away.
     let mut counts = [0; 4];
-    let modes = [HelperReprojection::ByDepth, HelperReprojection::ByDepthOrSamePlace, HelperReprojection::ByDepthOrNone];
+    let modes =
+        [HelperReprojection::ByDepth, HelperReprojection::ByDepthOrSamePlace, HelperReprojection::ByDepthOrNone];
     for mode in modes {
         let mut engine = engine::<B>(mode)?;
         for round in 0..8 {
@@ -205,7 +210,13 @@ fn check(
             continue;
         }
         let within = projected.filter(|clip| clip.abs().max_element() < 1.0);
-        counts[if within.is_some() { 0 } else if projected.is_some() { 1 } else { 2 }] += 1;
+        counts[if within.is_some() {
+            0
+        } else if projected.is_some() {
+            1
+        } else {
+            2
+        }] += 1;
         counts[3] += usize::from(matches!(shown, Shown::InDirection(_)));
         let expected = match (within, projected, mode) {
             (Some(within), ..) => Some(place(within)),
