@@ -203,7 +203,7 @@ impl PostHelper {
         let mut sources = Vec::new();
         for (index, view) in drawn {
             let Some(camera) = recorded.camera(index).cloned() else { continue };
-            match recorded.backend.read_back(&mut recorded.frame, index, &self.0.target) {
+            match recorded.read_back_whole(index, &self.0.target) {
                 Ok(read_back) => sources.push((view, Source { number, camera, read_back })),
                 Err(error) => self.0.tell_of_view(&view, number, error.into()),
             }
