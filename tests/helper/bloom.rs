@@ -14,11 +14,14 @@ use crate::Case;
 use crate::fixture::{DrawingBackend, Engine};
 
 pub const ON_ADAPTER: &[Case] = &[
-    ("bloom_of_the_helper_is_that_of_the_device", same_as_on_device),
+    ("bloom_of_the_helper_is_that_of_the_device", same_as_on_device::<WgpuBackend>),
     ("the_source_is_the_mean_of_what_it_covers", source::<WgpuBackend>),
 ];
 
-pub const IN_SOFTWARE: &[Case] = &[("software_the_source_is_the_mean_of_what_it_covers", source::<SoftwareBackend>)];
+pub const IN_SOFTWARE: &[Case] = &[
+    ("software_bloom_of_the_helper_is_that_of_the_device", same_as_on_device::<SoftwareBackend>),
+    ("software_the_source_is_the_mean_of_what_it_covers", source::<SoftwareBackend>),
+];
 
 fn scene() -> Scene {
     let mut scene = field(60);
@@ -35,18 +38,17 @@ fn halves(picture: &Picture) -> Vec<f64> {
 
 /// Every term of the sums is 0 or more. The device rounds rows and columns to half floats, by up to 2⁻¹⁰ each if it truncates, and the CPU rounds
 /// once, by 2⁻¹¹; denormal numbers by 2⁻²⁴ each. Each of them adds up to 66 terms twice in f32, which is 2⁻¹⁶.
-fn same_as_on_device() -> Result<(), Failed> {
+fn same_as_on_device<B: DrawingBackend>() -> Result<(), Failed> {
     let scene = scene();
     let view = scene.cameras[0].name.clone();
     for (divisor, radius) in [(1, 1), (2, 16), (4, 31), (5, 7)] {
         let bloom = Bloom { divisor, threshold: 0.5, radius };
-        let mut on_cpu =
-            Engine::<WgpuBackend>::new(bloom.on_cpu(), bloom.source(), |builder, helper| with(builder, helper))?;
+        let mut on_cpu = Engine::<B>::new(bloom.on_cpu(), bloom.source(), |builder, helper| with(builder, helper))?;
         let frame = on_cpu.draw_and_wait(&scene, &[&view])?;
-        let source = WgpuBackend::read(&frame.submission, 0, "bloom source")?;
+        let source = B::read(&frame.submission, 0, "bloom source")?;
         let (_, of_helper) = on_cpu.helper.latest(&view).ok_or("there is a result")?;
         // The helper of the second engine is not used.
-        let mut on_device = Engine::<WgpuBackend>::new(bloom.on_cpu(), bloom.source(), |mut builder, _| {
+        let mut on_device = Engine::<B>::new(bloom.on_cpu(), bloom.source(), |mut builder, _| {
             let (processes, step) = bloom.on_device(0.3);
             for process in processes {
                 builder = builder.process(process);
@@ -54,8 +56,8 @@ fn same_as_on_device() -> Result<(), Failed> {
             builder.deferred(Deferred::new().post(step).post(ToneMapping::default()))
         })?;
         let frame = on_device.draw(&scene)?;
-        let of_device = WgpuBackend::read(&frame.submission, 0, "bloom columns")?;
-        if WgpuBackend::read(&frame.submission, 0, "bloom source")? != source {
+        let of_device = B::read(&frame.submission, 0, "bloom columns")?;
+        if B::read(&frame.submission, 0, "bloom source")? != source {
             return Err("the sources differ".into());
         }
         let (of_helper, of_device) = (halves(&of_helper), halves(&of_device));
@@ -77,7 +79,7 @@ fn same_as_on_device() -> Result<(), Failed> {
     Ok(())
 }
 
-fn with(builder: RendererBuilder<WgpuBackend>, helper: &PostHelper) -> RendererBuilder<WgpuBackend> {
+fn with<B: DrawingBackend>(builder: RendererBuilder<B>, helper: &PostHelper) -> RendererBuilder<B> {
     let deferred = Deferred::new().post(helper.layer(HelperLayer::default())).post(ToneMapping::default());
     builder.deferred(deferred).process(helper.shrink().expect("it is shrunk"))
 }

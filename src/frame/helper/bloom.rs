@@ -1,10 +1,14 @@
 //! Bloom: the glow around what is brighter than white, on a helper or on the device.
 
+#[cfg(feature = "software")]
+mod cpu_shader;
+mod kernel;
 mod on_cpu;
 mod on_device;
 
 use std::sync::Arc;
 
+use self::kernel::{Kernel, MAX_RADIUS, NAME};
 use self::on_cpu::BloomStep;
 use self::on_device::{BloomColumns, BloomLayer, BloomRows};
 use super::shrink::Shrink;
@@ -61,9 +65,7 @@ impl Default for Bloom {
 
 impl Bloom {
     /// The largest radius.
-    pub const MAX_RADIUS: u32 = 31;
-
-    const NAME: &str = "bloom";
+    pub const MAX_RADIUS: u32 = MAX_RADIUS;
 
     /// What it is computed from.
     pub fn source(&self) -> HelperSource {
@@ -73,30 +75,21 @@ impl Bloom {
     /// The step for a [`PostHelper`](super::PostHelper). Its source must be in [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), as
     /// [`source`](Self::source) is; otherwise each result is an error.
     pub fn on_cpu(&self) -> impl HelperStep {
-        BloomStep::new(*self)
+        BloomStep::new(self.kernel())
     }
 
     /// The processes of the same step on the device, in the same frame, and the step of post-processing that adds `strength` times their result.
     pub fn on_device(&self, strength: f32) -> (Vec<Arc<dyn RenderProcess>>, impl PostStep + 'static) {
         let source = self.source();
-        let target = Shrink::target_of(Self::NAME, &source);
-        let shrink = Shrink::new(Self::NAME, &source).map(|shrink| Arc::new(shrink) as Arc<dyn RenderProcess>);
-        let rows = Arc::new(BloomRows { source: target, bloom: *self });
-        let processes = shrink.into_iter().chain([rows as _, Arc::new(BloomColumns { bloom: *self }) as _]);
+        let target = Shrink::target_of(NAME, &source);
+        let shrink = Shrink::new(NAME, &source).map(|shrink| Arc::new(shrink) as Arc<dyn RenderProcess>);
+        let (divisor, kernel) = (self.divisor.max(1), self.kernel());
+        let rows = Arc::new(BloomRows { source: target, divisor, kernel: kernel.clone() });
+        let processes = shrink.into_iter().chain([rows as _, Arc::new(BloomColumns { divisor, kernel }) as _]);
         (processes.collect(), BloomLayer { strength })
     }
 
-    fn clamped_threshold(&self) -> f32 {
-        // NaN becomes 0.
-        self.threshold.max(0.0)
-    }
-
-    /// The weights of pixels at the distances 0, 1, ... from a pixel. All but the first count twice, and their sum is 1.
-    fn weights(&self) -> Vec<f32> {
-        let radius = self.radius.clamp(1, Self::MAX_RADIUS);
-        let deviation = f64::from(radius) * 0.5;
-        let of = |distance: u32| (-0.5 * (f64::from(distance) / deviation).powi(2)).exp();
-        let sum = of(0) + 2.0 * (1..=radius).map(of).sum::<f64>();
-        (0..=radius).map(|distance| (of(distance) / sum) as f32).collect()
+    fn kernel(&self) -> Kernel {
+        Kernel::new(self.threshold, self.radius)
     }
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 
-use super::layer::{HelperBlend, HelperLayer, HelperReprojection};
+use super::layer_settings::{HelperBlend, HelperLayer, HelperReprojection};
+use super::selection::Selection;
 use crate::backend::Picture;
 use crate::process::{FullScreenCpuShader, FullScreenPixel, PassInputs, SampledTexture, ShaderView};
 use crate::raster::{Real, Vector, Vector2, Vector4};
@@ -30,7 +31,12 @@ enum LayerPosition<R> {
 }
 
 impl CpuLayer {
-    pub(super) fn new(view: &str, camera: &Camera, picture: &Arc<Picture>) -> Self {
+    /// The layers that a frame shows.
+    pub(super) fn all(shown: &Selection) -> Vec<Self> {
+        shown.results.iter().map(|(view, result)| Self::new(view, &result.camera, &result.picture)).collect()
+    }
+
+    fn new(view: &str, camera: &Camera, picture: &Arc<Picture>) -> Self {
         Self {
             view: view.to_owned(),
             picture: Arc::clone(picture),

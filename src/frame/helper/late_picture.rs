@@ -1,12 +1,20 @@
 //! The whole picture from the helper.
 
-use super::post_helper::PostHelper;
+#[cfg(feature = "software")]
+use super::cpu_shader::{CpuLayer, LatePictureCpuShader};
+use super::selection::SharedSelection;
+#[cfg(feature = "software")]
+use crate::process::CpuShader;
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, Place, RenderProcess};
+use crate::scene::ViewKind;
 
 /// Draws the helper's picture, and the source where there is none yet.
 pub(super) struct LatePicture {
     pub(super) name: String,
-    pub(super) helper: PostHelper,
+    pub(super) shown: SharedSelection,
+    pub(super) views: ViewKind,
+    /// The target that the step computes from.
+    pub(super) source: String,
     pub(super) target: String,
     pub(super) format: Format,
 }
@@ -17,14 +25,14 @@ impl RenderProcess for LatePicture {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.views(self.helper.source().views);
+        declare.views(self.views);
         declare.at(Place::AfterPostProcessing);
-        declare.samples(self.helper.source_target());
+        declare.samples(&self.source);
         declare.clears_color(&self.target, self.format, ClearColor::Value([0.0; 4]));
     }
 
     fn draws(&self) -> Draws<'_> {
-        let resources = self.helper.resources();
+        let resources = self.shown.resources();
         let shader = if resources.is_empty() {
             include_str!("copy.wgsl")
         } else {
@@ -34,8 +42,8 @@ impl RenderProcess for LatePicture {
     }
 
     #[cfg(feature = "software")]
-    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
-        let layers = self.helper.cpu_layers();
-        Some(crate::process::CpuShader::full_screen(super::cpu_shader::LatePictureCpuShader { layers }))
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        let layers = CpuLayer::all(&self.shown.get());
+        Some(CpuShader::full_screen(LatePictureCpuShader { layers }))
     }
 }

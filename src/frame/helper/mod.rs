@@ -32,6 +32,7 @@ mod bloom;
 mod cpu_shader;
 mod error;
 mod layer;
+mod layer_settings;
 mod layer_view;
 mod late_picture;
 mod post_helper;
@@ -44,7 +45,7 @@ mod view_work;
 
 pub use bloom::Bloom;
 pub use error::{HelperError, HelperErrorReason};
-pub use layer::{HelperBlend, HelperLayer, HelperReprojection};
+pub use layer_settings::{HelperBlend, HelperLayer, HelperReprojection};
 pub use post_helper::PostHelper;
 pub use source::HelperSource;
 pub use statistics::HelperStatistics;

@@ -7,14 +7,15 @@ use parking_lot::Mutex;
 
 use super::error::{HelperError, HelperErrorReason};
 use super::late_picture::LatePicture;
-use super::layer::{HelperLayer, LayerStep};
+use super::layer::LayerStep;
+use super::layer_settings::HelperLayer;
 use super::layer_view::view_words;
-use super::selection::{LayerTextures, Selection};
+use super::selection::{Selection, SharedSelection};
 use super::shrink::Shrink;
 use super::source::HelperSource;
 use super::statistics::HelperStatistics;
 use super::step::{HelperFrame, HelperStep};
-use super::view_work::{HelperResult, Source, ViewWork};
+use super::view_work::{HelperResult, LayerTextures, Source, ViewWork};
 use crate::backend::{Backend, BackendError, Picture};
 use crate::fence::{Fence, FenceError};
 use crate::frame::{FramePlace, Recorded, Renderer};
@@ -39,18 +40,22 @@ use crate::task::{JobPanic, Scheduler, catch};
 /// With [`Buffering::SameFrame`](crate::Buffering::SameFrame) nothing overlaps that is worth it: the device is done before the next frame
 /// begins, so the result of the frame before is there only if the step takes less time than the engine's update.
 ///
+/// Call `begin_frame` before [`Renderer::prepare_pipelines`], too: until the first call the helper has no textures, and its processes other shaders.
+///
 /// On a scheduler of one worker there is nobody to help: `begin_frame` computes the step itself.
 #[derive(Clone)]
 pub struct PostHelper(Arc<Shared>);
 
 struct Shared {
-    name: String,
+    name: Arc<str>,
     step: Box<dyn HelperStep>,
     source: HelperSource,
     /// The target that is read back.
     target: String,
     scheduler: Arc<Scheduler>,
     state: Mutex<State>,
+    /// What the processes draw.
+    shown: SharedSelection,
 }
 
 #[derive(Default)]
@@ -64,7 +69,6 @@ struct State {
     /// Frames whose pixels have not arrived, in the order of their numbers.
     in_flight: Vec<InFlight>,
     views: Vec<ViewWork>,
-    selection: Selection,
     errors: Vec<HelperError>,
     /// Whether what concerns all views has failed since it last worked.
     has_failed: bool,
@@ -96,10 +100,10 @@ impl PostHelper {
 
     /// A helper that computes a step from a source, on the workers of a scheduler: that of the renderer, as a rule.
     pub fn new(scheduler: Arc<Scheduler>, step: impl HelperStep, source: HelperSource) -> Self {
-        let name = step.name().to_owned();
+        let name: Arc<str> = step.name().into();
         let target = Shrink::target_of(&name, &source);
-        let (step, state) = (Box::new(step), Mutex::default());
-        Self(Arc::new(Shared { name, step, source, target, scheduler, state }))
+        let (step, state, shown) = (Box::new(step), Mutex::default(), SharedSelection::default());
+        Self(Arc::new(Shared { name, step, source, target, scheduler, state, shown }))
     }
 
     /// The step's name.
@@ -125,28 +129,28 @@ impl PostHelper {
 
     /// The step of post-processing that composites the helper's result over the picture: for [`Deferred::post`](crate::process::Deferred::post).
     pub fn layer(&self, layer: HelperLayer) -> impl PostStep + 'static {
-        LayerStep { helper: self.clone(), settings: layer }
+        let Shared { name, shown, .. } = &*self.0;
+        LayerStep { name: Arc::clone(name), shown: shown.clone(), settings: layer }
     }
 
     /// The process that draws the helper's result, as the whole picture, into a target of this name and format: for
     /// [`RendererBuilder::process`](crate::RendererBuilder::process). It stands after post-processing.
     pub fn late_picture(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
-        let name = format!("{} late", self.0.name);
-        LatePicture { name, helper: self.clone(), target: target.into(), format }
+        let Shared { name, shown, source, target: source_target, .. } = &*self.0;
+        LatePicture {
+            name: format!("{name} late"),
+            shown: shown.clone(),
+            views: source.views,
+            source: source_target.clone(),
+            target: target.into(),
+            format,
+        }
     }
 
     /// What the current frame shows, for an engine's own shaders: `layer` and `layer_view` of `layer_lookup.wgsl`. Empty before the first frame, and
     /// where the backend has no textures.
     pub fn resources(&self) -> Vec<ShaderResource<'static>> {
-        self.0.state.lock().selection.resources.clone()
-    }
-
-    /// What the current frame shows, for CPU shaders.
-    #[cfg(feature = "software")]
-    pub(super) fn cpu_layers(&self) -> Vec<super::cpu_shader::CpuLayer> {
-        let state = self.0.state.lock();
-        let results = state.selection.results.iter();
-        results.map(|(view, result)| super::cpu_shader::CpuLayer::new(view, &result.camera, &result.picture)).collect()
+        self.0.shown.resources()
     }
 
     /// Begins a frame: chooses the results that it shows. Call it right before the frame is [recorded](Renderer::record), so that they are
@@ -179,7 +183,7 @@ impl PostHelper {
             shown.extend(work.latest.clone().map(|latest| (work.view.clone(), latest)));
         }
         let selection = Selection::new(shown, state.neutral.as_ref());
-        let before = std::mem::replace(&mut state.selection, selection);
+        let before = self.0.shown.replace(selection);
         drop(state);
         // These may be the last references to what is on the device. To destroy that may wait for a thread that polls the device, whose callbacks
         // wait for the state.
@@ -348,7 +352,7 @@ impl Shared {
         source: Source,
         backend: Option<&Weak<dyn UploadPicture>>,
     ) -> Result<HelperResult, HelperErrorReason> {
-        let _span = self.scheduler.timeline().span(self.name.clone());
+        let _span = self.scheduler.timeline().span(self.name.to_string());
         let Source { number, camera, read_back } = source;
         let picture = read_back.read()?;
         drop(read_back);
@@ -363,14 +367,14 @@ impl Shared {
     }
 
     fn add_statistics<B: Backend>(&self, recorded: &mut Recorded<B>) {
-        let state = self.state.lock();
+        let (shown, state) = (self.shown.get(), self.state.lock());
         for view in recorded.views.recorded().iter().filter(|view| view.kind() == self.source.views) {
             let work = state.views.iter().find(|work| work.view == view.name());
             let statistics = HelperStatistics {
-                step: self.name.clone(),
+                step: self.name.to_string(),
                 view: view.name().to_owned(),
                 frame: state.frame,
-                result: state.selection.result(view.name()).map(|result| result.number),
+                result: shown.result(view.name()).map(|result| result.number),
                 computed: work.map_or(0, |work| work.computed),
                 skipped: work.map_or(0, |work| work.skipped),
                 latest_took: work.map_or_else(Default::default, |work| work.latest_took),
@@ -404,7 +408,7 @@ impl Shared {
     }
 
     fn add_error(&self, state: &mut State, view: String, frame: u64, reason: HelperErrorReason) {
-        let error = HelperError { step: self.name.clone(), view, frame, reason };
+        let error = HelperError { step: self.name.to_string(), view, frame, reason };
         crate::unwind::emit(|| tracing::warn!(target: "drawloom", %error, "a helper has no result"));
         if state.errors.len() == PostHelper::MAX_ERRORS {
             state.errors.remove(0);

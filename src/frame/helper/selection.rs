@@ -2,11 +2,30 @@
 
 use std::sync::Arc;
 
-use super::view_work::HelperResult;
+use parking_lot::Mutex;
+
+use super::view_work::{HelperResult, LayerTextures};
 use crate::process::ShaderResource;
 
-/// A picture and the words of its view on the device.
-pub(super) type LayerTextures = [ShaderResource<'static>; 2];
+/// The selection of the current frame, which the helper changes and its processes read.
+#[derive(Clone, Default)]
+pub(super) struct SharedSelection(Arc<Mutex<Selection>>);
+
+impl SharedSelection {
+    /// Replaces the selection, and returns the one before.
+    pub(super) fn replace(&self, selection: Selection) -> Selection {
+        std::mem::replace(&mut self.0.lock(), selection)
+    }
+
+    pub(super) fn get(&self) -> Selection {
+        self.0.lock().clone()
+    }
+
+    /// What shaders read in all views; empty if there is nothing on the device yet.
+    pub(super) fn resources(&self) -> Vec<ShaderResource<'static>> {
+        self.0.lock().resources.clone()
+    }
+}
 
 /// The results that a frame shows, chosen when it begins.
 #[derive(Clone, Default)]
@@ -14,7 +33,7 @@ pub(super) struct Selection {
     /// By view.
     pub(super) results: Vec<(String, Arc<HelperResult>)>,
     /// What shaders read in all views; empty if the backend has no textures.
-    pub(super) resources: Vec<ShaderResource<'static>>,
+    resources: Vec<ShaderResource<'static>>,
 }
 
 impl Selection {
@@ -26,6 +45,7 @@ impl Selection {
         Self { results, resources }
     }
 
+    /// The result that the frame shows in a view.
     pub(super) fn result(&self, view: &str) -> Option<&Arc<HelperResult>> {
         self.results.iter().find(|(name, _)| name == view).map(|(_, result)| result)
     }

@@ -1,6 +1,10 @@
 //! The source of a step, made smaller.
 
+#[cfg(feature = "software")]
+use super::cpu_shader::ShrinkCpuShader;
 use super::source::HelperSource;
+#[cfg(feature = "software")]
+use crate::process::CpuShader;
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
 
 /// Draws the source of a step into a smaller target.
@@ -45,8 +49,8 @@ impl RenderProcess for Shrink {
     }
 
     #[cfg(feature = "software")]
-    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+    fn cpu_shader(&self) -> Option<CpuShader> {
         let divisor = self.divisor as usize;
-        Some(crate::process::CpuShader::full_screen(super::cpu_shader::ShrinkCpuShader { divisor }))
+        Some(CpuShader::full_screen(ShrinkCpuShader { divisor }))
     }
 }

@@ -3,9 +3,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::selection::LayerTextures;
 use crate::backend::{Picture, ReadBack};
+use crate::process::ShaderResource;
 use crate::scene::Camera;
+
+/// A picture and the words of its view on the device.
+pub(super) type LayerTextures = [ShaderResource<'static>; 2];
 
 /// The pixels of a frame on their way to the step.
 pub(super) struct Source {

@@ -4,7 +4,7 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 use parking_lot::Mutex;
 
-use super::Bloom;
+use super::kernel::{Kernel, NAME};
 use crate::backend::Picture;
 use crate::frame::helper::step::{HelperFrame, HelperStep};
 use crate::process::Format;
@@ -18,8 +18,7 @@ const MAX_HALF: f32 = 65_504.0;
 
 /// Bloom on the CPU.
 pub(super) struct BloomStep {
-    bloom: Bloom,
-    weights: Vec<f32>,
+    kernel: Kernel,
     /// Memory that frames have used, so that pages are not faulted in again for each of them.
     scratch: Mutex<Vec<Scratch>>,
 }
@@ -31,14 +30,14 @@ struct Scratch {
 }
 
 impl BloomStep {
-    pub(super) fn new(bloom: Bloom) -> Self {
-        Self { bloom, weights: bloom.weights(), scratch: Mutex::default() }
+    pub(super) fn new(kernel: Kernel) -> Self {
+        Self { kernel, scratch: Mutex::default() }
     }
 }
 
 impl HelperStep for BloomStep {
     fn name(&self) -> &str {
-        Bloom::NAME
+        NAME
     }
 
     fn compute(&self, frame: &HelperFrame<'_>) -> Picture {
@@ -51,11 +50,11 @@ impl HelperStep for BloomStep {
 
         let sources = bytes.chunks_exact(row_length * size_of::<f16>());
         for_each_row(frame.scheduler, scratch.rows.chunks_exact_mut(row_length).zip(sources), |(row, source)| {
-            blur_row(source, self.bloom.clamped_threshold(), &self.weights, row);
+            blur_row(source, &self.kernel, row);
         });
         let targets = blurred.chunks_exact_mut(row_length * size_of::<f16>()).enumerate();
         for_each_row(frame.scheduler, targets, |(y, target)| {
-            blur_column(&scratch.rows, row_length, y, &self.weights, target);
+            blur_column(&scratch.rows, row_length, y, &self.kernel.weights, target);
         });
         self.scratch.lock().push(scratch);
         Picture { width, height, format, bytes: blurred }
@@ -74,7 +73,7 @@ fn for_each_row<I: ExactSizeIterator + Send>(scheduler: &Scheduler, rows: I, bod
 }
 
 /// Blurs what is brighter than the threshold along a row of half floats.
-fn blur_row(source: &[u8], threshold: f32, weights: &[f32], target: &mut [f32]) {
+fn blur_row(source: &[u8], Kernel { threshold, weights }: &Kernel, target: &mut [f32]) {
     let radius = weights.len() - 1;
     // With the pixels at both ends repeated, so that the loops below have no conditions.
     let mut padded = vec![0.0; target.len() + 2 * radius * CHANNELS];
@@ -82,7 +81,7 @@ fn blur_row(source: &[u8], threshold: f32, weights: &[f32], target: &mut [f32]) 
     let (start, end) = (radius * CHANNELS, radius * CHANNELS + target.len());
     halves.convert_to_f32_slice(&mut padded[start..end]);
     // The threshold is 0 or more, so infinite radiance becomes the largest half float, and NaN 0.
-    padded[start..end].iter_mut().for_each(|value| *value = (*value - threshold).max(0.0).min(MAX_HALF));
+    padded[start..end].iter_mut().for_each(|value| *value = (*value - *threshold).max(0.0).min(MAX_HALF));
     for distance in 0..radius {
         padded.copy_within(start..start + CHANNELS, distance * CHANNELS);
         padded.copy_within(end - CHANNELS..end, end + distance * CHANNELS);
@@ -126,8 +125,14 @@ mod tests {
     use crate::scene::Camera;
 
     /// Each pixel of the blur as a double sum, in f64.
-    fn oracle(bloom: Bloom, width: usize, height: usize, source: &[[f64; 4]], [x, y]: [usize; 2]) -> [f64; 3] {
-        let radius = i64::from(bloom.radius.clamp(1, 31));
+    fn oracle(
+        (threshold, radius): (f32, u32),
+        width: usize,
+        height: usize,
+        source: &[[f64; 4]],
+        [x, y]: [usize; 2],
+    ) -> [f64; 3] {
+        let radius = i64::from(radius.clamp(1, 31));
         let weight = |distance: i64| (-2.0 * (distance as f64 / radius as f64).powi(2)).exp();
         let all: f64 = (-radius..=radius).map(weight).sum();
         let mut sums = [0.0; 3];
@@ -136,7 +141,7 @@ mod tests {
                 let column = (x as i64 + across).clamp(0, width as i64 - 1) as usize;
                 let row = (y as i64 + down).clamp(0, height as i64 - 1) as usize;
                 for (channel, sum) in sums.iter_mut().enumerate() {
-                    let bright = (source[row * width + column][channel] - f64::from(bloom.threshold)).max(0.0);
+                    let bright = (source[row * width + column][channel] - f64::from(threshold)).max(0.0);
                     *sum += bright.min(65_504.0) * weight(across) * weight(down) / (all * all);
                 }
             }
@@ -173,18 +178,17 @@ mod tests {
             let picture = Picture { width: width as u32, height: height as u32, format: Format::Rgba16Float, bytes };
             let source: Vec<[f64; 4]> =
                 halves.chunks_exact(4).map(|pixel| std::array::from_fn(|channel| pixel[channel].to_f64())).collect();
-            let bloom = Bloom { divisor: 1, threshold, radius };
             let scheduler = Scheduler::new(workers).unwrap();
             let camera = Camera::looking_at("main", glam::DVec3::Z, glam::DVec3::ZERO);
             let frame = HelperFrame { picture: &picture, camera: &camera, number: 1, scheduler: &scheduler };
-            let step = BloomStep::new(bloom);
+            let step = BloomStep::new(Kernel::new(threshold, radius));
             let blurred = step.compute(&frame);
             prop_assert_eq!(&step.compute(&frame), &blurred, "the memory of the frame before changes nothing");
             // The threshold is subtracted from numbers of up to 2¹⁶, in f32.
             let of_roundings = 133.0 * f64::from(f32::EPSILON) * 0.5;
             for y in 0..height {
                 for x in 0..width {
-                    let expected = oracle(bloom, width, height, &source, [x, y]);
+                    let expected = oracle((threshold, radius), width, height, &source, [x, y]);
                     let start = (y * width + x) * 8;
                     for (channel, expected) in expected.into_iter().enumerate() {
                         let found = [0, 1].map(|byte| blurred.bytes[start + channel * 2 + byte]);

@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
-use super::Bloom;
+#[cfg(feature = "software")]
+use super::cpu_shader::{AddCpuShader, BlurCpuShader};
+use super::kernel::{Kernel, MAX_RADIUS, NAME};
+#[cfg(feature = "software")]
+use crate::process::CpuShader;
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, PostStep, RenderProcess, TargetSize};
 
 const ROWS: &str = "bloom rows";
@@ -11,25 +15,27 @@ const COLUMNS: &str = "bloom columns";
 /// Blurs what is brighter than the threshold along rows.
 pub(super) struct BloomRows {
     pub(super) source: String,
-    pub(super) bloom: Bloom,
+    pub(super) divisor: u32,
+    pub(super) kernel: Kernel,
 }
 
 /// Blurs that along columns.
 pub(super) struct BloomColumns {
-    pub(super) bloom: Bloom,
+    pub(super) divisor: u32,
+    pub(super) kernel: Kernel,
 }
 
-fn declare_blur(declare: &mut Declare, [source, target]: [&str; 2], bloom: &Bloom) {
+fn declare_blur(declare: &mut Declare, [source, target]: [&str; 2], divisor: u32) {
     declare.samples(source);
     declare.clears_color(target, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
-    declare.size(target, TargetSize::Divided(bloom.divisor.max(1)));
+    declare.size(target, TargetSize::Divided(divisor));
 }
 
 /// `Settings` in `blur.wgsl`: the step to the next pixel, the radius, the threshold, and the weights.
-fn draw_blur(bloom: &Bloom, step: [u32; 2], threshold: f32) -> Draws<'static> {
-    let mut weights = bloom.weights();
+fn draw_blur(kernel: &Kernel, step: [u32; 2], threshold: f32) -> Draws<'static> {
+    let mut weights = kernel.weights.clone();
     let radius = weights.len() as u32 - 1;
-    weights.resize(Bloom::MAX_RADIUS as usize + 1, 0.0);
+    weights.resize(MAX_RADIUS as usize + 1, 0.0);
     let mut words = vec![0, 0, 0, 0, step[0], step[1], radius, threshold.to_bits()];
     words.extend(weights.into_iter().map(f32::to_bits));
     let parameters = bytemuck::cast_slice(&words).to_vec().into();
@@ -42,11 +48,16 @@ impl RenderProcess for BloomRows {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare_blur(declare, [&self.source, ROWS], &self.bloom);
+        declare_blur(declare, [&self.source, ROWS], self.divisor);
     }
 
     fn draws(&self) -> Draws<'_> {
-        draw_blur(&self.bloom, [1, 0], self.bloom.clamped_threshold())
+        draw_blur(&self.kernel, [1, 0], self.kernel.threshold)
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::full_screen(BlurCpuShader { kernel: self.kernel.clone(), step: [1, 0] }))
     }
 }
 
@@ -56,11 +67,17 @@ impl RenderProcess for BloomColumns {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare_blur(declare, [ROWS, COLUMNS], &self.bloom);
+        declare_blur(declare, [ROWS, COLUMNS], self.divisor);
     }
 
     fn draws(&self) -> Draws<'_> {
-        draw_blur(&self.bloom, [0, 1], 0.0)
+        draw_blur(&self.kernel, [0, 1], 0.0)
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        let kernel = Kernel { threshold: 0.0, ..self.kernel.clone() };
+        Some(CpuShader::full_screen(BlurCpuShader { kernel, step: [0, 1] }))
     }
 }
 
@@ -84,7 +101,7 @@ struct BloomLayerProcess {
 
 impl RenderProcess for BloomLayerProcess {
     fn name(&self) -> &str {
-        Bloom::NAME
+        NAME
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -96,5 +113,10 @@ impl RenderProcess for BloomLayerProcess {
     fn draws(&self) -> Draws<'_> {
         let parameters = bytemuck::cast_slice(&[0.0, 0.0, 0.0, self.strength]).to_vec().into();
         Draws::FullScreen(FullScreen { shader: include_str!("add.wgsl"), parameters, ..FullScreen::default() })
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        Some(CpuShader::full_screen(AddCpuShader { strength: self.strength }))
     }
 }
