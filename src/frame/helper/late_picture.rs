@@ -6,13 +6,11 @@ use super::selection::SharedSelection;
 #[cfg(feature = "software")]
 use crate::process::CpuShader;
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, Place, RenderProcess};
-use crate::scene::ViewKind;
 
 /// Draws the helper's picture, and the source where there is none yet.
 pub(super) struct LatePicture {
     pub(super) name: String,
     pub(super) shown: SharedSelection,
-    pub(super) views: ViewKind,
     /// The target that the step computes from.
     pub(super) source: String,
     pub(super) target: String,
@@ -25,7 +23,6 @@ impl RenderProcess for LatePicture {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.views(self.views);
         declare.at(Place::AfterPostProcessing);
         declare.samples(&self.source);
         declare.clears_color(&self.target, self.format, ClearColor::Value([0.0; 4]));

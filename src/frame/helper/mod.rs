@@ -37,6 +37,7 @@ mod layer_view;
 mod late_picture;
 mod post_helper;
 mod selection;
+mod shared;
 mod shrink;
 mod source;
 mod statistics;

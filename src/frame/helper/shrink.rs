@@ -11,7 +11,7 @@ use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProce
 pub(super) struct Shrink {
     name: String,
     target: String,
-    source: HelperSource,
+    source: String,
     divisor: u32,
     format: Format,
 }
@@ -26,7 +26,7 @@ impl Shrink {
     pub(super) fn new(step: &str, source: &HelperSource) -> Option<Self> {
         let (divisor, format) = source.shrunk?;
         let (name, target) = (format!("{step} source"), Self::target_of(step, source));
-        Some(Self { name, target, source: source.clone(), divisor, format })
+        Some(Self { name, target, source: source.target.clone(), divisor, format })
     }
 }
 
@@ -36,8 +36,7 @@ impl RenderProcess for Shrink {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.views(self.source.views);
-        declare.samples(&self.source.target);
+        declare.samples(&self.source);
         declare.clears_color(&self.target, self.format, ClearColor::Value([0.0; 4]));
         declare.size(&self.target, TargetSize::Divided(self.divisor));
     }

@@ -25,6 +25,6 @@ pub struct HelperStatistics {
 impl HelperStatistics {
     /// How many frames old the result is that the frame shows: 1 if it is of the frame before.
     pub fn age(&self) -> Option<u64> {
-        self.result.map(|result| self.frame - result)
+        self.result.map(|result| self.frame.saturating_sub(result))
     }
 }

@@ -37,7 +37,7 @@ pub trait HelperStep: Send + Sync + 'static {
     /// Computes the step, in a [background job](Scheduler::background): on a worker that nothing else needs. A later frame samples what it
     /// returns, in any size, and any format but those of depth.
     ///
-    /// It is called once at a time for a view, and for several views at once. If it panics, the result is dropped, and
+    /// It is called once at a time for a view, while that is there in every frame, and for several views at once. If it panics, the result is dropped, and
     /// [reported](super::PostHelper::take_errors).
     fn compute(&self, frame: &HelperFrame<'_>) -> Picture;
 }

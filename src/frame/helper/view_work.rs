@@ -1,4 +1,4 @@
-//! What a helper does for one view: at most one step runs, and at most one source waits for it.
+//! What a helper does for one view.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,13 +29,17 @@ pub(super) struct HelperResult {
     pub(super) textures: Option<LayerTextures>,
 }
 
-/// What a helper does for one view.
+/// What a helper does for one view: at most one job is queued or runs, and at most one source waits for it.
 pub(super) struct ViewWork {
     pub(super) view: String,
+    /// Tells it from the work for a view of the same name that is gone.
+    pub(super) identity: u64,
     /// The newest source whose pixels have arrived, and when they did.
     arrived: Option<(Source, Instant)>,
-    /// When the pixels arrived of which the step is being computed, or is about to be.
-    running: Option<Instant>,
+    /// Whether a job is queued or runs.
+    has_job: bool,
+    /// When the pixels arrived of which the step is being computed.
+    started: Option<Instant>,
     pub(super) latest: Option<Arc<HelperResult>>,
     /// Whether the latest attempt failed, so that only the first of several failures in a row is told.
     has_failed: bool,
@@ -45,11 +49,13 @@ pub(super) struct ViewWork {
 }
 
 impl ViewWork {
-    pub(super) fn new(view: String) -> Self {
+    pub(super) fn new(view: String, identity: u64) -> Self {
         Self {
             view,
+            identity,
             arrived: None,
-            running: None,
+            has_job: false,
+            started: None,
             latest: None,
             has_failed: false,
             computed: 0,
@@ -65,25 +71,25 @@ impl ViewWork {
         Some(replaced)
     }
 
-    /// Whether a source waits, and nobody works on another one.
-    pub(super) fn may_start(&self) -> bool {
-        self.arrived.is_some() && self.running.is_none()
+    /// Whether a job is to be queued for a source that waits. If so, the view counts as having one.
+    pub(super) fn needs_job(&mut self) -> bool {
+        let is_needed = self.arrived.is_some() && !self.has_job;
+        self.has_job |= is_needed;
+        is_needed
     }
 
-    /// Takes the source that waits, if there is one and nobody works on another one.
+    /// Takes the source that waits.
     pub(super) fn start(&mut self) -> Option<Source> {
-        if self.running.is_some() {
-            return None;
-        }
         let (source, arrived) = self.arrived.take()?;
-        self.running = Some(arrived);
+        self.started = Some(arrived);
         Some(source)
     }
 
     /// The step has ended, with this result if it did not fail. Returns whether a failure is to be told, and the result that is of no use any
     /// more.
     pub(super) fn finish(&mut self, result: Option<Arc<HelperResult>>) -> (bool, Option<Arc<HelperResult>>) {
-        let took = self.running.take().map_or(Duration::ZERO, |arrived| arrived.elapsed());
+        self.has_job = false;
+        let took = self.started.take().map_or(Duration::ZERO, |arrived| arrived.elapsed());
         let Some(result) = result else { return (self.fail(), None) };
         self.computed += 1;
         self.latest_took = took;
