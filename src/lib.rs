@@ -105,7 +105,7 @@ pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, FinishedFrame, FrameError, FrameLoop, FrameLoopError, FramePlace,
     FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics, PieceStatistics, Recorded,
     Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
-    ViewStatistics, WarmUp,
+    ViewStatistics, WarmUp, helper,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

@@ -5,16 +5,18 @@ use std::sync::Arc;
 
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
+use super::picture::Picture;
+use super::read_back::ReadBack;
 use super::requests::{FrameRequest, PassRequest, ViewRequest};
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
 use crate::command::DrawState;
-use crate::process::{Draws, FramePlan};
+use crate::process::{Draws, FramePlan, ShaderResource};
 use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
-/// The interface between frames and a device. All methods but [`Backend::replace_view`] and [`Backend::submit`] are called while a frame is recorded,
+/// The interface between frames and a device. All methods but [`Backend::replace_view`], [`Backend::read_back`] and [`Backend::submit`] are called while a frame is recorded,
 /// most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also beside a frame. Those that record take the worker as proof that they run in a job (M 10.3
 /// asserts it).
 ///
@@ -25,7 +27,7 @@ use crate::timeline::{Labels, TuningChoice};
 ///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
 ///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
-/// 4. `replace_view`, as often as the engine replaces a camera.
+/// 4. `replace_view`, as often as the engine replaces a camera, and `read_back`.
 /// 5. Later, on the device thread, `submit`.
 ///
 /// What a backend must honour:
@@ -212,6 +214,25 @@ pub trait Backend: Send + Sync + 'static {
     fn replace_view(&self, frame: &mut Self::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
         let _ = (frame, request);
         Err(BackendError::CannotReplaceViews)
+    }
+
+    /// Has a view's target read back as a recorded frame leaves it, when the frame is submitted. It does not wait.
+    ///
+    /// # Errors
+    /// If there is no such target, or the device refuses; [`BackendError::CannotReadBack`] from a backend that does not implement it.
+    fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        let _ = (frame, view, target);
+        Err(BackendError::CannotReadBack)
+    }
+
+    /// A texture with the pixels of a picture, for shaders to sample. Called on any thread, at any time. `None` from a backend whose shaders
+    /// read no resources.
+    ///
+    /// # Errors
+    /// If the device refuses it.
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        let _ = picture;
+        Ok(None)
     }
 
     /// Submits a frame's queues one after the other. Called only on the device thread.

@@ -194,6 +194,21 @@ pub enum BackendError {
     /// [`Recorded::replace_camera`](crate::Recorded::replace_camera) of a backend that cannot change a view once it is recorded.
     #[error("the backend cannot replace the camera of a recorded frame")]
     CannotReplaceViews,
+    /// A target is to be read back from a backend that cannot.
+    #[error("the backend cannot read targets back")]
+    CannotReadBack,
+    /// A picture has other pixels than its size and format say, or a format that is not uploaded.
+    #[error("a picture of {width}x{height} pixels of the format {format:?} with {bytes} bytes cannot be uploaded")]
+    InvalidPicture {
+        /// In pixels.
+        width: u32,
+        /// In pixels.
+        height: u32,
+        /// The format of a pixel.
+        format: crate::process::Format,
+        /// The number of bytes.
+        bytes: usize,
+    },
     /// Pass times were requested from a backend that does not time passes.
     #[error("passes are not timed: see `WgpuBackend::time_passes`")]
     NotTimed,

@@ -10,6 +10,7 @@ mod mip_generation;
 mod mip_schedule;
 mod null;
 mod picture;
+mod read_back;
 mod requests;
 #[cfg(feature = "software")]
 mod software;
@@ -32,6 +33,7 @@ pub use frame_fence::FrameFence;
 pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
+pub use read_back::ReadBack;
 pub use requests::{FrameRequest, PassRequest, ViewRequest};
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};

@@ -43,6 +43,11 @@ impl LatchedViews {
         latched.map(|latched| &latched.view).or_else(|| self.views.views.get(index)).map(|view| &view.camera)
     }
 
+    /// The views as they were recorded.
+    pub(super) fn recorded(&self) -> &[RenderView] {
+        &self.views.views
+    }
+
     /// Replaces the camera of a view. `write` hands the view to the backend.
     ///
     /// # Errors

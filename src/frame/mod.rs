@@ -12,6 +12,7 @@ mod error;
 mod frame_loop;
 mod frame_place;
 mod granularity;
+pub mod helper;
 mod job_size;
 mod latched_views;
 mod light_maps;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::latched_views::LatchedViews;
 use super::view_cache::InFlight;
 use super::{FrameError, FramePlace, FrameStatistics, LatchError, SubmitError};
-use crate::backend::{Backend, FrameFence, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameFence, ReadBack, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
 use crate::scene::Camera;
@@ -167,6 +167,15 @@ impl<B: Backend> Recorded<B> {
         views.replace(view, camera, |request| backend.replace_view(frame, request))
     }
 
+    /// Has a view's target read back as a whole, as this frame leaves it, on any backend. It does not wait: ask the result when the frame is
+    /// submitted, or when [its end](FramePlace::End) is reached.
+    ///
+    /// # Errors
+    /// If there is no such target, or the backend cannot read it back.
+    pub fn read_back_whole(&mut self, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        self.backend.read_back(&mut self.frame, view, target)
+    }
+
     /// The queue of each view.
     pub fn queues(&self) -> &[ViewQueue<B::Commands>] {
         &self.queues
@@ -203,7 +212,7 @@ impl Recorded<crate::backend::WgpuBackend> {
         target: &str,
         origin: [u32; 2],
         size: [u32; 2],
-    ) -> Result<crate::backend::WgpuReadBack, crate::backend::BackendError> {
+    ) -> Result<crate::backend::WgpuReadBack, BackendError> {
         self.frame.read_back(self.backend.device(), view, target, [origin, size])
     }
 }

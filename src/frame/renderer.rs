@@ -459,6 +459,10 @@ impl<B: Backend> Renderer<B> {
     pub fn backend(&self) -> &B {
         &self.backend
     }
+
+    pub(super) fn shared_backend(&self) -> &Arc<B> {
+        &self.backend
+    }
 }
 
 /// Calls a backend on a thread whose panics no scheduler catches.

@@ -33,6 +33,16 @@ pub enum ShaderResource<'a> {
         /// The dimension that the view was made with: `D2` for `texture_2d`.
         dimension: wgpu::TextureViewDimension,
     },
+    /// Another texture in each view.
+    #[cfg(feature = "wgpu")]
+    TextureOfView {
+        /// The textures of views, by name. All have the format of `other`, or one that shaders read as the same kind of number.
+        views: Arc<[(String, wgpu::TextureView)]>,
+        /// The texture of all other views.
+        other: wgpu::TextureView,
+        /// The dimension that all of them were made with.
+        dimension: wgpu::TextureViewDimension,
+    },
     /// A sampler.
     #[cfg(feature = "wgpu")]
     Sampler {

@@ -47,6 +47,22 @@ macro_rules! forward_unchanged_calls {
             self.inner.replace_view(frame, request)
         }
 
+        fn read_back(
+            &self,
+            frame: &mut B::Frame,
+            view: usize,
+            target: &str,
+        ) -> Result<Box<dyn ::drawloom::backend::ReadBack>, ::drawloom::backend::BackendError> {
+            self.inner.read_back(frame, view, target)
+        }
+
+        fn upload_picture(
+            &self,
+            picture: &::drawloom::backend::Picture,
+        ) -> Result<Option<::drawloom::process::ShaderResource<'static>>, ::drawloom::backend::BackendError> {
+            self.inner.upload_picture(picture)
+        }
+
         fn part_count(&self, frame: &B::Frame, pass: &::drawloom::backend::PassRequest<'_>) -> usize {
             self.inner.part_count(frame, pass)
         }

@@ -10,7 +10,7 @@ use super::executor::Executor;
 use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
-use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
+use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, ViewQueue, ViewRequest};
 use crate::task::{Scheduler, Worker};
 
 /// Draws on the CPU.
@@ -135,6 +135,15 @@ impl Backend for SoftwareBackend {
 
     fn replace_view(&self, frame: &mut SoftwareFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
         frame.recording.replace_view(request)
+    }
+
+    fn read_back(
+        &self,
+        frame: &mut SoftwareFrame,
+        view: usize,
+        target: &str,
+    ) -> Result<Box<dyn ReadBack>, BackendError> {
+        Ok(Box::new(frame.recording.read_back(view, target)?))
     }
 
     fn submit(

@@ -15,6 +15,7 @@ use super::meshes::{Meshes, as_fetched};
 use super::object_pass::ObjectPass;
 use super::pass_context::PassContext;
 use super::precision::Precision;
+use super::read_back::{ReadBackCopy, SoftwareReadBack, new_read_back};
 use super::screen_pass::{draw_full_screen, draw_lights};
 use super::software_pass::{SoftwareDraws, SoftwarePass};
 use super::targets::SoftwareTargets;
@@ -44,6 +45,8 @@ pub(super) struct TypedFrame<R: Precision> {
     pub(super) subdivided: Mutex<SubdividedMeshes<Arc<Mesh>>>,
     pub(super) materials: Arc<MaterialTable>,
     pub(super) targets: Arc<SoftwareTargets<R>>,
+    /// What is read back when it is drawn.
+    pub(super) read_backs: Vec<ReadBackCopy>,
 }
 
 impl<R: Precision> FrameRecording for TypedFrame<R> {
@@ -63,6 +66,15 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         Ok(())
     }
 
+    fn read_back(&mut self, view: usize, target: &str) -> Result<SoftwareReadBack, BackendError> {
+        if self.targets.find(view, target).is_none() {
+            return Err(BackendError::UnknownTarget { view, target: target.to_owned() });
+        }
+        let (read_back, copy) = new_read_back(view, target);
+        self.read_backs.push(copy);
+        Ok(read_back)
+    }
+
     fn submit(
         self: Box<Self>,
         queues: Vec<ViewQueue<SoftwareCommands>>,
@@ -79,6 +91,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         }
         let drawn: HashSet<_> = queues.iter().map(|queue| queue.view).collect();
         self.targets.copy_histories(|view| drawn.contains(&view));
+        self.read_backs.into_iter().for_each(|copy| copy.drawn(&*self.targets));
         fences.into_iter().for_each(|fence| fence.setter.set());
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
     }

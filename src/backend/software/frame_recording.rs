@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::SoftwareSubmission;
 use super::commands::SoftwareCommands;
+use super::read_back::SoftwareReadBack;
 use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
 use crate::process::CpuShader;
 use crate::view::ObjectTable;
@@ -39,6 +40,12 @@ pub(super) trait FrameRecording: Send + Sync {
     /// # Errors
     /// If the camera is out of reach.
     fn replace_view(&mut self, request: &ViewRequest<'_>) -> Result<(), BackendError>;
+
+    /// Has a view's target read back when all passes are drawn.
+    ///
+    /// # Errors
+    /// If there is no such target.
+    fn read_back(&mut self, view: usize, target: &str) -> Result<SoftwareReadBack, BackendError>;
 
     /// Draws all passes, and sets each fence when the passes before its place are drawn.
     ///

@@ -25,6 +25,7 @@ mod pass_context;
 mod pixel_formats;
 mod precision;
 mod rasterizer;
+mod read_back;
 mod screen_pass;
 mod shader_inputs;
 mod software_pass;

@@ -177,6 +177,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::backend::Picture;
     use crate::raster::Vector;
     use crate::scene::Blend;
 
@@ -227,6 +228,42 @@ mod tests {
             }
             let sum = blended(Format::Rgba8Unorm, BlendEquation::ADDITIVE, Vector(color), there.map(f64::abs).map(|one| one.min(1.0)));
             prop_assert!(sum.iter().all(|value| (0.0..=1.0).contains(value)));
+        }
+    }
+
+    #[test]
+    fn texels_are_what_is_stored() {
+        let formats = [
+            Format::R8Unorm,
+            Format::Rg8Unorm,
+            Format::Rgba8Unorm,
+            Format::Rgba8Srgb,
+            Format::Bgra8Unorm,
+            Format::Bgra8Srgb,
+            Format::Rgb10a2Unorm,
+            Format::Rgba16Float,
+            Format::Rg16Float,
+            Format::R16Float,
+            Format::Rgba32Float,
+            Format::R32Float,
+            Format::R32Uint,
+            Format::Depth32Float,
+        ];
+        for format in formats {
+            for color in [[0.0, 0.25, 0.5, 1.0], [1.0, 0.002, 0.7, 0.3], [0.9, 0.1, 0.04, 0.0]] {
+                let color = stored::<f32>(format, color);
+                let mut bytes = Vec::new();
+                append_bytes(format, color, &mut bytes);
+                let texel = Picture { width: 1, height: 1, format, bytes }.texel([0, 0]);
+                for channel in 0..4 {
+                    let expected = match channel {
+                        _ if channel < format.channels() => color[channel],
+                        3 => 1.0,
+                        _ => 0.0,
+                    };
+                    assert!((texel[channel] - expected).abs() < 1e-6, "{format:?}: {texel:?} instead of {color:?}");
+                }
+            }
         }
     }
 

@@ -93,6 +93,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
             subdivided: Mutex::default(),
             materials,
             targets,
+            read_backs: Vec::new(),
         }))
     }
 }

@@ -99,6 +99,8 @@ impl ExactObject {
 pub(super) fn view_as_uploaded(view: &RenderView, gpu_view: &GpuView) -> ShaderView<f32> {
     let axis = |axis: Vec3| Vector(axis.to_array());
     ShaderView {
+        name: view.name().into(),
+        position: view.camera.position,
         clip_from_relative: gpu_view.clip_from_relative.to_cols_array_2d().map(Vector),
         right: axis(gpu_view.right),
         up: axis(gpu_view.up),
@@ -117,6 +119,8 @@ pub(super) fn exact_view(view: &RenderView, ambient: Vec3) -> ShaderView<f64> {
     let camera = &view.camera;
     let [right, up, forward] = view.precise_picture_axes().map(Vector3::of);
     ShaderView {
+        name: view.name().into(),
+        position: view.camera.position,
         clip_from_relative: view.precise_clip_from_relative().to_cols_array_2d().map(Vector),
         right,
         up,

@@ -16,11 +16,13 @@ use super::recording::{
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::streaming::Streamer;
 use super::submission::WgpuSubmission;
+use super::uploaded_picture::upload_picture;
 use crate::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, TargetMemory, ViewQueue, ViewRequest,
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, TargetMemory, ViewQueue,
+    ViewRequest,
 };
 use crate::command::{DrawList, DrawState};
-use crate::process::{Draws, FramePlan};
+use crate::process::{Draws, FramePlan, ShaderResource};
 use crate::quality::Quality;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
@@ -311,6 +313,14 @@ impl Backend for WgpuBackend {
         with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
             .flatten()
             .inspect_err(|_| self.buffers.clear())
+    }
+
+    fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        Ok(Box::new(frame.read_back_whole(&self.device, view, target)?))
+    }
+
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        upload_picture(&self.device, self.queue(), picture).map(Some)
     }
 
     fn submit(

@@ -35,6 +35,7 @@ mod submit_frame;
 mod surface_error;
 mod surface_formats;
 mod timing;
+mod uploaded_picture;
 mod window_surface;
 
 pub use backend::{WgpuBackend, WgpuResources};

@@ -50,6 +50,10 @@ pub(super) fn update_bind_groups(
         ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) => bytes.next().map(BindingResource::Buffer),
         ShaderResource::Buffer(buffer) => Some(BindingResource::Buffer(buffer.as_entire_buffer_binding())),
         ShaderResource::Texture { view, .. } => Some(BindingResource::Texture(view)),
+        ShaderResource::TextureOfView { views, other, .. } => {
+            let of_view = views.iter().find(|(name, _)| name == request.views[view].name());
+            Some(BindingResource::Texture(of_view.map_or(other, |(_, texture)| texture)))
+        }
         ShaderResource::Sampler { sampler, .. } => Some(BindingResource::Sampler(sampler)),
     });
     let (before, layout) = (pass.engine_bind_group.take(), pipelines.engine_layout.as_ref());

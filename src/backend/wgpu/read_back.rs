@@ -7,7 +7,7 @@ use parking_lot::{Condvar, Mutex};
 
 use super::error_scope::{poll, with_error_scope};
 use super::resources::{ViewTarget, WgpuTargets};
-use crate::backend::{BackendError, Picture};
+use crate::backend::{BackendError, Picture, ReadBack};
 use crate::process::Format;
 
 /// A rectangle of a target as one frame leaves it, on its way back to the CPU: see
@@ -96,6 +96,16 @@ impl WgpuReadBack {
         let rows = padded.chunks_exact(padded_row(width, format));
         let bytes = rows.flat_map(|row| &row[..width as usize * format.bytes()]).copied().collect();
         Ok(Picture { width, height, format, bytes })
+    }
+}
+
+impl ReadBack for WgpuReadBack {
+    fn try_read(&self) -> Result<Option<Picture>, BackendError> {
+        Self::try_read(self)
+    }
+
+    fn read(&self) -> Result<Picture, BackendError> {
+        Self::read(self)
     }
 }
 

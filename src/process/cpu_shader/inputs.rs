@@ -1,6 +1,9 @@
 //! What CPU shaders are given: the Rust side of the structures and bindings in `drawloom.wgsl`.
 
+use std::sync::Arc;
+
 use bytemuck::Pod;
+use glam::DVec3;
 
 use super::level_sampling::{bilinear, trilinear};
 use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
@@ -165,9 +168,13 @@ pub trait SampledTexture<R: Real>: Sync {
     }
 }
 
-/// A view: `View` in `drawloom.wgsl`, without the camera's position, which every other position is already relative to.
+/// A view: `View` in `drawloom.wgsl`.
 #[derive(Clone, Debug)]
 pub struct ShaderView<R> {
+    /// The name of the view's camera.
+    pub name: Arc<str>,
+    /// Where in the world the camera is, in metres. All other positions are relative to it.
+    pub position: DVec3,
     /// From world axes relative to the camera to clip space, column by column; depth is reversed.
     pub clip_from_relative: [Vector4<R>; 4],
     /// To the right, as long as half the picture's width; in perspective at a distance of 1.

@@ -49,6 +49,8 @@ pub(in crate::process) fn view_values<R: Real>(view: &RenderView) -> ShaderView<
     let is_orthographic = matches!(view.camera.projection, Projection::Orthographic { .. });
     let number = |value: f32| R::of(f64::from(value));
     ShaderView {
+        name: view.name().into(),
+        position: view.camera.position,
         clip_from_relative: view.clip_from_relative().to_cols_array_2d().map(|column| Vector(column.map(number))),
         right,
         up,

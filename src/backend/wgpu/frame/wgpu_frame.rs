@@ -57,6 +57,21 @@ impl WgpuFrame {
         Ok(read_back)
     }
 
+    /// Has a view's target read back as a whole.
+    ///
+    /// # Errors
+    /// See [`new_read_back`].
+    pub(crate) fn read_back_whole(
+        &mut self,
+        device: &wgpu::Device,
+        view: usize,
+        target: &str,
+    ) -> Result<WgpuReadBack, BackendError> {
+        let whole =
+            self.targets.find(view, target).map_or([0; 2], |found| [found.texture.width(), found.texture.height()]);
+        self.read_back(device, view, target, [[0, 0], whole])
+    }
+
     /// Whether mip levels are generated after a pass, by index in the frame.
     pub(crate) fn generates_mip_levels(&self, pass: usize) -> bool {
         !self.mip_schedule.after(pass).is_empty()

@@ -116,7 +116,7 @@ fn stages(is_compute: bool) -> [ShaderStages; 2] {
 pub(crate) fn binding_type(device_features: wgpu::Features, resource: &ShaderResource<'_>) -> wgpu::BindingType {
     match resource {
         ShaderResource::Bytes(_) | ShaderResource::SharedBytes(_) | ShaderResource::Buffer(_) => storage(false),
-        ShaderResource::Texture { view, dimension } => {
+        ShaderResource::Texture { view, dimension } | ShaderResource::TextureOfView { other: view, dimension, .. } => {
             let texture = view.texture();
             // A depth-stencil texture is sampled as depth.
             let depth = wgpu::TextureSampleType::Depth;

@@ -1,0 +1,282 @@
+//! Loops that draw frames with the step in different places.
+
+use std::error::Error;
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::{Backend, WgpuSubmission};
+use drawloom::glam::DVec3;
+use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStep, PostHelper};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, PostStep, RenderProcess, ShaderResource, ToneMapping,
+};
+use drawloom::scene::{Camera, Scene};
+use drawloom::task::Scheduler;
+use drawloom::{Buffering, FrameLoop, FramePlace, Renderer, Submitter, wgpu};
+use drawloom_benches::moving::Moving;
+
+use crate::steps::Grade;
+
+/// Longer than any frame.
+const LONG: Duration = Duration::from_secs(60);
+
+const STRENGTH: f32 = 0.3;
+
+/// Where the step is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Without,
+    OnDevice,
+    OnCpuInSameFrame,
+    Layer,
+    LatePicture,
+}
+
+impl Kind {
+    pub const ALL: [Self; 5] = [Self::Without, Self::OnDevice, Self::OnCpuInSameFrame, Self::Layer, Self::LatePicture];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Without => "none",
+            Self::OnDevice => "bloom on the device",
+            Self::OnCpuInSameFrame => "bloom on the CPU, waiting",
+            Self::Layer => "bloom on a helper, late layer",
+            Self::LatePicture => "grade on a helper, late picture",
+        }
+    }
+}
+
+/// A frame that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameSample {
+    pub finished: Instant,
+    /// From the input of what it shows.
+    pub latency: Duration,
+    pub age: Option<u64>,
+    /// The time of the latest result.
+    pub step: Option<Duration>,
+}
+
+/// A loop that draws frames.
+pub struct Contender<B: Backend>
+where
+    B::Submission: Send,
+{
+    kind: Kind,
+    frames: Frames<B>,
+    helper: Option<PostHelper>,
+    world: Moving,
+}
+
+#[expect(clippy::large_enum_variant, reason = "there are five")]
+enum Frames<B: Backend>
+where
+    B::Submission: Send,
+{
+    Loop(FrameLoop<B>),
+    Waiting(Waiting<B>),
+}
+
+impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
+    /// `open` opens a backend on one device. The second one, whose frames only composite, is for the contender that waits.
+    pub fn new(kind: Kind, open: impl Fn(Kind, bool) -> B, world: Moving) -> Result<Self, Box<dyn Error>> {
+        let scheduler = Arc::new(Scheduler::new(2)?);
+        let bloom = Bloom::default();
+        let builder = Renderer::builder(open(kind, false));
+        let mut helper = None;
+        let builder = match kind {
+            Kind::Without => builder.deferred(Deferred::to_picture()),
+            Kind::OnDevice => {
+                let (processes, step) = bloom.on_device(STRENGTH);
+                let builder = builder.deferred(Deferred::new().post(step).post(ToneMapping::default()));
+                processes.into_iter().fold(builder, |builder, process| builder.process(process))
+            }
+            Kind::OnCpuInSameFrame => {
+                // Never begun: only its process and the name of its target are used.
+                let source = PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source());
+                let shrink = source.shrink().ok_or("bloom is computed from a smaller picture")?;
+                builder.deferred(Deferred::new()).process(shrink).output(source.source_target())
+            }
+            Kind::Layer => {
+                let helper = helper.insert(PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source()));
+                let layer = helper.layer(HelperLayer { strength: STRENGTH, ..HelperLayer::default() });
+                let shrink = helper.shrink().ok_or("bloom is computed from a smaller picture")?;
+                let deferred = Deferred::new().post(layer).post(ToneMapping::default());
+                builder.deferred(deferred).process(shrink).output(helper.source_target())
+            }
+            Kind::LatePicture => {
+                let source = HelperSource::whole("picture");
+                let helper = helper.insert(PostHelper::new(Arc::clone(&scheduler), Grade, source));
+                let late = helper.late_picture("late picture", Format::Rgba8Srgb);
+                builder.deferred(Deferred::to_picture()).process(late).output("late picture")
+            }
+        };
+        let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
+        let frames = match kind {
+            Kind::OnCpuInSameFrame => {
+                let size = world.as_scene_ref().cameras[0].size;
+                Frames::Waiting(Waiting::new((renderer, submitter), open(kind, true), bloom, size, scheduler)?)
+            }
+            _ => Frames::Loop(FrameLoop::new(renderer, submitter, Buffering::Double)?),
+        };
+        Ok(Self { kind, frames, helper, world })
+    }
+
+    /// Draws frames, whose update takes so long, and waits for the last one.
+    pub fn draw(&mut self, count: usize, update: Duration) -> Result<Vec<FrameSample>, Box<dyn Error>> {
+        let world = &mut self.world;
+        let step = |world: &mut Moving| {
+            let start = Instant::now();
+            world.step();
+            while start.elapsed() < update {
+                std::hint::spin_loop();
+            }
+        };
+        let mut samples = Vec::with_capacity(count);
+        let frames = match &mut self.frames {
+            Frames::Loop(frames) => frames,
+            Frames::Waiting(waiting) => {
+                for _ in 0..count {
+                    let begun = Instant::now();
+                    step(world);
+                    let (finished, step) = waiting.draw(world)?;
+                    samples.push(FrameSample { finished, latency: finished - begun, age: Some(0), step: Some(step) });
+                }
+                return Ok(samples);
+            }
+        };
+        let mut finished = Vec::with_capacity(count);
+        // Of each frame, its statistics of the helper.
+        let mut statistics = Vec::with_capacity(count);
+        for _ in 0..count {
+            let (slot, more) = frames.begin();
+            finished.extend(more);
+            step(world);
+            if let Some(helper) = &self.helper {
+                helper.begin_frame(frames.renderer(), world.as_scene_ref().cameras);
+            }
+            let mut recorded = frames.renderer().record(world.as_scene_ref())?;
+            if let Some(helper) = &self.helper {
+                helper.read_back(&mut recorded);
+            }
+            statistics.push(recorded.statistics().helpers.first().cloned());
+            slot.submit(recorded);
+        }
+        while finished.len() < count {
+            thread::sleep(Duration::from_micros(100));
+            let (slot, more) = frames.begin();
+            finished.extend(more);
+            drop(slot);
+        }
+        let mut times = Vec::with_capacity(count);
+        for frame in finished {
+            frame.outcome?;
+            times.push(frame.times);
+        }
+        if let Some(error) = self.helper.as_ref().and_then(|helper| helper.take_errors().into_iter().next()) {
+            return Err(error.into());
+        }
+        for (index, (frame, statistics)) in times.iter().zip(&statistics).enumerate() {
+            let age = statistics.as_ref().and_then(|statistics| statistics.age());
+            let shown = match (self.kind, age) {
+                (Kind::LatePicture, Some(age)) => index.checked_sub(age as usize),
+                _ => Some(index),
+            };
+            // What shows a picture of the turn before is not counted.
+            let Some(shown) = shown else { continue };
+            samples.push(FrameSample {
+                finished: frame.finished,
+                latency: frame.finished.saturating_duration_since(times[shown].begun),
+                age,
+                step: statistics.as_ref().filter(|of_view| of_view.computed > 0).map(|of_view| of_view.latest_took),
+            });
+        }
+        Ok(samples)
+    }
+}
+
+/// Draws a frame, waits for it, computes the step, and composites its result with a second renderer.
+struct Waiting<B: Backend> {
+    renderer: Renderer<B>,
+    submitter: Submitter<B>,
+    composition: (Renderer<B>, Submitter<B>),
+    compose: Arc<Compose>,
+    scene: Scene,
+    step: Box<dyn HelperStep>,
+    scheduler: Arc<Scheduler>,
+}
+
+impl<B: Backend<Submission = WgpuSubmission>> Waiting<B> {
+    fn new(
+        (renderer, submitter): (Renderer<B>, Submitter<B>),
+        second: B,
+        bloom: Bloom,
+        size: [u32; 2],
+        scheduler: Arc<Scheduler>,
+    ) -> Result<Self, Box<dyn Error>> {
+        let compose = Arc::new(Compose::default());
+        let composition = Renderer::builder(second)
+            .process(Arc::clone(&compose))
+            .process(ToneMapping::default().process("composed", "picture"))
+            .output("picture")
+            .build(Arc::clone(&scheduler))?;
+        let mut scene = Scene::new();
+        scene.cameras = vec![Camera { size, ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) }];
+        Ok(Self { renderer, submitter, composition, compose, scene, step: Box::new(bloom.on_cpu()), scheduler })
+    }
+
+    /// Returns when the device was done, and how long the step took with its upload.
+    fn draw(&mut self, world: &Moving) -> Result<(Instant, Duration), Box<dyn Error>> {
+        let mut recorded = self.renderer.record(world.as_scene_ref())?;
+        let source = recorded.read_back_whole(0, "bloom source")?;
+        let drawn = recorded.fence_at(FramePlace::End)?;
+        let submitted = self.submitter.submit(recorded)?;
+        drawn.wait(LONG)?;
+        let start = Instant::now();
+        let picture = source.read()?;
+        let camera = &world.as_scene_ref().cameras[0];
+        let frame = HelperFrame { picture: &picture, camera, number: 1, scheduler: &self.scheduler };
+        let layer = self.renderer.backend().upload_picture(&self.step.compute(&frame))?;
+        let took = start.elapsed();
+        let (radiance, _) = submitted.submission.texture(0, "radiance").ok_or("it is an output")?;
+        let view = radiance.create_view(&wgpu::TextureViewDescriptor::default());
+        let radiance = ShaderResource::Texture { view, dimension: wgpu::TextureViewDimension::D2 };
+        *self.compose.0.lock().expect("no thread panics") = vec![layer.ok_or("wgpu has textures")?, radiance];
+        let (renderer, submitter) = &mut self.composition;
+        let mut recorded = renderer.record(self.scene.as_scene_ref())?;
+        let drawn = recorded.fence_at(FramePlace::End)?;
+        submitter.submit(recorded)?;
+        drawn.wait(LONG)?;
+        Ok((drawn.set_at().ok_or("it is set")?, took))
+    }
+}
+
+/// Adds a layer to a radiance.
+#[derive(Default)]
+struct Compose(Mutex<Vec<ShaderResource<'static>>>);
+
+impl RenderProcess for Compose {
+    fn name(&self) -> &str {
+        "compose"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("composed", Format::Rgba16Float, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @group(3) @binding(0) var layer: texture_2d<f32>;
+            @group(3) @binding(1) var radiance: texture_2d<f32>;
+
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                let value = textureSampleLevel(layer, target_sampler, in.clip * vec2<f32>(0.5, -0.5) + 0.5, 0.0);
+                return textureLoad(radiance, vec2<i32>(in.position.xy), 0) + 0.3 * value;
+            }
+        ";
+        let resources = self.0.lock().expect("no thread panics").clone();
+        Draws::FullScreen(FullScreen { shader, resources, ..FullScreen::default() })
+    }
+}

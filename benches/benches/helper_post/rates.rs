@@ -1,0 +1,113 @@
+//! Frame rate and latency with the step in different places.
+
+use std::error::Error;
+use std::time::Duration;
+
+use drawloom::backend::{Backend, WgpuBackend, WgpuSubmission};
+use drawloom_benches::backends::BackendName;
+use drawloom_benches::city;
+use drawloom_benches::harness::{Harness, Rounds};
+use drawloom_benches::moving::{Motion, Moving};
+use drawloom_benches::statistics::{median, percentile};
+use drawloom_testing::adapter;
+use drawloom_testing::simulated_device::SimulatedDevice;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use crate::contender::{Contender, FrameSample, Kind};
+
+/// The time of the engine's update.
+const UPDATE: Duration = Duration::from_millis(2);
+/// What the simulated device takes for the step, beside the rest of the frame, and for a frame that only composites.
+const STEP_ON_DEVICE: Duration = Duration::from_micros(1_500);
+const COMPOSITION: Duration = Duration::from_micros(200);
+/// The frames of a turn. The first ones are not counted, as the device is idle before them, and the helper has nothing.
+const FRAMES: usize = 60;
+const FIRST_FRAMES: usize = 10;
+
+#[derive(Serialize)]
+pub struct Row {
+    pub device: String,
+    pub name: &'static str,
+    /// Medians.
+    pub frame_ms: f64,
+    pub latency_ms: f64,
+    pub latency_99_ms: f64,
+    /// The mean.
+    pub age: Option<f64>,
+    pub step_ms: Option<f64>,
+}
+
+pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
+    let turns = if quick { 1 } else { 9 };
+    let mut rows = Vec::new();
+    match backend {
+        BackendName::Noop => {
+            let picture = if quick { [320, 180] } else { [1920, 1080] };
+            for milliseconds in [2, 10] {
+                let (device, queue) = adapter::noop_device()?;
+                let frame_time = Duration::from_millis(milliseconds);
+                let open = |kind, is_composition| {
+                    let backend = WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom");
+                    let time = match (kind, is_composition) {
+                        (_, true) => COMPOSITION,
+                        (Kind::OnDevice, _) => frame_time + STEP_ON_DEVICE,
+                        _ => frame_time,
+                    };
+                    SimulatedDevice::new(backend, time)
+                };
+                let device = format!("{milliseconds} ms");
+                rows.extend(of_device(&device, open, if quick { 100 } else { 1_000 }, picture, turns, progress)?);
+            }
+        }
+        BackendName::Adapter => {
+            let (device, queue) = adapter::device()?;
+            let open = |_, _| WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom");
+            let picture = if quick { [64, 36] } else { [480, 270] };
+            rows.extend(of_device("adapter", open, if quick { 50 } else { 1_000 }, picture, turns, progress)?);
+        }
+    }
+    Ok(rows)
+}
+
+fn of_device<B: Backend<Submission = WgpuSubmission>>(
+    device: &str,
+    open: impl Fn(Kind, bool) -> B,
+    boxes: usize,
+    picture: [u32; 2],
+    turns: usize,
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
+    let mut contenders = Vec::new();
+    for kind in Kind::ALL {
+        let mut scene = city::new(boxes, picture)?;
+        scene.cameras.truncate(1);
+        contenders.push(Contender::new(kind, &open, Moving::new(scene, Motion::Cameras))?);
+    }
+    let rounds = Rounds { warm_up: 1, measured: turns };
+    let measured =
+        Harness::new(rounds, progress).measure(&mut contenders, |contender, _| contender.draw(FRAMES, UPDATE))?;
+    Ok(Kind::ALL.into_iter().zip(measured).map(|(kind, turns)| row(device, kind, &turns)).collect())
+}
+
+fn row(device: &str, kind: Kind, turns: &[Vec<FrameSample>]) -> Row {
+    let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+    let samples = || turns.iter().flat_map(|turn| turn.iter().skip(FIRST_FRAMES));
+    // Over a whole turn, because frames that finish together have no time between them.
+    let frame = |turn: &Vec<FrameSample>| {
+        let (first, last) = (&turn[FIRST_FRAMES], &turn[turn.len() - 1]);
+        milliseconds(last.finished - first.finished) / (turn.len() - 1 - FIRST_FRAMES) as f64
+    };
+    let latencies = || samples().map(|sample| milliseconds(sample.latency));
+    let ages: Vec<_> = samples().filter_map(|sample| sample.age).map(|age| age as f64).collect();
+    let steps: Vec<_> = samples().filter_map(|sample| sample.step).map(milliseconds).collect();
+    Row {
+        device: device.to_owned(),
+        name: kind.name(),
+        frame_ms: median(turns.iter().map(frame)),
+        latency_ms: median(latencies()),
+        latency_99_ms: percentile(99, latencies()),
+        age: (!ages.is_empty()).then(|| ages.iter().sum::<f64>() / ages.len() as f64),
+        step_ms: (!steps.is_empty()).then(|| median(steps)),
+    }
+}

@@ -1,0 +1,95 @@
+//! Bloom: the glow around what is brighter than white, on a helper or on the device.
+
+#[cfg(feature = "software")]
+mod cpu_shader;
+mod kernel;
+mod on_cpu;
+mod on_device;
+
+use std::sync::Arc;
+
+use self::kernel::{Kernel, MAX_RADIUS, NAME};
+use self::on_cpu::BloomStep;
+use self::on_device::{BloomColumns, BloomLayer, BloomRows};
+use super::shrink::Shrink;
+use super::source::HelperSource;
+use super::step::HelperStep;
+use crate::process::{PostStep, RenderProcess};
+
+/// Bloom: what is brighter than a threshold glows, by a Gaussian blur of `radiance` at a fraction of its size.
+///
+/// The same layer is computed [on a helper](Self::on_cpu), a frame late, and [on the device](Self::on_device), in the same frame. Both
+/// agree up to the rounding of half floats. It is wide and smooth, so a late one is hardly noticed.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use drawloom::Renderer;
+/// use drawloom::backend::NullBackend;
+/// use drawloom::helper::{Bloom, HelperLayer, PostHelper};
+/// use drawloom::process::{Deferred, ToneMapping};
+/// use drawloom::task::Scheduler;
+///
+/// let scheduler = Arc::new(Scheduler::new(2)?);
+/// let bloom = Bloom::default();
+/// let helper = PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source());
+/// let deferred = Deferred::new()
+///     .post(helper.layer(HelperLayer { strength: 0.3, ..HelperLayer::default() }))
+///     .post(ToneMapping::default());
+/// let (renderer, submitter) = Renderer::builder(NullBackend)
+///     .deferred(deferred)
+///     .process(helper.shrink().expect("bloom is computed from a smaller picture"))
+///     .output(helper.source_target())
+///     .build(scheduler)?;
+/// // In each frame: helper.begin_frame(&renderer, cameras), record, helper.read_back(&mut recorded), submit.
+/// # let _ = (renderer, submitter);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bloom {
+    /// What width and height of `radiance` are divided by, from 1.
+    pub divisor: u32,
+    /// What is brighter glows, in each channel, by as much as it is brighter. Negative and NaN count as 0.
+    pub threshold: f32,
+    /// How far light is spread, in pixels of the smaller picture: 1 to [`MAX_RADIUS`](Self::MAX_RADIUS); other numbers count as the nearest of
+    /// these. The standard deviation is half of it.
+    pub radius: u32,
+}
+
+impl Default for Bloom {
+    /// A quarter of the size, what is brighter than white, and 16 pixels.
+    fn default() -> Self {
+        Self { divisor: 4, threshold: 1.0, radius: 16 }
+    }
+}
+
+impl Bloom {
+    /// The largest radius.
+    pub const MAX_RADIUS: u32 = MAX_RADIUS;
+
+    /// What it is computed from.
+    pub fn source(&self) -> HelperSource {
+        HelperSource::shrunk("radiance", self.divisor.max(1))
+    }
+
+    /// The step for a [`PostHelper`](super::PostHelper). Its source must be in [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), as
+    /// [`source`](Self::source) is; otherwise each result is an error.
+    pub fn on_cpu(&self) -> impl HelperStep {
+        BloomStep::new(self.kernel())
+    }
+
+    /// The processes of the same step on the device, in the same frame, and the step of post-processing that adds `strength` times their result.
+    pub fn on_device(&self, strength: f32) -> (Vec<Arc<dyn RenderProcess>>, impl PostStep + 'static) {
+        let source = self.source();
+        let target = Shrink::target_of(NAME, &source);
+        let shrink = Shrink::new(NAME, &source).map(|shrink| Arc::new(shrink) as Arc<dyn RenderProcess>);
+        let (divisor, kernel) = (self.divisor.max(1), self.kernel());
+        let rows = Arc::new(BloomRows { source: target, divisor, kernel: kernel.clone() });
+        let processes = shrink.into_iter().chain([rows as _, Arc::new(BloomColumns { divisor, kernel }) as _]);
+        (processes.collect(), BloomLayer { strength })
+    }
+
+    fn kernel(&self) -> Kernel {
+        Kernel::new(self.threshold, self.radius)
+    }
+}

@@ -1,0 +1,62 @@
+//! Why a helper has no result.
+
+use crate::backend::{BackendError, Picture};
+use crate::fence::FenceError;
+use crate::process::Format;
+
+/// Why there is no result of a frame in one view. The frames after it are computed as usual.
+#[derive(Debug, thiserror::Error)]
+#[error("the step {step:?} has no result of frame {frame} in view {view:?}: {reason}")]
+pub struct HelperError {
+    /// The step.
+    pub step: String,
+    /// The view; empty if the error is of all views.
+    pub view: String,
+    /// The number of the frame.
+    pub frame: u64,
+    /// What is wrong.
+    #[source]
+    pub reason: HelperErrorReason,
+}
+
+/// What is wrong.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum HelperErrorReason {
+    /// The backend cannot read the source back, cannot upload the result, or its device is lost.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// The device did not finish the frame.
+    #[error(transparent)]
+    Fence(#[from] FenceError),
+    /// The step panicked.
+    #[error("it panicked: {message}")]
+    Panicked {
+        /// What the panic said.
+        message: String,
+    },
+    /// The step's picture has other bytes than its size and format say, or none.
+    #[error("its picture of {width}x{height} pixels of the format {format:?} has {bytes} bytes")]
+    InvalidPicture {
+        /// In pixels.
+        width: u32,
+        /// In pixels.
+        height: u32,
+        /// The format of a pixel.
+        format: Format,
+        /// The number of bytes.
+        bytes: usize,
+    },
+}
+
+impl HelperErrorReason {
+    /// # Errors
+    /// If a step's picture is not whole, or its format cannot be sampled between pixels.
+    pub(super) fn check(picture: &Picture) -> Result<(), Self> {
+        let Picture { width, height, format, ref bytes } = *picture;
+        if picture.is_whole() && format.is_filterable() {
+            return Ok(());
+        }
+        Err(Self::InvalidPicture { width, height, format, bytes: bytes.len() })
+    }
+}

@@ -1,0 +1,122 @@
+//! The helper: from the pixels of frames to results that later frames show.
+
+use std::sync::{Arc, Weak};
+
+use super::error::HelperError;
+use super::late_picture::LatePicture;
+use super::layer::LayerStep;
+use super::layer_settings::HelperLayer;
+use super::shared::{MAX_ERRORS, Shared, UploadPicture};
+use super::shrink::Shrink;
+use super::source::HelperSource;
+use super::step::HelperStep;
+use crate::backend::{Backend, Picture};
+use crate::frame::{Recorded, Renderer};
+use crate::process::{Format, PostStep, RenderProcess, ShaderResource};
+use crate::scene::Camera;
+use crate::task::Scheduler;
+
+/// Computes a step of post-processing on idle workers, one or more frames late (S 9.7): see [the module](super). Clones are the same helper.
+///
+/// The engine gives the renderer the helper's processes, and calls two methods a frame: [`begin_frame`](Self::begin_frame) before it
+/// records, and [`read_back`](Self::read_back) before it submits.
+///
+/// | | what a frame shows |
+/// | --- | --- |
+/// | before the first result | no layer; of a late picture, the frame's own source |
+/// | the step is done before the next frame is recorded | the result of the frame before |
+/// | the step takes longer | the newest result, however old; of the sources that arrive meanwhile the newest is computed next |
+/// | a view has another size, or comes back | as before the first result |
+/// | the step panics, or the device refuses | the newest result before that, and [an error](Self::take_errors) |
+/// | the backend is replaced | as before the first result |
+///
+/// With [`Buffering::SameFrame`](crate::Buffering::SameFrame) nothing overlaps that is worth it: the device is done before the next frame
+/// begins, so the result of the frame before is there only if the step takes less time than the engine's update.
+///
+/// Call `begin_frame` before [`Renderer::prepare_pipelines`], too: until the first call the helper has no textures, and its processes other shaders.
+///
+/// On a scheduler of one worker there is nobody to help: `begin_frame` computes the step itself.
+#[derive(Clone)]
+pub struct PostHelper(Arc<Shared>);
+
+impl PostHelper {
+    /// So many errors are kept until the engine [takes](Self::take_errors) them.
+    pub const MAX_ERRORS: usize = MAX_ERRORS;
+
+    /// A helper that computes a step from a source, on the workers of a scheduler: that of the renderer, as a rule.
+    pub fn new(scheduler: Arc<Scheduler>, step: impl HelperStep, source: HelperSource) -> Self {
+        Self(Arc::new(Shared::new(scheduler, step, source)))
+    }
+
+    /// The step's name.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// What the step computes from.
+    pub fn source(&self) -> &HelperSource {
+        &self.0.source
+    }
+
+    /// The target that is read back: name it as an [output](crate::RendererBuilder::output) of the renderer, or nothing draws it.
+    pub fn source_target(&self) -> &str {
+        &self.0.target
+    }
+
+    /// The process that draws the source smaller, called `name source`: for [`RendererBuilder::process`](crate::RendererBuilder::process). `None` if
+    /// the source is read back as it is.
+    pub fn shrink(&self) -> Option<impl RenderProcess + 'static> {
+        Shrink::new(&self.0.name, &self.0.source)
+    }
+
+    /// The step of post-processing that composites the helper's result over the picture: for [`Deferred::post`](crate::process::Deferred::post).
+    pub fn layer(&self, layer: HelperLayer) -> impl PostStep + 'static {
+        let Shared { name, shown, .. } = &*self.0;
+        LayerStep { name: Arc::clone(name), shown: shown.clone(), settings: layer }
+    }
+
+    /// The process that draws the helper's result, as the whole picture, into a target of this name and format: for
+    /// [`RendererBuilder::process`](crate::RendererBuilder::process). It stands after post-processing.
+    pub fn late_picture(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
+        let Shared { name, shown, target: source, .. } = &*self.0;
+        LatePicture {
+            name: format!("{name} late"),
+            shown: shown.clone(),
+            source: source.clone(),
+            target: target.into(),
+            format,
+        }
+    }
+
+    /// What the current frame shows, for an engine's own shaders: `layer` and `layer_view` of `layer_lookup.wgsl`. Empty before the first frame, and
+    /// where the backend has no textures.
+    pub fn resources(&self) -> Vec<ShaderResource<'static>> {
+        self.0.shown.resources()
+    }
+
+    /// Begins a frame: chooses the results that it shows. Call it right before the frame is [recorded](Renderer::record), so that they are
+    /// as new as possible, with the cameras that are recorded. It does not wait, neither for the device nor for the step.
+    pub fn begin_frame<B: Backend>(&self, renderer: &Renderer<B>, cameras: &[Camera]) {
+        let backend: Weak<dyn UploadPicture> = Arc::downgrade(renderer.shared_backend()) as _;
+        self.0.begin_frame(&backend, cameras);
+    }
+
+    /// Has the source of a recorded frame read back when the frame is drawn, and the step computed from it. Call it when all cameras are
+    /// [replaced](Recorded::replace_camera) that will be, before the frame is submitted and the next one begins. It does not wait.
+    ///
+    /// It also adds to the frame's [statistics](crate::FrameStatistics::helpers).
+    pub fn read_back<B: Backend>(&self, recorded: &mut Recorded<B>) {
+        self.0.read_back(recorded);
+    }
+
+    /// The newest result of a view, by name: the number of its frame, and the step's picture. `None` before the first one.
+    pub fn latest(&self, view: &str) -> Option<(u64, Arc<Picture>)> {
+        self.0.latest(view)
+    }
+
+    /// The errors since the last call, oldest first: the first of several in a row of each view, and at most [`MAX_ERRORS`](Self::MAX_ERRORS).
+    /// Each has gone through `tracing`, too.
+    pub fn take_errors(&self) -> Vec<HelperError> {
+        self.0.take_errors()
+    }
+}

@@ -1,0 +1,380 @@
+//! What a helper, its callbacks and its jobs share.
+
+use std::sync::{Arc, Weak};
+use std::time::Instant;
+
+use parking_lot::Mutex;
+
+use super::error::{HelperError, HelperErrorReason};
+use super::layer_view::view_words;
+use super::selection::{Selection, SharedSelection};
+use super::shrink::Shrink;
+use super::source::HelperSource;
+use super::statistics::HelperStatistics;
+use super::step::{HelperFrame, HelperStep};
+use super::view_work::{HelperResult, LayerTextures, Source, ViewWork};
+use crate::backend::{Backend, BackendError, Picture};
+use crate::fence::{Fence, FenceError};
+use crate::frame::{FramePlace, Recorded};
+use crate::process::{Format, ShaderResource};
+use crate::scene::{Camera, ViewKind};
+use crate::task::{JobPanic, Scheduler, catch};
+
+/// So many errors are kept until the engine takes them.
+pub(super) const MAX_ERRORS: usize = 16;
+
+/// What a helper, its callbacks and its jobs share.
+pub(super) struct Shared {
+    pub(super) name: Arc<str>,
+    step: Box<dyn HelperStep>,
+    pub(super) source: HelperSource,
+    /// The target that is read back.
+    pub(super) target: String,
+    scheduler: Arc<Scheduler>,
+    state: Mutex<State>,
+    /// What the processes draw.
+    pub(super) shown: SharedSelection,
+}
+
+#[derive(Default)]
+struct State {
+    /// How many frames have begun.
+    frame: u64,
+    /// The backend that everything here belongs to.
+    backend: Option<Weak<dyn UploadPicture>>,
+    /// The textures of views without a result.
+    neutral: Option<LayerTextures>,
+    /// Frames whose pixels have not arrived, in the order of their numbers.
+    in_flight: Vec<InFlight>,
+    views: Vec<ViewWork>,
+    /// How many views there have been.
+    view_count: u64,
+    errors: Vec<HelperError>,
+    /// Whether what concerns all views has failed since it last worked.
+    has_failed: bool,
+    /// Sources that are left out. They are dropped where the device may be used, which a fence's callback must not.
+    retired: Vec<Source>,
+}
+
+struct InFlight {
+    number: u64,
+    drawn: Fence,
+    /// Each with its view.
+    sources: Vec<(String, Source)>,
+}
+
+impl State {
+    /// The work for a view, by name.
+    fn view(&mut self, name: &str) -> &mut ViewWork {
+        let index = self.views.iter().position(|work| work.view == name).unwrap_or_else(|| {
+            self.view_count += 1;
+            self.views.push(ViewWork::new(name.to_owned(), self.view_count));
+            self.views.len() - 1
+        });
+        &mut self.views[index]
+    }
+}
+
+/// What a helper needs of a backend of any type.
+pub(super) trait UploadPicture: Send + Sync {
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError>;
+}
+
+impl<B: Backend> UploadPicture for B {
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        Backend::upload_picture(self, picture)
+    }
+}
+
+impl Shared {
+    pub(super) fn new(scheduler: Arc<Scheduler>, step: impl HelperStep, source: HelperSource) -> Self {
+        let name: Arc<str> = step.name().into();
+        let target = Shrink::target_of(&name, &source);
+        let (step, state, shown) = (Box::new(step), Mutex::default(), SharedSelection::default());
+        Self { name, step, source, target, scheduler, state, shown }
+    }
+
+    /// See [`PostHelper::begin_frame`](super::PostHelper::begin_frame).
+    pub(super) fn begin_frame(&self, backend: &Weak<dyn UploadPicture>, cameras: &[Camera]) {
+        self.hear_from_device();
+        self.belong_to(backend);
+        if self.scheduler.workers() == 1 {
+            self.work_on_all();
+        }
+        let neutral = (self.state.lock().neutral.is_none())
+            .then(|| backend.upgrade().map_or(Ok(None), |backend| neutral_textures(&*backend)));
+        let mut state = self.state.lock();
+        let retired = std::mem::take(&mut state.retired);
+        state.frame += 1;
+        let told = match neutral {
+            Some(Ok(neutral)) => {
+                state.neutral = neutral;
+                None
+            }
+            Some(Err(error)) => self.fail(&mut state, error.into()),
+            None => None,
+        };
+        let camera_of = |view: &str| {
+            let of_kind = |camera: &&Camera| camera.name == view && camera.kind == ViewKind::Main;
+            cameras.iter().find(of_kind)
+        };
+        let gone: Vec<_> = state.views.extract_if(.., |work| camera_of(&work.view).is_none()).collect();
+        let (mut shown, mut of_other_sizes) = (Vec::new(), Vec::new());
+        for work in &mut state.views {
+            let size = camera_of(&work.view).map(|camera| camera.size);
+            of_other_sizes.extend(work.latest.take_if(|latest| Some(latest.camera.size) != size));
+            shown.extend(work.latest.clone().map(|latest| (work.view.clone(), latest)));
+        }
+        let selection = Selection::new(shown, state.neutral.as_ref());
+        let before = self.shown.replace(selection);
+        drop(state);
+        // These may be the last references to what is on the device. To destroy that may wait for a thread that polls the device, whose callbacks
+        // wait for the state.
+        drop((retired, gone, of_other_sizes, before));
+        tell(told);
+    }
+
+    /// See [`PostHelper::read_back`](super::PostHelper::read_back).
+    pub(super) fn read_back<B: Backend>(self: &Arc<Self>, recorded: &mut Recorded<B>) {
+        self.add_statistics(recorded);
+        let number = self.state.lock().frame;
+        let mut drawn: Vec<(usize, String)> = Vec::new();
+        for (index, view) in recorded.views.recorded().iter().enumerate() {
+            let is_source = view.kind() == ViewKind::Main && !view.is_cached();
+            if is_source && drawn.iter().all(|(_, name)| name != view.name()) {
+                drawn.push((index, view.name().to_owned()));
+            }
+        }
+        let mut sources = Vec::new();
+        for (index, view) in drawn {
+            let Some(camera) = recorded.camera(index).cloned() else { continue };
+            match recorded.read_back_whole(index, &self.target) {
+                Ok(read_back) => sources.push((view, Source { number, camera, read_back })),
+                Err(error) => self.fail_in_view(&view, number, error.into()),
+            }
+        }
+        if sources.is_empty() {
+            return;
+        }
+        // A frame always has an end.
+        let Ok(drawn) = recorded.fence_at(FramePlace::End) else { return };
+        self.state.lock().in_flight.push(InFlight { number, drawn: drawn.clone(), sources });
+        let shared = Arc::downgrade(self);
+        drawn.on_set(move |outcome| {
+            if let Some(shared) = shared.upgrade() {
+                shared.arrive(number, outcome);
+            }
+        });
+    }
+
+    /// See [`PostHelper::latest`](super::PostHelper::latest).
+    pub(super) fn latest(&self, view: &str) -> Option<(u64, Arc<Picture>)> {
+        let state = self.state.lock();
+        let latest = state.views.iter().find(|work| work.view == view)?.latest.as_ref()?;
+        Some((latest.number, Arc::clone(&latest.picture)))
+    }
+
+    /// See [`PostHelper::take_errors`](super::PostHelper::take_errors).
+    pub(super) fn take_errors(&self) -> Vec<HelperError> {
+        std::mem::take(&mut self.state.lock().errors)
+    }
+
+    /// Has callbacks called for what the device has done.
+    fn hear_from_device(&self) {
+        let fences: Vec<_> = self.state.lock().in_flight.iter().map(|frame| frame.drawn.clone()).collect();
+        // Not while the state is locked, as callbacks lock it. To ask for one that is not set asks for all.
+        fences.iter().all(Fence::is_set);
+    }
+
+    /// Forgets everything that belongs to another backend.
+    fn belong_to(&self, backend: &Weak<dyn UploadPicture>) {
+        let mut state = self.state.lock();
+        if state.backend.as_ref().is_some_and(|before| before.ptr_eq(backend)) {
+            return;
+        }
+        let next = State {
+            frame: state.frame,
+            backend: Some(Weak::clone(backend)),
+            view_count: state.view_count,
+            errors: std::mem::take(&mut state.errors),
+            ..State::default()
+        };
+        let before = std::mem::replace(&mut *state, next);
+        drop(state);
+        drop(before);
+    }
+
+    /// The device has drawn a frame, or will not.
+    fn arrive(self: &Arc<Self>, number: u64, outcome: Result<(), FenceError>) {
+        let (mut state, now) = (self.state.lock(), Instant::now());
+        // Frames are drawn in their order, so nothing comes of those before this one.
+        let arrived = state.in_flight.iter().take_while(|frame| frame.number <= number).count();
+        let arrived: Vec<_> = state.in_flight.drain(..arrived).collect();
+        for (view, source) in arrived.into_iter().flat_map(|frame| frame.sources) {
+            let left_out = if source.number < number || outcome.is_err() {
+                Some(source)
+            } else {
+                state.view(&view).arrive(source, now)
+            };
+            state.retired.extend(left_out);
+        }
+        let told = match outcome {
+            // The engine dropped the frame, or knows why it was refused.
+            Err(FenceError::Abandoned { .. }) => None,
+            Ok(()) => {
+                state.has_failed = false;
+                None
+            }
+            Err(error) => self.fail(&mut state, error.into()),
+        };
+        drop(state);
+        tell(told);
+        if self.scheduler.workers() > 1 {
+            self.queue_jobs();
+        }
+    }
+
+    /// Queues a job for each view whose source waits for one.
+    fn queue_jobs(self: &Arc<Self>) {
+        let mut state = self.state.lock();
+        let waiting = state.views.iter_mut().filter_map(|work| work.needs_job().then_some(work.identity));
+        let waiting: Vec<_> = waiting.collect();
+        drop(state);
+        for view in waiting {
+            let shared = Arc::clone(self);
+            // It reports what it has done to the state.
+            drop(self.scheduler.background(move || {
+                shared.work(view);
+                // A job for each source, so that other background jobs have their turn.
+                shared.queue_jobs();
+            }));
+        }
+    }
+
+    /// Computes the step for all views whose source waits.
+    fn work_on_all(&self) {
+        let views: Vec<_> = self.state.lock().views.iter().map(|work| work.identity).collect();
+        views.into_iter().for_each(|view| self.work(view));
+    }
+
+    /// Computes the step for a view, by its identity, if its source waits.
+    fn work(&self, view: u64) {
+        let mut state = self.state.lock();
+        let retired = std::mem::take(&mut state.retired);
+        let backend = state.backend.clone();
+        let source = state.views.iter_mut().find(|work| work.identity == view).and_then(ViewWork::start);
+        drop(state);
+        drop(retired);
+        let Some(source) = source else { return };
+        let number = source.number;
+        let computed = catch(|| self.compute(source, backend.as_ref()));
+        let result = computed.unwrap_or_else(|JobPanic { message }| Err(HelperErrorReason::Panicked { message }));
+        let (result, error) = match result {
+            Ok(result) => (Some(Arc::new(result)), None),
+            Err(error) => (None, Some(error)),
+        };
+        let mut state = self.state.lock();
+        // Otherwise the view is gone, or belonged to another backend.
+        let Some(work) = state.views.iter_mut().find(|work| work.identity == view) else { return };
+        let (is_told, before) = work.finish(result);
+        let name = work.view.clone();
+        let error = error.filter(|_| is_told).map(|reason| self.add_error(&mut state, name, number, reason));
+        drop(state);
+        drop(before);
+        tell(error);
+    }
+
+    fn compute(
+        &self,
+        source: Source,
+        backend: Option<&Weak<dyn UploadPicture>>,
+    ) -> Result<HelperResult, HelperErrorReason> {
+        let _span = self.scheduler.timeline().span(self.name.to_string());
+        let Source { number, camera, read_back } = source;
+        let picture = read_back.read()?;
+        drop(read_back);
+        let frame = HelperFrame { picture: &picture, camera: &camera, number, scheduler: &self.scheduler };
+        let picture = self.step.compute(&frame);
+        HelperErrorReason::check(&picture)?;
+        let textures = match backend.and_then(Weak::upgrade) {
+            Some(backend) => layer_textures(&*backend, &picture, Some(&camera))?,
+            None => None,
+        };
+        Ok(HelperResult { number, camera, picture: Arc::new(picture), textures })
+    }
+
+    fn add_statistics<B: Backend>(&self, recorded: &mut Recorded<B>) {
+        let (shown, state) = (self.shown.get(), self.state.lock());
+        for view in recorded.views.recorded().iter().filter(|view| view.kind() == ViewKind::Main) {
+            let work = state.views.iter().find(|work| work.view == view.name());
+            let statistics = HelperStatistics {
+                step: self.name.to_string(),
+                view: view.name().to_owned(),
+                frame: state.frame,
+                result: shown.result(view.name()).map(|result| result.number),
+                computed: work.map_or(0, |work| work.computed),
+                skipped: work.map_or(0, |work| work.skipped),
+                latest_took: work.map_or_else(Default::default, |work| work.latest_took),
+            };
+            let timeline = self.scheduler.timeline();
+            if let Some(age) = statistics.age().filter(|_| timeline.is_on()) {
+                timeline.count(format!("age of {} in {}, frames", self.name, view.name()), age as f64);
+            }
+            recorded.statistics.helpers.push(statistics);
+        }
+    }
+
+    /// Something failed for all views. Returns what is to be told.
+    fn fail(&self, state: &mut State, reason: HelperErrorReason) -> Option<String> {
+        let is_told = !std::mem::replace(&mut state.has_failed, true);
+        let number = state.frame;
+        is_told.then(|| self.add_error(state, String::new(), number, reason))
+    }
+
+    /// Something failed for one view.
+    fn fail_in_view(&self, view: &str, number: u64, reason: HelperErrorReason) {
+        let mut state = self.state.lock();
+        let is_told = state.view(view).fail();
+        let told = is_told.then(|| self.add_error(&mut state, view.to_owned(), number, reason));
+        drop(state);
+        tell(told);
+    }
+
+    /// Keeps an error for the engine, and returns what is to be [told](tell) when the state is not locked.
+    fn add_error(&self, state: &mut State, view: String, frame: u64, reason: HelperErrorReason) -> String {
+        let error = HelperError { step: self.name.to_string(), view, frame, reason };
+        let message = error.to_string();
+        if state.errors.len() == MAX_ERRORS {
+            state.errors.remove(0);
+        }
+        state.errors.push(error);
+        message
+    }
+}
+
+/// Tells of an error through `tracing`, whose subscriber is code of the engine's.
+fn tell(message: Option<String>) {
+    if let Some(message) = message {
+        crate::unwind::emit(|| tracing::warn!(target: "drawloom", message));
+    }
+}
+
+/// The textures of views without a result.
+///
+/// # Errors
+/// If the device refuses.
+fn neutral_textures(backend: &dyn UploadPicture) -> Result<Option<LayerTextures>, BackendError> {
+    let pixel = Picture { width: 1, height: 1, format: Format::Rgba8Unorm, bytes: vec![0; 4] };
+    layer_textures(backend, &pixel, None)
+}
+
+/// # Errors
+/// If the device refuses.
+fn layer_textures(
+    backend: &dyn UploadPicture,
+    picture: &Picture,
+    camera: Option<&Camera>,
+) -> Result<Option<LayerTextures>, BackendError> {
+    let picture = backend.upload_picture(picture)?;
+    Ok(picture.zip(backend.upload_picture(&view_words(camera))?).map(<[_; 2]>::from))
+}

@@ -1,0 +1,26 @@
+//! What a helper's step computes from.
+
+use crate::process::Format;
+
+/// The target that a step computes from, in each main view.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HelperSource {
+    /// The target: an output of the frame, or any other that is not [transient](crate::backend::WgpuBackend::transient_targets).
+    pub target: String,
+    /// If the target is to be made smaller first, what width and height are divided by, rounded up, and the format of the smaller one: see
+    /// [`PostHelper::shrink`](super::PostHelper::shrink).
+    pub shrunk: Option<(u32, Format)>,
+}
+
+impl HelperSource {
+    /// A target as it is, such as `picture`.
+    pub fn whole(target: impl Into<String>) -> Self {
+        Self { target: target.into(), shrunk: None }
+    }
+
+    /// A target with so much less width and height, in [`Format::Rgba16Float`]: each pixel is the mean of `divisor` ×
+    /// `divisor`.
+    pub fn shrunk(target: impl Into<String>, divisor: u32) -> Self {
+        Self { shrunk: Some((divisor, Format::Rgba16Float)), ..Self::whole(target) }
+    }
+}

@@ -1,0 +1,55 @@
+//! What an engine has the helper compute.
+
+use crate::backend::Picture;
+use crate::scene::Camera;
+use crate::task::Scheduler;
+
+/// A step of post-processing that the CPU computes, from the pixels of a frame that the device has drawn.
+///
+/// ```
+/// use drawloom::backend::Picture;
+/// use drawloom::helper::{HelperFrame, HelperStep};
+///
+/// /// The negative of a picture of bytes.
+/// struct Negative;
+///
+/// impl HelperStep for Negative {
+///     fn name(&self) -> &str {
+///         "negative"
+///     }
+///
+///     fn compute(&self, frame: &HelperFrame<'_>) -> Picture {
+///         let mut picture = frame.picture.clone();
+///         // A row at a time, on all workers that have nothing else to do.
+///         let rows = picture.bytes.chunks_mut(picture.width as usize * 4);
+///         let outcome = frame.scheduler.parallel_for_each(rows, |row, _worker| {
+///             row.chunks_mut(4).for_each(|pixel| pixel[..3].iter_mut().for_each(|channel| *channel = 255 - *channel));
+///         });
+///         outcome.expect("a row does not panic");
+///         picture
+///     }
+/// }
+/// ```
+pub trait HelperStep: Send + Sync + 'static {
+    /// Its name in errors, statistics and the timeline, and the first part of the names of its processes and its targets.
+    fn name(&self) -> &str;
+
+    /// Computes the step, in a [background job](Scheduler::background): on a worker that nothing else needs. A later frame samples what it
+    /// returns, in any size, and any format but those of depth.
+    ///
+    /// It is called once at a time for a view, while that is there in every frame, and for several views at once. If it panics, the result is dropped, and
+    /// [reported](super::PostHelper::take_errors).
+    fn compute(&self, frame: &HelperFrame<'_>) -> Picture;
+}
+
+/// What a step computes from.
+pub struct HelperFrame<'a> {
+    /// The pixels of the [source](super::HelperSource), as the device left them.
+    pub picture: &'a Picture,
+    /// The camera that the frame was drawn with.
+    pub camera: &'a Camera,
+    /// The number of the frame: how many had [begun](super::PostHelper::begin_frame) until it began, itself included.
+    pub number: u64,
+    /// The workers: loops that the step opens on it are background work, as the step is.
+    pub scheduler: &'a Scheduler,
+}

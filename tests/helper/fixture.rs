@@ -1,0 +1,133 @@
+//! A renderer with a helper, on either backend.
+
+use std::sync::{Arc, OnceLock};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use drawloom::backend::{Backend, Picture, SoftwareBackend, SoftwareSubmission, WgpuBackend, WgpuSubmission};
+use drawloom::helper::{HelperSource, HelperStatistics, HelperStep, PostHelper};
+use drawloom::scene::Scene;
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, RendererBuilder, Submitter, wgpu};
+use drawloom_testing::adapter;
+use libtest_mimic::Failed;
+
+/// Longer than anything here takes, also on a machine that is busy.
+pub const LONG: Duration = Duration::from_secs(60);
+
+/// A device on the machine's adapter, which all cases share; `None` without an adapter.
+pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
+    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+    DEVICE.get_or_init(|| adapter::device().ok()).clone()
+}
+
+/// A backend that draws.
+pub trait DrawingBackend: Backend {
+    fn open(scheduler: &Arc<Scheduler>) -> Result<Self, Failed>
+    where
+        Self: Sized;
+
+    /// The pixels of a view's target, when the frame is drawn.
+    fn read(submission: &Self::Submission, view: usize, target: &str) -> Result<Picture, Failed>;
+}
+
+impl DrawingBackend for WgpuBackend {
+    fn open(_scheduler: &Arc<Scheduler>) -> Result<Self, Failed> {
+        let (device, queue) = device().ok_or("there is no graphics adapter")?;
+        Ok(Self::new(device, queue)?)
+    }
+
+    fn read(submission: &WgpuSubmission, view: usize, target: &str) -> Result<Picture, Failed> {
+        Ok(submission.read(view, target)?)
+    }
+}
+
+impl DrawingBackend for SoftwareBackend {
+    fn open(scheduler: &Arc<Scheduler>) -> Result<Self, Failed> {
+        Ok(Self::new(Arc::clone(scheduler)))
+    }
+
+    fn read(submission: &SoftwareSubmission, view: usize, target: &str) -> Result<Picture, Failed> {
+        Ok(submission.read(view, target)?)
+    }
+}
+
+/// A renderer with a helper.
+pub struct Engine<B: Backend> {
+    pub renderer: Renderer<B>,
+    pub submitter: Submitter<B>,
+    pub helper: PostHelper,
+}
+
+/// A frame that was submitted.
+pub struct Frame<B: Backend> {
+    pub submission: B::Submission,
+    /// Of each view.
+    pub statistics: Vec<HelperStatistics>,
+}
+
+impl<B: DrawingBackend> Engine<B> {
+    pub fn new(
+        step: impl HelperStep,
+        source: HelperSource,
+        build: impl FnOnce(RendererBuilder<B>, &PostHelper) -> RendererBuilder<B>,
+    ) -> Result<Self, Failed> {
+        Self::with_workers(2, step, source, build)
+    }
+
+    pub fn with_workers(
+        workers: usize,
+        step: impl HelperStep,
+        source: HelperSource,
+        build: impl FnOnce(RendererBuilder<B>, &PostHelper) -> RendererBuilder<B>,
+    ) -> Result<Self, Failed> {
+        let scheduler = Arc::new(Scheduler::new(workers)?);
+        let helper = PostHelper::new(Arc::clone(&scheduler), step, source);
+        let builder = build(Renderer::builder(B::open(&scheduler)?), &helper);
+        let (renderer, submitter) = builder.output(helper.source_target()).build(scheduler)?;
+        Ok(Self { renderer, submitter, helper })
+    }
+
+    /// Draws a frame.
+    pub fn draw(&mut self, scene: &Scene) -> Result<Frame<B>, Failed> {
+        self.helper.begin_frame(&self.renderer, &scene.cameras);
+        let mut recorded = self.renderer.record(scene.as_scene_ref())?;
+        self.helper.read_back(&mut recorded);
+        let statistics = recorded.statistics().helpers.clone();
+        Ok(Frame { submission: self.submitter.submit(recorded)?.submission, statistics })
+    }
+
+    /// Draws a frame, and waits until its results are there in these views.
+    pub fn draw_and_wait(&mut self, scene: &Scene, views: &[&str]) -> Result<Frame<B>, Failed> {
+        let frame = self.draw(scene)?;
+        // Waits until the frame is drawn.
+        B::read(&frame.submission, 0, self.helper.source_target())?;
+        let number = frame.statistics[0].frame;
+        for view in views {
+            wait_until("a result", || self.helper.latest(view).is_some_and(|(latest, _)| latest >= number))?;
+        }
+        Ok(frame)
+    }
+
+    /// # Errors
+    /// If there was an error.
+    pub fn check_no_errors(&self) -> Result<(), Failed> {
+        match self.helper.take_errors().into_iter().next() {
+            Some(error) => Err(error.to_string().into()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// # Errors
+/// If it never comes true.
+pub fn wait_until(what: &str, is_so: impl Fn() -> bool) -> Result<(), Failed> {
+    let deadline = Instant::now() + LONG;
+    while !is_so() {
+        if Instant::now() > deadline {
+            return Err(format!("{what} never came").into());
+        }
+        thread::sleep(Duration::from_micros(100));
+    }
+    Ok(())
+}
