@@ -102,9 +102,10 @@ pub mod guide;
 pub use backend::ViewQueue;
 pub use bytemuck;
 pub use frame::{
-    BudgetError, BudgetedView, Buffering, BuildError, FinishedFrame, FrameError, FrameLoop, FrameLoopError, FramePlace,
-    FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics, Recorded, Renderer,
-    RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp,
+    BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
+    FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,
+    NodeAccesses, NodeFrame, NodeResource, Recorded, Renderer, RendererBuilder, Rung, StageTimes, SubmitError,
+    Submitted, Submitter, UndeclaredRead, ViewBudget, ViewForm, ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

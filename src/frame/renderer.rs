@@ -7,7 +7,8 @@ use parking_lot::RwLockReadGuard;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
-use super::pass_recording::PassRecording;
+use super::lent_nodes::{LentNodes, NodeDeclarations};
+use super::pass_recording::{PassRecording, reset_recordings};
 use super::pass_runs::{PassFailure, PassRuns};
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::{FrameFences, Recorded};
@@ -21,7 +22,7 @@ use super::view_filter::count_unknown_objects;
 use super::view_queues::view_queues;
 use super::views::FrameViews;
 use super::warnings::Warnings;
-use super::{BuildError, FrameError, FrameStatistics, Granularity};
+use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, FrameRequest};
 use crate::command::DrawList;
 use crate::graph::RunError;
@@ -78,6 +79,7 @@ pub struct Renderer<B: Backend> {
     pass_runs: PassRuns,
     /// What the engine chose for the next frame.
     choices: Vec<TuningChoice>,
+    node_declarations: NodeDeclarations,
     warnings: Warnings,
     column_check: ColumnCheck,
     /// The latest job of the backend, if there was any.
@@ -107,6 +109,7 @@ impl<B: Backend> Renderer<B> {
             recordings: Vec::new(),
             pass_runs: PassRuns::default(),
             choices: Vec::new(),
+            node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
             background_work: None,
@@ -127,17 +130,22 @@ impl<B: Backend> Renderer<B> {
     /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
-        self.record_part(&scene, true)
+        self.record_part(&scene, &[], true)
     }
 
-    /// Records a frame of the scene, of its objects that [need transparency](Requirements::needs_transparency) only if `transparency` is
-    /// true.
+    /// Records a frame of the scene with these nodes, of its objects that [need transparency](Requirements::needs_transparency) only if
+    /// `transparency` is true.
     ///
     /// # Errors
-    /// As [`record`](Self::record).
-    pub(super) fn record_part(&mut self, scene: &SceneRef<'_>, transparency: bool) -> Result<Recorded<B>, FrameError> {
+    /// As [`record_with_nodes`](Self::record_with_nodes).
+    pub(super) fn record_part(
+        &mut self,
+        scene: &SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
+        transparency: bool,
+    ) -> Result<Recorded<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
-        let recorded = self.record_frame(scene, choices, transparency);
+        let recorded = self.record_frame(scene, nodes, choices, transparency);
         match recorded {
             Ok(_) => {
                 self.tables.end_frame();
@@ -247,6 +255,7 @@ impl<B: Backend> Renderer<B> {
     fn record_frame(
         &mut self,
         scene: &SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
         mut choices: Vec<TuningChoice>,
         transparency: bool,
     ) -> Result<Recorded<B>, FrameError> {
@@ -282,7 +291,9 @@ impl<B: Backend> Renderer<B> {
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
         };
-        let graph = self.graphs.get(&plan, &draws, &views, options)?;
+        self.node_declarations.update(nodes)?;
+        let nodes = LentNodes { nodes, declarations: &self.node_declarations };
+        let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::default();
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
@@ -316,6 +327,7 @@ impl<B: Backend> Renderer<B> {
             backend_frame: &frame,
             recordings: &self.recordings,
             pass_runs: &self.pass_runs,
+            nodes,
             clock: &clock,
             costs: &graph.tuning.costs,
             occlusion: &graph.tuning.occlusion,
@@ -464,12 +476,6 @@ impl<B: Backend> Renderer<B> {
 /// If it panics.
 fn catch_panics<R>(stage: &str, call: impl FnOnce() -> R) -> Result<R, FrameError> {
     catch(call).map_err(|JobPanic { message }| FrameError::Panicked { stage: stage.to_owned(), message })
-}
-
-/// Makes `recordings` one for each pass, empty.
-fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
-    recordings.resize_with(passes, PassRecording::default);
-    recordings.iter_mut().for_each(|recording| drop(recording.take()));
 }
 
 /// The error of a run. If the job of another pass met it, it names the pass that failed.

@@ -85,6 +85,8 @@ pub struct StageTimes {
     pub instance: Duration,
     /// Other uploads, recording and finishing passes.
     pub record: Duration,
+    /// The engine's own [nodes](super::CpuNode).
+    pub nodes: Duration,
     /// Submitting; 0 until the frame is submitted.
     pub submit: Duration,
 }
@@ -92,8 +94,8 @@ pub struct StageTimes {
 impl StageTimes {
     /// The thread time of all groups.
     pub fn total(&self) -> Duration {
-        let Self { visibility, fill, sort, instance, record, submit } = *self;
-        visibility + fill + sort + instance + record + submit
+        let Self { visibility, fill, sort, instance, record, nodes, submit } = *self;
+        visibility + fill + sort + instance + record + nodes + submit
     }
 }
 

@@ -23,6 +23,7 @@ mod material_predicate;
 mod material_type;
 mod mesh;
 mod mesh_levels;
+mod node_column;
 #[cfg(feature = "obj")]
 pub mod obj;
 mod object_column;
@@ -58,6 +59,8 @@ pub use mesh::{Bounds, Mesh, Topology, Vertex};
 pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, VertexStream};
 #[cfg(feature = "wgpu")]
 pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
+pub(crate) use node_column::Column;
+pub use node_column::{ChunkInUse, ColumnChunk, NodeColumn, WrittenColumn, WrittenColumns};
 pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use object_filter::{ObjectFilter, ObjectList};
 pub use object_set::ObjectSet;

@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::transform::transform_is_valid;
 use super::{
     Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet,
-    SceneError, SceneRef,
+    SceneError, SceneRef, WrittenColumns,
 };
 use crate::handle::{Handle, Slots, StaleHandle};
 
@@ -95,6 +95,7 @@ impl Scene {
             materials: &self.materials,
             layers: &self.layers,
             columns: &[],
+            written: WrittenColumns::default(),
             changes: Changes::Unknown,
             assets: &self.assets,
             lights: &self.lights,

@@ -74,9 +74,9 @@ pub(super) struct ExactObject {
 impl ExactObject {
     pub(super) fn new(scene: &SceneRef<'_>, object: usize) -> Self {
         Self {
-            position: scene.positions[object],
-            orientation: Quaternion::of(scene.orientations[object].as_dquat().normalize()),
-            scale: Vector3::of_single(scene.scales[object]),
+            position: scene.position_column().get(object),
+            orientation: Quaternion::of(scene.orientation_column().get(object).as_dquat().normalize()),
+            scale: Vector3::of_single(scene.scale_column().get(object)),
             material: scene.materials[object].index(),
             index: object as u32,
         }
