@@ -1,35 +1,13 @@
-//! The CPU nodes of a frame, in its stage graph.
+//! The CPU nodes that an engine lends for a frame, and the order between them and the stages.
 
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::context::FrameContext;
-use super::cpu_node::NodeAccess;
-use super::stage::StageNode;
-use super::stage_clock::StageGroup;
-use super::{CpuNode, FrameData, FrameError, Granularity, NodeAccesses, NodeFrame, NodeResource, Recorded, Renderer};
-use crate::backend::Backend;
-use crate::graph::{FrameGraph, GraphProblem, Node, NodeError, NodeId};
-use crate::scene::SceneRef;
-use crate::task::{JobPanic, Worker, catch};
-
-impl<B: Backend> Renderer<B> {
-    /// Records a frame as [`record`](Self::record) does, with work of the engine's own among its jobs: see [`CpuNode`]. The nodes are lent as
-    /// the scene is, until this returns.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record). If the nodes make no graph, because some wait for each other in a circle, one reads what nobody writes,
-    /// two write the same without an order, or two have the same name; if a node fails or panics. The error names the node, and the next
-    /// frame is not affected.
-    pub fn record_with_nodes(
-        &mut self,
-        scene: SceneRef<'_>,
-        nodes: &[&dyn CpuNode],
-    ) -> Result<Recorded<B>, FrameError> {
-        self.record_part(&scene, nodes, true)
-    }
-}
+use super::node_accesses::NodeAccess;
+use super::{CpuNode, FrameData, FrameError, NodeAccesses, NodeResource};
+use crate::graph::{FrameGraph, GraphProblem, NodeId};
+use crate::task::{JobPanic, catch};
 
 /// What decides about the graph of a frame with CPU nodes: the declaration of each.
 #[derive(Debug, Default)]
@@ -77,7 +55,8 @@ impl NodeDeclarations {
         Ok(())
     }
 
-    fn of_node(&self, node: usize) -> &[NodeAccess] {
+    /// What a node declares, by its index.
+    pub(super) fn of_node(&self, node: usize) -> &[NodeAccess] {
         &self.accesses.accesses[self.ranges[node].clone()]
     }
 }
@@ -192,76 +171,5 @@ fn resource_name(resource: NodeResource) -> String {
     match resource {
         NodeResource::Frame(data) => format!("FrameData::{data:?}"),
         NodeResource::Own(name) => name.to_owned(),
-    }
-}
-
-/// A node of the frame's stage graph.
-pub(super) enum FrameNode<B> {
-    Stage(StageNode<B>),
-    Cpu(CpuNodeIndex),
-}
-
-/// A CPU node, by indices.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CpuNodeIndex {
-    /// Among those that are lent.
-    pub(super) lent: usize,
-    /// In the cost model.
-    pub(super) node: usize,
-}
-
-impl CpuNodeIndex {
-    fn get<'a, B: Backend>(self, frame: &FrameContext<'a, B>) -> (&'a dyn CpuNode, NodeFrame<'a>) {
-        let LentNodes { nodes, declarations } = frame.nodes;
-        let node = nodes[self.lent];
-        let accesses = declarations.of_node(self.lent);
-        (node, NodeFrame { request: frame.request, tables: frame.tables, node, accesses })
-    }
-}
-
-impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        match self {
-            Self::Stage(stage) => stage.width(frame),
-            Self::Cpu(index) => {
-                let (node, frame) = index.get(frame);
-                node.width(&frame)
-            }
-        }
-    }
-
-    fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
-        match self {
-            Self::Stage(stage) => stage.chunk(frame),
-            Self::Cpu(index) => {
-                let (node, node_frame) = index.get(frame);
-                let by_cost = || frame.items_per_job(index.node, node.width(&node_frame), 1);
-                node.items_per_job().unwrap_or_else(by_cost)
-            }
-        }
-    }
-
-    fn chunked_by_cost(&self, frame: &FrameContext<'_, B>) -> bool {
-        match self {
-            Self::Stage(stage) => stage.chunked_by_cost(frame),
-            Self::Cpu(index) => {
-                frame.granularity == Granularity::Adaptive && index.get(frame).0.items_per_job().is_none()
-            }
-        }
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
-        match self {
-            Self::Stage(stage) => stage.run(frame, items, worker),
-            Self::Cpu(index) => {
-                let (node, node_frame) = index.get(frame);
-                let count = items.len();
-                let (result, took) = frame.clock.measure(StageGroup::Nodes, || node.run(&node_frame, items, worker));
-                if frame.granularity == Granularity::Adaptive && node.items_per_job().is_none() {
-                    frame.costs.add_sample(index.node, count, took);
-                }
-                result
-            }
-        }
     }
 }

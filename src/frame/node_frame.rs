@@ -2,9 +2,9 @@
 
 use parking_lot::RwLockReadGuard;
 
-use super::cpu_node::NodeAccess;
+use super::node_accesses::NodeAccess;
 use super::tables::FrameTables;
-use super::{CpuNode, FrameData, NodeResource};
+use super::{FrameData, NodeResource};
 use crate::backend::FrameRequest;
 use crate::command::DrawList;
 use crate::view::{RenderView, set_bits};
@@ -14,7 +14,6 @@ use crate::view::{RenderView, set_bits};
 pub struct NodeFrame<'a> {
     pub(super) request: &'a FrameRequest<'a>,
     pub(super) tables: &'a FrameTables,
-    pub(super) node: &'a dyn CpuNode,
     /// What the node declares.
     pub(super) accesses: &'a [NodeAccess],
 }
@@ -59,16 +58,14 @@ impl<'a> NodeFrame<'a> {
     fn check(&self, data: FrameData) -> Result<(), UndeclaredRead> {
         let resource = NodeResource::Frame(data);
         let is_declared = self.accesses.contains(&NodeAccess::Reads(resource));
-        is_declared.then_some(()).ok_or_else(|| UndeclaredRead { node: self.node.name().to_owned(), resource })
+        is_declared.then_some(()).ok_or(UndeclaredRead { resource })
     }
 }
 
 /// A node asks for something that it does not declare to read, so that it may not be there yet.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("node {node:?} does not declare that it reads {resource:?}")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the node does not declare that it reads {resource:?}")]
 pub struct UndeclaredRead {
-    /// The node.
-    pub node: String,
     /// What it asks for.
     pub resource: NodeResource,
 }

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::FrameError;
-use super::lent_nodes::{CpuNodeIndex, FrameNode, LentNodes, NodeKeys};
+use super::frame_node::{CpuNodeIndex, FrameNode};
+use super::lent_nodes::{LentNodes, NodeKeys};
 use super::list_inputs::orders_by_bin;
 use super::occlusion_control::OcclusionControl;
 use super::stage::{Stage, StageNeeds, StageNode};
@@ -148,6 +149,32 @@ impl GraphKey {
 }
 
 impl<B: Backend> StageGraph<B> {
+    /// The graph of a frame.
+    ///
+    /// # Errors
+    /// If no process draws in a view, views sample each other in a circle, or the nodes make no graph.
+    pub(super) fn of_frame(
+        plan: &Arc<FramePlan>,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+        nodes: LentNodes<'_>,
+    ) -> Result<Self, FrameError> {
+        Self::new(plan, draws, views, GraphKey::new(draws, views, options, nodes)?)
+    }
+
+    /// Whether it is the graph of a frame. Allocates nothing.
+    pub(super) fn fits(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+        nodes: LentNodes<'_>,
+    ) -> bool {
+        self.plan.identity() == plan.identity() && self.key.fits(draws, views, options, nodes)
+    }
+
     /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass
     /// run one after the other. Nothing else waits: the order of passes binds submission, not recording.
     ///
@@ -228,7 +255,7 @@ impl<B: Backend> StageGraph<B> {
 
     /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a frame that requires
     /// something else does not try out again what is known.
-    fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
+    pub(super) fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
         self.schedule.inherit_measurements(&before.schedule);
         let kinds_before: HashMap<_, _> = before.cost_kind_names().collect();
         let pairs = self.cost_kind_names().filter_map(|(name, kind)| Some((kind, *kinds_before.get(&name)?)));
@@ -425,58 +452,6 @@ impl<B: Backend> GraphBuilder<B> {
         self.kind_of_node.push(*self.cost_kinds.entry((name, process)).or_insert(next_kind));
         self.labels.push(Arc::new(labels));
         self.labels.len() - 1
-    }
-}
-
-/// The graphs of recent frames, the latest first. A scene changes what it requires and changes back, and finds its
-/// graph again.
-pub(super) struct StageGraphCache<B: Backend> {
-    latest_first: Vec<StageGraph<B>>,
-}
-
-impl<B: Backend> Default for StageGraphCache<B> {
-    fn default() -> Self {
-        Self { latest_first: Vec::new() }
-    }
-}
-
-impl<B: Backend> StageGraphCache<B> {
-    const CAPACITY: usize = 16;
-
-    /// The graph of a frame, built if the cache does not have it.
-    ///
-    /// # Errors
-    /// If no process draws in a view, views sample each other in a circle, or the nodes make no graph.
-    pub(super) fn get(
-        &mut self,
-        plan: &Arc<FramePlan>,
-        draws: &[Draws<'_>],
-        views: &[RenderView],
-        options: StageOptions,
-        nodes: LentNodes<'_>,
-    ) -> Result<&mut StageGraph<B>, FrameError> {
-        let found = self
-            .latest_first
-            .iter()
-            .position(|graph| graph.plan.identity() == plan.identity() && graph.key.fits(draws, views, options, nodes));
-        let graph = match found {
-            Some(index) => self.latest_first.remove(index),
-            None => {
-                let mut graph = StageGraph::new(plan, draws, views, GraphKey::new(draws, views, options, nodes)?)?;
-                if let Some(before) = self.latest_first.first() {
-                    graph.inherit_measurements(before, views);
-                }
-                graph
-            }
-        };
-        self.latest_first.truncate(Self::CAPACITY - 1);
-        self.latest_first.insert(0, graph);
-        Ok(&mut self.latest_first[0])
-    }
-
-    /// The graph of the latest frame; `None` before the first one.
-    pub(super) fn latest(&self) -> Option<&StageGraph<B>> {
-        self.latest_first.first()
     }
 }
 

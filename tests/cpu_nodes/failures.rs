@@ -112,14 +112,14 @@ fn a_node_that_fails_or_panics_is_named() {
 fn what_is_not_declared_is_not_there() {
     let node = TestNode::new("spy", |_| (), |frame, _| Ok(drop(frame.visible_objects(0)?)));
     let error = error_of(&[node]).to_string();
-    assert_eq!(error, "spy failed: node \"spy\" does not declare that it reads Frame(VisibleObjects)");
+    assert_eq!(error, "spy failed: the node does not declare that it reads Frame(VisibleObjects)");
     let node = TestNode::new(
         "spy",
         |accesses| _ = accesses.reads(FrameData::VisibleObjects),
         |frame, _| Ok(drop(frame.draw_list("geometry buffer", 0)?)),
     );
     let error = error_of(&[node]).to_string();
-    assert_eq!(error, "spy failed: node \"spy\" does not declare that it reads Frame(DrawLists)");
+    assert_eq!(error, "spy failed: the node does not declare that it reads Frame(DrawLists)");
 }
 
 #[test]
