@@ -105,7 +105,7 @@ pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
     FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,
     NodeAccesses, NodeFrame, NodeResource, Recorded, Renderer, RendererBuilder, Rung, StageTimes, SubmitError,
-    Submitted, Submitter, UndeclaredRead, ViewBudget, ViewForm, ViewStatistics, WarmUp,
+    Submitted, Submitter, UndeclaredFill, UndeclaredRead, ViewBudget, ViewForm, ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

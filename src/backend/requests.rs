@@ -1,12 +1,14 @@
 //! What frames request of a backend.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::BackendError;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
-use crate::scene::{Light, SceneRef};
+use crate::scene::{GeneratedContents, Light, SceneRef};
 use crate::view::{GpuView, LightTable, ObjectTable, Rejections, RenderView};
 
 /// Everything that a backend needs to know of a frame.
@@ -30,6 +32,8 @@ pub struct FrameRequest<'a> {
     pub scene: &'a SceneRef<'a>,
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
+    /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes are finished.
+    pub generated: &'a [Arc<GeneratedContents>],
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.

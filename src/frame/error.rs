@@ -140,6 +140,14 @@ pub enum FrameError {
         /// What is wrong with it.
         problem: String,
     },
+    /// A node declares to fill a [buffer](crate::scene::GeneratedBuffer), and leaves out some of the elements that count.
+    #[error("no node has filled chunk {chunk} of buffer {buffer:?}")]
+    UnfilledBuffer {
+        /// The buffer.
+        buffer: String,
+        /// The first chunk that is not filled.
+        chunk: usize,
+    },
     /// The frame's stage graph does not compile: a bug in Drawloom.
     #[error("the frame's stage graph does not compile: {0}")]
     StageGraph(GraphProblem),

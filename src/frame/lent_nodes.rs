@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::node_accesses::NodeAccess;
 use super::{CpuNode, FrameData, FrameError, NodeAccesses, NodeResource};
 use crate::graph::{FrameGraph, GraphProblem, NodeId};
+use crate::scene::GeneratedContents;
 use crate::task::{JobPanic, catch};
 
 /// What decides about the graph of a frame with CPU nodes: the declaration of each.
@@ -27,6 +28,8 @@ pub(super) struct NodeDeclarations {
     accesses: NodeAccesses,
     /// The part of the accesses of each node.
     ranges: Vec<Range<usize>>,
+    /// What the nodes fill in this frame.
+    pub(super) generated: Vec<Arc<GeneratedContents>>,
 }
 
 /// The nodes that an engine lends for a frame.
@@ -37,13 +40,15 @@ pub(super) struct LentNodes<'a> {
 }
 
 impl NodeDeclarations {
-    /// Asks the nodes of a frame what they read and write.
+    /// The nodes of a frame, which are asked what they read and write.
     ///
     /// # Errors
     /// If one of them panics.
-    pub(super) fn update(&mut self, nodes: &[&dyn CpuNode]) -> Result<(), FrameError> {
+    pub(super) fn lend<'a>(&'a mut self, nodes: &'a [&'a dyn CpuNode]) -> Result<LentNodes<'a>, FrameError> {
         self.accesses.accesses.clear();
+        self.accesses.filled.clear();
         self.ranges.clear();
+        self.generated.clear();
         for node in nodes {
             let first = self.accesses.accesses.len();
             catch(|| node.declare(&mut self.accesses)).map_err(|JobPanic { message }| {
@@ -52,7 +57,18 @@ impl NodeDeclarations {
             })?;
             self.ranges.push(first..self.accesses.accesses.len());
         }
-        Ok(())
+        self.generated.extend(self.accesses.filled.iter().map(|source| source.begin_frame()));
+        Ok(LentNodes { nodes, declarations: self })
+    }
+
+    /// # Errors
+    /// If nodes have not filled all elements of their buffers.
+    pub(super) fn check_filled(&self) -> Result<(), FrameError> {
+        let unfilled = |contents: &Arc<GeneratedContents>| {
+            let chunk = contents.unfilled_chunk()?;
+            Some(FrameError::UnfilledBuffer { buffer: contents.layout().name.to_owned(), chunk })
+        };
+        self.generated.iter().find_map(unfilled).map_or(Ok(()), Err)
     }
 
     /// What a node declares, by its index.
@@ -162,7 +178,7 @@ fn stages_around(resource: NodeResource) -> (&'static [&'static str], &'static [
         NodeResource::Frame(FrameData::DrawLists) => (&["join", "triangles"], &[]),
         NodeResource::Frame(FrameData::PassInputs) => (&[], &["prepare", "record", "finish"]),
         NodeResource::Frame(FrameData::RecordedPasses) => (&["finish"], &[]),
-        NodeResource::Own(_) => (&[], &[]),
+        NodeResource::Own(_) | NodeResource::Buffer { .. } => (&[], &[]),
     }
 }
 
@@ -171,5 +187,6 @@ fn resource_name(resource: NodeResource) -> String {
     match resource {
         NodeResource::Frame(data) => format!("FrameData::{data:?}"),
         NodeResource::Own(name) => name.to_owned(),
+        NodeResource::Buffer { name, identity } => format!("{name} (buffer {identity})"),
     }
 }

@@ -30,6 +30,7 @@ mod record_with_nodes;
 mod recorded;
 mod renderer;
 mod replace_backend;
+mod run_error;
 mod scene_check;
 mod stage;
 mod stage_clock;
@@ -65,7 +66,7 @@ pub use granularity::Granularity;
 #[cfg(feature = "report")]
 pub(crate) use job_size::job_size;
 pub use node_accesses::{FrameData, NodeAccesses, NodeResource};
-pub use node_frame::{NodeFrame, UndeclaredRead};
+pub use node_frame::{NodeFrame, UndeclaredFill, UndeclaredRead};
 pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;
 pub use statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};

@@ -1,5 +1,9 @@
 //! What a CPU node declares.
 
+use std::sync::Arc;
+
+use crate::scene::{GeneratedBuffer, GeneratedSource};
+
 /// What the stages of a frame read and write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -25,11 +29,24 @@ pub enum NodeResource {
     Frame(FrameData),
     /// Something of the engine's own, by name. Only nodes read and write it.
     Own(&'static str),
+    /// A [`GeneratedBuffer`]. Nodes [fill](NodeAccesses::fills) and read it.
+    Buffer {
+        /// Its name.
+        name: &'static str,
+        /// Differs for every two buffers.
+        identity: u64,
+    },
 }
 
 impl From<FrameData> for NodeResource {
     fn from(data: FrameData) -> Self {
         Self::Frame(data)
+    }
+}
+
+impl<T: bytemuck::Pod> From<&GeneratedBuffer<T>> for NodeResource {
+    fn from(buffer: &GeneratedBuffer<T>) -> Self {
+        Self::Buffer { name: buffer.name(), identity: buffer.source().layout.identity }
     }
 }
 
@@ -45,6 +62,8 @@ impl From<&'static str> for NodeResource {
 #[derive(Debug, Default)]
 pub struct NodeAccesses {
     pub(super) accesses: Vec<NodeAccess>,
+    /// The buffers that nodes fill.
+    pub(super) filled: Vec<Arc<GeneratedSource>>,
 }
 
 /// One declaration of a node.
@@ -70,6 +89,14 @@ impl NodeAccesses {
     /// The node changes what others have written.
     pub fn modifies(&mut self, resource: impl Into<NodeResource>) -> &mut Self {
         self.add(NodeAccess::Modifies(resource.into()))
+    }
+
+    /// The node fills a buffer that this frame draws: see [`NodeFrame::fill`](super::NodeFrame::fill).
+    pub fn fills<T: bytemuck::Pod>(&mut self, buffer: &GeneratedBuffer<T>) -> &mut Self {
+        if !self.filled.iter().any(|known| Arc::ptr_eq(known, buffer.source())) {
+            self.filled.push(Arc::clone(buffer.source()));
+        }
+        self.writes(buffer)
     }
 
     /// The node runs after another one, whatever they read and write.

@@ -1,5 +1,9 @@
 //! What a CPU node sees of the frame.
 
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
+use bytemuck::Pod;
 use parking_lot::RwLockReadGuard;
 
 use super::node_accesses::NodeAccess;
@@ -7,6 +11,7 @@ use super::tables::FrameTables;
 use super::{FrameData, NodeResource};
 use crate::backend::FrameRequest;
 use crate::command::DrawList;
+use crate::scene::{GeneratedBuffer, GeneratedContents};
 use crate::view::{RenderView, set_bits};
 
 /// What a [`CpuNode`](super::CpuNode) sees of the frame while it runs: what it declares to read of it.
@@ -55,6 +60,49 @@ impl<'a> NodeFrame<'a> {
         Ok(table.filter(|table| table.selection.is_some()).map(|table| table.list.read()))
     }
 
+    /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with elements that
+    /// [count](Self::set_count) must be filled in each frame.
+    ///
+    /// # Errors
+    /// If no node of the frame declares that it [fills](super::NodeAccesses::fills) the buffer, or there is no such chunk.
+    pub fn fill<T: Pod>(
+        &self,
+        buffer: &GeneratedBuffer<T>,
+        chunk: usize,
+    ) -> Result<impl DerefMut<Target = [T]> + use<'a, T>, UndeclaredFill> {
+        let resource = buffer.into();
+        self.contents(buffer).and_then(|contents| contents.fill(chunk)).ok_or(UndeclaredFill { resource, chunk })
+    }
+
+    /// A chunk of a buffer that other nodes have filled in this frame.
+    ///
+    /// # Errors
+    /// If no node of the frame declares that it fills the buffer, or there is no such chunk.
+    pub fn filled<T: Pod>(
+        &self,
+        buffer: &GeneratedBuffer<T>,
+        chunk: usize,
+    ) -> Result<impl Deref<Target = [T]> + use<'a, T>, UndeclaredFill> {
+        let resource = buffer.into();
+        self.contents(buffer).and_then(|contents| contents.read(chunk)).ok_or(UndeclaredFill { resource, chunk })
+    }
+
+    /// Sets how many elements of a buffer count in this frame, from the first one on. Without it all do.
+    ///
+    /// # Errors
+    /// If no node of the frame declares that it fills the buffer.
+    pub fn set_count<T: Pod>(&self, buffer: &GeneratedBuffer<T>, count: usize) -> Result<(), UndeclaredFill> {
+        let contents = self.contents(buffer).ok_or(UndeclaredFill { resource: buffer.into(), chunk: 0 })?;
+        contents.set_count(count);
+        Ok(())
+    }
+
+    fn contents<T: Pod>(&self, buffer: &GeneratedBuffer<T>) -> Option<&'a GeneratedContents> {
+        let identity = buffer.source().layout.identity;
+        let is_it = |contents: &&Arc<GeneratedContents>| contents.layout().identity == identity;
+        self.request.generated.iter().find(is_it).map(|contents| &**contents)
+    }
+
     fn check(&self, data: FrameData) -> Result<(), UndeclaredRead> {
         let resource = NodeResource::Frame(data);
         let is_declared = self.accesses.contains(&NodeAccess::Reads(resource));
@@ -68,4 +116,14 @@ impl<'a> NodeFrame<'a> {
 pub struct UndeclaredRead {
     /// What it asks for.
     pub resource: NodeResource,
+}
+
+/// No node of the frame declares that it fills a buffer, or the buffer has no such chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no node of the frame declares that it fills {resource:?}, or it has no chunk {chunk}")]
+pub struct UndeclaredFill {
+    /// The buffer.
+    pub resource: NodeResource,
+    /// The chunk.
+    pub chunk: usize,
 }

@@ -7,14 +7,15 @@ use parking_lot::RwLockReadGuard;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
-use super::lent_nodes::{LentNodes, NodeDeclarations};
+use super::lent_nodes::NodeDeclarations;
 use super::pass_recording::{PassRecording, reset_recordings};
-use super::pass_runs::{PassFailure, PassRuns};
+use super::pass_runs::PassRuns;
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::{FrameFences, Recorded};
+use super::run_error::error_of_pass;
 use super::scene_check::check_scene;
 use super::stage_clock::{StageClock, StageGroup};
-use super::stage_graph::{StageGraph, StageOptions};
+use super::stage_graph::StageOptions;
 use super::stage_graph_cache::StageGraphCache;
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
@@ -26,7 +27,6 @@ use super::warnings::Warnings;
 use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, FrameRequest};
 use crate::command::DrawList;
-use crate::graph::RunError;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
@@ -292,8 +292,7 @@ impl<B: Backend> Renderer<B> {
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
         };
-        self.node_declarations.update(nodes)?;
-        let nodes = LentNodes { nodes, declarations: &self.node_declarations };
+        let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::default();
@@ -309,6 +308,7 @@ impl<B: Backend> Renderer<B> {
             sampled_views: &graph.sampled_views,
             scene,
             objects: &self.tables.objects,
+            generated: &nodes.declarations.generated,
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
@@ -356,6 +356,7 @@ impl<B: Backend> Renderer<B> {
         tuning.choices = choices;
         self.scheduler.timeline().add_tuning(frame_number, &tuning);
 
+        nodes.declarations.check_filled()?;
         // Record → per-camera queues, for the submitter.
         let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
@@ -477,23 +478,4 @@ impl<B: Backend> Renderer<B> {
 /// If it panics.
 fn catch_panics<R>(stage: &str, call: impl FnOnce() -> R) -> Result<R, FrameError> {
     catch(call).map_err(|JobPanic { message }| FrameError::Panicked { stage: stage.to_owned(), message })
-}
-
-/// The error of a run. If the job of another pass met it, it names the pass that failed.
-fn error_of_pass<B: Backend>(
-    error: RunError,
-    graph: &StageGraph<B>,
-    failures: &[PassFailure],
-    views: &[RenderView],
-) -> RunError {
-    let name_of = |pass| graph.node_name("finish", pass, views);
-    let name_failed = |node: String| {
-        let failure = failures.iter().find(|failure| name_of(failure.job_of) == node);
-        failure.map_or(node, |failure| name_of(failure.failed))
-    };
-    match error {
-        RunError::Failed { node, source } => RunError::Failed { node: name_failed(node), source },
-        RunError::Panicked { node, message } => RunError::Panicked { node: name_failed(node), message },
-        other => other,
-    }
 }

@@ -23,6 +23,8 @@ pub struct FrameStatistics {
     pub view_times: Vec<Duration>,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
+    /// Bytes that [CPU nodes](super::CpuNode) have filled, which are uploaded when the frame is submitted.
+    pub generated: u64,
     /// The memory of the frame's targets. The software backend does not tell.
     pub targets: TargetMemory,
     /// The thread time of each group of stages.
@@ -126,6 +128,7 @@ impl FrameStatistics {
             views,
             view_times: tables.view_times.times().collect(),
             uploaded,
+            generated: request.generated.iter().map(|contents| contents.byte_count() as u64).sum(),
             targets,
             stages,
             rejections: request.rejections.list(),

@@ -14,6 +14,9 @@ mod derived_camera;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
 mod error;
+mod generated_buffer;
+mod generated_geometry;
+mod generated_mesh;
 mod impostor;
 mod layer_mask;
 mod level_of_detail;
@@ -48,6 +51,11 @@ pub(crate) use camera_motion::PreciseMotion;
 pub use changes::Changes;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;
+pub(crate) use generated_buffer::GeneratedSource;
+pub use generated_buffer::{GeneratedBuffer, GeneratedContents, GeneratedLayout};
+pub use generated_geometry::GeneratedIndices;
+#[cfg(feature = "wgpu")]
+pub(crate) use generated_geometry::{GeneratedGeometry, IndexSource};
 pub use layer_mask::LayerMask;
 pub use level_of_detail::LevelOfDetail;
 pub use light::{Light, LightKind};

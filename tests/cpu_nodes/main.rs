@@ -1,6 +1,7 @@
 //! An engine's own nodes in the graph of a frame.
 
 mod failures;
+mod generated;
 mod order;
 mod same_bytes;
 mod timeline;

@@ -44,6 +44,7 @@ fn broken_rule(
         sampled_views: &SampledViews::default(),
         scene: &scene.as_scene_ref(),
         objects: &objects,
+        generated: &[],
         quality: &Quality::balanced(),
         rejections: &Rejections::default(),
     };
