@@ -102,10 +102,11 @@ pub mod guide;
 pub use backend::ViewQueue;
 pub use bytemuck;
 pub use frame::{
-    BudgetError, BudgetedView, Buffering, BuildError, FinishedFrame, FrameError, FrameLoop, FrameLoopError, FramePlace,
-    FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics, PieceStatistics, Recorded,
-    Renderer, RendererBuilder, Rung, StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm,
-    ViewStatistics, WarmUp, helper,
+    BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
+    FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,
+    NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung, StageTimes,
+    SubmitError, Submitted, Submitter, UndeclaredFill, UndeclaredRead, ViewBudget, ViewForm, ViewStatistics, WarmUp,
+    helper,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

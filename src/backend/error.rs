@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::process::AccessError;
+use crate::scene::SceneError;
 
 /// An error of a backend or its device.
 #[derive(Debug, thiserror::Error)]
@@ -119,6 +120,14 @@ pub enum BackendError {
     ImportedMesh {
         /// The mesh.
         mesh: String,
+    },
+    /// A [generated mesh](crate::scene::Mesh::generated) that CPU nodes have filled with what is no mesh. Only the software backend looks.
+    #[error("nodes have filled mesh `{mesh}` with what cannot be drawn: {source}")]
+    GeneratedMesh {
+        /// The mesh.
+        mesh: String,
+        /// What is wrong with it.
+        source: SceneError,
     },
     /// A render process draws into multisampled targets, and the software backend has none.
     #[error("process {process:?} draws into multisampled targets, which the software backend does not support")]

@@ -1,12 +1,14 @@
 //! What frames request of a backend.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::BackendError;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
-use crate::scene::{Light, SceneRef};
+use crate::scene::{GeneratedContents, Light, SceneRef};
 use crate::view::{GpuView, LightTable, ObjectTable, Rejections, RenderView};
 
 /// Everything that a backend needs to know of a frame.
@@ -32,6 +34,8 @@ pub struct FrameRequest<'a> {
     pub objects: &'a ObjectTable,
     /// The most objects that a draw list has: all of the scene, and once more those of its pieces.
     pub list_capacity: usize,
+    /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes are finished.
+    pub generated: &'a [Arc<GeneratedContents>],
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// Counts what the backend leaves out.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::cost_model::CostModel;
 use super::granularity::Granularity;
+use super::lent_nodes::LentNodes;
 use super::list_inputs::{ListInputs, OrderInputs};
 use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
@@ -31,6 +32,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     /// One for each pass.
     pub(super) recordings: &'a [PassRecording<B>],
     pub(super) pass_runs: &'a PassRuns,
+    /// The engine's own nodes.
+    pub(super) nodes: LentNodes<'a>,
     pub(super) clock: &'a StageClock,
     pub(super) costs: &'a CostModel,
     /// One for each view.

@@ -100,19 +100,19 @@ pub enum FrameError {
     /// The backend could not begin the frame, or a pass was not finished.
     #[error("the backend refused the frame: {0}")]
     Backend(#[from] BackendError),
-    /// A stage failed.
+    /// A stage failed, or a node of the engine's own.
     #[error("{stage} failed: {source}")]
     Failed {
-        /// The process, the view and the stage.
+        /// The process, the view and the stage; or the name of the node.
         stage: String,
         /// Why.
         source: NodeError,
     },
-    /// A stage panicked, in the code of a process, of a backend, or in Drawloom's own. Where the program is built with `panic =
+    /// A stage panicked, in the code of a process, of a node, of a backend, or in Drawloom's own. Where the program is built with `panic =
     /// "abort"` the program ends instead, as no panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
-        /// The process, the view and the stage; the stage alone where it is the whole frame's.
+        /// The process, the view and the stage; the stage alone where it is the whole frame's; or the name of the node.
         stage: String,
         /// What the panic said.
         message: String,
@@ -128,6 +128,25 @@ pub enum FrameError {
     UnknownPlace {
         /// The place.
         place: String,
+    },
+    /// The [nodes](super::CpuNode) of the engine's own make no graph with the frame's stages.
+    #[error("the nodes of the frame make no graph: {0}")]
+    Nodes(GraphProblem),
+    /// A [node](super::CpuNode) declares what no node can.
+    #[error("node {node:?} {problem}")]
+    InvalidNode {
+        /// The node.
+        node: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A node declares to fill a [buffer](crate::scene::GeneratedBuffer), and leaves out some of the elements that count.
+    #[error("no node has filled chunk {chunk} of buffer {buffer:?}")]
+    UnfilledBuffer {
+        /// The buffer.
+        buffer: String,
+        /// The first chunk that is not filled.
+        chunk: usize,
     },
     /// The frame's stage graph does not compile: a bug in Drawloom.
     #[error("the frame's stage graph does not compile: {0}")]

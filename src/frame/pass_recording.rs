@@ -68,3 +68,9 @@ impl<B: Backend> PassRecording<B> {
         self.finished.get_mut().take()
     }
 }
+
+/// Makes `recordings` one for each pass, empty.
+pub(super) fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
+    recordings.resize_with(passes, PassRecording::default);
+    recordings.iter_mut().for_each(|recording| drop(recording.take()));
+}

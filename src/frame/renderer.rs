@@ -7,13 +7,16 @@ use parking_lot::RwLockReadGuard;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
-use super::pass_recording::PassRecording;
-use super::pass_runs::{PassFailure, PassRuns};
+use super::lent_nodes::NodeDeclarations;
+use super::pass_recording::{PassRecording, reset_recordings};
+use super::pass_runs::PassRuns;
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::{FrameFences, Recorded};
+use super::run_error::error_of_pass;
 use super::scene_check::check_scene;
 use super::stage_clock::{StageClock, StageGroup};
-use super::stage_graph::{StageGraph, StageGraphCache, StageOptions};
+use super::stage_graph::StageOptions;
+use super::stage_graph_cache::StageGraphCache;
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
 use super::view_cache::ViewCache;
@@ -21,10 +24,9 @@ use super::view_filter::count_unknown_objects;
 use super::view_queues::view_queues;
 use super::views::FrameViews;
 use super::warnings::Warnings;
-use super::{BuildError, FrameError, FrameStatistics, Granularity};
+use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, FrameRequest};
 use crate::command::DrawList;
-use crate::graph::RunError;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
@@ -78,6 +80,7 @@ pub struct Renderer<B: Backend> {
     pass_runs: PassRuns,
     /// What the engine chose for the next frame.
     choices: Vec<TuningChoice>,
+    node_declarations: NodeDeclarations,
     warnings: Warnings,
     column_check: ColumnCheck,
     /// The latest job of the backend, if there was any.
@@ -107,6 +110,7 @@ impl<B: Backend> Renderer<B> {
             recordings: Vec::new(),
             pass_runs: PassRuns::default(),
             choices: Vec::new(),
+            node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
             background_work: None,
@@ -127,17 +131,22 @@ impl<B: Backend> Renderer<B> {
     /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
-        self.record_part(&scene, true)
+        self.record_part(&scene, &[], true)
     }
 
-    /// Records a frame of the scene, of its objects that [need transparency](Requirements::needs_transparency) only if `transparency` is
-    /// true.
+    /// Records a frame of the scene with these nodes, of its objects that [need transparency](Requirements::needs_transparency) only if
+    /// `transparency` is true.
     ///
     /// # Errors
-    /// As [`record`](Self::record).
-    pub(super) fn record_part(&mut self, scene: &SceneRef<'_>, transparency: bool) -> Result<Recorded<B>, FrameError> {
+    /// As [`record_with_nodes`](Self::record_with_nodes).
+    pub(super) fn record_part(
+        &mut self,
+        scene: &SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
+        transparency: bool,
+    ) -> Result<Recorded<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
-        let recorded = self.record_frame(scene, choices, transparency);
+        let recorded = self.record_frame(scene, nodes, choices, transparency);
         match recorded {
             Ok(_) => {
                 self.tables.end_frame();
@@ -247,6 +256,7 @@ impl<B: Backend> Renderer<B> {
     fn record_frame(
         &mut self,
         scene: &SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
         mut choices: Vec<TuningChoice>,
         transparency: bool,
     ) -> Result<Recorded<B>, FrameError> {
@@ -283,7 +293,8 @@ impl<B: Backend> Renderer<B> {
             opaque_order: self.quality.opaque_order,
             has_pieces: !scene.pieces.is_empty(),
         };
-        let graph = self.graphs.get(&plan, &draws, &views, options)?;
+        let nodes = self.node_declarations.lend(nodes)?;
+        let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::default();
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
@@ -299,6 +310,7 @@ impl<B: Backend> Renderer<B> {
             scene,
             objects: &self.tables.objects,
             list_capacity: scene.object_count() + self.tables.pieces.listed_objects(),
+            generated: &nodes.declarations.generated,
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
@@ -318,6 +330,7 @@ impl<B: Backend> Renderer<B> {
             backend_frame: &frame,
             recordings: &self.recordings,
             pass_runs: &self.pass_runs,
+            nodes,
             clock: &clock,
             costs: &graph.tuning.costs,
             occlusion: &graph.tuning.occlusion,
@@ -345,6 +358,7 @@ impl<B: Backend> Renderer<B> {
         tuning.choices = choices;
         self.scheduler.timeline().add_tuning(frame_number, &tuning);
 
+        nodes.declarations.check_filled()?;
         // Record → per-camera queues, for the submitter.
         let queues = view_queues(&request, &mut self.recordings)?;
         let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
@@ -471,29 +485,4 @@ impl<B: Backend> Renderer<B> {
 /// If it panics.
 fn catch_panics<R>(stage: &str, call: impl FnOnce() -> R) -> Result<R, FrameError> {
     catch(call).map_err(|JobPanic { message }| FrameError::Panicked { stage: stage.to_owned(), message })
-}
-
-/// Makes `recordings` one for each pass, empty.
-fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
-    recordings.resize_with(passes, PassRecording::default);
-    recordings.iter_mut().for_each(|recording| drop(recording.take()));
-}
-
-/// The error of a run. If the job of another pass met it, it names the pass that failed.
-fn error_of_pass<B: Backend>(
-    error: RunError,
-    graph: &StageGraph<B>,
-    failures: &[PassFailure],
-    views: &[RenderView],
-) -> RunError {
-    let name_of = |pass| graph.node_name("finish", pass, views);
-    let name_failed = |node: String| {
-        let failure = failures.iter().find(|failure| name_of(failure.job_of) == node);
-        failure.map_or(node, |failure| name_of(failure.failed))
-    };
-    match error {
-        RunError::Failed { node, source } => RunError::Failed { node: name_failed(node), source },
-        RunError::Panicked { node, message } => RunError::Panicked { node: name_failed(node), message },
-        other => other,
-    }
 }

@@ -13,12 +13,13 @@ pub(super) enum StageGroup {
     Sort,
     Instance,
     Record,
+    Nodes,
 }
 
 /// Sums up thread time by group while jobs run.
 #[derive(Debug, Default)]
 pub(super) struct StageClock {
-    nanoseconds: [AtomicU64; 5],
+    nanoseconds: [AtomicU64; 6],
 }
 
 impl StageClock {
@@ -40,6 +41,7 @@ impl StageClock {
             sort: of(StageGroup::Sort),
             instance: of(StageGroup::Instance),
             record: of(StageGroup::Record),
+            nodes: of(StageGroup::Nodes),
             submit: Duration::ZERO,
         }
     }

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::FrameError;
+use super::frame_node::{CpuNodeIndex, FrameNode};
+use super::lent_nodes::{LentNodes, NodeKeys};
 use super::list_inputs::orders_by_bin;
 use super::occlusion_control::OcclusionControl;
 use super::pieces::ListConditions;
@@ -24,7 +26,7 @@ use crate::view::{LevelSelector, RenderView};
 
 /// The stages of a frame for one plan and one list of views, compiled to a schedule, with what is measured about them.
 pub(super) struct StageGraph<B: Backend> {
-    pub(super) schedule: Schedule<StageNode<B>>,
+    pub(super) schedule: Schedule<FrameNode<B>>,
     pub(super) tuning: StageTuning,
     /// In submission order.
     pub(super) passes: Vec<Pass>,
@@ -34,13 +36,13 @@ pub(super) struct StageGraph<B: Backend> {
     /// For each view whether a pass of it draws commands.
     view_draws_commands: Vec<bool>,
     /// The cost kinds of the tuning, by stage and by the index of the process.
-    cost_kinds: HashMap<(&'static str, Option<usize>), usize>,
+    cost_kinds: HashMap<(Arc<str>, Option<usize>), usize>,
     /// What else the graph was built for.
     key: GraphKey,
 }
 
-/// What a cost kind is known by in all graphs: the stage, and the kind of views and the name of the process.
-type CostKindName<'a> = (&'static str, Option<(ViewKind, &'a str)>);
+/// What a cost kind is known by in all graphs: the stage or CPU node, and the kind of views and the name of the process.
+type CostKindName<'a> = (&'a str, Option<(ViewKind, &'a str)>);
 
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
 #[derive(Debug)]
@@ -49,6 +51,7 @@ struct GraphKey {
     /// Of each process.
     draws: Vec<DrawsKey>,
     options: StageOptions,
+    nodes: NodeKeys,
 }
 
 /// What decides which stages the passes of a process have, and what they may leave out.
@@ -122,17 +125,26 @@ fn is_paraboloid(view: &RenderView) -> bool {
 }
 
 impl GraphKey {
-    fn new(draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> Self {
-        Self {
+    /// # Errors
+    /// If a node panics when it is asked for its name.
+    fn new(
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+        nodes: LentNodes<'_>,
+    ) -> Result<Self, FrameError> {
+        Ok(Self {
             views: views.iter().map(ViewKey::new).collect(),
             draws: draws.iter().map(DrawsKey::new).collect(),
             options,
-        }
+            nodes: nodes.keys()?,
+        })
     }
 
     /// Whether the key matches the inputs of a frame. Allocates nothing.
-    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions) -> bool {
+    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions, nodes: LentNodes<'_>) -> bool {
         self.options == options
+            && self.nodes.fit(nodes)
             && self.views.len() == views.len()
             && self.views.iter().zip(views).all(|(key, view)| key.fits(view))
             && self.draws.iter().copied().eq(draws.iter().map(DrawsKey::new))
@@ -140,11 +152,37 @@ impl GraphKey {
 }
 
 impl<B: Backend> StageGraph<B> {
+    /// The graph of a frame.
+    ///
+    /// # Errors
+    /// If no process draws in a view, views sample each other in a circle, or the nodes make no graph.
+    pub(super) fn of_frame(
+        plan: &Arc<FramePlan>,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+        nodes: LentNodes<'_>,
+    ) -> Result<Self, FrameError> {
+        Self::new(plan, draws, views, GraphKey::new(draws, views, options, nodes)?)
+    }
+
+    /// Whether it is the graph of a frame. Allocates nothing.
+    pub(super) fn fits(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        options: StageOptions,
+        nodes: LentNodes<'_>,
+    ) -> bool {
+        self.plan.identity() == plan.identity() && self.key.fits(draws, views, options, nodes)
+    }
+
     /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass
     /// run one after the other. Nothing else waits: the order of passes binds submission, not recording.
     ///
     /// # Errors
-    /// If no process draws in a view, or views sample each other in a circle.
+    /// If no process draws in a view, views sample each other in a circle, or the nodes make no graph.
     fn new(
         plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
@@ -204,10 +242,11 @@ impl<B: Backend> StageGraph<B> {
             };
             builder.add(pass_scope, stages_of_pass(index), needs);
         }
+        builder.add_cpu_nodes(&key.nodes)?;
         let GraphBuilder { graph, cost_kinds, kind_of_node, labels, .. } = builder;
         let labels = TuningLabels::new(labels, plan, &passes, views);
         Ok(Self {
-            schedule: graph.compile().map_err(|error| FrameError::StageGraph(error.problem))?,
+            schedule: graph.compile().map_err(|error| key.nodes.error_of(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
             view_draws_commands: view_scopes.iter().map(Option::is_some).collect(),
             table_keys: Arc::new(TableKeys::new(plan, &passes, views)),
@@ -221,7 +260,7 @@ impl<B: Backend> StageGraph<B> {
 
     /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a frame that requires
     /// something else does not try out again what is known.
-    fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
+    pub(super) fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
         self.schedule.inherit_measurements(&before.schedule);
         let kinds_before: HashMap<_, _> = before.cost_kind_names().collect();
         let pairs = self.cost_kind_names().filter_map(|(name, kind)| Some((kind, *kinds_before.get(&name)?)));
@@ -239,7 +278,7 @@ impl<B: Backend> StageGraph<B> {
     fn cost_kind_names(&self) -> impl Iterator<Item = (CostKindName<'_>, usize)> {
         self.cost_kinds.iter().map(|((stage, process), kind)| {
             let planned = process.map(|index| &self.plan.processes()[index]);
-            ((*stage, planned.map(|planned| (planned.declaration.views, planned.name.as_str()))), *kind)
+            ((&**stage, planned.map(|planned| (planned.declaration.views, planned.name.as_str()))), *kind)
         })
     }
 
@@ -309,14 +348,16 @@ impl<B: Backend> StageGraph<B> {
 
 /// The graph under construction.
 struct GraphBuilder<B: Backend> {
-    graph: FrameGraph<StageNode<B>>,
+    graph: FrameGraph<FrameNode<B>>,
     /// A stage of one process has the same cost kind in all views, whatever its nodes.
-    cost_kinds: HashMap<(&'static str, Option<usize>), usize>,
+    cost_kinds: HashMap<(Arc<str>, Option<usize>), usize>,
     /// By node, in the order in which nodes were added: the index of its cost kind, and what it belongs to.
     kind_of_node: Vec<usize>,
     labels: Vec<Arc<Labels>>,
     /// The names of the stages, which nodes share.
     stage_names: HashMap<&'static str, Arc<str>>,
+    /// The nodes of each stage.
+    nodes_of_stages: HashMap<&'static str, Vec<NodeId>>,
 }
 
 /// What a node belongs to: the frame, a view or a pass. Not the job system's `Scope`.
@@ -365,6 +406,7 @@ impl<B: Backend> Default for GraphBuilder<B> {
             kind_of_node: Vec::new(),
             labels: Vec::new(),
             stage_names: HashMap::new(),
+            nodes_of_stages: HashMap::new(),
         }
     }
 }
@@ -374,21 +416,19 @@ impl<B: Backend> GraphBuilder<B> {
     fn add(&mut self, mut scope: Scope, stages: Vec<Box<dyn Stage<B>>>, needs: StageNeeds) -> Scope {
         for stage in stages.into_iter().filter(|stage| stage.is_needed(&needs)) {
             let info = stage.info();
-            let cost_kind = (info.cost_kind, scope.process);
-            let next_kind = self.cost_kinds.len();
-            let kind = *self.cost_kinds.entry(cost_kind).or_insert(next_kind);
-            let node = self.kind_of_node.len();
             let mut labels_of = |stage: &'static str| {
                 let name = self.stage_names.entry(stage).or_insert_with(|| stage.into());
                 Labels { stage: Some(Arc::clone(name)), ..scope.labels.clone() }
             };
-            self.kind_of_node.push(kind);
-            // The stage whose jobs a node sizes is the one that it shares its cost kind with.
-            self.labels.push(Arc::new(labels_of(info.cost_kind)));
             let labels = labels_of(info.name);
+            // The stage whose jobs a node sizes is the one that it shares its cost kind with.
+            let cost_labels = labels_of(info.cost_kind);
+            let node = self.add_to_costs(scope.process, cost_labels);
             let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
             let view = scope.view.as_ref().map(|(index, _)| *index);
-            let id = self.graph.add(scope.name_of(info.name), StageNode { stage, node, view, tuned_view });
+            let payload = FrameNode::Stage(StageNode { stage, node, view, tuned_view });
+            let id = self.graph.add(scope.name_of(info.name), payload);
+            self.nodes_of_stages.entry(info.name).or_default().push(id);
             self.graph.label(id, labels);
             self.graph.keep(id);
             let find = |name: &&str| scope.stages.iter().rev().find(|(known, _)| known == name);
@@ -399,56 +439,31 @@ impl<B: Backend> GraphBuilder<B> {
         }
         scope
     }
-}
 
-/// The graphs of recent frames, the latest first. A scene changes what it requires and changes back, and finds its
-/// graph again.
-pub(super) struct StageGraphCache<B: Backend> {
-    latest_first: Vec<StageGraph<B>>,
-}
-
-impl<B: Backend> Default for StageGraphCache<B> {
-    fn default() -> Self {
-        Self { latest_first: Vec::new() }
-    }
-}
-
-impl<B: Backend> StageGraphCache<B> {
-    const CAPACITY: usize = 16;
-
-    /// The graph of a frame, built if the cache does not have it.
+    /// Adds the engine's own nodes, after all stages.
     ///
     /// # Errors
-    /// If no process draws in a view, or views sample each other in a circle.
-    pub(super) fn get(
-        &mut self,
-        plan: &Arc<FramePlan>,
-        draws: &[Draws<'_>],
-        views: &[RenderView],
-        options: StageOptions,
-    ) -> Result<&mut StageGraph<B>, FrameError> {
-        let found = self
-            .latest_first
-            .iter()
-            .position(|graph| graph.plan.identity() == plan.identity() && graph.key.fits(draws, views, options));
-        let graph = match found {
-            Some(index) => self.latest_first.remove(index),
-            None => {
-                let mut graph = StageGraph::new(plan, draws, views, GraphKey::new(draws, views, options))?;
-                if let Some(before) = self.latest_first.first() {
-                    graph.inherit_measurements(before, views);
-                }
-                graph
-            }
-        };
-        self.latest_first.truncate(Self::CAPACITY - 1);
-        self.latest_first.insert(0, graph);
-        Ok(&mut self.latest_first[0])
+    /// If one of them declares what it cannot.
+    fn add_cpu_nodes(&mut self, keys: &NodeKeys) -> Result<(), FrameError> {
+        let mut ids = Vec::new();
+        for (lent, name) in keys.names().enumerate() {
+            let labels = Labels { stage: Some(Arc::clone(name)), ..Labels::default() };
+            let node = self.add_to_costs(None, labels.clone());
+            let id = self.graph.add(&**name, FrameNode::Cpu(CpuNodeIndex { lent, node }));
+            self.graph.label(id, labels);
+            self.graph.keep(id);
+            ids.push(id);
+        }
+        keys.order(&mut self.graph, &ids, &self.nodes_of_stages)
     }
 
-    /// The graph of the latest frame; `None` before the first one.
-    pub(super) fn latest(&self) -> Option<&StageGraph<B>> {
-        self.latest_first.first()
+    /// Adds a node to the cost model, and returns its index there. Its labels name the stage or CPU node whose cost kind it has.
+    fn add_to_costs(&mut self, process: Option<usize>, labels: Labels) -> usize {
+        let name = labels.stage.clone().unwrap_or_default();
+        let next_kind = self.cost_kinds.len();
+        self.kind_of_node.push(*self.cost_kinds.entry((name, process)).or_insert(next_kind));
+        self.labels.push(Arc::new(labels));
+        self.labels.len() - 1
     }
 }
 

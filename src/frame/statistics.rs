@@ -27,6 +27,8 @@ pub struct FrameStatistics {
     pub pieces: PieceStatistics,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
+    /// Bytes that [CPU nodes](super::CpuNode) have filled, which are uploaded when the frame is submitted.
+    pub generated: u64,
     /// The memory of the frame's targets. The software backend does not tell.
     pub targets: TargetMemory,
     /// The thread time of each group of stages.
@@ -95,6 +97,8 @@ pub struct StageTimes {
     pub instance: Duration,
     /// Other uploads, recording and finishing passes.
     pub record: Duration,
+    /// The engine's own [nodes](super::CpuNode).
+    pub nodes: Duration,
     /// Submitting; 0 until the frame is submitted.
     pub submit: Duration,
 }
@@ -102,8 +106,8 @@ pub struct StageTimes {
 impl StageTimes {
     /// The thread time of all groups.
     pub fn total(&self) -> Duration {
-        let Self { visibility, fill, sort, instance, record, submit } = *self;
-        visibility + fill + sort + instance + record + submit
+        let Self { visibility, fill, sort, instance, record, nodes, submit } = *self;
+        visibility + fill + sort + instance + record + nodes + submit
     }
 }
 
@@ -146,6 +150,7 @@ impl FrameStatistics {
             view_times: tables.view_times.times().collect(),
             pieces: tables.pieces.statistics(),
             uploaded,
+            generated: request.generated.iter().map(|contents| contents.byte_count() as u64).sum(),
             targets,
             stages,
             rejections: request.rejections.list(),

@@ -88,7 +88,7 @@ impl<'a> WarmUp<'a> {
         let is_drawn = |camera: &&Camera| reflections || camera.kind != ViewKind::Reflection;
         let cameras: Vec<_> = self.scene.cameras.iter().filter(is_drawn).cloned().collect();
         let scene = SceneRef { lights: &lights, cameras: &cameras, changes: Changes::Unknown, ..self.scene };
-        let recorded = renderer.record_part(&scene, transparency);
+        let recorded = renderer.record_part(&scene, &[], transparency);
         renderer.forget_previous_frames();
         recorded.map(Some)
     }

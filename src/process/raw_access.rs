@@ -107,7 +107,7 @@ impl<'a> RawAccess<'a> {
     /// # Errors
     /// If the process does not declare the buffer.
     pub(super) fn buffer<T>(&self, layout: BufferLayout, found: impl FnOnce() -> Option<T>) -> Result<T, AccessError> {
-        let BufferLayout { name: buffer, bytes } = layout;
+        let BufferLayout { name: buffer, bytes, .. } = layout;
         let undeclared = |process| AccessError::UndeclaredBuffer { process, buffer, bytes };
         self.checked(RawResource::Buffer(layout), found, undeclared)
     }

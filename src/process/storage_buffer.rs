@@ -4,10 +4,13 @@ use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
+use crate::scene::GeneratedBuffer;
+
 /// A buffer on the device that processes of a renderer share: particles, palettes, arguments of indirect draws. Make it once, as a
 /// constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that orders them.
 ///
-/// There is one for all views. It is all zeros until a shader writes it, or a [raw pass](super::RawPassResources::buffer) fills it, and keeps its content from frame to frame, in the order in
+/// There is one for all views. It is all zeros until a shader writes it, a [raw pass](super::RawPassResources::buffer) fills it, or
+/// [CPU nodes](StorageBuffer::generated) do, and keeps its content from frame to frame, in the order in
 /// which frames are submitted.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
@@ -26,13 +29,40 @@ impl<T: Pod> StorageBuffer<T> {
     pub const fn new(name: &'static str, count: u32) -> Self {
         assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
         assert!(count > 0, "a buffer has elements");
-        let layout = BufferLayout { name, bytes: size_of::<T>() as u64 * count as u64 };
+        let bytes = size_of::<T>() as u64 * count as u64;
+        let layout = BufferLayout { name, bytes, is_filled_by_nodes: false };
         Self { layout, element: PhantomData }
+    }
+
+    /// The same buffer, which [CPU nodes](crate::CpuNode) fill before all processes: see [`generated`](Self::generated). So processes may
+    /// read it that no other process writes for.
+    pub const fn filled_by_nodes(mut self) -> Self {
+        self.layout.is_filled_by_nodes = true;
+        self
     }
 
     /// Its name and size.
     pub const fn layout(self) -> BufferLayout {
         self.layout
+    }
+
+    /// What [CPU nodes](crate::CpuNode) fill, so that processes which declare to read this buffer draw it in the same frame: particles, or
+    /// the arguments of an indirect draw, by which a node says how many there are. A frame whose nodes fill it has that content from its
+    /// beginning on, before all processes.
+    ///
+    /// ```
+    /// use drawloom::process::StorageBuffer;
+    /// use drawloom::scene::GeneratedBuffer;
+    ///
+    /// const SPARKS: StorageBuffer<[f32; 4]> = StorageBuffer::new("sparks", 10_000).filled_by_nodes();
+    ///
+    /// let sparks: GeneratedBuffer<[f32; 4]> = SPARKS.generated();
+    /// assert_eq!(sparks.capacity(), 10_000);
+    /// ```
+    ///
+    /// The engine makes it once and keeps it. Of two that fill one buffer in the same frame, one is lost.
+    pub fn generated(self) -> GeneratedBuffer<T> {
+        GeneratedBuffer::of_storage(self.layout.name, self.layout.bytes as usize / size_of::<T>())
     }
 
     /// The place of an element: of the arguments of an indirect draw or dispatch.
@@ -63,6 +93,8 @@ pub struct BufferLayout {
     pub name: &'static str,
     /// Its size in bytes.
     pub bytes: u64,
+    /// Whether [CPU nodes](StorageBuffer::filled_by_nodes) fill it.
+    pub is_filled_by_nodes: bool,
 }
 
 /// A place in a [`StorageBuffer`].

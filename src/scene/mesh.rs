@@ -7,6 +7,7 @@ use glam::Vec3;
 
 #[cfg(feature = "wgpu")]
 use super::MeshBuffers;
+use super::generated_geometry::GeneratedGeometry;
 use super::vertex_attribute::MeshAttribute;
 use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, VertexAttribute};
 
@@ -14,17 +15,19 @@ use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, Sce
 /// their vertices and indices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    name: String,
+    pub(super) name: String,
     topology: Topology,
     vertices: Arc<Vec<Vertex>>,
     indices: Arc<Vec<u32>>,
     attributes: Arc<Vec<MeshAttribute>>,
-    bounds: Bounds,
-    corners: [Vec3; 2],
+    pub(super) bounds: Bounds,
+    pub(super) corners: [Vec3; 2],
     longest_edge: f32,
     culls_triangles: bool,
     /// The coarser levels, the finest first.
     pub(super) levels: Arc<Vec<LevelOfDetail>>,
+    /// If nodes make its vertices.
+    pub(super) generated: Option<Arc<GeneratedGeometry>>,
     /// If it is not in `vertices` and `indices`.
     #[cfg(feature = "wgpu")]
     buffers: Option<Arc<MeshBuffers>>,
@@ -125,6 +128,7 @@ impl Mesh {
             longest_edge: 0.0,
             culls_triangles: false,
             levels: Arc::default(),
+            generated: None,
             #[cfg(feature = "wgpu")]
             buffers: None,
         };
@@ -265,7 +269,7 @@ impl Mesh {
         let corners = self.indices.len();
         #[cfg(feature = "wgpu")]
         let corners = self.buffers.as_ref().map_or(corners, |buffers| buffers.index_count() as usize);
-        triangle_count(self.topology, corners)
+        triangle_count(self.topology, corners).max(self.generated_triangle_count())
     }
 
     /// The indices of each triangle's corners, counter-clockwise seen from its front; none of a mesh

@@ -14,6 +14,9 @@ mod derived_camera;
 #[cfg(feature = "wgpu")]
 mod mesh_buffers;
 mod error;
+mod generated_buffer;
+mod generated_geometry;
+mod generated_mesh;
 mod impostor;
 mod layer_mask;
 mod level_of_detail;
@@ -23,6 +26,7 @@ mod material_predicate;
 mod material_type;
 mod mesh;
 mod mesh_levels;
+mod node_column;
 #[cfg(feature = "obj")]
 pub mod obj;
 mod object_column;
@@ -48,6 +52,11 @@ pub(crate) use camera_motion::PreciseMotion;
 pub use changes::Changes;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;
+pub(crate) use generated_buffer::GeneratedSource;
+pub use generated_buffer::{GeneratedBuffer, GeneratedContents, GeneratedLayout};
+pub use generated_geometry::GeneratedIndices;
+#[cfg(feature = "wgpu")]
+pub(crate) use generated_geometry::{GeneratedGeometry, IndexSource};
 pub use layer_mask::LayerMask;
 pub use level_of_detail::LevelOfDetail;
 pub use light::{Light, LightKind};
@@ -59,6 +68,8 @@ pub use mesh::{Bounds, Mesh, Topology, Vertex};
 pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, VertexStream};
 #[cfg(feature = "wgpu")]
 pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
+pub(crate) use node_column::Column;
+pub use node_column::{ChunkInUse, ColumnChunk, NodeColumn, WrittenColumn, WrittenColumns};
 pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use object_filter::{ObjectFilter, ObjectList};
 pub use object_set::ObjectSet;

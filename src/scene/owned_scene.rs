@@ -7,7 +7,7 @@ use glam::{DVec3, Quat, Vec3};
 use super::transform::transform_is_valid;
 use super::{
     Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet, Piece,
-    SceneError, SceneRef,
+    SceneError, SceneRef, WrittenColumns,
 };
 use crate::handle::{Handle, Slots, StaleHandle};
 
@@ -97,6 +97,7 @@ impl Scene {
             materials: &self.materials,
             layers: &self.layers,
             columns: &[],
+            written: WrittenColumns::default(),
             changes: Changes::Unknown,
             pieces: &self.pieces,
             assets: &self.assets,

@@ -4,7 +4,8 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Assets, Bounds, Camera, Changes, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, Piece, SceneError,
+    Assets, Bounds, Camera, Changes, Column, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, Piece,
+    SceneError, WrittenColumns,
 };
 use crate::handle::Handle;
 
@@ -35,6 +36,8 @@ pub struct SceneRef<'a> {
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.
     pub columns: &'a [ColumnValues<'a>],
+    /// The columns that CPU nodes write while the frame is recorded, in the place of the slices of the same names.
+    pub written: WrittenColumns<'a>,
     /// Which objects changed since the last frame.
     pub changes: Changes<'a>,
     /// Objects that stand still together, and that views execute as a whole.
@@ -73,6 +76,7 @@ impl<'a> SceneRef<'a> {
             materials: &[],
             layers: &[],
             columns: &[],
+            written: WrittenColumns::default(),
             changes: Changes::Unknown,
             pieces: &[],
             assets,
@@ -84,10 +88,36 @@ impl<'a> SceneRef<'a> {
     }
 }
 
+impl<'a> SceneRef<'a> {
+    /// The positions, wherever they are.
+    #[inline(always)]
+    pub(crate) fn position_column(&self) -> Column<'a, DVec3> {
+        Column::new(self.positions, self.written.positions)
+    }
+
+    /// The orientations, wherever they are.
+    #[inline(always)]
+    pub(crate) fn orientation_column(&self) -> Column<'a, Quat> {
+        Column::new(self.orientations, self.written.orientations)
+    }
+
+    /// The scales, wherever they are.
+    #[inline(always)]
+    pub(crate) fn scale_column(&self) -> Column<'a, Vec3> {
+        Column::new(self.scales, self.written.scales)
+    }
+
+    /// The bounds, wherever they are.
+    #[inline(always)]
+    pub(crate) fn bounds_column(&self) -> Column<'a, Bounds> {
+        Column::new(self.bounds, self.written.bounds)
+    }
+}
+
 impl SceneRef<'_> {
     /// The number of objects.
     pub fn object_count(&self) -> usize {
-        self.positions.len()
+        self.position_column().len()
     }
 
     /// The values of a column; `None` if the scene has none of its name and element size.
@@ -99,11 +129,11 @@ impl SceneRef<'_> {
     /// If a slice or a column has another length than `positions`, or two columns have the same name. The error names the first
     /// one.
     pub(crate) fn check_lengths(&self) -> Result<(), SceneError> {
-        let positions = self.positions.len();
+        let positions = self.object_count();
         let slices = [
-            ("orientations", self.orientations.len()),
-            ("scales", self.scales.len()),
-            ("bounds", self.bounds.len()),
+            ("orientations", self.orientation_column().len()),
+            ("scales", self.scale_column().len()),
+            ("bounds", self.bounds_column().len()),
             ("meshes", self.meshes.len()),
             ("materials", self.materials.len()),
         ];
@@ -117,7 +147,7 @@ impl SceneRef<'_> {
     }
 
     fn check_columns(&self) -> Result<(), SceneError> {
-        let positions = self.positions.len();
+        let positions = self.object_count();
         for (index, values) in self.columns.iter().enumerate() {
             let (column, count) = (values.name(), values.count());
             if count != positions {
@@ -132,7 +162,8 @@ impl SceneRef<'_> {
 
     /// Whether the object's transform can be drawn: it is finite, and its orientation is a rotation.
     pub(crate) fn transform_is_valid(&self, object: usize) -> bool {
-        transform_is_valid(self.positions[object], self.orientations[object], self.scales[object])
+        let (position, orientation) = (self.position_column().get(object), self.orientation_column().get(object));
+        transform_is_valid(position, orientation, self.scale_column().get(object))
     }
 
     /// The objects whose transforms can be drawn; none if the scene's slices differ in length.
@@ -142,13 +173,14 @@ impl SceneRef<'_> {
     }
 
     /// Centre and radius, in metres, of a sphere around all objects that can be drawn. Without any it is a sphere of
-    /// radius 1 around the world's origin.
+    /// radius 1 around the world's origin. It reads all [written columns](Self::written), so nodes can write them no more.
     pub fn bounding_sphere(self) -> (DVec3, f64) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for object in self.drawable_objects() {
-            let scale = self.scales[object];
-            let bounds = self.bounds[object];
-            let center = self.positions[object] + (self.orientations[object] * (bounds.center * scale)).as_dvec3();
+            let scale = self.scale_column().get(object);
+            let bounds = self.bounds_column().get(object);
+            let offset = (self.orientation_column().get(object) * (bounds.center * scale)).as_dvec3();
+            let center = self.position_column().get(object) + offset;
             let reach = DVec3::splat(f64::from(bounds.radius * scale.abs().max_element()));
             if center.is_finite() && reach.is_finite() {
                 low = low.min(center - reach);

@@ -117,12 +117,12 @@ fn nearest_steps(positions: &[Lanes<f64>; 3]) -> [Lanes<i64>; 3] {
 /// Why an object cannot be drawn.
 #[cold]
 pub(super) fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> RejectionReason {
-    let [x, y, z, w] = scene.orientations[object].to_array();
+    let [x, y, z, w] = scene.orientation_column().get(object).to_array();
     // Rounded as where it was found to be invalid.
     let is_rotation = is_unit(x * x + y * y + z * z + w * w);
     if !is_rotation || !scene.transform_is_valid(object) {
         RejectionReason::InvalidTransform
-    } else if FixedPosition::new(scene.positions[object]).is_none() {
+    } else if FixedPosition::new(scene.position_column().get(object)).is_none() {
         RejectionReason::OutOfReach
     } else if scene.assets.is_pending(scene.meshes[object]) || scene.assets.is_pending(scene.materials[object]) {
         RejectionReason::NotResident
@@ -300,7 +300,7 @@ fn max<T: PartialOrd>(one: T, other: T) -> T {
 /// Rounding in f64 is far below the tolerances of [`position_error`] and
 /// [`Frustum::intersects_boxes`](super::Frustum::intersects_boxes).
 pub(super) fn bounding_box(scene: &SceneRef<'_>, object: usize, sphere: BoundingSphere) -> OrientedBox {
-    let bounds = scene.bounds[object];
+    let bounds = scene.bounds_column().get(object);
     let mesh = scene.assets.get(scene.meshes[object]).ok().filter(|mesh| mesh.bounds() == bounds);
     let Some(mesh) = mesh else {
         let radius = f64::from(sphere.radius);
@@ -308,9 +308,9 @@ pub(super) fn bounding_box(scene: &SceneRef<'_>, object: usize, sphere: Bounding
     };
     let [low, high] = mesh.corners().map(Vec3::as_dvec3);
     let center = bounds.center.as_dvec3();
-    let scale = scene.scales[object];
+    let scale = scene.scale_column().get(object);
     let half = (high - center).max(center - low) * scale.abs().as_dvec3();
-    let rotation = DMat3::from_quat(scene.orientations[object].as_dquat().normalize());
+    let rotation = DMat3::from_quat(scene.orientation_column().get(object).as_dquat().normalize());
     let offset = (scale * bounds.center).abs().element_sum();
     OrientedBox {
         half_axes: [rotation.x_axis * half.x, rotation.y_axis * half.y, rotation.z_axis * half.z],

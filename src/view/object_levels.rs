@@ -48,7 +48,7 @@ impl ObjectLevels {
             // Relaxed, here and below: jobs that read the levels depend on this job.
             let before = self.levels[object].load(Ordering::Relaxed);
             let level = meshes.get(block.draws[entry].mesh).map_or(0, |errors| {
-                let scale = scene.scales[object].abs().max_element();
+                let scale = scene.scale_column().get(object).abs().max_element();
                 selector.level(block.spheres.get(entry), scale, errors, before.into()) as u8
             });
             if level != before {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use crate::handle::Handle;
-use crate::scene::{Bounds, Material, Mesh, SceneRef};
+use crate::scene::{Bounds, Column, Material, Mesh, SceneRef};
 
 /// The number of objects in a packet.
 pub(super) const LANES: usize = 8;
@@ -40,12 +40,12 @@ impl<'a> PacketColumns<'a> {
     #[inline(always)]
     pub(super) fn new(scene: &SceneRef<'a>, first: usize) -> Self {
         Self {
-            positions: packet(scene.positions, first),
-            orientations: packet(scene.orientations, first),
-            scales: packet(scene.scales, first),
-            bounds: packet(scene.bounds, first),
-            meshes: packet(scene.meshes, first),
-            materials: packet(scene.materials, first),
+            positions: packet(scene.position_column(), first),
+            orientations: packet(scene.orientation_column(), first),
+            scales: packet(scene.scale_column(), first),
+            bounds: packet(scene.bounds_column(), first),
+            meshes: whole(&scene.meshes[first..]),
+            materials: whole(&scene.materials[first..]),
         }
     }
 }
@@ -59,18 +59,18 @@ impl GatheredColumns {
     pub(super) fn new(scene: &SceneRef<'_>, objects: &[usize]) -> Self {
         let first = objects[0];
         let mut columns = Self {
-            positions: [scene.positions[first]; LANES],
-            orientations: [scene.orientations[first]; LANES],
-            scales: [scene.scales[first]; LANES],
-            bounds: [scene.bounds[first]; LANES],
+            positions: [scene.position_column().get(first); LANES],
+            orientations: [scene.orientation_column().get(first); LANES],
+            scales: [scene.scale_column().get(first); LANES],
+            bounds: [scene.bounds_column().get(first); LANES],
             meshes: [scene.meshes[first]; LANES],
             materials: [scene.materials[first]; LANES],
         };
         for (lane, &object) in objects.iter().enumerate().skip(1) {
-            columns.positions[lane] = scene.positions[object];
-            columns.orientations[lane] = scene.orientations[object];
-            columns.scales[lane] = scene.scales[object];
-            columns.bounds[lane] = scene.bounds[object];
+            columns.positions[lane] = scene.position_column().get(object);
+            columns.orientations[lane] = scene.orientation_column().get(object);
+            columns.scales[lane] = scene.scale_column().get(object);
+            columns.bounds[lane] = scene.bounds_column().get(object);
             columns.meshes[lane] = scene.meshes[object];
             columns.materials[lane] = scene.materials[object];
         }
@@ -86,6 +86,12 @@ impl GatheredColumns {
 
 /// The eight entries of a column from `first` on.
 #[inline(always)]
-fn packet<T>(column: &[T], first: usize) -> &Lanes<T> {
-    column[first..].first_chunk().expect("the packet is whole")
+fn packet<T: Copy>(column: Column<'_, T>, first: usize) -> &Lanes<T> {
+    whole(column.from(first))
+}
+
+/// The first eight entries of a part of a column.
+#[inline(always)]
+fn whole<T>(entries: &[T]) -> &Lanes<T> {
+    entries.first_chunk().expect("the packet is whole")
 }

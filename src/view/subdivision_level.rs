@@ -19,9 +19,9 @@ pub(super) fn subdivision_level(
     widest_angle: f64,
 ) -> Option<u32> {
     let mesh = scene.assets.get(scene.meshes[object]).ok()?;
-    let scale = scene.scales[object];
-    let to_object = scene.orientations[object].normalize().as_dquat().inverse();
-    let eye = to_object * (view.camera.position - scene.positions[object]);
+    let scale = scene.scale_column().get(object);
+    let to_object = scene.orientation_column().get(object).normalize().as_dquat().inverse();
+    let eye = to_object * (view.camera.position - scene.position_column().get(object));
     let forward = to_object * (view.camera.orientation.normalize() * Vec3::NEG_Z).as_dvec3();
     let min_distance = f64::from(view.camera.far) * MIN_DISTANCE_SHARE;
 

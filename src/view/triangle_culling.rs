@@ -69,15 +69,18 @@ impl RenderView {
             return CulledTriangles { triangles: count, ..CulledTriangles::default() };
         }
         let clip_from_relative = self.precise_clip_from_relative();
-        let (scale, orientation) = (scene.scales[object].as_dvec3(), scene.orientations[object].as_dquat().normalize());
-        let origin = scene.positions[object] - self.camera.position;
+        let (scale, orientation) = (
+            scene.scale_column().get(object).as_dvec3(),
+            scene.orientation_column().get(object).as_dquat().normalize(),
+        );
+        let origin = scene.position_column().get(object) - self.camera.position;
         let transform = |vertex: &Vertex| {
             let local = Vec3::from(vertex.position).as_dvec3() * scale;
             let clip = clip_from_relative * (origin + orientation * local).extend(1.0);
             let error = origin.length() * ERROR_PER_DISTANCE + local.length() * ERROR_PER_SIZE + FIXED_POINT_ERROR;
             cull_vertex(error, clip, &clip_from_relative, self.camera.size)
         };
-        let is_mirrored = scene.scales[object].is_negative_bitmask().count_ones() % 2 == 1;
+        let is_mirrored = scene.scale_column().get(object).is_negative_bitmask().count_ones() % 2 == 1;
         let culled = match (material.double_sided, is_mirrored) {
             (true, _) => None,
             (false, false) => Some(Winding::Clockwise),
@@ -264,7 +267,7 @@ mod tests {
     fn back_facing_triangles_are_culled_in_perspective_and_orthographic_views() {
         let scene = demo::colonnade().unwrap();
         let scene = scene.as_scene_ref();
-        let center = scene.positions[0];
+        let center = scene.position_column().get(0);
         let camera = Camera::looking_at("near", center + DVec3::new(3.0, 40.0, 5.0), center);
         for projection in [camera.projection, Projection::Orthographic { height: 60.0 }, Projection::Paraboloid] {
             let kind = if projection == Projection::Paraboloid { ViewKind::Shadow } else { ViewKind::Main };

@@ -45,6 +45,7 @@ fn broken_rule(
         scene: &scene.as_scene_ref(),
         objects: &objects,
         list_capacity: objects.len(),
+        generated: &[],
         quality: &Quality::balanced(),
         rejections: &Rejections::default(),
     };

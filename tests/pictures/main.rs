@@ -16,6 +16,7 @@ mod cube_shadows;
 mod deformation;
 mod determinism;
 mod compute;
+mod cpu_nodes;
 mod imported_meshes;
 mod device_times;
 mod devices;
@@ -103,6 +104,7 @@ fn main() {
         (changing_shaders::CASES, Needs::Adapter),
         (columns::CASES, Needs::Adapter),
         (compute::CASES, Needs::Adapter),
+        (cpu_nodes::CASES, Needs::Adapter),
         (cube_shadows::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
         (materials::CASES, Needs::Adapter),

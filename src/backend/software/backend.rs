@@ -100,7 +100,7 @@ impl Backend for SoftwareBackend {
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
-        frame.recording.upload(request.objects, blocks);
+        frame.recording.upload(request, blocks);
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use parking_lot::Mutex;
 
 use super::executor::Executor;
+use super::generated_meshes::GeneratedMeshes;
 use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::scene::Mesh;
 
@@ -12,6 +13,6 @@ use crate::scene::Mesh;
 pub(super) struct DrawContext {
     pub(super) executor: Executor,
     /// Held while a frame is drawn: one frame is drawn at a time.
-    pub(super) drawing: Mutex<()>,
+    pub(super) drawing: Mutex<GeneratedMeshes>,
     pub(super) subdivisions: SubdivisionCache<Arc<Mesh>>,
 }

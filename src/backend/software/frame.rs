@@ -22,12 +22,11 @@ use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
-use crate::backend::{BackendError, FrameFence, PassRequest, ViewQueue, ViewRequest};
+use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
 use crate::command::Batch;
 use crate::process::ShaderColumns;
 use crate::quality::{TransformPrecision, VertexFormat};
-use crate::scene::{ColumnLayout, Mesh};
-use crate::view::ObjectTable;
+use crate::scene::{ColumnLayout, GeneratedContents, Mesh};
 
 /// A frame in one precision, from `begin` until it was submitted.
 pub(super) struct TypedFrame<R: Precision> {
@@ -42,6 +41,8 @@ pub(super) struct TypedFrame<R: Precision> {
     /// The format of the vertices that it draws.
     pub(super) vertices: VertexFormat,
     pub(super) meshes: Meshes,
+    /// What nodes fill in this frame.
+    pub(super) generated: Vec<Arc<GeneratedContents>>,
     pub(super) subdivided: Mutex<SubdividedMeshes<Arc<Mesh>>>,
     pub(super) materials: Arc<MaterialTable>,
     pub(super) targets: Arc<SoftwareTargets<R>>,
@@ -50,8 +51,8 @@ pub(super) struct TypedFrame<R: Precision> {
 }
 
 impl<R: Precision> FrameRecording for TypedFrame<R> {
-    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>) {
-        R::upload(&self.objects, objects, blocks);
+    fn upload(&self, request: &FrameRequest<'_>, blocks: Range<usize>) {
+        R::upload(&self.objects, request, blocks);
     }
 
     fn prepare(&self, &PassRequest { frame: request, list, .. }: &PassRequest<'_>) -> Result<(), BackendError> {
@@ -80,14 +81,16 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         queues: Vec<ViewQueue<SoftwareCommands>>,
         mut fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
-        let _one_at_a_time = self.context.drawing.lock();
+        let mut generated = self.context.drawing.lock();
+        generated.keep(&self.generated, &self.meshes);
+        let meshes = generated.complete(&self.meshes)?;
         for (before, (pass, commands)) in queues.iter().flat_map(|queue| &queue.passes).enumerate() {
             FrameFence::set_up_to(before, &mut fences);
             let known = self.passes.iter().find(|known| known.pass == *pass);
             let unknown = || BackendError::BrokenRule {
                 rule: format!("submitted passes belong to the frame, but {pass:?} does not"),
             };
-            self.draw(known.ok_or_else(unknown)?, commands)?;
+            self.draw(known.ok_or_else(unknown)?, commands, &meshes)?;
         }
         let drawn: HashSet<_> = queues.iter().map(|queue| queue.view).collect();
         self.targets.copy_histories(|view| drawn.contains(&view));
@@ -98,7 +101,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
 }
 
 impl<R: Precision> TypedFrame<R> {
-    fn draw(&self, pass: &SoftwarePass<R>, commands: &SoftwareCommands) -> Result<(), BackendError> {
+    fn draw(&self, pass: &SoftwarePass<R>, commands: &SoftwareCommands, meshes: &Meshes) -> Result<(), BackendError> {
         let view = &self.views[pass.pass.view_index];
         let context = PassContext {
             executor: &self.context.executor,
@@ -112,7 +115,7 @@ impl<R: Precision> TypedFrame<R> {
                 let subdivided = self.subdivided.lock();
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
-                        0 => self.meshes.get(batch.mesh as usize).and_then(Option::as_ref),
+                        0 => meshes.get(batch.mesh as usize).and_then(Option::as_ref),
                         _ => subdivided.get(&subdivision_of(batch)).map(|mesh| &mesh.geometry),
                     };
                     mesh.cloned().ok_or_else(missing_mesh_error)

@@ -7,7 +7,6 @@ use super::commands::SoftwareCommands;
 use super::read_back::SoftwareReadBack;
 use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
 use crate::process::CpuShader;
-use crate::view::ObjectTable;
 
 /// A rasterizer in either precision.
 pub(super) trait BeginFrame: Send + Sync {
@@ -27,7 +26,7 @@ pub(super) trait BeginFrame: Send + Sync {
 /// A frame that is being recorded, in either precision.
 pub(super) trait FrameRecording: Send + Sync {
     /// Copies blocks of objects.
-    fn upload(&self, objects: &ObjectTable, blocks: Range<usize>);
+    fn upload(&self, request: &FrameRequest<'_>, blocks: Range<usize>);
 
     /// Subdivides the meshes that a pass draws subdivided.
     ///

@@ -36,7 +36,8 @@ impl MeshCache {
             return Ok(Arc::clone(&self.meshes));
         }
         let used = || assets.meshes.iter_with_revision().filter(|(handle, ..)| used.contains(*handle));
-        if let Some((.., mesh)) = used().find(|(.., mesh)| !mesh.has_triangles()) {
+        if let Some((.., mesh)) = used().find(|(.., mesh)| !mesh.has_triangles() && mesh.generated_geometry().is_none())
+        {
             return Err(BackendError::ImportedMesh { mesh: mesh.name().to_owned() });
         }
         let mut before = std::mem::take(&mut self.kept);

@@ -15,6 +15,7 @@ mod commands;
 mod draw_context;
 mod executor;
 mod frame;
+mod generated_meshes;
 mod frame_recording;
 mod light_bounds;
 mod materials;

@@ -5,12 +5,13 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::shader_inputs::{
-    CameraPosition, ExactObject, UploadedObjects, exact_light, exact_view, light_as_uploaded, view_as_uploaded,
+    CameraPosition, ExactObjects, UploadedObjects, exact_light, exact_view, light_as_uploaded, view_as_uploaded,
 };
+use crate::backend::FrameRequest;
 use crate::process::{CpuShader, ShaderLight, ShaderObject, ShaderView, TypedCpuShader};
 use crate::raster::Real;
 use crate::scene::{Light, SceneRef};
-use crate::view::{GpuLight, GpuView, ObjectTable, RenderView};
+use crate::view::{GpuLight, GpuView, RenderView};
 
 /// A precision that the backend draws in: f32 reads the same numbers that a device gets, f64 reads the scene.
 pub(super) trait Precision: Real {
@@ -27,7 +28,7 @@ pub(super) trait Precision: Real {
     fn objects(scene: &SceneRef<'_>) -> Self::Objects;
 
     /// Copies blocks of objects.
-    fn upload(objects: &Self::Objects, table: &ObjectTable, blocks: Range<usize>);
+    fn upload(objects: &Self::Objects, request: &FrameRequest<'_>, blocks: Range<usize>);
 
     /// One object, relative to a camera; `None` if there is none.
     fn object(objects: &Self::Objects, index: usize, camera: &CameraPosition) -> Option<ShaderObject<Self>>;
@@ -57,8 +58,8 @@ impl Precision for f32 {
         UploadedObjects::new(scene)
     }
 
-    fn upload(objects: &UploadedObjects, table: &ObjectTable, blocks: Range<usize>) {
-        objects.upload(table, blocks);
+    fn upload(objects: &UploadedObjects, request: &FrameRequest<'_>, blocks: Range<usize>) {
+        objects.upload(request.objects, blocks);
     }
 
     fn object(objects: &UploadedObjects, index: usize, camera: &CameraPosition) -> Option<ShaderObject<Self>> {
@@ -80,7 +81,7 @@ impl Precision for f32 {
 }
 
 impl Precision for f64 {
-    type Objects = Vec<ExactObject>;
+    type Objects = ExactObjects;
 
     const ROUNDS: bool = false;
 
@@ -88,13 +89,15 @@ impl Precision for f64 {
         &shader.double
     }
 
-    fn objects(scene: &SceneRef<'_>) -> Vec<ExactObject> {
-        (0..scene.object_count()).map(|object| ExactObject::new(scene, object)).collect()
+    fn objects(scene: &SceneRef<'_>) -> ExactObjects {
+        ExactObjects::new(scene)
     }
 
-    fn upload(_objects: &Vec<ExactObject>, _table: &ObjectTable, _blocks: Range<usize>) {}
+    fn upload(objects: &ExactObjects, request: &FrameRequest<'_>, blocks: Range<usize>) {
+        objects.upload(request.scene, blocks);
+    }
 
-    fn object(objects: &Vec<ExactObject>, index: usize, camera: &CameraPosition) -> Option<ShaderObject<Self>> {
+    fn object(objects: &ExactObjects, index: usize, camera: &CameraPosition) -> Option<ShaderObject<Self>> {
         objects.get(index).map(|object| object.relative_to(camera))
     }
 

@@ -90,6 +90,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
             columns,
             vertices,
             meshes,
+            generated: request.generated.to_vec(),
             subdivided: Mutex::default(),
             materials,
             targets,

@@ -62,6 +62,34 @@ impl UploadedObjects {
     }
 }
 
+/// A frame's objects as the scene has them.
+pub(super) struct ExactObjects {
+    /// One for each block of the table.
+    blocks: Vec<OnceLock<Box<[ExactObject]>>>,
+}
+
+impl ExactObjects {
+    pub(super) fn new(scene: &SceneRef<'_>) -> Self {
+        let mut blocks = Vec::new();
+        blocks.resize_with(scene.object_count().div_ceil(ObjectTable::BLOCK_SIZE), OnceLock::new);
+        Self { blocks }
+    }
+
+    pub(super) fn upload(&self, scene: &SceneRef<'_>, blocks: Range<usize>) {
+        for block in blocks {
+            let first = block * ObjectTable::BLOCK_SIZE;
+            let objects = first..scene.object_count().min(first + ObjectTable::BLOCK_SIZE);
+            if let Some(uploaded) = self.blocks.get(block) {
+                uploaded.get_or_init(|| objects.map(|object| ExactObject::new(scene, object)).collect());
+            }
+        }
+    }
+
+    pub(super) fn get(&self, index: usize) -> Option<&ExactObject> {
+        self.blocks.get(index / ObjectTable::BLOCK_SIZE)?.get()?.get(index % ObjectTable::BLOCK_SIZE)
+    }
+}
+
 /// An object as the scene has it.
 pub(super) struct ExactObject {
     position: DVec3,
@@ -74,9 +102,9 @@ pub(super) struct ExactObject {
 impl ExactObject {
     pub(super) fn new(scene: &SceneRef<'_>, object: usize) -> Self {
         Self {
-            position: scene.positions[object],
-            orientation: Quaternion::of(scene.orientations[object].as_dquat().normalize()),
-            scale: Vector3::of_single(scene.scales[object]),
+            position: scene.position_column().get(object),
+            orientation: Quaternion::of(scene.orientation_column().get(object).as_dquat().normalize()),
+            scale: Vector3::of_single(scene.scale_column().get(object)),
             material: scene.materials[object].index(),
             index: object as u32,
         }

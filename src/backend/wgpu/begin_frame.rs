@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use super::backend::WgpuBackend;
 use super::error_scope::with_error_scope;
-use super::frame::{BundleKey, PendingUploads, WgpuFrame, WgpuPassState};
+use super::frame::{BundleKey, GeneratedUploads, PendingUploads, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
 use super::pipelines::ProcessPipelines;
 use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets};
@@ -40,6 +40,7 @@ impl WgpuBackend {
             with_error_scope(&self.device, "meshes, materials and textures", || self.update_resources(request))
                 .flatten()?;
         let storage_buffers = self.storage_buffers(plan)?;
+        let generated = GeneratedUploads::new(request, &storage_buffers, &meshes.imported_meshes);
         let mut buffers = self.buffers.take(&self.device)?;
         with_error_scope(&self.device, "the frame's buffers", || {
             buffers.begin(&self.device, &self.uploads, &self.layouts, &materials, request)?;
@@ -60,6 +61,7 @@ impl WgpuBackend {
                 light_meshes,
                 targets,
                 storage_buffers,
+                generated,
                 mip_schedule: MipSchedule::new(request.plan, request.views, (request.passes, request.sampled_views)),
                 background,
                 read_backs,

@@ -61,6 +61,7 @@ impl WgpuBackend {
                 timestamps.map(|(timestamps, timing)| timestamps.read_back(&self.device, timing)).transpose()?;
             let (copy, readback) = readback.unzip();
             frame.buffers.objects().unmap();
+            frame.generated.write(self.queue());
             let copies = (has_histories || !frame.read_backs.is_empty()).then(|| {
                 let descriptor = wgpu::CommandEncoderDescriptor { label: Some("copies of targets") };
                 let mut encoder = self.device.create_command_encoder(&descriptor);

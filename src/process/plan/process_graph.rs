@@ -75,9 +75,11 @@ fn process_graph(
             let resource = graph.resource(buffer_name(buffer.name));
             graph.read(id, resource);
             if *access == BufferAccess::Change {
-                // The first to change it finds what the frame before left.
-                graph.import(resource);
                 graph.write(id, resource);
+            }
+            if *access == BufferAccess::Change || buffer.is_filled_by_nodes {
+                // The first to change it finds what the frame before left, or what nodes have filled it with.
+                graph.import(resource);
             }
         }
         if declaration.keep {

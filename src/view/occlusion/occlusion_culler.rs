@@ -156,7 +156,7 @@ impl OcclusionCuller {
             return false;
         }
         // The bounding sphere of most hidden objects is hidden, and testing it takes less time than testing the box.
-        let (radius, position) = (f64::from(bounds.radius), scene.positions[object]);
+        let (radius, position) = (f64::from(bounds.radius), scene.position_column().get(object));
         let slack = camera.slack(center.length() + 2.0 * bounds.center.distance(position) + radius);
         let depth = center.z - radius - slack;
         if depth > camera.min_depth(slack)
@@ -274,7 +274,7 @@ impl Occluders {
 /// its mesh is.
 fn exact_mesh_corners(scene: &SceneRef<'_>, object: usize) -> Option<[Vec3; 2]> {
     let mesh = scene.assets.get(scene.meshes[object]).ok()?;
-    (scene.bounds[object] == mesh.bounds()).then(|| mesh.corners())
+    (scene.bounds_column().get(object) == mesh.bounds()).then(|| mesh.corners())
 }
 
 /// An object's orientation and scale.
@@ -293,5 +293,5 @@ fn camera_from_object(
 ) -> CameraFromObject {
     let (orientation, scale) = transform(objects, object % ObjectTable::BLOCK_SIZE);
     let extent = (low.abs().max(high.abs()).as_dvec3() * scale.as_dvec3()).length();
-    camera.camera_from_object(scene.positions[object], orientation, scale, extent)
+    camera.camera_from_object(scene.position_column().get(object), orientation, scale, extent)
 }

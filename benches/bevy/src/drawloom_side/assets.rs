@@ -62,6 +62,7 @@ impl Surroundings {
             materials: &[],
             layers: &[],
             columns: &[],
+            written: WrittenColumns::default(),
             changes: Changes::Unknown,
             assets: &self.assets,
             lights: &self.lights,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::frame_buffers::FrameBuffers;
+use super::generated_uploads::GeneratedUploads;
 use super::pass_state::WgpuPassState;
 use super::pending_uploads::PendingUploads;
 use crate::backend::mip_schedule::MipSchedule;
@@ -30,6 +31,7 @@ pub struct WgpuFrame {
     pub(crate) light_meshes: Option<Arc<LightMeshes>>,
     pub(crate) targets: Arc<WgpuTargets>,
     pub(crate) storage_buffers: Arc<StorageBuffers>,
+    pub(crate) generated: GeneratedUploads,
     /// After which passes mip levels are generated.
     pub(crate) mip_schedule: MipSchedule,
     pub(crate) background: [f64; 3],

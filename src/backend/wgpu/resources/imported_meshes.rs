@@ -1,15 +1,19 @@
-//! Imported meshes: those in an engine's own buffers.
+//! Imported meshes: those in an engine's own buffers, and in buffers that CPU nodes fill.
 
 use std::collections::HashMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use wgpu::util::RenderEncoder;
+use wgpu::util::{DeviceExt, RenderEncoder};
 
+use super::buffers::new_buffer;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 use crate::process::DeclaredAttribute;
-use crate::scene::{Mesh, MeshBuffers, NORMAL, POSITION, StreamLayout, Topology, UV};
+use crate::scene::{
+    GeneratedGeometry, GeneratedSource, IndexBuffer, IndexSource, Mesh, MeshBuffers, NORMAL, POSITION, StreamAttribute,
+    StreamLayout, Topology, UV, Vertex, VertexStream,
+};
 
 /// What pipelines know of an imported mesh. Meshes with equal layouts share pipelines.
 #[derive(Debug)]
@@ -72,11 +76,20 @@ impl VertexStreamLayouts {
     }
 }
 
-/// A mesh in an engine's own buffers, with what pipelines know of it.
+/// A mesh in buffers of its own, with what pipelines know of it.
 #[derive(Clone)]
 pub(crate) struct ImportedMesh {
     pub(crate) layout: Arc<VertexStreamLayouts>,
     pub(crate) buffers: Arc<MeshBuffers>,
+    /// If nodes make its vertices, and the buffers are not the engine's.
+    generated: Option<Arc<GeneratedGeometry>>,
+}
+
+/// Where a mesh has its buffers from.
+#[derive(Clone, Copy)]
+enum BufferSource<'a> {
+    Engine(&'a Arc<MeshBuffers>),
+    Nodes(&'a Arc<GeneratedGeometry>),
 }
 
 /// The imported meshes by slot.
@@ -97,22 +110,43 @@ impl ImportedMeshes {
     ) -> Result<Self, BackendError> {
         let mut updated = Self::default();
         for (slot, mesh) in meshes {
-            let Some(buffers) = mesh.buffers() else { continue };
-            let known = self.meshes.get(&slot).filter(|known| Arc::ptr_eq(&known.buffers, buffers));
+            let Some(source) = BufferSource::of(mesh) else { continue };
+            let known = self.meshes.get(&slot).filter(|known| source.is_of(known));
             let mesh = match known {
                 Some(known) => known.clone(),
                 None => {
-                    check_limits(device, mesh.name(), buffers)?;
-                    check_device(device, mesh.name(), buffers)?;
-                    let layout = VertexStreamLayouts::new(mesh, buffers);
+                    let (buffers, generated) = match source {
+                        BufferSource::Engine(buffers) => (Arc::clone(buffers), None),
+                        BufferSource::Nodes(generated) => {
+                            (new_buffers(device, generated)?, Some(Arc::clone(generated)))
+                        }
+                    };
+                    check_limits(device, mesh.name(), &buffers)?;
+                    check_device(device, mesh.name(), &buffers)?;
+                    let layout = VertexStreamLayouts::new(mesh, &buffers);
                     let mut others = self.meshes.values().chain(updated.meshes.values());
                     let same = others.find(|other| *other.layout == layout).map(|other| Arc::clone(&other.layout));
-                    ImportedMesh { layout: same.unwrap_or_else(|| Arc::new(layout)), buffers: Arc::clone(buffers) }
+                    ImportedMesh { layout: same.unwrap_or_else(|| Arc::new(layout)), buffers, generated }
                 }
             };
             updated.meshes.insert(slot, mesh);
         }
         Ok(updated)
+    }
+
+    /// The buffers on the device that nodes fill by the identity of a [`GeneratedBuffer`](crate::scene::GeneratedBuffer), and whether they
+    /// are indices.
+    pub(crate) fn filled_by(&self, identity: u64) -> impl Iterator<Item = (&wgpu::Buffer, bool)> {
+        let meshes = self.meshes.values().filter_map(|mesh| Some((mesh, mesh.generated.as_ref()?)));
+        meshes.flat_map(move |(mesh, generated)| {
+            let is_it = |source: &GeneratedSource| source.layout.identity == identity;
+            let vertices = is_it(&generated.vertices).then(|| (&mesh.buffers.streams[0].buffer, false));
+            let indices = match &generated.indices.0 {
+                IndexSource::Generated(source) if is_it(source) => mesh.buffers.indices.as_ref(),
+                _ => None,
+            };
+            vertices.into_iter().chain(indices.map(|indices| (&indices.buffer, true)))
+        })
     }
 
     /// Whether there are none.
@@ -157,6 +191,53 @@ impl ImportedMesh {
             encoder.set_index_buffer(indices.buffer.slice(indices.offset..), indices.format);
         }
     }
+}
+
+impl<'a> BufferSource<'a> {
+    /// That of a mesh; `None` if the mesh lies in the pages.
+    fn of(mesh: &'a Mesh) -> Option<Self> {
+        mesh.generated_geometry().map(Self::Nodes).or_else(|| mesh.buffers().map(Self::Engine))
+    }
+
+    fn is_of(self, mesh: &ImportedMesh) -> bool {
+        match (self, &mesh.generated) {
+            (Self::Engine(buffers), None) => Arc::ptr_eq(buffers, &mesh.buffers),
+            (Self::Nodes(generated), Some(known)) => Arc::ptr_eq(generated, known),
+            _ => false,
+        }
+    }
+}
+
+/// Buffers for a mesh whose vertices nodes make.
+///
+/// # Errors
+/// If the device has no room.
+fn new_buffers(device: &wgpu::Device, generated: &GeneratedGeometry) -> Result<Arc<MeshBuffers>, BackendError> {
+    use wgpu::{BufferUsages, VertexFormat};
+    let GeneratedGeometry { vertices, indices } = generated;
+    let usage = BufferUsages::VERTEX | BufferUsages::COPY_DST;
+    let buffer = new_buffer(device, vertices.layout.name, vertices.layout.bytes() as u64, usage)?;
+    let attributes = vec![
+        StreamAttribute::position(VertexFormat::Float32x3, std::mem::offset_of!(Vertex, position) as u64),
+        StreamAttribute::normal(VertexFormat::Float32x3, std::mem::offset_of!(Vertex, normal) as u64),
+        StreamAttribute::uv(VertexFormat::Float32x2, std::mem::offset_of!(Vertex, uv) as u64),
+    ];
+    let layout = StreamLayout { stride: size_of::<Vertex>() as u64, attributes };
+    let usage = BufferUsages::INDEX | BufferUsages::COPY_DST;
+    let index_buffer = match &indices.0 {
+        IndexSource::Fixed(indices) => device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("indices of a mesh that nodes make"),
+            contents: bytemuck::cast_slice(indices),
+            usage,
+        }),
+        IndexSource::Generated(source) => new_buffer(device, source.layout.name, source.layout.bytes() as u64, usage)?,
+    };
+    let count = u32::try_from(indices.count()).unwrap_or(u32::MAX);
+    Ok(Arc::new(MeshBuffers {
+        streams: vec![VertexStream { buffer, offset: 0, layout }],
+        vertex_count: u32::try_from(vertices.layout.capacity).unwrap_or(u32::MAX),
+        indices: Some(IndexBuffer { buffer: index_buffer, offset: 0, format: wgpu::IndexFormat::Uint32, count }),
+    }))
 }
 
 /// Checks that pipelines of this device can read the streams of a mesh.

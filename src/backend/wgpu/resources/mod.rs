@@ -41,7 +41,7 @@ pub(crate) use bind_group_layouts::{
 pub(crate) use buffers::new_buffer;
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
 pub(crate) use growing_buffer::{ALIGNMENT, GrowingBuffer, check_storage_binding_size, size_with_headroom};
-pub(crate) use imported_meshes::{VertexSlot, VertexStreamLayouts};
+pub(crate) use imported_meshes::{ImportedMeshes, VertexSlot, VertexStreamLayouts};
 pub(crate) use imported_target::ImportedTarget;
 pub(crate) use light_meshes::LightMeshes;
 pub(crate) use material_cache::{MaterialCache, MaterialSnapshot, MaterialTextures};

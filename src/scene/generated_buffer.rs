@@ -1,0 +1,357 @@
+//! Memory that CPU nodes fill in a frame, and that this frame draws.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut, Range};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytemuck::Pod;
+use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+/// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
+/// terrain (S 9.5). When the frame is submitted, its content goes to the device, ahead of all passes. Each frame has a content of its own
+/// until then, so that frames in flight do not meet. What no frame fills keeps what the latest one has put there.
+///
+/// A [mesh](super::Mesh::generated) is drawn from it by the whole pipeline. One that a
+/// [`StorageBuffer`](crate::process::StorageBuffer::generated) makes is read by shaders.
+///
+/// It is cut into chunks of equal length. Each is written by one job at a time:
+///
+/// ```
+/// use std::ops::Range;
+///
+/// use drawloom::graph::NodeError;
+/// use drawloom::scene::{GeneratedBuffer, Vertex};
+/// use drawloom::task::Worker;
+/// use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+///
+/// struct Sea {
+///     vertices: GeneratedBuffer<Vertex>,
+///     seconds: f32,
+/// }
+///
+/// impl CpuNode for Sea {
+///     fn name(&self) -> &str {
+///         "sea"
+///     }
+///
+///     fn declare(&self, accesses: &mut NodeAccesses) {
+///         accesses.fills(&self.vertices);
+///     }
+///
+///     fn width(&self, _: &NodeFrame<'_>) -> usize {
+///         self.vertices.chunk_count()
+///     }
+///
+///     fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+///         for chunk in chunks {
+///             let elements = self.vertices.chunk_range(chunk);
+///             for (index, vertex) in elements.zip(&mut *frame.fill(&self.vertices, chunk)?) {
+///                 let [x, z] = [index % 256, index / 256].map(|steps| steps as f32);
+///                 *vertex = Vertex { position: [x, (x + self.seconds).sin(), z], normal: [0.0, 1.0, 0.0], uv: [0.0; 2] };
+///             }
+///         }
+///         Ok(())
+///     }
+/// }
+/// ```
+pub struct GeneratedBuffer<T> {
+    source: Arc<GeneratedSource>,
+    /// Neither owns nor borrows a `T`.
+    element: PhantomData<fn() -> T>,
+}
+
+impl<T: Pod> GeneratedBuffer<T> {
+    /// What a chunk has, in bytes, unless the engine chooses another length.
+    const CHUNK_BYTES: usize = 16 << 10;
+
+    /// A buffer with room for this many elements.
+    ///
+    /// # Panics
+    /// If it has none, or `T` has no bytes, a size that is not a multiple of 4 bytes, or an alignment of more than 16.
+    pub fn new(name: &'static str, capacity: usize) -> Self {
+        Self::with_chunk(name, capacity, (Self::CHUNK_BYTES / size_of::<T>().max(1)).max(1))
+    }
+
+    /// The same in chunks of this many elements; the last one may have fewer.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new), or if a chunk has none.
+    pub fn with_chunk(name: &'static str, capacity: usize, chunk: usize) -> Self {
+        Self { source: Arc::new(GeneratedSource::new::<T>((name, false), capacity, chunk)), element: PhantomData }
+    }
+
+    /// What a [`StorageBuffer`](crate::process::StorageBuffer) of that name and capacity is filled from.
+    pub(crate) fn of_storage(name: &'static str, capacity: usize) -> Self {
+        let chunk = (Self::CHUNK_BYTES / size_of::<T>()).max(1);
+        Self { source: Arc::new(GeneratedSource::new::<T>((name, true), capacity, chunk)), element: PhantomData }
+    }
+
+    /// Its name in errors.
+    pub fn name(&self) -> &'static str {
+        self.source.layout.name
+    }
+
+    /// The number of elements that it has room for.
+    pub fn capacity(&self) -> usize {
+        self.source.layout.capacity
+    }
+
+    /// The number of chunks: the width of a node that fills it as a whole.
+    pub fn chunk_count(&self) -> usize {
+        self.source.layout.chunk_count()
+    }
+
+    /// The indices of the elements of a chunk.
+    pub fn chunk_range(&self, chunk: usize) -> Range<usize> {
+        self.source.layout.chunk_range(chunk)
+    }
+
+    pub(crate) fn source(&self) -> &Arc<GeneratedSource> {
+        &self.source
+    }
+}
+
+impl<T> Clone for GeneratedBuffer<T> {
+    fn clone(&self) -> Self {
+        Self { source: Arc::clone(&self.source), element: PhantomData }
+    }
+}
+
+impl<T> fmt::Debug for GeneratedBuffer<T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("GeneratedBuffer").field(&self.source.layout).finish()
+    }
+}
+
+/// What a [`GeneratedBuffer`] is, without the type of its elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GeneratedLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// Differs for every two buffers.
+    pub identity: u64,
+    /// Whether it fills the [`StorageBuffer`](crate::process::StorageBuffer) of that name.
+    pub fills_storage: bool,
+    /// The size of an element in bytes.
+    pub stride: usize,
+    /// The number of elements.
+    pub capacity: usize,
+    /// The number of elements in a chunk.
+    pub chunk: usize,
+}
+
+impl GeneratedLayout {
+    /// Its size in bytes.
+    pub fn bytes(&self) -> usize {
+        self.stride * self.capacity
+    }
+
+    fn chunk_count(&self) -> usize {
+        self.capacity.div_ceil(self.chunk)
+    }
+
+    fn chunk_range(&self, chunk: usize) -> Range<usize> {
+        chunk * self.chunk..((chunk + 1) * self.chunk).min(self.capacity)
+    }
+}
+
+/// Where the contents of a buffer come from: they are used again when the frames that had them are gone.
+pub(crate) struct GeneratedSource {
+    pub(crate) layout: GeneratedLayout,
+    contents: Mutex<Vec<Arc<GeneratedContents>>>,
+}
+
+impl GeneratedSource {
+    fn new<T: Pod>((name, fills_storage): (&'static str, bool), capacity: usize, chunk: usize) -> Self {
+        static BUFFERS: AtomicU64 = AtomicU64::new(0);
+        let stride = size_of::<T>();
+        assert!(stride > 0 && stride.is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
+        assert!(align_of::<T>() <= align_of::<u128>(), "an element has an alignment of 16 bytes at most");
+        assert!(capacity > 0 && chunk > 0, "a buffer and its chunks have elements");
+        // Relaxed: the numbers only have to be unique.
+        let identity = BUFFERS.fetch_add(1, Ordering::Relaxed);
+        let layout = GeneratedLayout { name, identity, fills_storage, stride, capacity, chunk };
+        Self { layout, contents: Mutex::default() }
+    }
+
+    /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled.
+    pub(crate) fn begin_frame(&self) -> Arc<GeneratedContents> {
+        let mut contents = self.contents.lock();
+        for free in &mut *contents {
+            if let Some(unused) = Arc::get_mut(free) {
+                unused.reset();
+                return Arc::clone(free);
+            }
+        }
+        contents.push(Arc::new(GeneratedContents::new(self.layout)));
+        contents.last().map(Arc::clone).expect("one was pushed")
+    }
+}
+
+impl PartialEq for GeneratedSource {
+    fn eq(&self, other: &Self) -> bool {
+        self.layout == other.layout
+    }
+}
+
+impl fmt::Debug for GeneratedSource {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.layout.fmt(formatter)
+    }
+}
+
+/// What nodes fill a [`GeneratedBuffer`] with in one frame.
+pub struct GeneratedContents {
+    layout: GeneratedLayout,
+    chunks: Vec<RwLock<Chunk>>,
+    count: Mutex<usize>,
+}
+
+struct Chunk {
+    /// Aligned for every element.
+    words: Box<[u128]>,
+    is_filled: bool,
+}
+
+impl Chunk {
+    fn bytes(&self, layout: &GeneratedLayout, elements: usize) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..elements * layout.stride]
+    }
+}
+
+impl GeneratedContents {
+    fn new(layout: GeneratedLayout) -> Self {
+        let words = |elements: usize| vec![0; (elements * layout.stride).div_ceil(size_of::<u128>())].into();
+        let chunk = |index| RwLock::new(Chunk { words: words(layout.chunk_range(index).len()), is_filled: false });
+        Self { layout, chunks: (0..layout.chunk_count()).map(chunk).collect(), count: Mutex::new(layout.capacity) }
+    }
+
+    fn reset(&mut self) {
+        *self.count.get_mut() = self.layout.capacity;
+        self.chunks.iter_mut().for_each(|chunk| chunk.get_mut().is_filled = false);
+    }
+
+    /// What the buffer is.
+    pub fn layout(&self) -> &GeneratedLayout {
+        &self.layout
+    }
+
+    /// The number of elements.
+    pub fn count(&self) -> usize {
+        *self.count.lock()
+    }
+
+    /// The size of its elements in bytes.
+    pub fn byte_count(&self) -> usize {
+        self.count() * self.layout.stride
+    }
+
+    /// Sets the number of elements. There are as many as fit if it is higher.
+    pub(crate) fn set_count(&self, count: usize) {
+        *self.count.lock() = count.min(self.layout.capacity);
+    }
+
+    /// A chunk to fill; `None` if there is no such chunk.
+    ///
+    /// # Panics
+    /// If the elements are not of this type.
+    pub(crate) fn fill<T: Pod>(&self, chunk: usize) -> Option<impl DerefMut<Target = [T]> + use<'_, T>> {
+        let elements = self.layout.chunk_range(chunk).len();
+        let mut guard = self.chunks.get(chunk)?.write();
+        guard.is_filled = true;
+        let bytes = elements * self.layout.stride;
+        Some(RwLockWriteGuard::map(guard, move |chunk| {
+            bytemuck::cast_slice_mut(&mut bytemuck::cast_slice_mut::<u128, u8>(&mut chunk.words)[..bytes])
+        }))
+    }
+
+    /// A chunk that is filled; `None` if there is no such chunk.
+    ///
+    /// # Panics
+    /// If the elements are not of this type.
+    pub(crate) fn read<T: Pod>(&self, chunk: usize) -> Option<impl Deref<Target = [T]> + use<'_, T>> {
+        let elements = self.layout.chunk_range(chunk).len();
+        let guard = self.chunks.get(chunk)?.read();
+        Some(RwLockReadGuard::map(guard, |chunk| bytemuck::cast_slice(chunk.bytes(&self.layout, elements))))
+    }
+
+    /// A chunk with elements that no node has filled; `None` if there is none.
+    pub(crate) fn unfilled_chunk(&self) -> Option<usize> {
+        let used = self.count().div_ceil(self.layout.chunk);
+        self.chunks[..used].iter().position(|chunk| !chunk.read().is_filled)
+    }
+
+    /// Calls `visit` with the bytes of consecutive elements and where they begin in the buffer, for all that there are.
+    pub fn for_each_part(&self, mut visit: impl FnMut(usize, &[u8])) {
+        let count = self.count();
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let Range { start, end } = self.layout.chunk_range(index);
+            if start >= count {
+                break;
+            }
+            visit(start * self.layout.stride, chunk.read().bytes(&self.layout, end.min(count) - start));
+        }
+    }
+
+    /// All elements.
+    ///
+    /// # Panics
+    /// If they are not of this type.
+    pub fn elements<T: Pod>(&self) -> Vec<T> {
+        let mut elements = Vec::with_capacity(self.count());
+        self.for_each_part(|_, bytes| elements.extend_from_slice(bytemuck::cast_slice(bytes)));
+        elements
+    }
+}
+
+impl fmt::Debug for GeneratedContents {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("GeneratedContents").field("layout", &self.layout).finish_non_exhaustive()
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_in_flight_have_contents_of_their_own_and_memory_is_used_again() {
+        let buffer = GeneratedBuffer::<[f32; 3]>::with_chunk("points", 10, 4);
+        assert_eq!((buffer.chunk_count(), buffer.chunk_range(2)), (3, 8..10));
+        let fill = |contents: &GeneratedContents, value: f32| {
+            for chunk in 0..3 {
+                contents.fill::<[f32; 3]>(chunk).unwrap().fill([value; 3]);
+            }
+        };
+        let first = buffer.source().begin_frame();
+        assert_eq!(first.unfilled_chunk(), Some(0));
+        fill(&first, 1.0);
+        let second = buffer.source().begin_frame();
+        fill(&second, 2.0);
+        assert_eq!(first.elements::<[f32; 3]>(), [[1.0; 3]; 10]);
+        assert_eq!((first.unfilled_chunk(), first.fill::<[f32; 3]>(3).is_none()), (None, true));
+        let memory = |contents: &GeneratedContents| std::ptr::from_ref(contents);
+        let before = memory(&first);
+        drop(first);
+        let third = buffer.source().begin_frame();
+        assert_eq!((memory(&third), third.unfilled_chunk()), (before, Some(0)));
+        assert_eq!(second.elements::<[f32; 3]>(), [[2.0; 3]; 10]);
+    }
+
+    #[test]
+    fn only_elements_that_count_are_there() {
+        let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 10, 4);
+        let contents = buffer.source().begin_frame();
+        contents.fill::<u32>(0).unwrap().fill(7);
+        contents.set_count(3);
+        assert_eq!((contents.unfilled_chunk(), contents.elements::<u32>()), (None, vec![7; 3]));
+        contents.set_count(5);
+        assert_eq!(contents.unfilled_chunk(), Some(1));
+        contents.set_count(11);
+        assert_eq!(contents.count(), 10);
+        contents.set_count(0);
+        assert_eq!((contents.unfilled_chunk(), contents.elements::<u32>()), (None, vec![]));
+    }
+}

@@ -1,0 +1,140 @@
+//! Nodes that are declared wrongly, fail or panic. Each error names the node, and the next frame is that of an engine without them.
+
+use drawloom::glam::DVec3;
+use drawloom::graph::GraphProblem;
+use drawloom::scene::{NodeColumn, SceneRef, WrittenColumns};
+use drawloom::{FrameData, FrameError, NodeAccesses};
+use drawloom_testing::scenes::field;
+
+use crate::{TestNode, lent, renderer};
+
+fn idle(name: &str, declare: impl Fn(&mut NodeAccesses) + Send + Sync + 'static) -> TestNode<'static> {
+    TestNode::new(name, declare, |_, _| Ok(()))
+}
+
+/// The error of a frame with these nodes. Checks that the next frame draws what one without them draws.
+fn error_of(nodes: &[TestNode<'_>]) -> FrameError {
+    let scene = field(500);
+    let mut found = None;
+    for workers in [1, 2, 4] {
+        let (mut renderer, submitter) = renderer(workers);
+        let expected = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        let error = renderer.record_with_nodes(scene.as_scene_ref(), &lent(nodes)).map(drop).unwrap_err();
+        let next = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        assert_eq!(next.submission.passes, expected.submission.passes);
+        assert_eq!(next.statistics.views, expected.statistics.views);
+        found = Some(error);
+    }
+    found.unwrap()
+}
+
+fn problem_of(nodes: &[TestNode<'_>]) -> GraphProblem {
+    match error_of(nodes) {
+        FrameError::Nodes(problem) => problem,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn nodes_that_make_no_graph_are_named() {
+    let circle = [
+        idle("one", |accesses| _ = accesses.reads("b").writes("a")),
+        idle("two", |accesses| _ = accesses.reads("a").writes("b")),
+    ];
+    assert_eq!(problem_of(&circle), GraphProblem::Cycle { nodes: vec!["one".to_owned(), "two".to_owned()] });
+    let unwritten = [idle("one", |accesses| _ = accesses.reads("a"))];
+    let error = problem_of(&unwritten).to_string();
+    assert_eq!(error, "nothing writes \"a\" before it is read by \"one\"");
+    let writers = ["one", "two"].map(|name| idle(name, |accesses| _ = accesses.writes("a")));
+    let error = problem_of(&writers).to_string();
+    assert!(error.starts_with("\"one\" and \"two\" both write \"a\""), "{error}");
+    let writers = ["one", "two"].map(|name| idle(name, |accesses| _ = accesses.writes(FrameData::Transforms)));
+    assert!(matches!(problem_of(&writers), GraphProblem::UnorderedWriters { .. }));
+    let same = ["one", "one"].map(|name| idle(name, |_| ()));
+    assert_eq!(problem_of(&same), GraphProblem::DuplicateNode { name: "one".to_owned() });
+    for stage in ["objects", "visibility", "finish"] {
+        assert_eq!(problem_of(&[idle(stage, |_| ())]), GraphProblem::DuplicateNode { name: stage.to_owned() });
+    }
+}
+
+#[test]
+fn a_node_cannot_come_before_what_it_needs_of_the_stages() {
+    let late = idle("late", |accesses| _ = accesses.reads(FrameData::VisibleObjects).writes(FrameData::Transforms));
+    let GraphProblem::Cycle { nodes } = problem_of(&[late]) else { panic!("no cycle") };
+    assert!(nodes.contains(&"late".to_owned()) && nodes.contains(&"objects".to_owned()), "{nodes:?}");
+}
+
+#[test]
+fn a_declaration_that_no_node_can_make_is_refused() {
+    let refused = |declare: fn(&mut NodeAccesses)| error_of(&[idle("node", declare)]).to_string();
+    assert_eq!(
+        refused(|accesses| _ = accesses.writes(FrameData::DrawLists)),
+        "node \"node\" writes Frame(DrawLists), which only stages write"
+    );
+    assert_eq!(
+        refused(|accesses| _ = accesses.after("nobody")),
+        "node \"node\" runs after \"nobody\", which is no node of the frame"
+    );
+}
+
+#[test]
+fn a_node_that_fails_or_panics_is_named() {
+    let fails = |item| {
+        TestNode::new(
+            "sea",
+            |_| (),
+            move |_, items| if items.contains(&item) { Err("it is dry".into()) } else { Ok(()) },
+        )
+    };
+    for item in [0, 7] {
+        match error_of(&[idle("first", |_| ()), fails(item).with_width(9)]) {
+            FrameError::Failed { stage, source } => {
+                assert_eq!((stage.as_str(), source.to_string().as_str()), ("sea", "it is dry"));
+            }
+            other => panic!("{other}"),
+        }
+    }
+    let panics = [
+        TestNode::new("sea", |_| (), |_, _| panic!("it boils")),
+        TestNode::new("sea", |_| panic!("it boils"), |_, _| Ok(())),
+    ];
+    for node in panics {
+        match error_of(&[node]) {
+            FrameError::Panicked { stage, message } => {
+                assert_eq!((stage.as_str(), message.as_str()), ("sea", "it boils"));
+            }
+            other => panic!("{other}"),
+        }
+    }
+}
+
+#[test]
+fn what_is_not_declared_is_not_there() {
+    let node = TestNode::new("spy", |_| (), |frame, _| Ok(drop(frame.visible_objects(0)?)));
+    let error = error_of(&[node]).to_string();
+    assert_eq!(error, "spy failed: the node does not declare that it reads Frame(VisibleObjects)");
+    let node = TestNode::new(
+        "spy",
+        |accesses| _ = accesses.reads(FrameData::VisibleObjects),
+        |frame, _| Ok(drop(frame.draw_list("geometry buffer", 0)?)),
+    );
+    let error = error_of(&[node]).to_string();
+    assert_eq!(error, "spy failed: the node does not declare that it reads Frame(DrawLists)");
+}
+
+#[test]
+fn a_column_is_not_written_after_it_was_read() {
+    let scene = field(300);
+    let scene = scene.as_scene_ref();
+    let mut positions: Vec<DVec3> = scene.positions.to_vec();
+    let column = NodeColumn::new(&mut positions);
+    let written = WrittenColumns { positions: Some(&column), ..WrittenColumns::default() };
+    let late = TestNode::new(
+        "late",
+        |accesses| _ = accesses.reads(FrameData::VisibleObjects),
+        |_, _| Ok(drop(column.write(1)?)),
+    );
+    let (mut renderer, _submitter) = renderer(2);
+    let error = renderer.record_with_nodes(SceneRef { written, ..scene }, &[&late]).map(drop).unwrap_err().to_string();
+    assert!(error.starts_with("late failed: chunk 1 of the column has been read"), "{error}");
+}

@@ -1,0 +1,155 @@
+//! Memory that nodes fill in a frame, and that this frame draws, on the software backend.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use drawloom::backend::{BackendError, SoftwareBackend};
+use drawloom::graph::GraphProblem;
+use drawloom::process::Deferred;
+use drawloom::scene::{GeneratedBuffer, SceneError, Vertex};
+use drawloom::task::Scheduler;
+use drawloom::{FrameError, Renderer, SubmitError, Submitter};
+use drawloom_testing::hills::{self, GeneratedHills};
+
+use crate::{TestNode, renderer};
+
+const FRAMES: usize = 4;
+
+fn software(workers: usize) -> (Renderer<SoftwareBackend>, Submitter<SoftwareBackend>) {
+    let scheduler = Arc::new(Scheduler::new(workers).unwrap());
+    let backend = SoftwareBackend::new(Arc::clone(&scheduler));
+    Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+}
+
+#[test]
+fn a_mesh_that_nodes_make_looks_like_one_that_the_engine_makes() {
+    let expected = [0, 1, 2, 3].map(|frame| {
+        let (mut renderer, submitter) = software(1);
+        let scene = hills::scene(hills::mesh(frame).unwrap()).unwrap();
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        submitted.submission.read(0, "picture").unwrap()
+    });
+    assert!(expected[0] != expected[1] && expected[0] != expected[2], "nothing moves");
+    for workers in [1, 2, 4] {
+        let (mut renderer, submitter) = software(workers);
+        let made = GeneratedHills::new();
+        let scene = hills::scene(made.mesh().unwrap()).unwrap();
+        // All are in flight at the same time.
+        let recorded = [0, 1, 2, 3].map(|frame| {
+            let (vertices, indices) = made.nodes(frame);
+            renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices]).unwrap()
+        });
+        for (frame, recorded) in recorded.into_iter().enumerate() {
+            let picture = submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap();
+            assert!(picture == expected[frame], "frame {frame} on {workers} workers");
+        }
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let picture = submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap();
+        assert!(picture == expected[FRAMES - 1], "without nodes it stays as it was");
+    }
+}
+
+#[test]
+fn a_mesh_that_nobody_has_filled_is_not_drawn() {
+    let (mut renderer, submitter) = software(2);
+    let made = GeneratedHills::new();
+    let mut scene = hills::scene(made.mesh().unwrap()).unwrap();
+    let mut picture = |scene: &drawloom::scene::Scene| {
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap()
+    };
+    let empty = picture(&scene);
+    let hills = scene.objects().next().unwrap();
+    scene.remove_object(hills).unwrap();
+    assert!(picture(&scene) == empty);
+}
+
+#[test]
+fn what_is_no_mesh_is_named_and_the_next_frame_is_right() {
+    let (mut renderer, submitter) = software(2);
+    let vertices = GeneratedBuffer::<Vertex>::with_chunk("vertices", 3, 2);
+    let corners = [drawloom::glam::Vec3::NEG_ONE, drawloom::glam::Vec3::ONE];
+    let mesh = drawloom::scene::Mesh::generated("leaf", Default::default(), corners, &vertices, vec![0, 1, 2]).unwrap();
+    let scene = hills::scene(mesh).unwrap();
+    let mut submit = |x: f32| {
+        let node = TestNode::new(
+            "grow",
+            |accesses| _ = accesses.fills(&vertices),
+            |frame, items| {
+                for chunk in items {
+                    let corner = Vertex { position: [x, 0.0, 0.0], ..Vertex::default() };
+                    frame.fill(&vertices, chunk)?.fill(corner);
+                }
+                Ok(())
+            },
+        );
+        submitter.submit(renderer.record_with_nodes(scene.as_scene_ref(), &[&node.with_width(2)]).unwrap()).map(drop)
+    };
+    submit(0.0).unwrap();
+    match submit(f32::NAN) {
+        Err(SubmitError::Backend(BackendError::GeneratedMesh { mesh, source })) => {
+            assert_eq!(mesh, "leaf");
+            assert!(matches!(source, SceneError::NonFiniteVertex { vertex: 0, .. }));
+        }
+        other => panic!("{other:?}"),
+    }
+    submit(0.0).unwrap();
+}
+
+#[test]
+fn a_buffer_is_filled_as_declared() {
+    let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 10, 4);
+    let scene = drawloom_testing::scenes::field(50);
+    for workers in [1, 2] {
+        let (mut renderer, submitter) = renderer(workers);
+        let half = TestNode::new(
+            "half",
+            |accesses| _ = accesses.fills(&buffer),
+            |frame, _| Ok(frame.fill(&buffer, 1)?.fill(1)),
+        );
+        match renderer.record_with_nodes(scene.as_scene_ref(), &[&half]).map(drop) {
+            Err(FrameError::UnfilledBuffer { buffer, chunk: 0 }) => assert_eq!(buffer, "numbers"),
+            other => panic!("{other:?}"),
+        }
+        let undeclared = TestNode::new("sly", |_| (), |frame, _| Ok(frame.fill(&buffer, 1)?.fill(1)));
+        let error = renderer.record_with_nodes(scene.as_scene_ref(), &[&undeclared]).map(drop).unwrap_err().to_string();
+        assert!(error.starts_with("sly failed: no node of the frame declares that it fills"), "{error}");
+        let both =
+            ["one", "two"].map(|name| TestNode::new(name, |accesses| _ = accesses.fills(&buffer), |_, _| Ok(())));
+        match renderer.record_with_nodes(scene.as_scene_ref(), &[&both[0], &both[1]]).map(drop) {
+            Err(FrameError::Nodes(GraphProblem::UnorderedWriters { resource, .. })) => {
+                assert!(resource.starts_with("numbers"), "{resource}");
+            }
+            other => panic!("{other:?}"),
+        }
+        // One fills it, another one reads that, and the frame is told of the rest.
+        let fill = TestNode::new(
+            "count up",
+            |accesses| _ = accesses.fills(&buffer),
+            |frame, items| {
+                for chunk in items {
+                    buffer.chunk_range(chunk).zip(&mut *frame.fill(&buffer, chunk)?).for_each(|(index, number)| {
+                        *number = index as u32;
+                    });
+                }
+                Ok(frame.set_count(&buffer, 7)?)
+            },
+        );
+        let sum = AtomicU32::new(0);
+        let add = TestNode::new(
+            "add",
+            |accesses| _ = accesses.reads(&buffer),
+            |frame, items| {
+                for chunk in items {
+                    let numbers: u32 = frame.filled(&buffer, chunk)?.iter().sum();
+                    sum.fetch_add(numbers, Ordering::Relaxed);
+                }
+                Ok(())
+            },
+        );
+        let (fill, add) = (fill.with_width(2), add.with_width(2));
+        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &[&add, &fill]).unwrap();
+        assert_eq!((sum.load(Ordering::Relaxed), recorded.statistics().generated), (28, 28));
+        drop(submitter.submit(recorded).unwrap());
+    }
+}
