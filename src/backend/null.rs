@@ -179,7 +179,7 @@ impl Backend for NullBackend {
             })?;
         }
         let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
-        let in_order = bundles.iter().map(|bundle| bundle.objects.start).eq(first_objects);
+        let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.objects.start == first);
         ensure(in_order, || "bundles are finished in order".to_owned())?;
         let objects = bundles.iter().map(|bundle| bundle.objects.len()).sum();
         let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);

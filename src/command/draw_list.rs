@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut, Range};
 
-use super::list_pieces::ListPieces;
+use super::list_pieces::{BATCHES_PER_BUNDLE, ListPieces};
 use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
@@ -30,7 +30,7 @@ pub struct DrawList {
 impl DrawList {
     /// The number of batches in a bundle. It is the same for every granularity: smaller bundles cost up to three times as
     /// much per draw, and bundle boundaries that moved with the granularity could change the picture.
-    pub const BATCHES_PER_BUNDLE: usize = 256;
+    pub const BATCHES_PER_BUNDLE: usize = BATCHES_PER_BUNDLE;
 
     /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
     /// it. Lists of [`Version::default`] may differ.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{DrawList, Version};
+use super::Version;
 
 /// What a draw list has of [pieces](crate::scene::Piece): the objects of all of them, and the batches of those that the view executes. Both come
 /// before those of other objects, and stay as they are while these change.
@@ -28,6 +28,9 @@ struct PieceBundle {
     end: u32,
     slot: u32,
 }
+
+/// The number of batches in a bundle.
+pub(super) const BATCHES_PER_BUNDLE: usize = 256;
 
 impl ListPieces {
     /// The version of the objects of pieces: a backend that holds those of this version need not upload them again.
@@ -57,7 +60,7 @@ impl ListPieces {
 
     /// The number of bundles that a piece of so many objects has at most.
     pub(crate) fn max_bundles(objects: usize) -> usize {
-        objects.div_ceil(DrawList::BATCHES_PER_BUNDLE)
+        objects.div_ceil(BATCHES_PER_BUNDLE)
     }
 
     pub(super) fn clear(&mut self) {
@@ -90,9 +93,7 @@ impl ListPieces {
     pub(super) fn push(&mut self, objects: usize, batches: usize, slot: usize) {
         self.drawn += objects;
         let (first, end) = (self.batch_count(), self.batch_count() + batches);
-        let ends = (first..end)
-            .step_by(DrawList::BATCHES_PER_BUNDLE)
-            .map(|start| end.min(start + DrawList::BATCHES_PER_BUNDLE));
+        let ends = (first..end).step_by(BATCHES_PER_BUNDLE).map(|start| end.min(start + BATCHES_PER_BUNDLE));
         self.bundles.extend(ends.zip(slot..).map(|(end, slot)| PieceBundle { end: end as u32, slot: slot as u32 }));
     }
 
