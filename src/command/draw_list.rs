@@ -1,6 +1,6 @@
 //! What one pass draws.
 
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::{DerefMut, Range};
 
 use super::list_pieces::{BATCHES_PER_BUNDLE, ListPieces};
 use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
@@ -45,7 +45,7 @@ impl DrawList {
 
     /// Removes everything and keeps the memory.
     pub fn clear(&mut self) {
-        self.pieces.clear();
+        self.pieces = ListPieces::default();
         self.clear_own();
     }
 
@@ -190,47 +190,50 @@ impl DrawList {
     }
 
     /// What belongs to pieces.
-    pub fn pieces(&self) -> &ListPieces {
-        &self.pieces
+    pub fn pieces(&self) -> ListPieces {
+        self.pieces
     }
 
-    /// Replaces the objects of pieces, unless they are those of this version. `copy` is called with memory for `objects` of them, which may have
-    /// numbers of bundles below `slots`.
-    pub(crate) fn set_piece_objects(
-        &mut self,
-        version: Version,
-        (objects, slots): (usize, usize),
-        copy: impl FnOnce(&mut [u32]),
-    ) {
+    /// Replaces the objects of pieces, unless they are those of this version.
+    pub(crate) fn set_piece_objects(&mut self, version: Version, objects: &[u32]) {
         self.clear_own();
-        if self.pieces.set_objects(version, (objects, slots)) {
+        if self.pieces.set_objects(version, objects.len()) {
             self.batches.clear();
             self.objects.clear();
-            self.objects.resize(objects, 0);
-            copy(&mut self.objects);
+            self.objects.extend_from_slice(objects);
         }
     }
 
-    /// Replaces the pieces that are executed, unless they are those of this version. Each has the index of its first object among those of
-    /// pieces, the number of its first bundle, and its list.
-    pub(crate) fn execute_pieces<L: Deref<Target = Self>>(
+    /// Replaces the batches of pieces, unless they are those of this version. They come in draw order; neighbours whose objects follow each other become
+    /// one batch where both have the same state and mesh, and `can_merge` holds for that mesh's slot.
+    pub(crate) fn execute_pieces(
         &mut self,
         version: Version,
-        pieces: impl Iterator<Item = (usize, usize, L)>,
+        batches: impl Iterator<Item = Batch>,
+        can_merge: impl Fn(u32) -> bool,
     ) {
         self.clear_own();
         if !self.pieces.set_executed(version) {
             return;
         }
         self.batches.clear();
-        for (first, first_slot, piece) in pieces {
-            let batches = piece.batches.iter().map(|batch| Batch { first: first as u32 + batch.first, ..*batch });
-            self.batches.extend(batches);
-            self.pieces.push(piece.objects.len(), piece.batches.len(), first_slot);
+        let mut drawn = 0;
+        for batch in batches {
+            drawn += batch.count as usize;
+            match self.batches.last_mut() {
+                Some(last)
+                    if (last.state, last.mesh, last.first + last.count) == (batch.state, batch.mesh, batch.first)
+                        && can_merge(batch.mesh) =>
+                {
+                    last.count += batch.count;
+                }
+                _ => self.batches.push(batch),
+            }
         }
+        self.pieces.set_drawn(drawn, self.batches.len());
     }
 
-    /// The number of bundles that the batches fill. No bundle has batches of two pieces.
+    /// The number of bundles that the batches fill. No bundle has batches of pieces and of other objects.
     pub fn bundle_count(&self) -> usize {
         let own = self.batches.len() - self.pieces.batch_count();
         self.pieces.bundle_count() + own.div_ceil(Self::BATCHES_PER_BUNDLE)
@@ -258,18 +261,15 @@ impl DrawList {
         }
     }
 
-    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of a piece does not depend on which other pieces the view
-    /// executes.
+    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of pieces does not depend on other objects, and that of
+    /// others not on pieces.
     pub fn bundle_slot(&self, index: usize) -> usize {
-        match index.checked_sub(self.pieces.bundle_count()) {
-            None => self.pieces.bundle_slot(index),
-            Some(own) => self.pieces.slot_count() + own,
-        }
+        index.checked_sub(self.pieces.bundle_count()).map_or(2 * index, |own| 2 * own + 1)
     }
 
     /// More than the number of every bundle.
     pub fn bundle_slot_count(&self) -> usize {
-        self.pieces.slot_count() + self.bundle_count() - self.pieces.bundle_count()
+        2 * self.bundle_count()
     }
 }
 

@@ -18,7 +18,7 @@ use std::ops::Range;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::piece_statistics::PieceStatistics;
-use crate::command::{BinnedSegment, DrawList, ListPieces, Selection, Version};
+use crate::command::{Batch, BinnedSegment, DrawList, Selection, Version};
 use crate::scene::{Changes, Piece, SceneError, SceneRef};
 use crate::view::{GroupBounds, ObjectTable, ObjectWord, SelectionFilter, bin_objects, recordable_objects, set_bits};
 
@@ -41,12 +41,13 @@ pub(super) struct PieceTable {
     assets: [(u64, u64); 2],
     /// The indices of the pieces that this frame records.
     recording: Vec<u32>,
-    /// The end of all places in lists: see [`KnownPiece::objects`] and [`KnownPiece::first_slot`].
-    objects_end: usize,
-    slots_end: usize,
+    /// What processes draw of all pieces: one for each selection.
+    joined: Vec<RwLock<JoinedPieces>>,
+    /// The number of objects of all pieces.
+    object_count: usize,
     /// Counts how often another object became, or ceased to be, one of a recorded piece.
     revision: u64,
-    /// Counts how often lists or their places changed.
+    /// Counts how often the lists of recorded pieces changed.
     lists_revision: u64,
 }
 
@@ -63,14 +64,21 @@ pub(super) struct ListConditions {
 #[derive(Debug)]
 struct KnownPiece {
     piece: Piece,
-    /// Its place among the objects of all pieces in draw lists, long enough for all its objects.
-    objects: Range<usize>,
-    /// The number of its first bundle.
-    first_slot: usize,
     is_recorded: bool,
     /// Whether an object of it changed in this frame.
     has_changed: bool,
-    recorded: RwLock<RecordedPiece>,
+    /// Boxed, because every frame looks at all pieces, and at few of these.
+    recorded: Box<RwLock<RecordedPiece>>,
+}
+
+/// What a process draws of all recorded pieces: their objects by draw state, by mesh, and by piece, so that pieces which follow each other and are
+/// executed together become one batch for each mesh.
+#[derive(Debug, Default)]
+struct JoinedPieces {
+    version: Version,
+    objects: Vec<u32>,
+    /// In draw order, each with its piece.
+    batches: Vec<(Batch, u32)>,
 }
 
 /// What is recorded of a piece.
@@ -90,6 +98,10 @@ struct RecordedPiece {
 }
 
 impl KnownPiece {
+    fn new(piece: &Piece) -> Self {
+        Self { piece: piece.clone(), is_recorded: false, has_changed: false, recorded: Box::default() }
+    }
+
     /// It is not recorded any more. Returns whether it was.
     fn lose(&mut self, recorded_words: &mut [u64]) -> bool {
         let was_recorded = std::mem::take(&mut self.is_recorded);
@@ -114,9 +126,6 @@ const NO_PIECE: u32 = u32::MAX;
 
 /// More selections than this are forgotten, because most of them are of passes that are gone.
 const MAX_SELECTIONS: usize = 32;
-
-/// As long as the places of pieces that are gone are fewer than this, and fewer than those in use, they stay empty.
-const MAX_UNUSED_PLACES: usize = 4096;
 
 impl PieceTable {
     /// Begins a frame, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
@@ -208,7 +217,7 @@ impl PieceTable {
             }
             let next = match known.entry(piece.name.clone()) {
                 Entry::Occupied(known) if known.get().piece.objects == piece.objects => known.remove(),
-                _ => self.new_piece(piece),
+                _ => KnownPiece::new(piece),
             };
             self.pieces.push(next);
             self.claim(index, 0..objects)?;
@@ -216,7 +225,7 @@ impl PieceTable {
         for mut gone in known.into_values() {
             gone.lose(&mut self.recorded_words);
         }
-        self.compact_places();
+        self.object_count = self.pieces.iter().map(|known| known.piece.objects.len()).sum();
         self.bounds.clear();
         self.bounds.resize_with(self.pieces.len().div_ceil(GroupBounds::GROUPS), GroupBounds::default);
         for (index, known) in self.pieces.iter_mut().enumerate().filter(|(_, known)| known.is_recorded) {
@@ -237,37 +246,6 @@ impl PieceTable {
                 .iter_from(objects.start)
                 .next()
                 .is_some_and(|object| (object as usize) < objects.end)
-    }
-
-    /// A piece with a place behind all others.
-    fn new_piece(&mut self, piece: &Piece) -> KnownPiece {
-        let count = piece.objects.len();
-        let known = KnownPiece {
-            piece: piece.clone(),
-            objects: self.objects_end..self.objects_end + count,
-            first_slot: self.slots_end,
-            is_recorded: false,
-            has_changed: false,
-            recorded: RwLock::default(),
-        };
-        self.objects_end += count;
-        self.slots_end += ListPieces::max_bundles(count);
-        known
-    }
-
-    /// Gives all pieces new places if too many are unused.
-    fn compact_places(&mut self) {
-        let used: usize = self.pieces.iter().map(|known| known.objects.len()).sum();
-        if self.objects_end - used <= used.max(MAX_UNUSED_PLACES) {
-            return;
-        }
-        (self.objects_end, self.slots_end) = (0, 0);
-        for known in &mut self.pieces {
-            let count = known.objects.len();
-            (known.objects, known.first_slot) = (self.objects_end..self.objects_end + count, self.slots_end);
-            self.objects_end += count;
-            self.slots_end += ListPieces::max_bundles(count);
-        }
     }
 
     /// Notes a piece's objects among a range of the scene's.
@@ -296,6 +274,7 @@ impl PieceTable {
             }
         }
         if is_new {
+            self.joined.resize_with(self.selections.len(), RwLock::default);
             self.invalidate();
         }
     }
@@ -342,6 +321,11 @@ impl PieceTable {
         }
     }
 
+    /// The number of pieces.
+    pub(super) fn len(&self) -> usize {
+        self.pieces.len()
+    }
+
     /// Whether the scene has no pieces.
     pub(super) fn is_empty(&self) -> bool {
         self.pieces.is_empty()
@@ -372,9 +356,9 @@ impl PieceTable {
         self.pieces[piece].recorded.read().words.iter().for_each(visit);
     }
 
-    /// The number of objects of all pieces that may stand in a draw list.
+    /// The number of objects of all pieces.
     pub(super) fn listed_objects(&self) -> usize {
-        self.objects_end
+        self.object_count
     }
 
     /// The number of pieces that this frame records.
@@ -435,21 +419,47 @@ impl PieceTable {
         Version { frame: self.lists_revision + 1, index }
     }
 
-    /// Makes a draw list have what a process with a selection draws of some pieces, whose version is `executed`.
-    pub(super) fn execute(&self, selection: Selection, pieces: &[u32], executed: Version, list: &mut DrawList) {
+    /// Makes a draw list have what a process with a selection draws of the pieces that a view executes, whose version is `executed`.
+    pub(super) fn execute(
+        &self,
+        selection: Selection,
+        (executes, executed): (impl Fn(u32) -> bool, Version),
+        can_merge: impl Fn(u32) -> bool,
+        list: &mut DrawList,
+    ) {
         let version = self.version(selection);
-        list.set_piece_objects(version, (self.objects_end, self.slots_end), |objects| {
-            for known in self.pieces.iter().filter(|known| known.is_recorded) {
-                if let Some(piece) = known.list(version.index) {
-                    objects[known.objects.start..][..piece.objects.len()].copy_from_slice(&piece.objects);
-                }
+        let Some(joined) = self.joined.get(version.index) else { return list.clear() };
+        if joined.read().version != version {
+            self.join(version, &mut joined.write());
+        }
+        let joined = joined.read();
+        list.set_piece_objects(version, &joined.objects);
+        let batches = joined.batches.iter().filter(|(_, piece)| executes(*piece)).map(|(batch, _)| *batch);
+        list.execute_pieces(executed, batches, can_merge);
+    }
+
+    /// Joins what a selection's lists have of the recorded pieces, unless another job has done it.
+    fn join(&self, version: Version, joined: &mut JoinedPieces) {
+        if joined.version == version {
+            return;
+        }
+        let JoinedPieces { objects, batches, .. } = joined;
+        batches.clear();
+        for piece in self.recorded() {
+            if let Some(list) = self.pieces[piece].list(version.index) {
+                batches.extend(list.batches.iter().map(|batch| (*batch, piece as u32)));
             }
-        });
-        let executed_pieces = pieces.iter().filter_map(|piece| {
-            let known = &self.pieces[*piece as usize];
-            Some((known.objects.start, known.first_slot, known.list(version.index)?))
-        });
-        list.execute_pieces(executed, executed_pieces);
+        }
+        batches.sort_by_key(|(batch, piece)| (batch.state, batch.mesh, *piece));
+        objects.clear();
+        for (batch, piece) in batches {
+            if let Some(list) = self.pieces[*piece as usize].list(version.index) {
+                let of_batch = batch.first as usize..(batch.first + batch.count) as usize;
+                batch.first = objects.len() as u32;
+                objects.extend_from_slice(&list.objects[of_batch]);
+            }
+        }
+        joined.version = version;
     }
 }
 
