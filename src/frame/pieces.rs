@@ -20,7 +20,10 @@ use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 use super::piece_statistics::PieceStatistics;
 use crate::command::{Batch, BinnedSegment, DrawList, Selection, Version};
 use crate::scene::{Changes, Piece, SceneError, SceneRef};
-use crate::view::{GroupBounds, ObjectTable, ObjectWord, SelectionFilter, bin_objects, recordable_objects, set_bits};
+use crate::view::{
+    GroupBounds, ObjectTable, ObjectWord, RejectionReason, Rejections, SelectionFilter, bin_objects,
+    recordable_objects, set_bits,
+};
 
 /// The pieces of a scene.
 #[derive(Debug, Default)]
@@ -43,8 +46,13 @@ pub(super) struct PieceTable {
     recording: Vec<u32>,
     /// What processes draw of all pieces: one for each selection.
     joined: Vec<RwLock<JoinedPieces>>,
-    /// The number of objects of all pieces.
+    /// The number of objects of all pieces, and whether the scene has all of them.
     object_count: usize,
+    has_unknown_objects: bool,
+    /// The number of recorded pieces.
+    recorded_count: usize,
+    /// The pieces with an object that changed in this frame, by index.
+    changed: Vec<u32>,
     /// Counts how often another object became, or ceased to be, one of a recorded piece.
     revision: u64,
     /// Counts how often the lists of recorded pieces changed.
@@ -142,7 +150,9 @@ impl PieceTable {
         if scene.pieces.is_empty() && self.pieces.is_empty() {
             return Ok(());
         }
-        self.pieces.iter_mut().for_each(|known| known.has_changed = false);
+        for piece in self.changed.drain(..) {
+            self.pieces[piece as usize].has_changed = false;
+        }
         if let Err(error) = self.sync(scene) {
             *self = Self { revision: self.revision + 1, lists_revision: self.lists_revision + 1, ..Self::default() };
             return Err(error);
@@ -153,7 +163,7 @@ impl PieceTable {
         self.add_selections(selections);
         self.find_changed_objects(scene.changes);
         self.find_changed_assets(scene);
-        if scene.changes != Changes::Unknown {
+        if scene.changes != Changes::Unknown && self.recorded_count < self.pieces.len() {
             let is_due = |(_, known): &(u32, &KnownPiece)| !known.is_recorded && !known.has_changed;
             self.recording.extend((0..).zip(&self.pieces).filter(is_due).map(|(index, _)| index));
         }
@@ -176,6 +186,7 @@ impl PieceTable {
         for index in std::mem::take(&mut self.recording) {
             let known = &mut self.pieces[index as usize];
             known.is_recorded = true;
+            self.recorded_count += 1;
             let recorded = known.recorded.get_mut();
             let (group, place) = (index as usize / GroupBounds::GROUPS, index as usize % GroupBounds::GROUPS);
             self.bounds[group].set_union(place, &recorded.bounds);
@@ -189,6 +200,15 @@ impl PieceTable {
     fn lose(&mut self, piece: usize) {
         if self.pieces[piece].lose(&mut self.recorded_words) {
             self.revision += 1;
+            self.recorded_count -= 1;
+        }
+    }
+
+    /// An object of a piece changed.
+    fn change(&mut self, piece: usize) {
+        if !std::mem::replace(&mut self.pieces[piece].has_changed, true) {
+            self.changed.push(piece as u32);
+            self.lose(piece);
         }
     }
 
@@ -199,14 +219,17 @@ impl PieceTable {
         for piece in 0..self.pieces.len() {
             // Objects that are gone, or new at indices that it lists.
             if self.has_object_in(piece, before.min(objects)..before.max(objects)) {
-                self.pieces[piece].has_changed = true;
-                self.lose(piece);
+                self.change(piece);
             }
         }
         self.owners.resize(objects, NO_PIECE);
         self.recorded_words.resize(objects.div_ceil(WORD), 0);
         if self.pieces.iter().map(|known| &known.piece).eq(scene.pieces) {
-            return (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects));
+            if before != objects {
+                (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects))?;
+                self.find_unknown_objects(objects);
+            }
+            return Ok(());
         }
         let mut known: HashMap<_, _> = self.pieces.drain(..).map(|known| (known.piece.name.clone(), known)).collect();
         self.owners.fill(NO_PIECE);
@@ -226,6 +249,11 @@ impl PieceTable {
             gone.lose(&mut self.recorded_words);
         }
         self.object_count = self.pieces.iter().map(|known| known.piece.objects.len()).sum();
+        self.find_unknown_objects(objects);
+        self.recorded_count = self.pieces.iter().filter(|known| known.is_recorded).count();
+        let changed = (0..).zip(&self.pieces).filter(|(_, known)| known.has_changed).map(|(index, _)| index);
+        self.changed.clear();
+        self.changed.extend(changed);
         self.bounds.clear();
         self.bounds.resize_with(self.pieces.len().div_ceil(GroupBounds::GROUPS), GroupBounds::default);
         for (index, known) in self.pieces.iter_mut().enumerate().filter(|(_, known)| known.is_recorded) {
@@ -246,6 +274,19 @@ impl PieceTable {
                 .iter_from(objects.start)
                 .next()
                 .is_some_and(|object| (object as usize) < objects.end)
+    }
+
+    fn find_unknown_objects(&mut self, objects: usize) {
+        self.has_unknown_objects =
+            self.pieces.iter().any(|known| known.piece.objects.iter_from(objects).next().is_some());
+    }
+
+    /// Counts the indices at which the scene has no object, each once.
+    pub(super) fn count_unknown_objects(&self, rejections: &Rejections) {
+        let pieces = if self.has_unknown_objects { &self.pieces[..] } else { &[] };
+        for index in pieces.iter().flat_map(|known| known.piece.objects.iter_from(self.owners.len())) {
+            rejections.count_once(RejectionReason::UnknownObject, index as usize);
+        }
     }
 
     /// Notes a piece's objects among a range of the scene's.
@@ -282,20 +323,19 @@ impl PieceTable {
     fn find_changed_objects(&mut self, changes: Changes<'_>) {
         match changes {
             Changes::Unknown => self.invalidate(),
-            Changes::Objects(objects) => objects.iter().for_each(|&object| self.change(object as usize)),
+            Changes::Objects(objects) => objects.iter().for_each(|&object| self.change_object(object as usize)),
             Changes::Ranges(ranges) => {
                 for range in ranges {
                     (range.start as usize..(range.end as usize).min(self.owners.len()))
-                        .for_each(|object| self.change(object));
+                        .for_each(|object| self.change_object(object));
                 }
             }
         }
     }
 
-    fn change(&mut self, object: usize) {
+    fn change_object(&mut self, object: usize) {
         if let Some(&owner) = self.owners.get(object).filter(|owner| **owner != NO_PIECE) {
-            self.pieces[owner as usize].has_changed = true;
-            self.lose(owner as usize);
+            self.change(owner as usize);
         }
     }
 
@@ -373,9 +413,7 @@ impl PieceTable {
 
     /// What the frame did with pieces.
     pub(super) fn statistics(&self) -> PieceStatistics {
-        let executable = self.pieces.iter().filter(|known| known.is_recorded).count();
-        let changed = self.pieces.iter().filter(|known| known.has_changed).count();
-        PieceStatistics { executable, recorded: self.recording.len(), changed }
+        PieceStatistics { executable: self.recorded_count, recorded: self.recording.len(), changed: self.changed.len() }
     }
 
     /// The name of one of the pieces that this frame records, by index among them.
