@@ -284,3 +284,63 @@ impl PartialEq for DrawList {
 }
 
 impl Eq for DrawList {}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::command::DrawState;
+
+    proptest! {
+        /// Batches of pieces, then others, against a plain list of what is drawn.
+        #[test]
+        fn executed_pieces_merge_and_their_bundles_are_apart_from_others(
+            counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..900),
+            own in 0_usize..600,
+            merges in any::<bool>(),
+        ) {
+            let mut list = DrawList::default();
+            let (mut first, mut batches, mut expected) = (0, Vec::new(), Vec::new());
+            let mut counts = counts;
+            counts.sort_by_key(|(_, mesh, _)| *mesh);
+            for &(count, mesh, is_executed) in &counts {
+                if is_executed {
+                    batches.push(Batch { mesh, state: DrawState::PLAIN, first, count });
+                    expected.extend((first..first + count).map(|object| (mesh, object + 7)));
+                }
+                first += count;
+            }
+            let objects: Vec<_> = (7..first + 7).collect();
+            for version in [1, 2] {
+                // The second time with what is there already.
+                list.set_piece_objects(Version { frame: 1, index: 0 }, &objects);
+                list.execute_pieces(Version { frame: version, index: 0 }, batches.iter().copied(), |_| merges);
+                prop_assert_eq!(list.drawn_count(), expected.len());
+                let start = list.objects.len() as u32;
+                list.objects.extend((0..own as u32).map(|object| object + 10_000));
+                list.batches.extend((0..own as u32).map(|object| Batch { mesh: 9, state: DrawState::PLAIN, first: start + object, count: 1 }));
+                let of_pieces = list.pieces().batch_count();
+                let drawn = list.batches[..of_pieces].iter().flat_map(|batch| {
+                    let of_batch = &list.objects[batch.first as usize..][..batch.count as usize];
+                    of_batch.iter().map(|object| (batch.mesh, *object))
+                });
+                prop_assert_eq!(drawn.collect::<Vec<_>>(), expected.clone());
+                let could_merge = |pair: &[Batch]| {
+                    (pair[0].mesh, pair[0].first + pair[0].count) == (pair[1].mesh, pair[1].first)
+                };
+                prop_assert!(!merges || !list.batches[..of_pieces].windows(2).any(could_merge));
+                prop_assert!(merges || of_pieces == batches.len());
+                let ranges: Vec<_> = (0..list.bundle_count()).map(|bundle| list.bundle_range(bundle)).collect();
+                prop_assert_eq!(ranges.iter().cloned().flatten().collect::<Vec<_>>(), (0..list.batches.len()).collect::<Vec<_>>());
+                prop_assert!(ranges.iter().all(|range| (1..=256).contains(&range.len())));
+                prop_assert!(ranges.iter().all(|range| range.end <= of_pieces || range.start >= of_pieces));
+                let mut slots: Vec<_> = (0..ranges.len()).map(|bundle| list.bundle_slot(bundle)).collect();
+                prop_assert!(slots.iter().all(|slot| *slot < list.bundle_slot_count()));
+                slots.sort_unstable();
+                slots.dedup();
+                prop_assert_eq!(slots.len(), ranges.len());
+            }
+        }
+    }
+}
