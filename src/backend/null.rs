@@ -21,7 +21,7 @@ use crate::task::Worker;
 /// - each pass of commands is prepared once at most, with a sorted list that has one object per command, all of them in
 ///   the scene;
 /// - each bundle is recorded once, and has 1 to [`DrawList::BATCHES_PER_BUNDLE`] batches;
-/// - batches are not empty, draw existing meshes, and follow each other without gaps or overlaps;
+/// - batches are not empty, draw existing meshes, and follow each other without overlaps and, except between those of pieces, without gaps;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
 /// - a pass without commands has neither batches nor bundles;
@@ -73,7 +73,8 @@ pub struct NullFrame {
 #[derive(Debug)]
 pub struct NullBundle {
     batches: usize,
-    objects: Range<usize>,
+    first_object: usize,
+    objects: usize,
     triangles: usize,
 }
 
@@ -179,9 +180,9 @@ impl Backend for NullBackend {
             })?;
         }
         let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
-        let in_order = bundles.iter().map(|bundle| bundle.objects.start).eq(first_objects);
+        let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.first_object == first);
         ensure(in_order, || "bundles are finished in order".to_owned())?;
-        let objects = bundles.iter().map(|bundle| bundle.objects.len()).sum();
+        let objects = bundles.iter().map(|bundle| bundle.objects).sum();
         let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
         ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
         Ok(NullPass {
@@ -233,10 +234,13 @@ fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<Null
     ensure(within, || {
         format!("a bundle has 1 to {} batches, but one has {}", DrawList::BATCHES_PER_BUNDLE, batches.len())
     })?;
-    let start = batches[0].first;
-    let (mut end, mut triangles) = (start, 0);
+    // Objects of pieces that the view does not execute lie between those of others.
+    let may_have_gaps = bundle < list.pieces().bundle_count();
+    let first_object = batches[0].first as usize;
+    let (mut end, mut objects, mut triangles) = (batches[0].first, 0, 0);
     for (index, batch) in list.bundle_range(bundle).zip(batches) {
-        ensure(batch.first == end && batch.count > 0, || {
+        let follows = batch.first == end || may_have_gaps && batch.first > end;
+        ensure(follows && batch.count > 0, || {
             format!("batches have no gaps or overlaps, but there is one at object {end}")
         })?;
         let Some((_, mesh)) = assets.meshes.get_with_revision(batch.mesh) else {
@@ -255,9 +259,10 @@ fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<Null
                 remaining.len() / 3
             }
         };
-        end += batch.count;
+        end = batch.first + batch.count;
+        objects += batch.count as usize;
     }
-    Ok(NullBundle { batches: batches.len(), objects: start as usize..end as usize, triangles })
+    Ok(NullBundle { batches: batches.len(), first_object, objects, triangles })
 }
 
 fn ensure(holds: bool, rule: impl FnOnce() -> String) -> Result<(), BackendError> {

@@ -1,8 +1,8 @@
 //! What one pass draws.
 
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::{DerefMut, Range};
 
-use super::list_pieces::ListPieces;
+use super::list_pieces::{BATCHES_PER_BUNDLE, ListPieces};
 use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
@@ -30,7 +30,7 @@ pub struct DrawList {
 impl DrawList {
     /// The number of batches in a bundle. It is the same for every granularity: smaller bundles cost up to three times as
     /// much per draw, and bundle boundaries that moved with the granularity could change the picture.
-    pub const BATCHES_PER_BUNDLE: usize = 256;
+    pub const BATCHES_PER_BUNDLE: usize = BATCHES_PER_BUNDLE;
 
     /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
     /// it. Lists of [`Version::default`] may differ.
@@ -45,7 +45,7 @@ impl DrawList {
 
     /// Removes everything and keeps the memory.
     pub fn clear(&mut self) {
-        self.pieces.clear();
+        self.pieces = ListPieces::default();
         self.clear_own();
     }
 
@@ -190,47 +190,50 @@ impl DrawList {
     }
 
     /// What belongs to pieces.
-    pub fn pieces(&self) -> &ListPieces {
-        &self.pieces
+    pub fn pieces(&self) -> ListPieces {
+        self.pieces
     }
 
-    /// Replaces the objects of pieces, unless they are those of this version. `copy` is called with memory for `objects` of them, which may have
-    /// numbers of bundles below `slots`.
-    pub(crate) fn set_piece_objects(
-        &mut self,
-        version: Version,
-        (objects, slots): (usize, usize),
-        copy: impl FnOnce(&mut [u32]),
-    ) {
+    /// Replaces the objects of pieces, unless they are those of this version.
+    pub(crate) fn set_piece_objects(&mut self, version: Version, objects: &[u32]) {
         self.clear_own();
-        if self.pieces.set_objects(version, (objects, slots)) {
+        if self.pieces.set_objects(version, objects.len()) {
             self.batches.clear();
             self.objects.clear();
-            self.objects.resize(objects, 0);
-            copy(&mut self.objects);
+            self.objects.extend_from_slice(objects);
         }
     }
 
-    /// Replaces the pieces that are executed, unless they are those of this version. Each has the index of its first object among those of
-    /// pieces, the number of its first bundle, and its list.
-    pub(crate) fn execute_pieces<L: Deref<Target = Self>>(
+    /// Replaces the batches of pieces, unless they are those of this version. They come in draw order; neighbours whose objects follow each other become
+    /// one batch where both have the same state and mesh, and `can_merge` holds for that mesh's slot.
+    pub(crate) fn execute_pieces(
         &mut self,
         version: Version,
-        pieces: impl Iterator<Item = (usize, usize, L)>,
+        batches: impl Iterator<Item = Batch>,
+        can_merge: impl Fn(u32) -> bool,
     ) {
         self.clear_own();
         if !self.pieces.set_executed(version) {
             return;
         }
         self.batches.clear();
-        for (first, first_slot, piece) in pieces {
-            let batches = piece.batches.iter().map(|batch| Batch { first: first as u32 + batch.first, ..*batch });
-            self.batches.extend(batches);
-            self.pieces.push(piece.objects.len(), piece.batches.len(), first_slot);
+        let mut drawn = 0;
+        for batch in batches {
+            drawn += batch.count as usize;
+            match self.batches.last_mut() {
+                Some(last)
+                    if (last.state, last.mesh, last.first + last.count) == (batch.state, batch.mesh, batch.first)
+                        && can_merge(batch.mesh) =>
+                {
+                    last.count += batch.count;
+                }
+                _ => self.batches.push(batch),
+            }
         }
+        self.pieces.set_drawn(drawn, self.batches.len());
     }
 
-    /// The number of bundles that the batches fill. No bundle has batches of two pieces.
+    /// The number of bundles that the batches fill. No bundle has batches of pieces and of other objects.
     pub fn bundle_count(&self) -> usize {
         let own = self.batches.len() - self.pieces.batch_count();
         self.pieces.bundle_count() + own.div_ceil(Self::BATCHES_PER_BUNDLE)
@@ -258,18 +261,15 @@ impl DrawList {
         }
     }
 
-    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of a piece does not depend on which other pieces the view
-    /// executes.
+    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of pieces does not depend on other objects, and that of
+    /// others not on pieces.
     pub fn bundle_slot(&self, index: usize) -> usize {
-        match index.checked_sub(self.pieces.bundle_count()) {
-            None => self.pieces.bundle_slot(index),
-            Some(own) => self.pieces.slot_count() + own,
-        }
+        index.checked_sub(self.pieces.bundle_count()).map_or(2 * index, |own| 2 * own + 1)
     }
 
     /// More than the number of every bundle.
     pub fn bundle_slot_count(&self) -> usize {
-        self.pieces.slot_count() + self.bundle_count() - self.pieces.bundle_count()
+        2 * self.bundle_count()
     }
 }
 
@@ -284,3 +284,63 @@ impl PartialEq for DrawList {
 }
 
 impl Eq for DrawList {}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::command::DrawState;
+
+    proptest! {
+        /// Batches of pieces, then others, against a plain list of what is drawn.
+        #[test]
+        fn executed_pieces_merge_and_their_bundles_are_apart_from_others(
+            counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..900),
+            own in 0_usize..600,
+            merges in any::<bool>(),
+        ) {
+            let mut list = DrawList::default();
+            let (mut first, mut batches, mut expected) = (0, Vec::new(), Vec::new());
+            let mut counts = counts;
+            counts.sort_by_key(|(_, mesh, _)| *mesh);
+            for &(count, mesh, is_executed) in &counts {
+                if is_executed {
+                    batches.push(Batch { mesh, state: DrawState::PLAIN, first, count });
+                    expected.extend((first..first + count).map(|object| (mesh, object + 7)));
+                }
+                first += count;
+            }
+            let objects: Vec<_> = (7..first + 7).collect();
+            for version in [1, 2] {
+                // The second time with what is there already.
+                list.set_piece_objects(Version { frame: 1, index: 0 }, &objects);
+                list.execute_pieces(Version { frame: version, index: 0 }, batches.iter().copied(), |_| merges);
+                prop_assert_eq!(list.drawn_count(), expected.len());
+                let start = list.objects.len() as u32;
+                list.objects.extend((0..own as u32).map(|object| object + 10_000));
+                list.batches.extend((0..own as u32).map(|object| Batch { mesh: 9, state: DrawState::PLAIN, first: start + object, count: 1 }));
+                let of_pieces = list.pieces().batch_count();
+                let drawn = list.batches[..of_pieces].iter().flat_map(|batch| {
+                    let of_batch = &list.objects[batch.first as usize..][..batch.count as usize];
+                    of_batch.iter().map(|object| (batch.mesh, *object))
+                });
+                prop_assert_eq!(drawn.collect::<Vec<_>>(), expected.clone());
+                let could_merge = |pair: &[Batch]| {
+                    (pair[0].mesh, pair[0].first + pair[0].count) == (pair[1].mesh, pair[1].first)
+                };
+                prop_assert!(!merges || !list.batches[..of_pieces].windows(2).any(could_merge));
+                prop_assert!(merges || of_pieces == batches.len());
+                let ranges: Vec<_> = (0..list.bundle_count()).map(|bundle| list.bundle_range(bundle)).collect();
+                prop_assert_eq!(ranges.iter().cloned().flatten().collect::<Vec<_>>(), (0..list.batches.len()).collect::<Vec<_>>());
+                prop_assert!(ranges.iter().all(|range| (1..=256).contains(&range.len())));
+                prop_assert!(ranges.iter().all(|range| range.end <= of_pieces || range.start >= of_pieces));
+                let mut slots: Vec<_> = (0..ranges.len()).map(|bundle| list.bundle_slot(bundle)).collect();
+                prop_assert!(slots.iter().all(|slot| *slot < list.bundle_slot_count()));
+                slots.sort_unstable();
+                slots.dedup();
+                prop_assert_eq!(slots.len(), ranges.len());
+            }
+        }
+    }
+}

@@ -18,9 +18,12 @@ use std::ops::Range;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::piece_statistics::PieceStatistics;
-use crate::command::{BinnedSegment, DrawList, ListPieces, Selection, Version};
+use crate::command::{Batch, BinnedSegment, DrawList, Selection, Version};
 use crate::scene::{Changes, Piece, SceneError, SceneRef};
-use crate::view::{GroupBounds, ObjectTable, ObjectWord, SelectionFilter, bin_objects, recordable_objects, set_bits};
+use crate::view::{
+    GroupBounds, ObjectTable, ObjectWord, RejectionReason, Rejections, SelectionFilter, bin_objects,
+    recordable_objects, set_bits,
+};
 
 /// The pieces of a scene.
 #[derive(Debug, Default)]
@@ -41,12 +44,18 @@ pub(super) struct PieceTable {
     assets: [(u64, u64); 2],
     /// The indices of the pieces that this frame records.
     recording: Vec<u32>,
-    /// The end of all places in lists: see [`KnownPiece::objects`] and [`KnownPiece::first_slot`].
-    objects_end: usize,
-    slots_end: usize,
+    /// What processes draw of all pieces: one for each selection.
+    joined: Vec<RwLock<JoinedPieces>>,
+    /// The number of objects of all pieces, and whether the scene has all of them.
+    object_count: usize,
+    has_unknown_objects: bool,
+    /// The number of recorded pieces.
+    recorded_count: usize,
+    /// The pieces with an object that changed in this frame, by index.
+    changed: Vec<u32>,
     /// Counts how often another object became, or ceased to be, one of a recorded piece.
     revision: u64,
-    /// Counts how often lists or their places changed.
+    /// Counts how often the lists of recorded pieces changed.
     lists_revision: u64,
 }
 
@@ -63,14 +72,21 @@ pub(super) struct ListConditions {
 #[derive(Debug)]
 struct KnownPiece {
     piece: Piece,
-    /// Its place among the objects of all pieces in draw lists, long enough for all its objects.
-    objects: Range<usize>,
-    /// The number of its first bundle.
-    first_slot: usize,
     is_recorded: bool,
     /// Whether an object of it changed in this frame.
     has_changed: bool,
-    recorded: RwLock<RecordedPiece>,
+    /// Boxed, because every frame looks at all pieces, and at few of these.
+    recorded: Box<RwLock<RecordedPiece>>,
+}
+
+/// What a process draws of all recorded pieces: their objects by draw state, by mesh, and by piece, so that pieces which follow each other and are
+/// executed together become one batch for each mesh.
+#[derive(Debug, Default)]
+struct JoinedPieces {
+    version: Version,
+    objects: Vec<u32>,
+    /// In draw order, each with its piece.
+    batches: Vec<(Batch, u32)>,
 }
 
 /// What is recorded of a piece.
@@ -90,6 +106,10 @@ struct RecordedPiece {
 }
 
 impl KnownPiece {
+    fn new(piece: &Piece) -> Self {
+        Self { piece: piece.clone(), is_recorded: false, has_changed: false, recorded: Box::default() }
+    }
+
     /// It is not recorded any more. Returns whether it was.
     fn lose(&mut self, recorded_words: &mut [u64]) -> bool {
         let was_recorded = std::mem::take(&mut self.is_recorded);
@@ -115,9 +135,6 @@ const NO_PIECE: u32 = u32::MAX;
 /// More selections than this are forgotten, because most of them are of passes that are gone.
 const MAX_SELECTIONS: usize = 32;
 
-/// As long as the places of pieces that are gone are fewer than this, and fewer than those in use, they stay empty.
-const MAX_UNUSED_PLACES: usize = 4096;
-
 impl PieceTable {
     /// Begins a frame, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
     ///
@@ -133,7 +150,9 @@ impl PieceTable {
         if scene.pieces.is_empty() && self.pieces.is_empty() {
             return Ok(());
         }
-        self.pieces.iter_mut().for_each(|known| known.has_changed = false);
+        for piece in self.changed.drain(..) {
+            self.pieces[piece as usize].has_changed = false;
+        }
         if let Err(error) = self.sync(scene) {
             *self = Self { revision: self.revision + 1, lists_revision: self.lists_revision + 1, ..Self::default() };
             return Err(error);
@@ -144,7 +163,7 @@ impl PieceTable {
         self.add_selections(selections);
         self.find_changed_objects(scene.changes);
         self.find_changed_assets(scene);
-        if scene.changes != Changes::Unknown {
+        if scene.changes != Changes::Unknown && self.recorded_count < self.pieces.len() {
             let is_due = |(_, known): &(u32, &KnownPiece)| !known.is_recorded && !known.has_changed;
             self.recording.extend((0..).zip(&self.pieces).filter(is_due).map(|(index, _)| index));
         }
@@ -167,6 +186,7 @@ impl PieceTable {
         for index in std::mem::take(&mut self.recording) {
             let known = &mut self.pieces[index as usize];
             known.is_recorded = true;
+            self.recorded_count += 1;
             let recorded = known.recorded.get_mut();
             let (group, place) = (index as usize / GroupBounds::GROUPS, index as usize % GroupBounds::GROUPS);
             self.bounds[group].set_union(place, &recorded.bounds);
@@ -180,6 +200,15 @@ impl PieceTable {
     fn lose(&mut self, piece: usize) {
         if self.pieces[piece].lose(&mut self.recorded_words) {
             self.revision += 1;
+            self.recorded_count -= 1;
+        }
+    }
+
+    /// An object of a piece changed.
+    fn change(&mut self, piece: usize) {
+        if !std::mem::replace(&mut self.pieces[piece].has_changed, true) {
+            self.changed.push(piece as u32);
+            self.lose(piece);
         }
     }
 
@@ -190,14 +219,17 @@ impl PieceTable {
         for piece in 0..self.pieces.len() {
             // Objects that are gone, or new at indices that it lists.
             if self.has_object_in(piece, before.min(objects)..before.max(objects)) {
-                self.pieces[piece].has_changed = true;
-                self.lose(piece);
+                self.change(piece);
             }
         }
         self.owners.resize(objects, NO_PIECE);
         self.recorded_words.resize(objects.div_ceil(WORD), 0);
         if self.pieces.iter().map(|known| &known.piece).eq(scene.pieces) {
-            return (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects));
+            if before != objects {
+                (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects))?;
+                self.find_unknown_objects(objects);
+            }
+            return Ok(());
         }
         let mut known: HashMap<_, _> = self.pieces.drain(..).map(|known| (known.piece.name.clone(), known)).collect();
         self.owners.fill(NO_PIECE);
@@ -208,7 +240,7 @@ impl PieceTable {
             }
             let next = match known.entry(piece.name.clone()) {
                 Entry::Occupied(known) if known.get().piece.objects == piece.objects => known.remove(),
-                _ => self.new_piece(piece),
+                _ => KnownPiece::new(piece),
             };
             self.pieces.push(next);
             self.claim(index, 0..objects)?;
@@ -216,7 +248,12 @@ impl PieceTable {
         for mut gone in known.into_values() {
             gone.lose(&mut self.recorded_words);
         }
-        self.compact_places();
+        self.object_count = self.pieces.iter().map(|known| known.piece.objects.len()).sum();
+        self.find_unknown_objects(objects);
+        self.recorded_count = self.pieces.iter().filter(|known| known.is_recorded).count();
+        let changed = (0..).zip(&self.pieces).filter(|(_, known)| known.has_changed).map(|(index, _)| index);
+        self.changed.clear();
+        self.changed.extend(changed);
         self.bounds.clear();
         self.bounds.resize_with(self.pieces.len().div_ceil(GroupBounds::GROUPS), GroupBounds::default);
         for (index, known) in self.pieces.iter_mut().enumerate().filter(|(_, known)| known.is_recorded) {
@@ -239,34 +276,16 @@ impl PieceTable {
                 .is_some_and(|object| (object as usize) < objects.end)
     }
 
-    /// A piece with a place behind all others.
-    fn new_piece(&mut self, piece: &Piece) -> KnownPiece {
-        let count = piece.objects.len();
-        let known = KnownPiece {
-            piece: piece.clone(),
-            objects: self.objects_end..self.objects_end + count,
-            first_slot: self.slots_end,
-            is_recorded: false,
-            has_changed: false,
-            recorded: RwLock::default(),
-        };
-        self.objects_end += count;
-        self.slots_end += ListPieces::max_bundles(count);
-        known
+    fn find_unknown_objects(&mut self, objects: usize) {
+        self.has_unknown_objects =
+            self.pieces.iter().any(|known| known.piece.objects.iter_from(objects).next().is_some());
     }
 
-    /// Gives all pieces new places if too many are unused.
-    fn compact_places(&mut self) {
-        let used: usize = self.pieces.iter().map(|known| known.objects.len()).sum();
-        if self.objects_end - used <= used.max(MAX_UNUSED_PLACES) {
-            return;
-        }
-        (self.objects_end, self.slots_end) = (0, 0);
-        for known in &mut self.pieces {
-            let count = known.objects.len();
-            (known.objects, known.first_slot) = (self.objects_end..self.objects_end + count, self.slots_end);
-            self.objects_end += count;
-            self.slots_end += ListPieces::max_bundles(count);
+    /// Counts the indices at which the scene has no object, each once.
+    pub(super) fn count_unknown_objects(&self, rejections: &Rejections) {
+        let pieces = if self.has_unknown_objects { &self.pieces[..] } else { &[] };
+        for index in pieces.iter().flat_map(|known| known.piece.objects.iter_from(self.owners.len())) {
+            rejections.count_once(RejectionReason::UnknownObject, index as usize);
         }
     }
 
@@ -296,6 +315,7 @@ impl PieceTable {
             }
         }
         if is_new {
+            self.joined.resize_with(self.selections.len(), RwLock::default);
             self.invalidate();
         }
     }
@@ -303,20 +323,19 @@ impl PieceTable {
     fn find_changed_objects(&mut self, changes: Changes<'_>) {
         match changes {
             Changes::Unknown => self.invalidate(),
-            Changes::Objects(objects) => objects.iter().for_each(|&object| self.change(object as usize)),
+            Changes::Objects(objects) => objects.iter().for_each(|&object| self.change_object(object as usize)),
             Changes::Ranges(ranges) => {
                 for range in ranges {
                     (range.start as usize..(range.end as usize).min(self.owners.len()))
-                        .for_each(|object| self.change(object));
+                        .for_each(|object| self.change_object(object));
                 }
             }
         }
     }
 
-    fn change(&mut self, object: usize) {
+    fn change_object(&mut self, object: usize) {
         if let Some(&owner) = self.owners.get(object).filter(|owner| **owner != NO_PIECE) {
-            self.pieces[owner as usize].has_changed = true;
-            self.lose(owner as usize);
+            self.change(owner as usize);
         }
     }
 
@@ -340,6 +359,11 @@ impl PieceTable {
                 self.lose(piece);
             }
         }
+    }
+
+    /// The number of pieces.
+    pub(super) fn len(&self) -> usize {
+        self.pieces.len()
     }
 
     /// Whether the scene has no pieces.
@@ -372,9 +396,9 @@ impl PieceTable {
         self.pieces[piece].recorded.read().words.iter().for_each(visit);
     }
 
-    /// The number of objects of all pieces that may stand in a draw list.
+    /// The number of objects of all pieces.
     pub(super) fn listed_objects(&self) -> usize {
-        self.objects_end
+        self.object_count
     }
 
     /// The number of pieces that this frame records.
@@ -389,9 +413,7 @@ impl PieceTable {
 
     /// What the frame did with pieces.
     pub(super) fn statistics(&self) -> PieceStatistics {
-        let executable = self.pieces.iter().filter(|known| known.is_recorded).count();
-        let changed = self.pieces.iter().filter(|known| known.has_changed).count();
-        PieceStatistics { executable, recorded: self.recording.len(), changed }
+        PieceStatistics { executable: self.recorded_count, recorded: self.recording.len(), changed: self.changed.len() }
     }
 
     /// The name of one of the pieces that this frame records, by index among them.
@@ -435,21 +457,47 @@ impl PieceTable {
         Version { frame: self.lists_revision + 1, index }
     }
 
-    /// Makes a draw list have what a process with a selection draws of some pieces, whose version is `executed`.
-    pub(super) fn execute(&self, selection: Selection, pieces: &[u32], executed: Version, list: &mut DrawList) {
+    /// Makes a draw list have what a process with a selection draws of the pieces that a view executes, whose version is `executed`.
+    pub(super) fn execute(
+        &self,
+        selection: Selection,
+        (executes, executed): (impl Fn(u32) -> bool, Version),
+        can_merge: impl Fn(u32) -> bool,
+        list: &mut DrawList,
+    ) {
         let version = self.version(selection);
-        list.set_piece_objects(version, (self.objects_end, self.slots_end), |objects| {
-            for known in self.pieces.iter().filter(|known| known.is_recorded) {
-                if let Some(piece) = known.list(version.index) {
-                    objects[known.objects.start..][..piece.objects.len()].copy_from_slice(&piece.objects);
-                }
+        let Some(joined) = self.joined.get(version.index) else { return list.clear() };
+        if joined.read().version != version {
+            self.join(version, &mut joined.write());
+        }
+        let joined = joined.read();
+        list.set_piece_objects(version, &joined.objects);
+        let batches = joined.batches.iter().filter(|(_, piece)| executes(*piece)).map(|(batch, _)| *batch);
+        list.execute_pieces(executed, batches, can_merge);
+    }
+
+    /// Joins what a selection's lists have of the recorded pieces, unless another job has done it.
+    fn join(&self, version: Version, joined: &mut JoinedPieces) {
+        if joined.version == version {
+            return;
+        }
+        let JoinedPieces { objects, batches, .. } = joined;
+        batches.clear();
+        for piece in self.recorded() {
+            if let Some(list) = self.pieces[piece].list(version.index) {
+                batches.extend(list.batches.iter().map(|batch| (*batch, piece as u32)));
             }
-        });
-        let executed_pieces = pieces.iter().filter_map(|piece| {
-            let known = &self.pieces[*piece as usize];
-            Some((known.objects.start, known.first_slot, known.list(version.index)?))
-        });
-        list.execute_pieces(executed, executed_pieces);
+        }
+        batches.sort_by_key(|(batch, piece)| (batch.state, batch.mesh, *piece));
+        objects.clear();
+        for (batch, piece) in batches {
+            if let Some(list) = self.pieces[*piece as usize].list(version.index) {
+                let of_batch = batch.first as usize..(batch.first + batch.count) as usize;
+                batch.first = objects.len() as u32;
+                objects.extend_from_slice(&list.objects[of_batch]);
+            }
+        }
+        joined.version = version;
     }
 }
 

@@ -97,7 +97,9 @@ impl FrameTables {
             self.visibility[pass.view_index].may_execute_pieces &= !table.selection.is_some_and(draws_in_order);
         }
         let selections = self.passes.iter().filter(|table| table.orders_by_bin).filter_map(|table| table.selection);
-        self.pieces.begin_frame(scene, conditions, selections)
+        self.pieces.begin_frame(scene, conditions, selections)?;
+        self.pieces.count_unknown_objects(self.objects.rejections());
+        Ok(())
     }
 
     /// Ends a frame that succeeded: what it derived holds for the next one.

@@ -94,10 +94,9 @@ fn passing_slots(predicate: &MaterialPredicate, assets: &Assets) -> Vec<u64> {
     slots
 }
 
-/// Counts the indices that the cameras' filters and the pieces list and at which the scene has no object, each once.
+/// Counts the indices that the cameras' filters list and at which the scene has no object, each once.
 pub(super) fn count_unknown_objects(scene: &SceneRef<'_>, rejections: &Rejections) {
-    let of_filters = scene.cameras.iter().filter_map(|camera| camera.filter.objects.set());
-    for set in of_filters.chain(scene.pieces.iter().map(|piece| &piece.objects)) {
+    for set in scene.cameras.iter().filter_map(|camera| camera.filter.objects.set()) {
         for index in set.iter_from(scene.object_count()) {
             rejections.count_once(RejectionReason::UnknownObject, index as usize);
         }

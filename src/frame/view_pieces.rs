@@ -13,6 +13,8 @@ pub(super) struct ViewPieces {
     /// What it was found with; `None` if the view executes no pieces.
     found_with: Option<FoundWith>,
     executed: Vec<u32>,
+    /// The same as bits.
+    executed_words: Vec<u64>,
     /// The number of objects that are executed.
     object_count: usize,
     /// The version of the executed pieces.
@@ -92,6 +94,11 @@ impl ViewPieces {
         if is_other || self.executed != executed_before {
             self.version = version;
             self.object_count = self.executed.iter().map(|piece| table.object_count(*piece)).sum();
+            self.executed_words.clear();
+            self.executed_words.resize(table.len().div_ceil(WORD), 0);
+            self.executed
+                .iter()
+                .for_each(|&piece| self.executed_words[piece as usize / WORD] |= 1 << (piece as usize % WORD));
         }
         self.scratch = executed_before;
         let (before, now) = self.opened.split_at(opened_before);
@@ -106,6 +113,7 @@ impl ViewPieces {
     pub(super) fn clear(&mut self, version: Version) {
         if self.found_with.take().is_some() {
             self.executed.clear();
+            self.executed_words.clear();
             self.object_count = 0;
             self.opened.clear();
             self.excluded.clear();
@@ -154,6 +162,12 @@ impl ViewPieces {
         &self.executed
     }
 
+    /// Whether it executes a piece, by index.
+    #[inline]
+    pub(super) fn executes(&self, piece: u32) -> bool {
+        self.executed_words.get(piece as usize / WORD).is_some_and(|word| word >> (piece as usize % WORD) & 1 == 1)
+    }
+
     /// The number of objects that are executed.
     pub(super) fn object_count(&self) -> usize {
         self.object_count
@@ -182,3 +196,5 @@ impl ViewFilter {
         *self.objects() == ObjectList::All && self.passes_all_materials()
     }
 }
+
+const WORD: usize = u64::BITS as usize;

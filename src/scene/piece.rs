@@ -17,9 +17,9 @@ use super::ObjectSet;
 /// - a piece with an object that [changed](super::SceneRef::changes), until the first frame in which none of them does. That frame
 ///   records the piece anew; the next one executes it. In frames that report [`Changes::Unknown`](super::Changes::Unknown) any object may have
 ///   changed, so an engine that wants pieces executed reports its changes;
-/// - all pieces in a view whose opaque objects are ordered by [depth](crate::quality::Quality::opaque_order) or by
-///   [the engine](crate::command::DrawOrder), in maps of paraboloids, and while a view tests for
-///   [occlusion](crate::quality::Quality::occlusion), which finds hidden objects one by one;
+/// - all pieces in a view with a process that draws opaque objects in an order, by [depth](crate::quality::Quality::opaque_order), by
+///   [the engine's](crate::command::DrawOrder) or [before blended ones](crate::command::Selection::ALL); in maps of paraboloids; and while a view
+///   tests for [occlusion](crate::quality::Quality::occlusion), which finds hidden objects one by one;
 /// - a piece of which a view's [filter](super::Camera::filter) shows only some objects, and one that reaches beyond the
 ///   [far plane](super::Camera::far) of a perspective view.
 ///

@@ -214,6 +214,30 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
+        fn a_group_that_ends_before_the_far_plane_has_no_sphere_beyond_it(
+            camera in any_camera(),
+            spheres in prop::collection::vec((prop::array::uniform3(-1.0..1.0_f64), 0.0..0.3_f64), 1..20),
+            along in -0.5..1.5_f64,
+        ) {
+            let scale = if camera.far.is_finite() { f64::from(camera.far) } else { 10.0 };
+            let middle = camera.position + (camera.orientation * glam::Vec3::NEG_Z).as_dvec3() * (along * scale);
+            let mut bounds = GroupBounds::default();
+            let spheres: Vec<_> = spheres
+                .into_iter()
+                .map(|(offset, radius)| (middle + DVec3::from(offset) * (0.3 * scale), (radius * scale) as f32))
+                .collect();
+            spheres.iter().for_each(|&(center, radius)| bounds.extend_word(2, BoundingSphere { center, radius }));
+            let frustum = Frustum::new(&camera);
+            let forward = (camera.orientation * glam::Vec3::NEG_Z).as_dvec3();
+            let is_beyond = |&(center, radius): &(DVec3, f32)| {
+                (center - camera.position).dot(forward) - f64::from(radius) > f64::from(camera.far)
+            };
+            if spheres.iter().any(is_beyond) {
+                prop_assert!(frustum.may_end_before(&bounds, 2));
+            }
+        }
+
+        #[test]
         fn a_verdict_on_a_group_is_that_on_each_of_its_spheres(
             camera in any_camera(),
             place in prop::array::uniform3(-1.0..1.0_f64),

@@ -78,7 +78,8 @@ impl<B: Backend> Stage<B> for ExecutePieces {
         let table = &frame.tables.passes[self.pass];
         let pieces = &frame.tables.visibility[frame.view_index_of(self.pass)].pieces;
         if let Some(selection) = table.selection {
-            frame.tables.pieces.execute(selection, pieces.executed(), pieces.version(), &mut table.list.write());
+            let executed = (|piece| pieces.executes(piece), pieces.version());
+            frame.tables.pieces.execute(selection, executed, |_| frame.instancing, &mut table.list.write());
         }
         Ok(())
     }

@@ -111,6 +111,8 @@ impl Simulation {
                 kind: ViewKind::Main,
                 age: u32::from(!is_drawn),
                 visible: 0,
+                pieces: 0,
+                objects_of_pieces: 0,
                 occluded: 0,
                 lights: 0,
                 commands: 0,
