@@ -68,7 +68,8 @@ impl CpuLayer {
         let products = [columns[0] * x, columns[1] * y, columns[2] * z, columns[3] * inverse_distance];
         let projected = products.into_iter().fold(Vector::zero(), |sum, product| sum + product);
         let w = projected[3];
-        if !(w > R::zero()) {
+        let is_in_front = w > R::zero();
+        if !is_in_front {
             return LayerPosition::BehindCamera;
         }
         let clip = Vector([projected[0] / w, projected[1] / w]);
