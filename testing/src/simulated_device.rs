@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -22,9 +22,14 @@ pub struct SimulatedDevice<B> {
     /// The times of the next frames, before `frame_time`.
     next_times: Mutex<VecDeque<Duration>>,
     frame_time: Duration,
+    device: Arc<Device>,
+}
+
+/// The device's thread. It ends with the last backend on it.
+struct Device {
     /// `None` once it ends.
     frames: Option<Sender<DeviceFrame>>,
-    device: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<()>>,
 }
 
 /// A frame that the device draws.
@@ -39,8 +44,15 @@ impl<B> SimulatedDevice<B> {
     /// A device that takes so long for each frame.
     pub fn new(inner: B, frame_time: Duration) -> Self {
         let (frames, received) = channel();
-        let device = thread::spawn(move || draw_frames(&received));
-        Self { inner, next_times: Mutex::default(), frame_time, frames: Some(frames), device: Some(device) }
+        let thread = thread::spawn(move || draw_frames(&received));
+        let device = Arc::new(Device { frames: Some(frames), thread: Some(thread) });
+        Self { inner, next_times: Mutex::default(), frame_time, device }
+    }
+
+    /// Another backend on the same device, which takes so long for each of its frames: those of both are drawn in the order in which they are
+    /// submitted.
+    pub fn beside<C>(&self, inner: C, frame_time: Duration) -> SimulatedDevice<C> {
+        SimulatedDevice { inner, next_times: Mutex::default(), frame_time, device: Arc::clone(&self.device) }
     }
 
     /// The backend that it wraps.
@@ -55,11 +67,11 @@ impl<B> SimulatedDevice<B> {
     }
 }
 
-impl<B> Drop for SimulatedDevice<B> {
+impl Drop for Device {
     fn drop(&mut self) {
         self.frames = None;
-        if let Some(device) = self.device.take() {
-            device.join().unwrap();
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
         }
     }
 }
@@ -107,7 +119,12 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         let submission = self.inner.submit(frame, queues, Vec::new())?;
         let time = self.next_times.lock().unwrap().pop_front().unwrap_or(self.frame_time);
         let frame = DeviceFrame { submitted: Instant::now(), time, passes, fences };
-        self.frames.as_ref().expect("it ends when it is dropped").send(frame).expect("the device runs until then");
+        self.device
+            .frames
+            .as_ref()
+            .expect("it ends when it is dropped")
+            .send(frame)
+            .expect("the device runs until then");
         Ok(submission)
     }
 

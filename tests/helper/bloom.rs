@@ -65,7 +65,8 @@ fn same_as_on_device<B: DrawingBackend>() -> Result<(), Failed> {
         for (index, (one, other)) in of_helper.iter().zip(&of_device).enumerate().filter(|(index, _)| index % 4 < 3) {
             let bound =
                 one.max(*other) * (2.0 * 2_f64.powi(-10) + 2_f64.powi(-11) + 2_f64.powi(-15)) + 3.0 * 2_f64.powi(-24);
-            if !((one - other).abs() <= bound) {
+            let is_equal = (one - other).abs() <= bound;
+            if !is_equal {
                 return Err(format!("÷ {divisor}, radius {radius}, number {index}: {one} and {other}").into());
             }
             largest = largest.max((one - other).abs());

@@ -1,27 +1,31 @@
 //! The whole picture from the helper.
 
-use drawloom::RendererBuilder;
+use std::sync::Arc;
+
 use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
 use drawloom::glam::Vec3;
 use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
 use drawloom::process::{Deferred, Format};
 use drawloom::scene::{Camera, Scene};
+use drawloom::{Renderer, RendererBuilder};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{DrawingBackend, Engine};
+use crate::fixture::{DrawingBackend, Engine, wait_until};
 
 pub const ON_ADAPTER: &[Case] = &[
     ("a_late_picture_is_the_step_of_the_frame_before", late::<WgpuBackend>),
     ("the_first_picture_and_that_of_another_size_are_the_frames_own", first_and_resized::<WgpuBackend>),
     ("each_view_has_its_own_results", several_views::<WgpuBackend>),
+    ("a_renderer_of_its_own_draws_a_picture_before_the_next_frame", alone::<WgpuBackend>),
 ];
 
 pub const IN_SOFTWARE: &[Case] = &[
     ("software_a_late_picture_is_the_step_of_the_frame_before", late::<SoftwareBackend>),
     ("software_the_first_picture_and_that_of_another_size_are_the_frames_own", first_and_resized::<SoftwareBackend>),
     ("software_each_view_has_its_own_results", several_views::<SoftwareBackend>),
+    ("software_a_renderer_of_its_own_draws_a_picture_before_the_next_frame", alone::<SoftwareBackend>),
 ];
 
 /// The negative of a picture of bytes.
@@ -131,6 +135,37 @@ fn several_views<B: DrawingBackend>() -> Result<(), Failed> {
     let results: Vec<_> = second.statistics.iter().map(|of_view| of_view.result).collect();
     if results != [Some(1), None, Some(1)] {
         return Err(format!("{:?}", second.statistics).into());
+    }
+    engine.check_no_errors()
+}
+
+fn alone<B: DrawingBackend>() -> Result<(), Failed> {
+    let mut engine = Engine::<B>::new(Negative, HelperSource::whole("picture"), |builder, _| {
+        builder.deferred(Deferred::to_picture())
+    })?;
+    let scheduler = Arc::clone(engine.renderer.scheduler());
+    let late = engine.helper.late_picture_alone("late picture", Format::Rgba8Srgb);
+    let builder = Renderer::builder(B::open(&scheduler)?).process(late).output("late picture");
+    let (mut renderer, submitter) = builder.build(scheduler)?;
+    let mut scene = scene();
+    let mut pictures = Scene::new();
+    pictures.cameras = scene.cameras.clone();
+    let mut before: Option<Picture> = None;
+    for number in 1..=4_u64 {
+        scene.background = Vec3::new(number as f32 * 0.2, 0.5, 1.0 - number as f32 * 0.2);
+        engine.helper.begin_frame(&engine.renderer, &scene.cameras);
+        let submitted = submitter.submit(renderer.record(pictures.as_scene_ref())?)?;
+        let late = B::read(&submitted.submission, 0, "late picture")?;
+        let shown = engine.helper.shown(name_of(&scene));
+        let expected = before.as_ref().map_or_else(|| vec![0; late.bytes.len()], negative_of);
+        if late.bytes != expected || shown != number.checked_sub(1).filter(|number| *number > 0) {
+            return Err(format!("before frame {number}, the picture of {shown:?} is another one").into());
+        }
+        let mut recorded = engine.renderer.record(scene.as_scene_ref())?;
+        engine.helper.read_back(&mut recorded);
+        let submission = engine.submitter.submit(recorded)?.submission;
+        before = Some(B::read(&submission, 0, "picture")?);
+        wait_until("a result", || engine.helper.latest(name_of(&scene)).is_some_and(|(latest, _)| latest == number))?;
     }
     engine.check_no_errors()
 }

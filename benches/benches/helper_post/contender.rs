@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, WgpuSubmission};
 use drawloom::glam::DVec3;
-use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStep, PostHelper};
+use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStatistics, HelperStep, PostHelper};
 use drawloom::process::{
     ClearColor, Declare, Deferred, Draws, Format, FullScreen, PostStep, RenderProcess, ShaderResource, ToneMapping,
 };
@@ -31,10 +31,12 @@ pub enum Kind {
     OnCpuInSameFrame,
     Layer,
     LatePicture,
+    LatePictureAlone,
 }
 
 impl Kind {
-    pub const ALL: [Self; 5] = [Self::Without, Self::OnDevice, Self::OnCpuInSameFrame, Self::Layer, Self::LatePicture];
+    pub const ALL: [Self; 6] =
+        [Self::Without, Self::OnDevice, Self::OnCpuInSameFrame, Self::Layer, Self::LatePicture, Self::LatePictureAlone];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -42,7 +44,8 @@ impl Kind {
             Self::OnDevice => "bloom on the device",
             Self::OnCpuInSameFrame => "bloom on the CPU, waiting",
             Self::Layer => "bloom on a helper, late layer",
-            Self::LatePicture => "grade on a helper, late picture",
+            Self::LatePicture => "grade on a helper, in a later frame",
+            Self::LatePictureAlone => "grade on a helper, before the next frame",
         }
     }
 }
@@ -66,6 +69,7 @@ where
     kind: Kind,
     frames: Frames<B>,
     helper: Option<PostHelper>,
+    presenter: Option<Presenter<B>>,
     world: Moving,
 }
 
@@ -75,15 +79,33 @@ where
     B::Submission: Send,
 {
     Loop(FrameLoop<B>),
-    Waiting(Waiting<B>),
+    Waiting(Renderer<B>, Submitter<B>, Waiting<B>),
+}
+
+/// Draws late pictures, each as soon as it is there.
+struct Presenter<B: Backend> {
+    renderer: Renderer<B>,
+    submitter: Submitter<B>,
+    scene: Scene,
+    /// The number of the frame whose picture was drawn last.
+    latest: u64,
 }
 
 impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
-    /// `open` opens a backend on one device. The second one, whose frames only composite, is for the contender that waits.
-    pub fn new(kind: Kind, open: impl Fn(Kind, bool) -> B, world: Moving) -> Result<Self, Box<dyn Error>> {
+    /// `open` opens a backend: the first one on a device, or one beside the first, whose frames only draw a finished picture.
+    pub fn new(kind: Kind, open: impl Fn(Kind, Option<&B>) -> B, world: Moving) -> Result<Self, Box<dyn Error>> {
         let scheduler = Arc::new(Scheduler::new(2)?);
         let bloom = Bloom::default();
-        let builder = Renderer::builder(open(kind, false));
+        let first = open(kind, None);
+        let second = open(kind, Some(&first));
+        let builder = Renderer::builder(first);
+        let camera = &world.as_scene_ref().cameras[0];
+        let mut scene = Scene::new();
+        scene.cameras = vec![Camera {
+            name: camera.name.clone(),
+            size: camera.size,
+            ..Camera::looking_at("", DVec3::Z, DVec3::ZERO)
+        }];
         let mut helper = None;
         let builder = match kind {
             Kind::Without => builder.deferred(Deferred::to_picture()),
@@ -111,16 +133,31 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
                 let late = helper.late_picture("late picture", Format::Rgba8Srgb);
                 builder.deferred(Deferred::to_picture()).process(late).output("late picture")
             }
+            Kind::LatePictureAlone => {
+                let source = HelperSource::whole("picture");
+                helper = Some(PostHelper::new(Arc::clone(&scheduler), Grade, source));
+                builder.deferred(Deferred::to_picture())
+            }
         };
         let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
-        let frames = match kind {
-            Kind::OnCpuInSameFrame => {
-                let size = world.as_scene_ref().cameras[0].size;
-                Frames::Waiting(Waiting::new((renderer, submitter), open(kind, true), bloom, size, scheduler)?)
+        let (mut presenter, mut waiting) = (None, None);
+        match (kind, &helper) {
+            (Kind::OnCpuInSameFrame, _) => {
+                waiting = Some(Waiting::new(second, bloom, scene, Arc::clone(&scheduler))?);
             }
-            _ => Frames::Loop(FrameLoop::new(renderer, submitter, Buffering::Double)?),
+            (Kind::LatePictureAlone, Some(helper)) => {
+                let late = helper.late_picture_alone("late picture", Format::Rgba8Srgb);
+                let builder = Renderer::builder(second).process(late).output("late picture");
+                let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
+                presenter = Some(Presenter { renderer, submitter, scene, latest: 0 });
+            }
+            _ => {}
+        }
+        let frames = match waiting {
+            Some(waiting) => Frames::Waiting(renderer, submitter, waiting),
+            None => Frames::Loop(FrameLoop::new(renderer, submitter, Buffering::Double)?),
         };
-        Ok(Self { kind, frames, helper, world })
+        Ok(Self { kind, frames, helper, presenter, world })
     }
 
     /// Draws frames, whose update takes so long, and waits for the last one.
@@ -136,11 +173,11 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         let mut samples = Vec::with_capacity(count);
         let frames = match &mut self.frames {
             Frames::Loop(frames) => frames,
-            Frames::Waiting(waiting) => {
+            Frames::Waiting(renderer, submitter, waiting) => {
                 for _ in 0..count {
                     let begun = Instant::now();
                     step(world);
-                    let (finished, step) = waiting.draw(world)?;
+                    let (finished, step) = waiting.draw(renderer, submitter, world)?;
                     samples.push(FrameSample { finished, latency: finished - begun, age: Some(0), step: Some(step) });
                 }
                 return Ok(samples);
@@ -149,12 +186,23 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         let mut finished = Vec::with_capacity(count);
         // Of each frame, its statistics of the helper.
         let mut statistics = Vec::with_capacity(count);
+        // The numbers of the frames whose pictures were drawn alone and of those that were begun by then, and when they are drawn.
+        let mut presented = Vec::new();
         for _ in 0..count {
             let (slot, more) = frames.begin();
             finished.extend(more);
             step(world);
             if let Some(helper) = &self.helper {
-                helper.begin_frame(frames.renderer(), world.as_scene_ref().cameras);
+                let cameras = world.as_scene_ref().cameras;
+                helper.begin_frame(frames.renderer(), cameras);
+                if let (Some(presenter), Some(number)) = (&mut self.presenter, helper.shown(&cameras[0].name))
+                    && number > presenter.latest
+                {
+                    let mut recorded = presenter.renderer.record(presenter.scene.as_scene_ref())?;
+                    presented.push((number, statistics.len(), recorded.fence_at(FramePlace::End)?));
+                    presenter.submitter.submit(recorded)?;
+                    presenter.latest = number;
+                }
             }
             let mut recorded = frames.renderer().record(world.as_scene_ref())?;
             if let Some(helper) = &self.helper {
@@ -177,6 +225,18 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         if let Some(error) = self.helper.as_ref().and_then(|helper| helper.take_errors().into_iter().next()) {
             return Err(error.into());
         }
+        if self.kind == Kind::LatePictureAlone {
+            let first = statistics[0].as_ref().map_or(0, |of_view: &HelperStatistics| of_view.frame);
+            for (number, index, drawn) in presented {
+                drawn.wait(LONG)?;
+                let finished = drawn.set_at().ok_or("it is set")?;
+                let Some(shown) = number.checked_sub(first) else { continue };
+                let latency = finished.saturating_duration_since(times[shown as usize].begun);
+                let step = statistics[index].as_ref().map(|of_view| of_view.latest_took);
+                samples.push(FrameSample { finished, latency, age: Some(first + index as u64 - number), step });
+            }
+            return Ok(samples);
+        }
         for (index, (frame, statistics)) in times.iter().zip(&statistics).enumerate() {
             let age = statistics.as_ref().and_then(|statistics| statistics.age());
             let shown = match (self.kind, age) {
@@ -198,8 +258,6 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
 
 /// Draws a frame, waits for it, computes the step, and composites its result with a second renderer.
 struct Waiting<B: Backend> {
-    renderer: Renderer<B>,
-    submitter: Submitter<B>,
     composition: (Renderer<B>, Submitter<B>),
     compose: Arc<Compose>,
     scene: Scene,
@@ -208,36 +266,33 @@ struct Waiting<B: Backend> {
 }
 
 impl<B: Backend<Submission = WgpuSubmission>> Waiting<B> {
-    fn new(
-        (renderer, submitter): (Renderer<B>, Submitter<B>),
-        second: B,
-        bloom: Bloom,
-        size: [u32; 2],
-        scheduler: Arc<Scheduler>,
-    ) -> Result<Self, Box<dyn Error>> {
+    fn new(second: B, bloom: Bloom, scene: Scene, scheduler: Arc<Scheduler>) -> Result<Self, Box<dyn Error>> {
         let compose = Arc::new(Compose::default());
         let composition = Renderer::builder(second)
             .process(Arc::clone(&compose))
             .process(ToneMapping::default().process("composed", "picture"))
             .output("picture")
             .build(Arc::clone(&scheduler))?;
-        let mut scene = Scene::new();
-        scene.cameras = vec![Camera { size, ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) }];
-        Ok(Self { renderer, submitter, composition, compose, scene, step: Box::new(bloom.on_cpu()), scheduler })
+        Ok(Self { composition, compose, scene, step: Box::new(bloom.on_cpu()), scheduler })
     }
 
     /// Returns when the device was done, and how long the step took with its upload.
-    fn draw(&mut self, world: &Moving) -> Result<(Instant, Duration), Box<dyn Error>> {
-        let mut recorded = self.renderer.record(world.as_scene_ref())?;
+    fn draw(
+        &mut self,
+        renderer: &mut Renderer<B>,
+        submitter: &Submitter<B>,
+        world: &Moving,
+    ) -> Result<(Instant, Duration), Box<dyn Error>> {
+        let mut recorded = renderer.record(world.as_scene_ref())?;
         let source = recorded.read_back_whole(0, "bloom source")?;
         let drawn = recorded.fence_at(FramePlace::End)?;
-        let submitted = self.submitter.submit(recorded)?;
+        let submitted = submitter.submit(recorded)?;
         drawn.wait(LONG)?;
         let start = Instant::now();
         let picture = source.read()?;
         let camera = &world.as_scene_ref().cameras[0];
         let frame = HelperFrame { picture: &picture, camera, number: 1, scheduler: &self.scheduler };
-        let layer = self.renderer.backend().upload_picture(&self.step.compute(&frame))?;
+        let layer = renderer.backend().upload_picture(&self.step.compute(&frame))?;
         let took = start.elapsed();
         let (radiance, _) = submitted.submission.texture(0, "radiance").ok_or("it is an output")?;
         let view = radiance.create_view(&wgpu::TextureViewDescriptor::default());

@@ -18,7 +18,7 @@ use crate::contender::{Contender, FrameSample, Kind};
 
 /// The time of the engine's update.
 const UPDATE: Duration = Duration::from_millis(2);
-/// What the simulated device takes for the step, beside the rest of the frame, and for a frame that only composites.
+/// What the simulated device takes for the step, beside the rest of the frame, and for a frame that only draws a finished picture.
 const STEP_ON_DEVICE: Duration = Duration::from_micros(1_500);
 const COMPOSITION: Duration = Duration::from_micros(200);
 /// The frames of a turn. The first ones are not counted, as the device is idle before them, and the helper has nothing.
@@ -47,14 +47,13 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
             for milliseconds in [2, 10] {
                 let (device, queue) = adapter::noop_device()?;
                 let frame_time = Duration::from_millis(milliseconds);
-                let open = |kind, is_composition| {
+                let open = |kind, first: Option<&SimulatedDevice<WgpuBackend>>| {
                     let backend = WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom");
-                    let time = match (kind, is_composition) {
-                        (_, true) => COMPOSITION,
-                        (Kind::OnDevice, _) => frame_time + STEP_ON_DEVICE,
-                        _ => frame_time,
-                    };
-                    SimulatedDevice::new(backend, time)
+                    match (first, kind) {
+                        (Some(first), _) => first.beside(backend, COMPOSITION),
+                        (None, Kind::OnDevice) => SimulatedDevice::new(backend, frame_time + STEP_ON_DEVICE),
+                        (None, _) => SimulatedDevice::new(backend, frame_time),
+                    }
                 };
                 let device = format!("{milliseconds} ms");
                 rows.extend(of_device(&device, open, if quick { 100 } else { 1_000 }, picture, turns, progress)?);
@@ -62,7 +61,9 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
         }
         BackendName::Adapter => {
             let (device, queue) = adapter::device()?;
-            let open = |_, _| WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom");
+            let open = |_, _: Option<&WgpuBackend>| {
+                WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom")
+            };
             let picture = if quick { [64, 36] } else { [480, 270] };
             rows.extend(of_device("adapter", open, if quick { 50 } else { 1_000 }, picture, turns, progress)?);
         }
@@ -72,7 +73,7 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
 
 fn of_device<B: Backend<Submission = WgpuSubmission>>(
     device: &str,
-    open: impl Fn(Kind, bool) -> B,
+    open: impl Fn(Kind, Option<&B>) -> B,
     boxes: usize,
     picture: [u32; 2],
     turns: usize,

@@ -68,7 +68,8 @@ impl CpuLayer {
         let products = [columns[0] * x, columns[1] * y, columns[2] * z, columns[3] * inverse_distance];
         let projected = products.into_iter().fold(Vector::zero(), |sum, product| sum + product);
         let w = projected[3];
-        if !(w > R::zero()) {
+        let is_in_front = w > R::zero();
+        if !is_in_front {
             return LayerPosition::BehindCamera;
         }
         let clip = Vector([projected[0] / w, projected[1] / w]);
@@ -132,17 +133,18 @@ impl<R: Real> FullScreenCpuShader<R> for LayerCpuShader {
     }
 }
 
-/// `late_picture.wgsl`.
+/// `late_picture.wgsl`, or `late_picture_alone.wgsl` for a process that samples nothing.
 pub(super) struct LatePictureCpuShader {
     pub(super) layers: Vec<CpuLayer>,
 }
 
 impl<R: Real> FullScreenCpuShader<R> for LatePictureCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        let source = pass.sampled[0];
+        let source = pass.sampled.first();
+        let size = source.map_or(pass.view.size, |source| source.size());
         targets[0] = match layer_of(&self.layers, pass) {
-            None => source.load(pixel.coordinates, 0),
-            Some(layer) if SampledTexture::<R>::size(layer) == source.size() => layer.load(pixel.coordinates, 0),
+            None => source.map_or_else(Vector::zero, |source| source.load(pixel.coordinates, 0)),
+            Some(layer) if SampledTexture::<R>::size(layer) == size => layer.load(pixel.coordinates, 0),
             Some(layer) => SampledTexture::<R>::sample_level(layer, position_of_clip(pixel.clip), 0, R::zero()),
         };
         true

@@ -11,8 +11,8 @@ use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, Place, Rend
 pub(super) struct LatePicture {
     pub(super) name: String,
     pub(super) shown: SharedSelection,
-    /// The target that the step computes from.
-    pub(super) source: String,
+    /// The target that the step computes from, if there is one in the same frames.
+    pub(super) source: Option<String>,
     pub(super) target: String,
     pub(super) format: Format,
 }
@@ -23,17 +23,20 @@ impl RenderProcess for LatePicture {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterPostProcessing);
-        declare.samples(&self.source);
+        if let Some(source) = &self.source {
+            declare.at(Place::AfterPostProcessing);
+            declare.samples(source);
+        }
         declare.clears_color(&self.target, self.format, ClearColor::Value([0.0; 4]));
     }
 
     fn draws(&self) -> Draws<'_> {
         let resources = self.shown.resources();
-        let shader = if resources.is_empty() {
-            include_str!("copy.wgsl")
-        } else {
-            concat!(include_str!("layer_lookup.wgsl"), include_str!("late_picture.wgsl"))
+        let shader = match (resources.is_empty(), &self.source) {
+            (false, Some(_)) => concat!(include_str!("layer_lookup.wgsl"), include_str!("late_picture.wgsl")),
+            (false, None) => concat!(include_str!("layer_lookup.wgsl"), include_str!("late_picture_alone.wgsl")),
+            (true, Some(_)) => include_str!("copy.wgsl"),
+            (true, None) => include_str!("nothing.wgsl"),
         };
         Draws::FullScreen(FullScreen { shader, resources, ..FullScreen::default() })
     }

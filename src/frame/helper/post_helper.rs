@@ -76,16 +76,33 @@ impl PostHelper {
     }
 
     /// The process that draws the helper's result, as the whole picture, into a target of this name and format: for
-    /// [`RendererBuilder::process`](crate::RendererBuilder::process). It stands after post-processing.
+    /// [`RendererBuilder::process`](crate::RendererBuilder::process). It stands after post-processing, and draws the source where there is no
+    /// result.
+    ///
+    /// With frames in flight, a frame is recorded before the device has drawn the one before, so its picture is that of two frames before, where
+    /// the device limits the frame rate. [`late_picture_alone`](Self::late_picture_alone) is a frame sooner.
     pub fn late_picture(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
-        let Shared { name, shown, target: source, .. } = &*self.0;
-        LatePicture {
-            name: format!("{name} late"),
-            shown: shown.clone(),
-            source: source.clone(),
-            target: target.into(),
-            format,
-        }
+        self.late_picture_over(Some(self.0.target.clone()), target.into(), format)
+    }
+
+    /// The same, for a renderer of its own on the same device, whose frames are only this picture, and transparent black where there is no
+    /// result (S figure 9.6). The engine begins a frame of the helper with the renderer of the scene, then records and submits the picture with
+    /// this one, if [something is shown](Self::shown), and then the scene of the next frame. So the picture stands in the device's queue before
+    /// that scene, and not behind it: its latency is that of the scene and one frame more.
+    ///
+    /// Its scenes have cameras of the same names and sizes, and need no objects.
+    pub fn late_picture_alone(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
+        self.late_picture_over(None, target.into(), format)
+    }
+
+    fn late_picture_over(&self, source: Option<String>, target: String, format: Format) -> LatePicture {
+        let Shared { name, shown, .. } = &*self.0;
+        LatePicture { name: format!("{name} late"), shown: shown.clone(), source, target, format }
+    }
+
+    /// The number of the frame whose result the current frame shows in a view, by name.
+    pub fn shown(&self, view: &str) -> Option<u64> {
+        self.0.shown.get().result(view).map(|result| result.number)
     }
 
     /// What the current frame shows, for an engine's own shaders: `layer` and `layer_view` of `layer_lookup.wgsl`. Empty before the first frame, and

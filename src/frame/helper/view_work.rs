@@ -26,6 +26,7 @@ pub(super) struct HelperResult {
     pub(super) camera: Camera,
     pub(super) picture: Arc<Picture>,
     /// `None` if the backend has none.
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "no other backend has textures"))]
     pub(super) textures: Option<LayerTextures>,
 }
 

@@ -81,7 +81,10 @@ fn blur_row(source: &[u8], Kernel { threshold, weights }: &Kernel, target: &mut 
     let (start, end) = (radius * CHANNELS, radius * CHANNELS + target.len());
     halves.convert_to_f32_slice(&mut padded[start..end]);
     // The threshold is 0 or more, so infinite radiance becomes the largest half float, and NaN 0.
-    padded[start..end].iter_mut().for_each(|value| *value = (*value - *threshold).max(0.0).min(MAX_HALF));
+    for value in &mut padded[start..end] {
+        let above = *value - *threshold;
+        *value = if above > 0.0 { above.min(MAX_HALF) } else { 0.0 };
+    }
     for distance in 0..radius {
         padded.copy_within(start..start + CHANNELS, distance * CHANNELS);
         padded.copy_within(end - CHANNELS..end, end + distance * CHANNELS);
