@@ -32,6 +32,7 @@
 //!   thread with one, two or three frames in flight.
 //! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
+//! - [`CpuNode`] is work of an engine's own among the jobs of a frame, and [`scene::GeneratedBuffer`] what the same frame draws of it.
 //! - [`timeline`] tells what ran where and when; `report`, behind its feature, why a frame took as long as it did.
 //! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
 //!

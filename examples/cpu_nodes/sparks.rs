@@ -60,7 +60,8 @@ fn spark(number: usize, seconds: f32) -> [f32; 4] {
     let age = seconds - birth - lives * LIFE;
     let random = |salt: u32| random(number as u32, lives as u32 * 4 + salt);
     let (angle, spread) = (random(1) * std::f32::consts::TAU, 1.8 * random(2));
-    let velocity = Vec3::new(angle.cos() * spread, 5.5 + 4.0 * random(3), angle.sin() * spread);
+    let up = 5.5 + (4.0 - spread) * random(3);
+    let velocity = Vec3::new(angle.cos() * spread, up, angle.sin() * spread);
     let start = Vec3::new(SOURCE[0], ground::height(SOURCE[0], SOURCE[1]), SOURCE[1]);
     let mut position = start + velocity * age + Vec3::NEG_Y * (4.9 * age * age);
     // They bounce off the land, and lose height.

@@ -110,13 +110,23 @@ fn a_node_that_fails_or_panics_is_named() {
 
 #[test]
 fn what_is_not_declared_is_not_there() {
-    let node = TestNode::new("spy", |_| (), |frame, _| Ok(drop(frame.visible_objects(0)?)));
+    let node = TestNode::new(
+        "spy",
+        |_| (),
+        |frame, _| {
+            drop(frame.visible_objects(0)?);
+            Ok(())
+        },
+    );
     let error = error_of(&[node]).to_string();
     assert_eq!(error, "spy failed: the node does not declare that it reads Frame(VisibleObjects)");
     let node = TestNode::new(
         "spy",
         |accesses| _ = accesses.reads(FrameData::VisibleObjects),
-        |frame, _| Ok(drop(frame.draw_list("geometry buffer", 0)?)),
+        |frame, _| {
+            drop(frame.draw_list("geometry buffer", 0)?);
+            Ok(())
+        },
     );
     let error = error_of(&[node]).to_string();
     assert_eq!(error, "spy failed: the node does not declare that it reads Frame(DrawLists)");
@@ -132,7 +142,10 @@ fn a_column_is_not_written_after_it_was_read() {
     let late = TestNode::new(
         "late",
         |accesses| _ = accesses.reads(FrameData::VisibleObjects),
-        |_, _| Ok(drop(column.write(1)?)),
+        |_, _| {
+            drop(column.write(1)?);
+            Ok(())
+        },
     );
     let (mut renderer, _submitter) = renderer(2);
     let error = renderer.record_with_nodes(SceneRef { written, ..scene }, &[&late]).map(drop).unwrap_err().to_string();

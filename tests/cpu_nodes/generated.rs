@@ -105,13 +105,23 @@ fn a_buffer_is_filled_as_declared() {
         let half = TestNode::new(
             "half",
             |accesses| _ = accesses.fills(&buffer),
-            |frame, _| Ok(frame.fill(&buffer, 1)?.fill(1)),
+            |frame, _| {
+                frame.fill(&buffer, 1)?.fill(1);
+                Ok(())
+            },
         );
         match renderer.record_with_nodes(scene.as_scene_ref(), &[&half]).map(drop) {
             Err(FrameError::UnfilledBuffer { buffer, chunk: 0 }) => assert_eq!(buffer, "numbers"),
             other => panic!("{other:?}"),
         }
-        let undeclared = TestNode::new("sly", |_| (), |frame, _| Ok(frame.fill(&buffer, 1)?.fill(1)));
+        let undeclared = TestNode::new(
+            "sly",
+            |_| (),
+            |frame, _| {
+                frame.fill(&buffer, 1)?.fill(1);
+                Ok(())
+            },
+        );
         let error = renderer.record_with_nodes(scene.as_scene_ref(), &[&undeclared]).map(drop).unwrap_err().to_string();
         assert!(error.starts_with("sly failed: no node of the frame declares that it fills"), "{error}");
         let both =

@@ -203,7 +203,10 @@ fn nodes_see_what_the_frame_draws() {
         let visible = TestNode::new(
             "visible",
             |accesses| _ = accesses.reads(FrameData::VisibleObjects),
-            |frame, _| Ok(*seen.lock().unwrap() = frame.visible_objects(0)?.collect()),
+            |frame, _| {
+                *seen.lock().unwrap() = frame.visible_objects(0)?.collect();
+                Ok(())
+            },
         );
         let lists = TestNode::new(
             "lists",

@@ -15,8 +15,10 @@ fn spin(time: Duration) {
 }
 
 fn nodes() -> Vec<TestNode<'static>> {
-    let work =
-        |_: &NodeFrame<'_>, items: std::ops::Range<usize>| Ok(items.for_each(|_| spin(Duration::from_micros(300))));
+    let work = |_: &NodeFrame<'_>, items: std::ops::Range<usize>| {
+        items.for_each(|_| spin(Duration::from_micros(300)));
+        Ok(())
+    };
     let mut animation =
         TestNode::new("animation", |accesses| _ = accesses.writes(FrameData::Transforms), work).with_width(8);
     animation.items_per_job = None;

@@ -9,6 +9,7 @@
 #![cfg(unix)]
 
 mod counting_allocator;
+mod nodes;
 mod report;
 mod stack;
 
@@ -16,15 +17,17 @@ use std::env;
 use std::process::Command;
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuSubmission};
 use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
+use drawloom::{CpuNode, Renderer};
+use drawloom_testing::hills::{self, GeneratedHills};
 use drawloom_testing::{adapter, scenes};
 
+use nodes::SeenObjects;
 use report::Report;
 use stack::{Owner, Phase};
 
@@ -47,10 +50,19 @@ fn jobs_of_steady_frames_do_not_allocate() {
 
 fn count_allocations() {
     let show = env::var_os("DRAWLOOM_SHOW_ALLOCATIONS").is_some_and(|value| value == "1");
-    let scenes = [("colonnade", demo::colonnade().unwrap()), ("4 × 2,000 boxes", four_cameras())];
-    for (name, scene) in &scenes {
+    let hills = GeneratedHills::new();
+    let with_nodes = hills::scene(hills.mesh().unwrap()).unwrap();
+    let none: &[&dyn CpuNode] = &[];
+    let (vertices, indices) = hills.nodes(0);
+    let all: &[&dyn CpuNode] = &[&vertices, &indices, &SeenObjects::default()];
+    let scenes = [
+        ("colonnade", demo::colonnade().unwrap(), none),
+        ("4 × 2,000 boxes", four_cameras(), none),
+        ("hills that nodes make", with_nodes, all),
+    ];
+    for (name, scene, nodes) in &scenes {
         for workers in [1, 2] {
-            let rounds = steady_frames(scene, workers);
+            let rounds = steady_frames(scene, nodes, workers);
             // A thread may allocate when it does something for the first time, in any frame. So take the best round.
             let own = |report: &Report| report.allocations_of(Owner::Drawloom, Phase::Jobs);
             let report = rounds.into_iter().min_by_key(own).unwrap();
@@ -64,7 +76,7 @@ fn count_allocations() {
 }
 
 /// The allocations of several rounds of frames.
-fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
+fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Vec<Report> {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let (device, queue) = adapter::noop_device().unwrap();
     // Fixed strategies, because a trial of the tuner allocates once.
@@ -78,7 +90,7 @@ fn steady_frames(scene: &Scene, workers: usize) -> Vec<Report> {
         Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {
         counting_allocator::count(is_counted);
-        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), nodes).unwrap();
         let submission: WgpuSubmission = submitter.submit(recorded).unwrap().submission;
         counting_allocator::count(false);
         submission.wait().unwrap();
