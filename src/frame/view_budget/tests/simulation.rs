@@ -118,8 +118,6 @@ impl Simulation {
                 commands: 0,
                 batches: 0,
                 bundles: 0,
-                pieces: 0,
-                objects_of_pieces: 0,
                 culled_triangles: CulledTriangles::default(),
                 levels_of_detail: None,
             });
