@@ -93,11 +93,14 @@ fn of_device<B: Backend<Submission = WgpuSubmission>>(
 
 fn row(device: &str, kind: Kind, turns: &[Vec<FrameSample>]) -> Row {
     let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
-    let samples = || turns.iter().flat_map(|turn| turn.iter().skip(FIRST_FRAMES));
+    // On a machine that is busy, a turn may have few late pictures.
+    let first_of = |turn: &[FrameSample]| FIRST_FRAMES.min(turn.len() / 2);
+    let samples = || turns.iter().flat_map(|turn| &turn[first_of(turn)..]);
     // Over a whole turn, because frames that finish together have no time between them.
     let frame = |turn: &Vec<FrameSample>| {
-        let (first, last) = (&turn[FIRST_FRAMES], &turn[turn.len() - 1]);
-        milliseconds(last.finished - first.finished) / (turn.len() - 1 - FIRST_FRAMES) as f64
+        let counted = &turn[first_of(turn)..];
+        let [first, .., last] = counted else { return f64::NAN };
+        milliseconds(last.finished - first.finished) / (counted.len() - 1) as f64
     };
     let latencies = || samples().map(|sample| milliseconds(sample.latency));
     let ages: Vec<_> = samples().filter_map(|sample| sample.age).map(|age| age as f64).collect();
@@ -105,7 +108,7 @@ fn row(device: &str, kind: Kind, turns: &[Vec<FrameSample>]) -> Row {
     Row {
         device: device.to_owned(),
         name: kind.name(),
-        frame_ms: median(turns.iter().map(frame)),
+        frame_ms: median(turns.iter().map(frame).filter(|time| time.is_finite())),
         latency_ms: median(latencies()),
         latency_99_ms: percentile(99, latencies()),
         age: (!ages.is_empty()).then(|| ages.iter().sum::<f64>() / ages.len() as f64),

@@ -93,8 +93,12 @@ impl WgpuReadBack {
         let lost = |error: wgpu::MapRangeError| BackendError::DeviceLost { message: error.to_string() };
         let padded = self.buffer.get_mapped_range(..).map_err(lost)?;
         let ([width, height], format) = (self.size, self.format);
-        let rows = padded.chunks_exact(padded_row(width, format));
-        let bytes = rows.flat_map(|row| &row[..width as usize * format.bytes()]).copied().collect();
+        let row_length = width as usize * format.bytes();
+        let mut bytes = Vec::with_capacity(row_length * height as usize);
+        // A row at a time, which is several times as fast as byte by byte.
+        for row in padded.chunks_exact(padded_row(width, format)) {
+            bytes.extend_from_slice(&row[..row_length]);
+        }
         Ok(Picture { width, height, format, bytes })
     }
 }

@@ -1,11 +1,11 @@
 //! Post-processing on a helper (S 9.7, figure 9.6): idle workers of the CPU compute a step of post-processing from a frame that the device
-//! has drawn, while the device draws the next one. The frame rate stays, and what the step adds to the picture is a frame late.
+//! has drawn, while the device draws the next one. The frame rate stays, and what the step adds to the picture is late by a frame or more.
 //!
 //! ```text
-//!  device    │ frame 1 │ frame 2 │ frame 3 │
-//!            └─pixels─┐ ▲
-//!  helper             │step of 1│step of 2│        what frame 2 may show of frame 1, if the step is done when frame 2 is recorded,
-//!                     └────┴────▲                  and frame 3 otherwise
+//!  device    │ scene 1   │ scene 2 │ late picture 1 │ scene 3 ...
+//!            └─pixels─┐            ▲
+//!  helper             │ step of 1 ─┘          a frame takes a result when it begins to be recorded: with frames
+//!                                           in flight, scene 3 is the first that can show a layer of scene 1
 //! ```
 //!
 //! Data flows one way, and each piece has one owner. The frame owns the target that is read back; the device's copy of it goes to the
@@ -15,8 +15,9 @@
 //!
 //! There are two ways to use a result:
 //!
-//! - [`PostHelper::late_picture`]: the whole picture comes from the helper. It is exact, and that of an earlier frame: one frame more of
-//!   latency.
+//! - [`PostHelper::late_picture`]: the whole picture comes from the helper. It is exact, and that of an earlier frame.
+//!   [`PostHelper::late_picture_alone`] draws it in a frame of its own, which stands before the next scene in the device's queue: one frame more of
+//!   latency, as in the figure.
 //! - [`PostHelper::layer`]: the step computes a layer, such as a glow or ambient occlusion, which is composited over the current picture.
 //!   Only the layer is late. [Reprojection](HelperLayer::reprojection) looks it up where the surface of each pixel was in the frame that the
 //!   layer is of, by the cameras of both and the current depth.

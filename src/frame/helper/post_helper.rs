@@ -24,14 +24,15 @@ use crate::task::Scheduler;
 /// | | what a frame shows |
 /// | --- | --- |
 /// | before the first result | no layer; of a late picture, the frame's own source |
-/// | the step is done before the next frame is recorded | the result of the frame before |
+/// | the step is done before the next frame begins | the result of the frame before |
+/// | frames are in flight, and the device limits their rate | that of two frames before: a frame begins before the one before it is drawn |
 /// | the step takes longer | the newest result, however old; of the sources that arrive meanwhile the newest is computed next |
 /// | a view has another size, or comes back | as before the first result |
 /// | the step panics, or the device refuses | the newest result before that, and [an error](Self::take_errors) |
 /// | the backend is replaced | as before the first result |
 ///
-/// With [`Buffering::SameFrame`](crate::Buffering::SameFrame) nothing overlaps that is worth it: the device is done before the next frame
-/// begins, so the result of the frame before is there only if the step takes less time than the engine's update.
+/// With [`Buffering::SameFrame`](crate::Buffering::SameFrame) the device is done before the next frame begins, so the step has the time of the
+/// engine's update to be one frame late.
 ///
 /// Call `begin_frame` before [`Renderer::prepare_pipelines`], too: until the first call the helper has no textures, and its processes other shaders.
 ///
