@@ -28,17 +28,17 @@ pub fn vertex(frame: usize, index: usize) -> Vertex {
     Vertex { position: [x, height(x, z, frame), z], normal: normal.to_array(), uv: [0.0; 2] }
 }
 
-/// An index of the hills in a frame: odd ones have a hole in the first row.
-pub fn index(frame: usize, index: usize) -> u32 {
-    let (square, corner) = (index / 6 + if frame.is_multiple_of(2) { 0 } else { HOLE }, index % 6);
+/// An index of the hills.
+pub fn index(index: usize) -> u32 {
+    let (square, corner) = (index / 6, index % 6);
     let [row, column] = [square / (SIDE - 1), square % (SIDE - 1)];
     let first = row * SIDE + column;
     [first, first + SIDE, first + 1, first + 1, first + SIDE, first + SIDE + 1][corner] as u32
 }
 
-const HOLE: usize = 10;
+const HOLE: usize = 50;
 
-/// The number of indices in a frame.
+/// The number of indices in a frame: odd ones lack the last squares.
 pub fn index_count(frame: usize) -> usize {
     if frame.is_multiple_of(2) { INDICES } else { INDICES - 6 * HOLE }
 }
@@ -49,7 +49,7 @@ pub fn index_count(frame: usize) -> usize {
 /// None.
 pub fn mesh(frame: usize) -> Result<Mesh, SceneError> {
     let vertices = (0..SIDE * SIDE).map(|index| vertex(frame, index)).collect();
-    let indices = (0..index_count(frame)).map(|number| index(frame, number)).collect();
+    let indices = (0..index_count(frame)).map(|number| index(number)).collect();
     Mesh::new("hills", Topology::TriangleList, vertices, indices)
 }
 
@@ -139,7 +139,7 @@ impl CpuNode for MakeIndices<'_> {
             let numbers = self.hills.indices.chunk_range(chunk);
             for (number, made) in numbers.zip(&mut *frame.fill(&self.hills.indices, chunk)?) {
                 // What is behind the count is not read.
-                *made = if number < index_count(self.frame) { index(self.frame, number) } else { 7 };
+                *made = if number < index_count(self.frame) { index(number) } else { 7 };
             }
             if chunk == 0 {
                 frame.set_count(&self.hills.indices, index_count(self.frame))?;
