@@ -11,6 +11,7 @@ pub(super) struct TextureLayers {
     texture: Option<wgpu::Texture>,
     /// By layer.
     is_used: Vec<bool>,
+    free_count: usize,
 }
 
 impl TextureLayers {
@@ -18,12 +19,14 @@ impl TextureLayers {
     pub(super) fn take(&mut self) -> Option<u32> {
         let free = self.is_used.iter().position(|is_used| !is_used)?;
         self.is_used[free] = true;
+        self.free_count -= 1;
         Some(free as u32)
     }
 
     /// Makes a layer free.
     pub(super) fn free(&mut self, layer: u32) {
         if let Some(is_used) = self.is_used.get_mut(layer as usize) {
+            self.free_count += usize::from(*is_used);
             *is_used = false;
         }
     }
@@ -33,7 +36,7 @@ impl TextureLayers {
     }
 
     pub(super) fn free_count(&self) -> usize {
-        self.is_used.iter().filter(|is_used| !**is_used).count()
+        self.free_count
     }
 
     pub(super) fn texture(&self) -> Option<&wgpu::Texture> {
@@ -63,7 +66,7 @@ impl TextureLayers {
             queue.submit([encoder.finish()]);
         }
         let is_used = (0..layers as usize).map(|layer| layer < live.len()).collect();
-        *self = Self { texture: Some(texture), is_used };
+        *self = Self { texture: Some(texture), is_used, free_count: layers as usize - live.len() };
     }
 }
 

@@ -49,6 +49,18 @@ impl UploadJobs {
         !self.state.lock().waiting.is_empty()
     }
 
+    /// Drops what waits for a job, and is not current any more.
+    pub(super) fn drop_stale(&self, is_current: impl Fn(&Upload) -> bool) {
+        let stale: VecDeque<_> = {
+            let mut state = self.state.lock();
+            let (current, stale) = std::mem::take(&mut state.waiting).into_iter().partition(is_current);
+            state.waiting = current;
+            stale
+        };
+        // Not under the lock.
+        drop(stale);
+    }
+
     /// The bytes of what waits for a job, whether a part of it is uploaded already or not.
     pub(super) fn waiting_bytes(&self) -> u64 {
         self.state.lock().waiting.iter().map(Upload::bytes).sum()
@@ -89,7 +101,8 @@ impl UploadJobs {
 }
 
 impl Upload {
-    fn bytes(&self) -> u64 {
+    /// All that it uploads.
+    pub(super) fn bytes(&self) -> u64 {
         match self {
             Self::Mesh(mesh) => mesh.bytes(),
             Self::Texture(texture) => texture.bytes(),
