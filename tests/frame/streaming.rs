@@ -376,6 +376,85 @@ fn textures_of_several_sizes_share_their_budget() {
 }
 
 #[test]
+fn textures_beyond_the_device_s_layers_are_told_as_that_and_others_make_no_room_in_vain() {
+    let layers = adapter::noop_device().unwrap().0.limits().max_texture_array_layers;
+    let budget = StreamingBudget {
+        texture_bytes: 1 << 30,
+        upload_bytes_per_frame: 64 << 20,
+        upload_time_per_frame: Duration::from_secs(100),
+        ..budget(1 << 20)
+    };
+    let mut world = World::new(1, budget);
+    let mesh = world.meshes[0];
+    let mut add = |side: u32, place: f64| {
+        let texture = Texture::new("plain", side, side, vec![200; (side * side * 4) as usize]).unwrap();
+        let texture = world.scene.add(texture).unwrap();
+        let material = world.scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
+        world.scene.add_object(RenderObject::new(mesh, material, DVec3::X * place * 10.0)).unwrap();
+    };
+    (0..4).for_each(|_| add(512, 0.0));
+    (0..layers + 3).for_each(|number| add(1, 100.0 + f64::from(number) * 0.0001));
+    world.frames(4);
+    world.look_at(100.0);
+    world.frames(8);
+    let (statistics, streaming) = world.frame();
+    let told = |reason| statistics.rejections.iter().find(|told| told.reason == reason).map(|told| told.count);
+    assert_eq!(told(RejectionReason::TextureLimit), Some(3), "{:?}", statistics.rejections);
+    assert_eq!(told(RejectionReason::TextureNotResident), Some(3), "{:?}", statistics.rejections);
+    assert_eq!((streaming.over_budget, streaming.evictions, streaming.textures), (0, 0, layers as usize + 4));
+}
+
+#[test]
+fn a_mesh_that_is_replaced_while_the_budget_is_full_is_drawn_in_every_frame() {
+    let budget = StreamingBudget { upload_bytes_per_frame: StreamingBudget::MIN_UPLOAD_BYTES, ..budget(1 << 20) };
+    let mut world = World::new(40, budget);
+    let replaced = world.add(sized_mesh("first", 6_000), 5.0);
+    world.look_at(5.0);
+    assert!(world.frames_until_complete(40) < 40);
+    for (number, vertices) in [6_500, 4_000, 7_000, 100, 8_000].into_iter().enumerate() {
+        world.frames(60);
+        assert!(world.statistics().requested > 0, "the budget is full");
+        world.scene.replace(replaced, sized_mesh(&number.to_string(), vertices)).unwrap();
+        let uploaded = world.statistics().uploaded_bytes;
+        let frames = (0..40).take_while(|_| {
+            assert_eq!(world.missing(), 0, "{number}");
+            world.statistics().wanted + world.statistics().in_flight > 0
+        });
+        assert!(frames.count() < 40);
+        // Small ones are uploaded by the frame, if there is room.
+        assert!(vertices < 1_000 || world.statistics().uploaded_bytes - uploaded >= vertices as u64 * 32);
+    }
+}
+
+#[test]
+fn a_mesh_that_is_replaced_in_every_frame_keeps_up() {
+    let budget = StreamingBudget { upload_bytes_per_frame: 1 << 20, ..budget(1 << 20) };
+    let mut world = World::new(40, budget);
+    let replaced = world.add(sized_mesh("first", 6_000), 5.0);
+    world.look_at(5.0);
+    assert!(world.frames_until_complete(40) < 40);
+    world.frames(60);
+    let before = world.statistics().uploaded_bytes;
+    for frame in 0..30 {
+        world.scene.replace(replaced, sized_mesh(&frame.to_string(), 7_000 + frame)).unwrap();
+        assert_eq!(world.missing(), 0);
+    }
+    assert!(world.statistics().uploaded_bytes - before > 10 * 7_000 * 32);
+}
+
+#[test]
+fn a_mesh_that_has_no_room_beside_the_one_it_replaces_takes_its_place() {
+    let mut world = World::new(0, budget(StreamingBudget::MIN_BYTES));
+    let replaced = world.add(sized_mesh("first", 20_000), 0.0);
+    assert!(world.frames_until_complete(40) < 40);
+    world.scene.replace(replaced, sized_mesh("second", 25_000)).unwrap();
+    world.frame();
+    world.frame();
+    assert!(world.frames_until_complete(40) < 40);
+    assert_eq!((world.statistics().evictions, world.statistics().requested), (1, 0));
+}
+
+#[test]
 fn a_texture_that_goes_before_it_is_on_the_device_is_told_as_gone() {
     let mut world = World::new(1, budget(8 << 20));
     let texture = Texture::new("gone", 2, 2, vec![255; 16]).unwrap();

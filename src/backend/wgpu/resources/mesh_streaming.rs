@@ -291,3 +291,20 @@ impl MeshCache {
         self.in_flight.len()
     }
 }
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::scene::{Topology, Vertex};
+
+    #[test]
+    fn a_mesh_is_too_large_for_the_budget_or_for_the_largest_buffer_by_name() {
+        let mesh = Mesh::new("sheet", Topology::TriangleList, vec![Vertex::default(); 100], vec![0; 300]).unwrap();
+        let cache = MeshCache::default();
+        let too_large = |bytes, limit, allowed| Some(Unplaced::TooLarge { bytes, limit, allowed });
+        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3200), None);
+        assert_eq!(cache.exceeded_limit(&mesh, 4399, 3200), too_large(4400, "mesh_bytes", 4399));
+        // Vertices and indices have buffers of their own.
+        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3199), too_large(3200, "max_buffer_size", 3199));
+    }
+}

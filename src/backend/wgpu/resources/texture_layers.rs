@@ -103,8 +103,13 @@ pub(super) fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::
 }
 
 /// The size of a layer with all mip levels, in bytes.
-pub(crate) fn layer_bytes(side: u32) -> u64 {
-    (0..=side.ilog2()).map(|level| u64::from(side >> level).pow(2) * 4).sum()
+pub(crate) const fn layer_bytes(side: u32) -> u64 {
+    let (mut bytes, mut level) = (0, side as u64);
+    while level > 0 {
+        bytes += level * level * 4;
+        level /= 2;
+    }
+    bytes
 }
 
 /// Uploads a texture with all mip levels.

@@ -11,12 +11,22 @@ use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::handle::Handle;
 use crate::scene::{Assets, Texture};
 
-/// The device that arrays are on, and what all of them may take, in bytes.
+/// The device that arrays are on, and what they may take there.
 #[derive(Clone, Copy)]
 pub(crate) struct ArrayBudget<'a> {
-    pub(crate) device: &'a wgpu::Device,
-    pub(crate) uploads: &'a UploadQueue,
-    pub(crate) bytes: u64,
+    device: &'a wgpu::Device,
+    uploads: &'a UploadQueue,
+    /// Of all arrays.
+    bytes: u64,
+    /// Of each array.
+    max_layers: u64,
+}
+
+impl<'a> ArrayBudget<'a> {
+    /// So many bytes, and what the device allows.
+    pub(crate) fn new(device: &'a wgpu::Device, uploads: &'a UploadQueue, bytes: u64) -> Self {
+        Self { device, uploads, bytes, max_layers: u64::from(device.limits().max_texture_array_layers) }
+    }
 }
 
 /// How much an array must gain, or give up, before it is copied for it.
@@ -109,7 +119,7 @@ impl TextureArrays {
             *evictions += self.evict_for(index, budget, Copying::AnyTime, candidates());
             found = self.take_layer(index, budget, Copying::AnyTime);
         }
-        if found == Err(Unplaced::Full) && self.arrays[index].capacity() as u64 == budget.max_layers() {
+        if found == Err(Unplaced::Full) && self.arrays[index].capacity() as u64 == budget.max_layers {
             found = Err(Unplaced::LayerLimit);
         }
         self.placed(found?)
@@ -138,7 +148,7 @@ impl TextureArrays {
     /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what they do not use.
     fn grow(&mut self, index: usize, budget: ArrayBudget<'_>, copying: Copying) -> Result<(), Unplaced> {
         let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.arrays[index].capacity() as u64);
-        let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers());
+        let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers);
         let growth = copying.min_growth(capacity).min(wanted - capacity);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
         if growth == 0 || self.surplus_bytes(index, copying, |_| 0) + rest < growth * bytes {
@@ -182,8 +192,8 @@ impl TextureArrays {
         candidates: impl Iterator<Item = u32>,
     ) -> usize {
         let capacity = self.arrays[index].capacity() as u64;
-        let may_grow = capacity < budget.max_layers();
-        let needed = copying.min_growth(capacity).min(budget.max_layers() - capacity) * layer_bytes(ARRAY_SIDES[index]);
+        let may_grow = capacity < budget.max_layers;
+        let needed = copying.min_growth(capacity).min(budget.max_layers - capacity) * layer_bytes(ARRAY_SIDES[index]);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
         let (mut counts, mut chosen) = ([0; ARRAY_SIDES.len()], Vec::new());
         for slot in candidates {
@@ -300,11 +310,108 @@ impl TextureArrays {
     }
 }
 
-impl ArrayBudget<'_> {
-    fn max_layers(self) -> u64 {
-        u64::from(self.device.limits().max_texture_array_layers)
-    }
-}
-
 /// The layers of a new array, if the budget allows.
 const MIN_LAYERS: u64 = 8;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+
+    /// Arrays, and the textures in them, those that were used longest ago first.
+    struct Arrays {
+        arrays: TextureArrays,
+        assets: Assets,
+        device: wgpu::Device,
+        uploads: UploadQueue,
+        by_use: Vec<u32>,
+    }
+
+    const LAYER: u64 = layer_bytes(ARRAY_SIDES[0]);
+    /// A layer of 512 takes four bytes more than four of 256.
+    const SLACK: u64 = 64;
+
+    impl Arrays {
+        fn new() -> Self {
+            let (device, queue) = noop_device();
+            let (arrays, uploads) = (TextureArrays::default(), UploadQueue::new(queue));
+            Self { arrays, assets: Assets::default(), device, uploads, by_use: Vec::new() }
+        }
+
+        /// Places a new texture, which is on the device at once; the first `candidates` by use may make room.
+        fn place(&mut self, side: u32, (layers, max_layers): (u64, u64), candidates: usize) -> Result<usize, Unplaced> {
+            let texture = Texture::new("plain", side, side, vec![255; (side * side * 4) as usize]).unwrap();
+            let handle = self.assets.add(texture.clone()).unwrap();
+            self.arrays.begin_streamed_frame(&self.assets);
+            let (device, uploads) = (&self.device, &self.uploads);
+            let budget = ArrayBudget { device, uploads, bytes: layers * LAYER + SLACK, max_layers };
+            let (by_use, mut evictions) = (self.by_use[..candidates].to_vec(), 0);
+            let mut placed = self.arrays.place_beside(&texture, budget);
+            if matches!(placed, Err(Unplaced::Full)) {
+                placed = self.arrays.place_instead(&texture, budget, || by_use.iter().copied(), &mut evictions);
+            }
+            self.by_use.retain(|slot| self.arrays.is_resident(*slot));
+            let (location, _) = placed.inspect_err(|_| assert_eq!(evictions, 0, "nothing is evicted in vain"))?.target;
+            assert!(self.arrays.resident_bytes() <= budget.bytes);
+            let (_, revision, _) = self.assets.textures.entry(handle.index()).unwrap();
+            let epoch = self.arrays.begin_upload(handle, location);
+            let end = self.arrays.end_upload(&epoch, (handle, revision), location, (&self.assets, true));
+            assert_eq!(end, EndOfUpload::Resident);
+            self.by_use.push(handle.index());
+            Ok(evictions)
+        }
+    }
+
+    #[test]
+    fn at_the_limit_of_layers_only_textures_of_the_same_array_make_room() {
+        let mut arrays = Arrays::new();
+        let limits = (1000, 8);
+        // The larger ones were used longest ago.
+        for side in [512, 512, 512, 16, 16, 16, 16, 16, 16, 16, 16] {
+            assert_eq!(arrays.place(side, limits, 0), Ok(0));
+        }
+        assert_eq!(arrays.place(16, limits, 3), Err(Unplaced::LayerLimit), "larger ones would make room in vain");
+        assert_eq!(arrays.place(512, limits, 0), Ok(0), "the other array is not at its limit");
+        assert_eq!(arrays.place(16, limits, 4), Ok(1));
+        assert_eq!(arrays.by_use[..4], [0, 1, 2, 4], "the oldest one of its array");
+    }
+
+    #[test]
+    fn where_the_budget_is_full_too_few_candidates_make_no_room() {
+        let mut arrays = Arrays::new();
+        let limits = (8, 256);
+        for _ in 0..8 {
+            assert_eq!(arrays.place(16, limits, 0), Ok(0));
+        }
+        // One of 512 takes the room of four of 256.
+        assert_eq!(arrays.place(512, limits, 3), Err(Unplaced::Full));
+        assert_eq!(arrays.place(512, limits, 5), Ok(4));
+        assert_eq!(
+            arrays.place(2048, limits, 5),
+            Err(Unplaced::TooLarge { bytes: layer_bytes(2048), limit: "texture_bytes", allowed: 8 * LAYER + SLACK })
+        );
+    }
+
+    #[test]
+    fn arrays_that_grow_and_shrink_in_turn_are_copied_seldom() {
+        let mut arrays = Arrays::new();
+        let mut random = fastrand::Rng::with_seed(4);
+        let limits = (256, 2048);
+        let (mut placed, mut share) = (0, 0.5);
+        let mut after_filling = 0;
+        for step in 0..1200 {
+            if step % 50 == 0 {
+                // What is in sight has other sizes than before.
+                share = random.f64();
+            }
+            if step == 200 {
+                after_filling = arrays.arrays.moves();
+            }
+            let side = if random.f64() < share { 512 } else { 256 };
+            placed += usize::from(arrays.place(side, limits, arrays.by_use.len()).is_ok());
+        }
+        assert_eq!(placed, 1200);
+        let moves = arrays.arrays.moves() - after_filling;
+        assert!(moves < 150, "{moves} copies of arrays for 1000 textures");
+    }
+}

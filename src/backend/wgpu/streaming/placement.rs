@@ -123,7 +123,7 @@ impl<'a, 'b> Placement<'a, 'b> {
             return Err(refused);
         }
         let textures = &mut on_device.materials.textures;
-        let budget = ArrayBudget { device: on_device.device, uploads: on_device.uploads, bytes: budget };
+        let budget = ArrayBudget::new(on_device.device, on_device.uploads, budget);
         let mut placed = textures.place_beside(texture, budget);
         if matches!(placed, Err(Unplaced::Full)) {
             let victims = self.texture_victims.get_or_insert_with(|| uses.texture_victims(textures));

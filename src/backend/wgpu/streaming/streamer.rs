@@ -21,7 +21,7 @@ use crate::backend::wgpu::resources::{
 };
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
-use crate::view::{RejectionReason, Rejections};
+use crate::view::{RejectionReason, Rejections, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
 ///
@@ -85,7 +85,7 @@ impl Streamer {
             latest.held.retain(|held| on_device.is_current(&held.upload));
             self.jobs.drop_stale(|upload| on_device.is_current(upload));
         }
-        self.take_over(&mut on_device, request, &latest.frame_use)?;
+        self.take_over(&mut on_device, (assets, request.objects.used_meshes()), &latest.frame_use)?;
         self.place(&mut on_device, (assets, request.rejections), latest)?;
         let Latest { frame_use, statistics, held, .. } = latest;
         latest.warning.update(statistics.over_budget);
@@ -128,10 +128,9 @@ impl Streamer {
     fn take_over(
         &self,
         on_device: &mut OnDevice<'_>,
-        request: &FrameRequest<'_>,
+        (assets, used): (&Assets, &UsedMeshes),
         frame_use: &FrameUse,
     ) -> Result<(), BackendError> {
-        let (assets, used) = (request.scene.assets, request.objects.used_meshes());
         let mut outcome = Ok(());
         for (upload, result) in self.jobs.take_finished() {
             let is_complete = result.is_ok();
@@ -238,5 +237,50 @@ impl BudgetWarning {
             let count = over_budget;
             tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
         }
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::iter;
+
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::resources::MeshCache;
+    use crate::scene::{Mesh, Topology, Vertex};
+
+    #[test]
+    fn an_error_of_an_upload_to_pages_that_are_gone_is_nobodys() {
+        let (device, queue) = noop_device();
+        let (streamer, uploads) = (Streamer::new(StreamingBudget::default()), UploadQueue::new(queue));
+        let (mut assets, used) = (Assets::default(), UsedMeshes::default());
+        let mesh = Mesh::new("leaf", Topology::TriangleList, vec![Vertex::default(); 3], vec![0, 1, 2]).unwrap();
+        let handle = assets.add(mesh.clone()).unwrap();
+        for was_cleared in [true, false] {
+            let (mut meshes, mut materials) = (MeshCache::default(), MaterialCache::default());
+            let placed = meshes.place(&device, &mesh, 1 << 20, iter::empty(), &mut 0).unwrap().ok().unwrap();
+            let upload = MeshUpload::new(meshes.begin_upload(0), (handle, 1), mesh.clone(), placed.target);
+            let error = BackendError::OutOfMemory { label: "a leaf".to_owned() };
+            streamer.jobs.end(Upload::Mesh(upload), Err(error));
+            if was_cleared {
+                meshes = MeshCache::default();
+            }
+            let (device, uploads) = (&device, &uploads);
+            let mut on_device = OnDevice { device, uploads, meshes: &mut meshes, materials: &mut materials };
+            let outcome = streamer.take_over(&mut on_device, (&assets, &used), &FrameUse::default());
+            assert_eq!(outcome.is_ok(), was_cleared);
+        }
+    }
+
+    #[test]
+    fn what_exceeds_the_budget_in_some_frames_is_told_once_until_it_did_not_for_long() {
+        let mut warning = BudgetWarning::default();
+        let told = |warning: &BudgetWarning| warning.was_told;
+        for frame in 0..5000 {
+            warning.update(usize::from(frame % 7 == 0));
+            assert!(told(&warning), "it is not told again");
+        }
+        (0..BudgetWarning::FRAMES_WITHIN).for_each(|_| warning.update(0));
+        assert!(!told(&warning));
     }
 }

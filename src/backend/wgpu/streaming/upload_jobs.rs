@@ -44,6 +44,12 @@ impl UploadJobs {
         std::mem::take(&mut self.state.lock().finished)
     }
 
+    /// Ends an upload as a job does.
+    #[cfg(test)]
+    pub(super) fn end(&self, upload: Upload, result: Result<(), BackendError>) {
+        self.state.lock().finished.push((upload, result));
+    }
+
     /// Whether something waits for a job.
     pub(super) fn has_work(&self) -> bool {
         !self.state.lock().waiting.is_empty()
