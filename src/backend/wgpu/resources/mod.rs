@@ -58,7 +58,7 @@ pub(crate) use subdivided_mesh::SubdividedMesh;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
 pub(crate) use target_texture::sample_count;
 pub(crate) use texture_arrays::{TextureArrays, TextureLocation};
-pub(crate) use texture_layers::{layer_bytes, write_rows};
+pub(crate) use texture_layers::{copy_rows, layer_bytes};
 pub(crate) use texture_streaming::ArrayBudget;
 pub(crate) use upload_queue::UploadQueue;
 pub(crate) use vertex_layout::{vertex_attributes, vertex_stride};

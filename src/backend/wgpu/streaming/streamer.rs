@@ -131,8 +131,12 @@ impl Streamer {
         (assets, used): (&Assets, &UsedMeshes),
         frame_use: &FrameUse,
     ) -> Result<(), BackendError> {
+        let (finished, commands) = self.jobs.take_finished();
+        if !commands.is_empty() {
+            on_device.uploads.queue().submit(commands);
+        }
         let mut outcome = Ok(());
-        for (upload, result) in self.jobs.take_finished() {
+        for (upload, result) in finished {
             let is_complete = result.is_ok();
             let end = match upload {
                 Upload::Mesh(MeshUpload { epoch, handle, revision, mesh, target, .. }) => {

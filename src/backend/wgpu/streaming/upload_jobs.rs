@@ -1,6 +1,7 @@
 //! What background jobs upload.
 
 use std::collections::VecDeque;
+use std::mem;
 use std::time::Instant;
 
 use parking_lot::Mutex;
@@ -30,6 +31,8 @@ pub(super) struct UploadJobs {
 struct State {
     waiting: VecDeque<Upload>,
     finished: Vec<(Upload, Result<(), BackendError>)>,
+    /// What the device has to execute before what is finished is there.
+    commands: Vec<wgpu::CommandBuffer>,
     uploaded_bytes: u64,
 }
 
@@ -39,9 +42,10 @@ impl UploadJobs {
         self.state.lock().waiting.extend(uploads);
     }
 
-    /// What was uploaded, or could not be.
-    pub(super) fn take_finished(&self) -> Vec<(Upload, Result<(), BackendError>)> {
-        std::mem::take(&mut self.state.lock().finished)
+    /// What was uploaded, or could not be, once the device has executed the commands.
+    pub(super) fn take_finished(&self) -> (Vec<(Upload, Result<(), BackendError>)>, Vec<wgpu::CommandBuffer>) {
+        let mut state = self.state.lock();
+        (mem::take(&mut state.finished), mem::take(&mut state.commands))
     }
 
     /// Ends an upload as a job does.
@@ -59,7 +63,7 @@ impl UploadJobs {
     pub(super) fn drop_stale(&self, is_current: impl Fn(&Upload) -> bool) {
         let stale: VecDeque<_> = {
             let mut state = self.state.lock();
-            let (current, stale) = std::mem::take(&mut state.waiting).into_iter().partition(is_current);
+            let (current, stale) = mem::take(&mut state.waiting).into_iter().partition(is_current);
             state.waiting = current;
             stale
         };
@@ -87,16 +91,25 @@ impl UploadJobs {
             let Some(mut upload) = next else { break };
             let before = allowance.bytes();
             let advance = || match &mut upload {
-                Upload::Mesh(mesh) => mesh.advance(device, uploads, &mut allowance),
-                Upload::Texture(texture) => Ok(texture.advance(uploads, &mut allowance)),
+                Upload::Mesh(mesh) => Ok((mesh.advance(device, uploads, &mut allowance)?, None)),
+                Upload::Texture(texture) => {
+                    let (is_complete, commands) = texture.advance(device, uploads, &mut allowance)?;
+                    Ok((is_complete, Some(commands)))
+                }
             };
             let label = "a streamed mesh or texture";
             let advanced = with_error_scope(device, label, || catch_wgpu_panic(label, advance)).flatten().flatten();
             let mut state = self.state.lock();
             state.uploaded_bytes += before - allowance.bytes();
             match advanced {
-                Ok(true) => state.finished.push((upload, Ok(()))),
-                Ok(false) => state.waiting.push_front(upload),
+                Ok((is_complete, commands)) => {
+                    state.commands.extend(commands);
+                    if is_complete {
+                        state.finished.push((upload, Ok(())));
+                    } else {
+                        state.waiting.push_front(upload);
+                    }
+                }
                 Err(error) => state.finished.push((upload, Err(error))),
             }
             if allowance.is_over() || matches!(state.waiting.front(), Some(next) if !next.can_advance(&allowance)) {
