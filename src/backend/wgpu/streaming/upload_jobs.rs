@@ -20,6 +20,9 @@ pub(super) enum Upload {
     Texture(TextureUpload),
 }
 
+/// An upload, and whether the device had room for it.
+pub(super) type EndedUpload = (Upload, Result<(), BackendError>);
+
 /// What background jobs upload, and what they have uploaded. Frames add to it and take from it when they begin; one job at a time does
 /// what was added.
 #[derive(Default)]
@@ -30,7 +33,7 @@ pub(super) struct UploadJobs {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Upload>,
-    finished: Vec<(Upload, Result<(), BackendError>)>,
+    finished: Vec<EndedUpload>,
     /// What the device has to execute before what is finished is there.
     commands: Vec<wgpu::CommandBuffer>,
     uploaded_bytes: u64,
@@ -43,7 +46,7 @@ impl UploadJobs {
     }
 
     /// What was uploaded, or could not be, once the device has executed the commands.
-    pub(super) fn take_finished(&self) -> (Vec<(Upload, Result<(), BackendError>)>, Vec<wgpu::CommandBuffer>) {
+    pub(super) fn take_finished(&self) -> (Vec<EndedUpload>, Vec<wgpu::CommandBuffer>) {
         let mut state = self.state.lock();
         (mem::take(&mut state.finished), mem::take(&mut state.commands))
     }
