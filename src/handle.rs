@@ -267,6 +267,12 @@ impl<T> Slots<T> {
         })
     }
 
+    /// The entry in a slot, with its handle and the revision of its last change.
+    pub(crate) fn entry(&self, slot: u32) -> Option<(Handle<T>, u64, &T)> {
+        let entry = self.entries.get(slot as usize)?;
+        entry.value.as_ref().map(|value| (self.handle(slot, entry.generation), entry.revision, value))
+    }
+
     /// The entry in a slot, with the revision of its last change.
     pub fn get_with_revision(&self, slot: u32) -> Option<(u64, &T)> {
         let entry = self.entries.get(slot as usize)?;

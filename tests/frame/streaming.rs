@@ -13,6 +13,8 @@ use drawloom::view::RejectionReason;
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use drawloom_testing::adapter;
 
+use crate::reported;
+
 /// The bytes of each mesh of the world: in a page of 64 KiB are two.
 const VERTICES: usize = 1000;
 const BYTES: u64 = VERTICES as u64 * 32 + 3 * 4;
@@ -25,9 +27,13 @@ struct World {
 }
 
 fn mesh(number: usize) -> Mesh {
+    sized_mesh(&number.to_string(), VERTICES)
+}
+
+fn sized_mesh(name: &str, vertices: usize) -> Mesh {
     let vertex = |index| Vertex { position: [(index % 2) as f32, (index % 3) as f32, 0.0], ..Vertex::default() };
-    let vertices = (0..VERTICES).map(vertex).collect();
-    Mesh::new(number.to_string(), Topology::TriangleList, vertices, vec![0, 1, 2]).unwrap()
+    let vertices = (0..vertices).map(vertex).collect();
+    Mesh::new(name, Topology::TriangleList, vertices, vec![0, 1, 2]).unwrap()
 }
 
 impl World {
@@ -48,6 +54,23 @@ impl World {
         let mut world = Self { renderer, submitter, scene, meshes };
         world.look_at(0.0);
         world
+    }
+
+    /// Adds an object with a mesh of its own, in the row or beyond its end.
+    fn add(&mut self, mesh: Mesh, place: f64) -> Handle<Mesh> {
+        let mesh = self.scene.add(mesh).unwrap();
+        let material = self.scene.assets().iter::<Material>().next().unwrap().0;
+        self.scene.add_object(RenderObject::new(mesh, material, DVec3::X * place * 10.0)).unwrap();
+        mesh
+    }
+
+    /// The number of frames until nothing that is in sight is missing.
+    fn frames_until_complete(&mut self, at_most: usize) -> usize {
+        (0..at_most).find(|_| self.missing() == 0).unwrap_or(at_most)
+    }
+
+    fn statistics(&self) -> StreamingStatistics {
+        self.renderer.backend().streaming_statistics().unwrap()
     }
 
     fn look_at(&mut self, object: f64) {
@@ -169,6 +192,119 @@ fn what_was_seen_longest_ago_makes_room() {
 }
 
 #[test]
+fn a_full_budget_makes_room_for_as_many_meshes_a_frame_as_may_be_uploaded() {
+    const SMALL: usize = 100;
+    let mut world = World::new(0, budget(StreamingBudget::MIN_BYTES));
+    // Two clusters, of which only one fits.
+    for number in 0..500 {
+        let cluster = number / 250;
+        let place = f64::from(cluster) * 100.0 + f64::from(number % 250) * 0.0001;
+        world.add(sized_mesh(&number.to_string(), SMALL), place);
+    }
+    assert!(world.frames_until_complete(60) < 60);
+    world.frames(60);
+    let full = world.statistics();
+    assert!(full.requested > 150, "the budget is full: {full:?}");
+    world.look_at(100.0);
+    world.frame();
+    let missing = world.missing();
+    let frames = world.frames_until_complete(missing);
+    assert!(missing > 150 && frames < missing / 8, "{frames} frames for {missing} meshes");
+    let after = world.statistics();
+    assert!(after.evictions as usize <= missing, "one makes room for one as large: {after:?}");
+}
+
+/// A world whose budget is full, and in which every other mesh of the row was seen later than those between.
+fn fragmented_world() -> World {
+    let mut world = World::new(30, budget(StreamingBudget::MIN_BYTES));
+    world.frames(60);
+    for first in [0, 1] {
+        for object in (first..30).step_by(2) {
+            world.look_at(f64::from(object));
+            world.frame();
+            world.frame();
+        }
+    }
+    assert_eq!((world.missing(), world.statistics().meshes, world.statistics().evictions), (0, 30, 0));
+    world
+}
+
+#[test]
+fn room_is_made_where_a_mesh_fits() {
+    // In each page are two meshes that were seen at different times. The new one takes more than one of them, and less than a page.
+    let mut world = fragmented_world();
+    world.add(sized_mesh("large", 1500), 100.0);
+    world.look_at(100.0);
+    let frames = world.frames_until_complete(40);
+    let after = world.frames(40);
+    assert!(frames < 8 && after.evictions == 2, "{frames} frames, {after:?}");
+    assert_eq!((after.wanted, after.over_budget), (0, 0));
+}
+
+#[test]
+fn whole_pages_make_room_for_a_mesh_that_is_larger_than_a_page() {
+    let mut world = fragmented_world();
+    // Three pages and a little.
+    world.add(sized_mesh("larger", 6200), 100.0);
+    world.look_at(100.0);
+    let frames = world.frames_until_complete(40);
+    let after = world.frames(40);
+    assert!(frames < 16 && (7..=8).contains(&after.evictions), "{frames} frames, {after:?}");
+    assert!(after.mesh_bytes <= StreamingBudget::MIN_BYTES, "{after:?}");
+}
+
+#[test]
+fn a_mesh_that_has_no_room_costs_no_evictions_and_arrives_when_it_has() {
+    // The first of the two meshes in each page is in sight all the time.
+    let mut world = fragmented_world();
+    let places: Vec<_> = (0..30).step_by(2).collect();
+    world.add(sized_mesh("large", 1500), 14.0);
+    let far = DVec3::new(145.0, 1.0, 260.0);
+    world.scene.cameras = vec![Camera::looking_at("main", far, DVec3::new(145.0, 1.0, 0.0))];
+    for mesh in places.iter().map(|place| world.meshes[place + 1]).collect::<Vec<_>>() {
+        let objects: Vec<_> = world.scene.objects().collect();
+        let object = objects.into_iter().find(|object| world.scene.object(*object).unwrap().mesh == mesh).unwrap();
+        let before = world.scene.object(object).unwrap();
+        // Out of sight, but used.
+        world.scene.replace_object(object, RenderObject { position: DVec3::Y * -5000.0, ..before }).unwrap();
+    }
+    let before = world.frames(4);
+    let after = world.frames(100);
+    assert_eq!((after.evictions, after.uploaded_bytes), (before.evictions, before.uploaded_bytes), "{after:?}");
+    assert_eq!((after.wanted, after.over_budget, world.missing()), (1, 1, 1), "{after:?}");
+    world.look_at(14.0);
+    assert!(world.frames_until_complete(20) < 20);
+    assert_eq!(world.statistics().evictions, before.evictions + 2);
+}
+
+#[test]
+fn a_mesh_that_can_never_fit_is_told_once_by_name_and_evicts_nothing() {
+    let budget = budget(StreamingBudget::MIN_BYTES);
+    let mut world = World::new(30, budget);
+    world.frames(60);
+    let bytes = 40_000 * 32 + 3 * 4;
+    let large = world.add(sized_mesh("mountain", 40_000), 0.0);
+    let told = reported(|| {
+        let after = world.frames(50);
+        assert_eq!((after.too_large, after.requested, after.wanted, after.evictions), (1, 0, 0, 0), "{after:?}");
+    });
+    assert_eq!(told.matches("mountain").count(), 1, "{told}");
+    assert!(told.contains(&format!("bytes={bytes}")) && told.contains("allowed=1048576"), "{told}");
+    assert_eq!(world.missing(), 1, "its object is left out");
+    // What replaces it is something else.
+    world.scene.replace(large, sized_mesh("hill", 2_000)).unwrap();
+    assert!(world.frames_until_complete(20) < 20);
+    assert_eq!(world.statistics().too_large, 0);
+    let told = reported(|| {
+        world.scene.replace(large, sized_mesh("summit", 50_000)).unwrap();
+        world.frames(5);
+    });
+    assert_eq!(told.matches("summit").count(), 1, "{told}");
+    world.scene.remove(large).unwrap();
+    assert_eq!(world.frames(2).too_large, 0);
+}
+
+#[test]
 fn frames_that_draw_more_than_the_budget_keep_what_they_have_and_count_the_rest() {
     let budget = budget(StreamingBudget::MIN_BYTES);
     let mut world = World::new(100, budget);
@@ -237,6 +373,85 @@ fn textures_of_several_sizes_share_their_budget() {
             assert_eq!(statistics.rejections, [], "object {object} in pass {pass}");
         }
     }
+}
+
+#[test]
+fn textures_beyond_the_device_s_layers_are_told_as_that_and_others_make_no_room_in_vain() {
+    let layers = adapter::noop_device().unwrap().0.limits().max_texture_array_layers;
+    let budget = StreamingBudget {
+        texture_bytes: 1 << 30,
+        upload_bytes_per_frame: 64 << 20,
+        upload_time_per_frame: Duration::from_secs(100),
+        ..budget(1 << 20)
+    };
+    let mut world = World::new(1, budget);
+    let mesh = world.meshes[0];
+    let mut add = |side: u32, place: f64| {
+        let texture = Texture::new("plain", side, side, vec![200; (side * side * 4) as usize]).unwrap();
+        let texture = world.scene.add(texture).unwrap();
+        let material = world.scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
+        world.scene.add_object(RenderObject::new(mesh, material, DVec3::X * place * 10.0)).unwrap();
+    };
+    (0..4).for_each(|_| add(512, 0.0));
+    (0..layers + 3).for_each(|number| add(1, 100.0 + f64::from(number) * 0.0001));
+    world.frames(4);
+    world.look_at(100.0);
+    world.frames(8);
+    let (statistics, streaming) = world.frame();
+    let told = |reason| statistics.rejections.iter().find(|told| told.reason == reason).map(|told| told.count);
+    assert_eq!(told(RejectionReason::TextureLimit), Some(3), "{:?}", statistics.rejections);
+    assert_eq!(told(RejectionReason::TextureNotResident), Some(3), "{:?}", statistics.rejections);
+    assert_eq!((streaming.over_budget, streaming.evictions, streaming.textures), (0, 0, layers as usize + 4));
+}
+
+#[test]
+fn a_mesh_that_is_replaced_while_the_budget_is_full_is_drawn_in_every_frame() {
+    let budget = StreamingBudget { upload_bytes_per_frame: StreamingBudget::MIN_UPLOAD_BYTES, ..budget(1 << 20) };
+    let mut world = World::new(40, budget);
+    let replaced = world.add(sized_mesh("first", 6_000), 5.0);
+    world.look_at(5.0);
+    assert!(world.frames_until_complete(40) < 40);
+    for (number, vertices) in [6_500, 4_000, 7_000, 100, 8_000].into_iter().enumerate() {
+        world.frames(60);
+        assert!(world.statistics().requested > 0, "the budget is full");
+        world.scene.replace(replaced, sized_mesh(&number.to_string(), vertices)).unwrap();
+        let uploaded = world.statistics().uploaded_bytes;
+        let frames = (0..40).take_while(|_| {
+            assert_eq!(world.missing(), 0, "{number}");
+            world.statistics().wanted + world.statistics().in_flight > 0
+        });
+        assert!(frames.count() < 40);
+        // Small ones are uploaded by the frame, if there is room.
+        assert!(vertices < 1_000 || world.statistics().uploaded_bytes - uploaded >= vertices as u64 * 32);
+    }
+}
+
+#[test]
+fn a_mesh_that_is_replaced_in_every_frame_keeps_up() {
+    let budget = StreamingBudget { upload_bytes_per_frame: 1 << 20, ..budget(1 << 20) };
+    let mut world = World::new(40, budget);
+    let replaced = world.add(sized_mesh("first", 6_000), 5.0);
+    world.look_at(5.0);
+    assert!(world.frames_until_complete(40) < 40);
+    world.frames(60);
+    let before = world.statistics().uploaded_bytes;
+    for frame in 0..30 {
+        world.scene.replace(replaced, sized_mesh(&frame.to_string(), 7_000 + frame)).unwrap();
+        assert_eq!(world.missing(), 0);
+    }
+    assert!(world.statistics().uploaded_bytes - before > 10 * 7_000 * 32);
+}
+
+#[test]
+fn a_mesh_that_has_no_room_beside_the_one_it_replaces_takes_its_place() {
+    let mut world = World::new(0, budget(StreamingBudget::MIN_BYTES));
+    let replaced = world.add(sized_mesh("first", 20_000), 0.0);
+    assert!(world.frames_until_complete(40) < 40);
+    world.scene.replace(replaced, sized_mesh("second", 25_000)).unwrap();
+    world.frame();
+    world.frame();
+    assert!(world.frames_until_complete(40) < 40);
+    assert_eq!((world.statistics().evictions, world.statistics().requested), (1, 0));
 }
 
 #[test]

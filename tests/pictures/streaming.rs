@@ -28,6 +28,7 @@ pub const CASES: &[Case] = &[
     ("streamed_scenes_look_the_same_once_everything_is_there", streamed),
     ("a_mesh_and_a_texture_larger_than_a_frame_may_upload_arrive_in_pieces", pieces),
     ("a_streamed_mesh_that_is_replaced_never_vanishes", replaced),
+    ("a_mesh_that_is_replaced_while_the_budget_is_full_is_drawn_until_the_next_one_arrives", replaced_when_full),
 ];
 
 /// Draws with the shipped processes.
@@ -284,6 +285,59 @@ fn replaced() -> Result<(), Failed> {
         fixture.submitter.submit(recorded)?;
         let submitted = draw_until_resident(&mut fixture, &scene)?;
         expect_same(&pictures(&submitted, &scene)?, &expected(&scene)?, &format!("texture {round}"))?;
+    }
+    Ok(())
+}
+
+/// Meshes with and without levels and triangle culling replace each other. The one before is drawn with what it has.
+fn replaced_when_full() -> Result<(), Failed> {
+    let mut scene = field(2);
+    let material = materials(&scene)[0];
+    let empty = expected(&scene)?;
+    let variant = |number: u32| {
+        let mesh = disc(3000 + number, 1.0);
+        let level = LevelOfDetail::new(mesh.indices()[..6000].to_vec(), 1e-9);
+        let mesh = if number % 2 == 0 { mesh.with_levels([level])? } else { mesh };
+        Ok::<_, Failed>(mesh.with_triangle_culling(number % 3 == 0))
+    };
+    let mesh = scene.add(variant(0)?)?;
+    add(&mut scene, 20, mesh, material)?;
+    // Out of sight, and more than the budget.
+    for number in 0..10 {
+        let filler = scene.add(disc(3000, number as f32))?;
+        scene.add_object(RenderObject::new(filler, material, DVec3::Y * -1e6))?;
+    }
+    let budget = StreamingBudget {
+        mesh_bytes: StreamingBudget::MIN_BYTES,
+        upload_bytes_per_frame: StreamingBudget::MIN_UPLOAD_BYTES,
+        ..StreamingBudget::default()
+    };
+    let mut fixture = streamed_fixture(budget, 1)?;
+    let mut frame = |scene: &Scene| -> Result<_, Failed> {
+        let recorded = fixture.record(scene)?;
+        let submitted = fixture.submitter.submit(recorded)?;
+        let is_missing = submitted.statistics.rejections.iter().any(|told| told.reason == RejectionReason::NotResident);
+        let statistics = fixture.renderer.backend().streaming_statistics().ok_or("it streams")?;
+        Ok((pictures(&submitted, scene)?, is_missing, statistics))
+    };
+    for _frame in 0..40 {
+        frame(&scene)?;
+    }
+    for number in 1..7 {
+        scene.replace(mesh, variant(number)?)?;
+        let mut waited = 0;
+        for _frame in 0..30 {
+            let (found, is_missing, statistics) = frame(&scene)?;
+            if is_missing || found.iter().zip(&empty).all(|(found, empty)| found.bytes == empty.bytes) {
+                return Err(format!("mesh {number} vanishes: {statistics:?}").into());
+            }
+            waited += usize::from(statistics.wanted > 0 || statistics.in_flight > 0);
+        }
+        let (found, _, statistics) = frame(&scene)?;
+        if waited == 0 || statistics.requested == 0 {
+            return Err(format!("mesh {number}: the budget is not full: {statistics:?}").into());
+        }
+        expect_same(&found, &expected(&scene)?, &format!("mesh {number}"))?;
     }
     Ok(())
 }

@@ -42,7 +42,7 @@ impl IndirectArguments {
         let buffer = buffer.get_or_insert_with(|| MirroredBuffer::new("indirect draws", wgpu::BufferUsages::INDIRECT));
         let bytes = buffer.rewrite();
         for (index, batch) in list.batches.iter().enumerate() {
-            let is_whole = batch.state.subdivision_level() == 0 && list.remaining(index).is_none();
+            let is_whole = batch.state.subdivision_level() == 0 && meshes.remaining(list, index).is_none();
             let mesh = if is_whole { meshes.mesh_range(batch)? } else { None };
             // Otherwise it is drawn directly, because it has buffers of its own, or not at all.
             let arguments = mesh.map_or_else(DrawIndexedIndirectArgs::default, |mesh| DrawIndexedIndirectArgs {

@@ -102,7 +102,7 @@ impl<'a> BatchRecorder<'a> {
         let mut whole = batches.start..batches.start;
         let mut binds_partial_indices = false;
         for index in batches {
-            let Some(remaining) = self.list.remaining(index) else {
+            let Some(remaining) = self.frame.meshes.remaining(self.list, index) else {
                 whole.end = index + 1;
                 continue;
             };

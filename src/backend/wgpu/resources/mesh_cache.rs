@@ -1,6 +1,6 @@
 //! The cache of meshes on the device.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use super::attribute_set::AttributeBuffers;
@@ -11,6 +11,7 @@ use super::snapshot_lifetimes::SnapshotLifetimes;
 use super::upload_queue::UploadQueue;
 use super::vertex_layout::with_vertex_bytes;
 use crate::backend::BackendError;
+use crate::handle::Handle;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
@@ -23,7 +24,12 @@ pub(crate) struct MeshCache {
     pub(super) pages: MeshPages,
     /// By slot.
     pub(super) meshes: Vec<Option<ResidentMesh>>,
-    pub(super) coarser_levels: CoarserLevels,
+    pub(super) resident_count: usize,
+    /// The slots of the meshes on the device that were replaced since. Without streaming there are none.
+    pub(super) outdated: BTreeSet<u32>,
+    /// The slots of the meshes that are to be streamed, and not on their way.
+    pub(super) missing: BTreeSet<u32>,
+    pub(super) coarser_levels: Arc<CoarserLevels>,
     /// The memory of meshes that are gone.
     pub(super) lifetimes: SnapshotLifetimes<MeshLocation>,
     pub(super) imported_meshes: ImportedMeshes,
@@ -40,8 +46,9 @@ pub(crate) struct MeshCache {
 /// A mesh on the device.
 #[derive(Clone, Copy)]
 pub(super) struct ResidentMesh {
+    pub(super) handle: Handle<Mesh>,
     /// In the assets.
-    revision: u64,
+    pub(super) revision: u64,
     pub(super) location: MeshLocation,
     /// Of level 0.
     index_count: u32,
@@ -142,7 +149,9 @@ impl MeshCache {
         (self.epoch, self.in_flight) = (Arc::default(), HashSet::new());
         self.pages.clear();
         self.meshes.clear();
-        self.coarser_levels.clear();
+        self.resident_count = 0;
+        (self.outdated, self.missing) = (BTreeSet::new(), BTreeSet::new());
+        self.coarser_levels = Arc::default();
         self.lifetimes = SnapshotLifetimes::following(&self.lifetimes);
     }
 
@@ -153,22 +162,31 @@ impl MeshCache {
         }
     }
 
-    /// Retires the meshes that changed, or were removed, since they were uploaded. Returns their slots.
-    pub(super) fn retire_changed(&mut self, assets: &Assets, used: &UsedMeshes) -> Vec<u32> {
-        let mut retired = Vec::new();
+    /// Retires the meshes that changed, or were removed, since they were uploaded.
+    fn retire_changed(&mut self, assets: &Assets, used: &UsedMeshes) {
         self.meshes.resize(assets.meshes.slot_count().max(self.meshes.len()), None);
-        for (slot, entry) in (0..).zip(&mut self.meshes) {
-            let Some(mesh) = entry else { continue };
+        for slot in 0..self.meshes.len() as u32 {
+            let Some(mesh) = self.meshes[slot as usize] else { continue };
             let current = assets.meshes.get_with_revision(slot).map(|(revision, _)| revision);
-            if current != Some(mesh.revision) || !used.contains_slot(slot) {
-                self.lifetimes.retire(mesh.location);
-                self.coarser_levels.remove(&slot);
-                *entry = None;
-                retired.push(slot);
+            if (current != Some(mesh.revision) || !used.contains_slot(slot))
+                && let Some(location) = self.remove_resident(slot)
+            {
+                self.lifetimes.retire(location);
             }
         }
         self.meshes.truncate(assets.meshes.slot_count());
-        retired
+    }
+
+    /// Forgets the mesh in a slot. Returns where it lay.
+    pub(super) fn remove_resident(&mut self, slot: u32) -> Option<MeshLocation> {
+        let mesh = self.meshes.get_mut(slot as usize).and_then(Option::take)?;
+        self.resident_count -= 1;
+        self.outdated.remove(&slot);
+        if self.coarser_levels.contains_key(&slot) {
+            Arc::make_mut(&mut self.coarser_levels).remove(&slot);
+        }
+        self.snapshot = None;
+        Some(mesh.location)
     }
 
     /// Uploads the used meshes that are not on the device.
@@ -185,18 +203,16 @@ impl MeshCache {
         let resident = &self.meshes;
         let is_missing = |slot: u32| used.contains_slot(slot) && resident[slot as usize].is_none();
         let meshes = assets.meshes.iter_with_revision();
-        let missing: Vec<_> = meshes
-            .map(|(handle, revision, mesh)| (handle.index(), revision, mesh))
-            .filter(|(slot, _, mesh)| mesh.has_triangles() && is_missing(*slot))
-            .collect();
+        let missing: Vec<_> =
+            meshes.filter(|(handle, _, mesh)| mesh.has_triangles() && is_missing(handle.index())).collect();
         let mut expected: MeshBytes = missing.iter().map(|(.., mesh)| self.pages.bytes_of(mesh)).sum();
-        for (slot, revision, mesh) in missing {
+        for (handle, revision, mesh) in missing {
             let location = self.pages.allocate(mesh, expected, Self::PAGE_SIZES);
             let bytes = self.pages.bytes_of(mesh);
             expected.vertices -= bytes.vertices;
             expected.indices -= bytes.indices;
             let target = self.pages.target(location)?;
-            self.write(device, uploads, (slot, revision, mesh), &target)?;
+            self.write(device, uploads, (handle, revision, mesh), &target)?;
         }
         Ok(())
     }
@@ -209,19 +225,24 @@ impl MeshCache {
         &mut self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
-        (slot, revision, mesh): (u32, u64, &Mesh),
+        (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
         target: &MeshTarget,
     ) -> Result<(), BackendError> {
         target.create_buffers(device)?;
         with_vertex_bytes(mesh, target.format, |vertices| {
             target.for_each_piece(mesh, vertices, |buffer, offset, bytes| uploads.write_buffer(buffer, offset, bytes))
         })?;
-        self.add_resident(slot, revision, mesh, target.location);
+        self.add_resident((handle, revision, mesh), target.location);
         Ok(())
     }
 
     /// Adds a mesh that was written to its location.
-    pub(super) fn add_resident(&mut self, slot: u32, revision: u64, mesh: &Mesh, location: MeshLocation) {
+    pub(super) fn add_resident(
+        &mut self,
+        (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
+        location: MeshLocation,
+    ) {
+        let slot = handle.index();
         let index_count = mesh.indices().len() as u32;
         let mut end = location.indices.start + index_count;
         let ranges = mesh.levels().iter().map(|level| {
@@ -231,9 +252,10 @@ impl MeshCache {
         });
         let ranges: Arc<[_]> = ranges.collect();
         if !ranges.is_empty() {
-            self.coarser_levels.insert(slot, ranges);
+            Arc::make_mut(&mut self.coarser_levels).insert(slot, ranges);
         }
-        self.meshes[slot as usize] = Some(ResidentMesh { revision, location, index_count });
+        self.resident_count += 1;
+        self.meshes[slot as usize] = Some(ResidentMesh { handle, revision, location, index_count });
     }
 
     pub(super) fn new_snapshot(&mut self) -> MeshSnapshot {
@@ -258,7 +280,8 @@ impl MeshCache {
             vertex_pages,
             index_pages,
             meshes,
-            coarser_levels: self.coarser_levels.clone(),
+            coarser_levels: Arc::clone(&self.coarser_levels),
+            outdated: self.outdated.clone(),
             imported_meshes: self.imported_meshes.clone(),
             is_streamed: false,
         }

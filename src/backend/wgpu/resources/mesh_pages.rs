@@ -26,6 +26,13 @@ pub(crate) struct MeshLocation {
     pub(crate) indices: PageRange,
 }
 
+impl MeshLocation {
+    /// Whether both have some memory.
+    pub(super) fn overlaps(&self, other: Self) -> bool {
+        self.vertices.overlaps(other.vertices) || self.indices.overlaps(other.indices)
+    }
+}
+
 /// How long new pages are, in bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PageSizes {
@@ -38,8 +45,8 @@ pub(crate) struct PageSizes {
 pub(crate) struct MeshPages {
     pub(crate) format: VertexFormat,
     pub(super) attributes: Arc<AttributeSet>,
-    vertices: PageSet<VertexBuffers>,
-    indices: PageSet<wgpu::Buffer>,
+    pub(super) vertices: PageSet<VertexBuffers>,
+    pub(super) indices: PageSet<wgpu::Buffer>,
 }
 
 impl MeshPages {
@@ -56,23 +63,22 @@ impl MeshPages {
         }
     }
 
-    /// Finds room for a mesh, or adds pages as long as all of them take no more than `budget` bytes.
-    pub(super) fn allocate_within(&mut self, mesh: &Mesh, sizes: PageSizes, budget: u64) -> Option<MeshLocation> {
-        let (stride, count) = (self.bytes_per_vertex(), mesh.vertices().len() as u32);
-        let rest = budget.saturating_sub(self.page_bytes());
-        let vertices = allocate_within(&mut self.vertices, count, stride, sizes, rest)?;
-        let rest = budget.saturating_sub(self.page_bytes());
-        let indices = allocate_within(&mut self.indices, index_count(mesh) as u32, INDEX, sizes, rest);
-        if indices.is_none() {
-            self.vertices.free(vertices);
-        }
-        Some(MeshLocation { vertices, indices: indices? })
-    }
-
     /// Frees the memory of a mesh, and releases pages that are empty then.
     pub(super) fn free(&mut self, location: MeshLocation) {
         self.vertices.free(location.vertices);
         self.indices.free(location.indices);
+    }
+
+    /// Frees the memory of a mesh. Pages that are empty then stay.
+    pub(super) fn vacate(&mut self, location: MeshLocation) {
+        self.vertices.vacate(location.vertices);
+        self.indices.vacate(location.indices);
+    }
+
+    /// Takes memory that was vacated.
+    pub(super) fn occupy(&mut self, location: MeshLocation) {
+        self.vertices.occupy(location.vertices);
+        self.indices.occupy(location.indices);
     }
 
     /// What writing a mesh to its location takes.
@@ -111,11 +117,6 @@ impl MeshPages {
         }
     }
 
-    /// What a mesh at a location takes, in bytes.
-    pub(super) fn bytes_in(&self, MeshLocation { vertices, indices }: MeshLocation) -> u64 {
-        u64::from(vertices.length) * self.bytes_per_vertex() + u64::from(indices.length) * INDEX
-    }
-
     /// The size of all pages in bytes.
     pub(super) fn page_bytes(&self) -> u64 {
         self.vertices.length() * self.bytes_per_vertex() + self.indices.length() * INDEX
@@ -126,29 +127,16 @@ impl MeshPages {
         (self.vertices, self.indices) = (PageSet::default(), PageSet::default());
     }
 
-    fn bytes_per_vertex(&self) -> u64 {
+    pub(super) fn bytes_per_vertex(&self) -> u64 {
         vertex_stride(self.format) + self.attributes.bytes_per_vertex()
     }
 }
 
-/// Finds room for `count` entries of `stride` bytes in the pages, or in a new page of at most `rest` bytes.
-fn allocate_within<B>(
-    pages: &mut PageSet<B>,
-    count: u32,
-    stride: u64,
-    sizes: PageSizes,
-    rest: u64,
-) -> Option<PageRange> {
-    pages.allocate_in_pages(count).or_else(|| {
-        let page_bytes = sizes.max.min(rest).max(u64::from(count) * stride);
-        (page_bytes <= rest).then(|| pages.allocate(count, (page_bytes / stride) as u32))
-    })
-}
-
-const INDEX: u64 = mem::size_of::<u32>() as u64;
+/// The size of an index.
+pub(super) const INDEX: u64 = mem::size_of::<u32>() as u64;
 
 /// The indices of a mesh and of its coarser levels.
-fn index_count(mesh: &Mesh) -> usize {
+pub(super) fn index_count(mesh: &Mesh) -> usize {
     mesh.indices().len() + mesh.levels().iter().map(|level| level.indices().len()).sum::<usize>()
 }
 

@@ -1,6 +1,6 @@
 //! The meshes of a frame.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::snapshot_lifetimes::SnapshotToken;
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::missing_mesh_error;
-use crate::command::Batch;
+use crate::command::{Batch, DrawList};
 use crate::scene::AttributeLayout;
 
 /// The meshes of a frame. It stays valid while meshes change for later frames.
@@ -23,7 +23,9 @@ pub(crate) struct MeshSnapshot {
     pub(super) index_pages: Vec<Option<wgpu::Buffer>>,
     /// By mesh slot.
     pub(super) meshes: Vec<Option<MeshRange>>,
-    pub(super) coarser_levels: CoarserLevels,
+    pub(super) coarser_levels: Arc<CoarserLevels>,
+    /// The slots of meshes that were replaced since: the ones before are drawn.
+    pub(super) outdated: BTreeSet<u32>,
     /// Those that are not in the pages, but in buffers of the engine's own.
     pub(crate) imported_meshes: ImportedMeshes,
     /// Whether meshes that are used may be missing.
@@ -68,10 +70,24 @@ impl MeshSnapshot {
             0 => Ok(Some(mesh)),
             level => {
                 let levels = self.coarser_levels.get(&batch.mesh);
-                let indices = levels.and_then(|levels| levels.get(level - 1)).ok_or_else(missing_mesh_error)?;
+                if levels.is_none() && self.outdated.contains(&batch.mesh) {
+                    return Ok(Some(mesh));
+                }
+                let found = levels.and_then(|levels| {
+                    // The mesh before may have fewer levels.
+                    let coarsest = if self.outdated.contains(&batch.mesh) { levels.last() } else { None };
+                    levels.get(level - 1).or(coarsest)
+                });
+                let indices = found.ok_or_else(missing_mesh_error)?;
                 Ok(Some(MeshRange { first_index: indices.start, index_count: indices.end - indices.start, ..mesh }))
             }
         }
+    }
+
+    /// The range of the remaining indices that a batch of a list draws; `None` where it draws its whole mesh. A mesh that was replaced, and
+    /// is drawn nevertheless, is drawn as a whole: what remains is of the new one.
+    pub(crate) fn remaining(&self, list: &DrawList, batch: usize) -> Option<Range<u32>> {
+        list.remaining(batch).filter(|_| !self.outdated.contains(&list.batches[batch].mesh))
     }
 
     /// Whether a batch's mesh is used, but not on the device.

@@ -1,29 +1,55 @@
 //! Meshes that are streamed: they come to the device by background jobs, and make room for others.
 
+use std::collections::BTreeSet;
+use std::iter;
 use std::sync::Arc;
 
 use super::mesh_cache::{MeshCache, MeshVersion};
-use super::mesh_pages::{MeshTarget, PageSizes};
+use super::mesh_pages::{INDEX, MeshLocation, MeshTarget, PageSizes, index_count};
 use super::mesh_snapshot::MeshSnapshot;
+use super::snapshot_lifetimes::LastReader;
 use super::upload_queue::UploadQueue;
+use super::vertex_layout::vertex_stride;
 use crate::backend::BackendError;
+use crate::handle::Handle;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::UsedMeshes;
 
-/// Whether something that is streamed has room.
-pub(crate) enum Room<T> {
-    /// It has.
-    Found(T),
-    /// It will have as soon as no frame in flight reads what was evicted.
+/// Where something that is streamed will lie.
+pub(crate) struct Placed<T> {
+    pub(crate) target: T,
+    /// It may be written to when that is gone.
+    pub(crate) last_reader: LastReader,
+}
+
+/// Why something that is streamed has no room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unplaced {
+    /// It will have as soon as what is on its way to the same texture array has arrived.
     Awaited,
-    /// Others have to be evicted: at least so many bytes.
-    Missing(u64),
+    /// What could make room for it is not enough.
+    Full,
+    /// Its texture array has as many layers as the device allows, and none can make room.
+    LayerLimit,
+    /// It can never have any: it takes so many bytes, and the limit of this name allows so many.
+    TooLarge { bytes: u64, limit: &'static str, allowed: u64 },
+}
+
+/// What became of an upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EndOfUpload {
+    /// It is on the device.
+    Resident,
+    /// It is not needed any more, or could not be uploaded.
+    Dropped,
+    /// It belongs to what was cleared since.
+    Stale,
 }
 
 impl MeshCache {
-    /// Begins a frame with meshes that are streamed. A mesh that replaces one on the device is uploaded at once, if there is room: otherwise
-    /// what is in sight would vanish.
+    /// Begins a frame with meshes that are streamed. A mesh that replaces one on the device is uploaded at once, if there is room. Otherwise
+    /// the one before stays, and is drawn, until the new one arrives.
     ///
     /// # Errors
     /// If the device has no room.
@@ -35,7 +61,7 @@ impl MeshCache {
         vertices: VertexFormat,
         budget: u64,
     ) -> Result<(), BackendError> {
-        self.free_unread();
+        self.release_unread();
         let requested = MeshVersion::new(assets, used);
         if self.pages.format != vertices || self.current.is_some_and(|current| !current.has_same_assets(requested)) {
             self.clear_meshes();
@@ -45,14 +71,23 @@ impl MeshCache {
             return Ok(());
         }
         self.current = None;
-        for slot in self.retire_changed(assets, used) {
-            self.snapshot = None;
-            let replaced = assets.meshes.get_with_revision(slot).filter(|(_, mesh)| mesh.has_triangles());
-            let Some((revision, mesh)) = replaced.filter(|_| used.contains_slot(slot)) else { continue };
-            if let Room::Found(target) = self.find_room(mesh, budget)? {
-                self.write(device, uploads, (slot, revision, mesh), &target)?;
+        self.meshes.resize(assets.meshes.slot_count().max(self.meshes.len()), None);
+        for slot in 0..self.meshes.len() as u32 {
+            let Some(resident) = self.meshes[slot as usize] else { continue };
+            match self.used_mesh(assets, used, slot) {
+                Some((_, revision, _)) if revision == resident.revision => {}
+                Some((handle, revision, mesh)) if handle == resident.handle => {
+                    self.snapshot = None;
+                    self.outdated.insert(slot);
+                    self.replace_at_once(device, uploads, (handle, revision, mesh), budget)?;
+                }
+                _ => self.take_off(slot),
             }
         }
+        self.meshes.truncate(assets.meshes.slot_count());
+        let is_missing = |slot: &u32| self.is_missing(*slot) && self.used_mesh(assets, used, *slot).is_some();
+        let missing: BTreeSet<_> = (0..self.meshes.len() as u32).filter(is_missing).collect();
+        self.missing = missing;
         let imported = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
         self.imported_meshes = self.imported_meshes.updated(device, imported)?;
         // Meshes in the engine's own buffers may have come or gone.
@@ -61,79 +96,184 @@ impl MeshCache {
         Ok(())
     }
 
-    /// The meshes that are used, and neither on the device nor on their way: slot, revision and mesh.
-    pub(crate) fn missing<'a>(
-        &self,
-        assets: &'a Assets,
-        used: &UsedMeshes,
-    ) -> impl Iterator<Item = (u32, u64, &'a Mesh)> {
-        let slots = 0..self.meshes.len() as u32;
-        let is_missing = |slot: &u32| {
-            self.meshes[*slot as usize].is_none() && used.contains_slot(*slot) && !self.in_flight.contains(slot)
+    /// Uploads a mesh that replaces one on the device, if there is room that no frame in flight reads.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn replace_at_once(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
+        budget: u64,
+    ) -> Result<(), BackendError> {
+        let Ok(Placed { target, last_reader }) = self.place(device, mesh, budget, iter::empty(), &mut 0)? else {
+            return Ok(());
         };
-        slots.filter(is_missing).filter_map(|slot| {
-            let (revision, mesh) = assets.meshes.get_with_revision(slot)?;
-            mesh.has_triangles().then_some((slot, revision, mesh))
-        })
+        if self.lifetimes.is_gone(last_reader) {
+            self.take_off(handle.index());
+            self.write(device, uploads, (handle, revision, mesh), &target)
+        } else {
+            self.pages.free(target.location);
+            Ok(())
+        }
     }
 
-    /// Finds room for a mesh in the pages, or adds pages if the budget allows.
+    /// The mesh in a slot if it is used and lies in pages, with its handle and revision.
+    fn used_mesh<'a>(&self, assets: &'a Assets, used: &UsedMeshes, slot: u32) -> Option<(Handle<Mesh>, u64, &'a Mesh)> {
+        let found = assets.meshes.entry(slot).filter(|(.., mesh)| mesh.has_triangles());
+        found.filter(|_| used.contains_slot(slot))
+    }
+
+    /// Whether there is none in a slot that is on the device as it is, or on its way.
+    fn is_missing(&self, slot: u32) -> bool {
+        let is_resident = self.meshes[slot as usize].is_some() && !self.outdated.contains(&slot);
+        !is_resident && !self.in_flight.contains(&slot)
+    }
+
+    /// The meshes that are used, and neither on the device, as they are, nor on their way: with handle and revision.
+    pub(crate) fn missing<'a>(&self, assets: &'a Assets) -> impl Iterator<Item = (Handle<Mesh>, u64, &'a Mesh)> {
+        self.missing.iter().filter_map(|slot| assets.meshes.entry(*slot))
+    }
+
+    /// Finds room for a mesh in the pages, or adds pages if the budget allows. Otherwise the candidates make room, the first ones first.
+    /// `evictions` counts them.
     ///
     /// # Errors
     /// If there is no such page. This is a bug in Drawloom.
-    pub(crate) fn find_room(&mut self, mesh: &Mesh, budget: u64) -> Result<Room<MeshTarget>, BackendError> {
-        let sizes = PageSizes { min: 1 << 16, max: (budget / 16).clamp(1 << 16, 4 << 20) };
-        if let Some(location) = self.pages.allocate_within(mesh, sizes, budget) {
-            return Ok(Room::Found(self.pages.target(location)?));
+    pub(crate) fn place(
+        &mut self,
+        device: &wgpu::Device,
+        mesh: &Mesh,
+        budget: u64,
+        candidates: impl Iterator<Item = u32>,
+        evictions: &mut usize,
+    ) -> Result<Result<Placed<MeshTarget>, Unplaced>, BackendError> {
+        let max_buffer_size = device.limits().max_buffer_size;
+        if let Some(too_large) = self.exceeded_limit(mesh, budget, max_buffer_size) {
+            return Ok(Err(too_large));
         }
-        let needed = self.pages.bytes_of(mesh).total();
-        let retired: u64 = self.lifetimes.retired().map(|location| self.pages.bytes_in(*location)).sum();
-        Ok(if retired >= needed { Room::Awaited } else { Room::Missing(needed - retired) })
+        let sizes = PageSizes { min: 1 << 16, max: (budget / 16).clamp(1 << 16, (4 << 20).min(max_buffer_size)) };
+        let (meshes, pages) = (&self.meshes, &mut self.pages);
+        let candidates = candidates.filter_map(|slot| Some((slot, meshes.get(slot as usize)?.as_ref()?.location)));
+        let Some(room) = pages.find_room(mesh, (sizes, budget), candidates) else { return Ok(Err(Unplaced::Full)) };
+        *evictions += room.evicted.len();
+        for slot in &room.evicted {
+            if let Some(location) = self.remove_resident(*slot) {
+                self.lifetimes.retire(location);
+                self.missing.insert(*slot);
+            }
+        }
+        let target = self.pages.target(room.location)?;
+        // The memory of pages that were released is free when nothing reads them any more.
+        let is_written = |retired: &MeshLocation| room.releases_pages || retired.overlaps(room.location);
+        let last_reader = self.lifetimes.last_reader(is_written);
+        Ok(Ok(Placed { target, last_reader }))
+    }
+
+    fn exceeded_limit(&self, mesh: &Mesh, budget: u64, max_buffer_size: u64) -> Option<Unplaced> {
+        let bytes = self.pages.bytes_of(mesh).total();
+        if bytes > budget {
+            return Some(Unplaced::TooLarge { bytes, limit: "mesh_bytes", allowed: budget });
+        }
+        let stride = vertex_stride(self.pages.format).max(self.pages.attributes.max_bytes_per_vertex());
+        let longest = (mesh.vertices().len() as u64 * stride).max(index_count(mesh) as u64 * INDEX);
+        let limit = "max_buffer_size";
+        (longest > max_buffer_size).then_some(Unplaced::TooLarge { bytes: longest, limit, allowed: max_buffer_size })
     }
 
     /// The slots of the meshes on the device, with their bytes.
-    pub(crate) fn resident(&self) -> impl Iterator<Item = (u32, u64)> {
-        let meshes = (0..).zip(&self.meshes);
-        meshes.filter_map(|(slot, mesh)| mesh.map(|mesh| (slot, self.pages.bytes_in(mesh.location))))
+    pub(crate) fn resident(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.meshes).filter(|(_, mesh)| mesh.is_some()).map(|(slot, _)| slot)
     }
 
-    /// Takes a mesh off the device.
-    pub(crate) fn evict(&mut self, slot: u32) {
-        if let Some(mesh) = self.meshes.get_mut(slot as usize).and_then(Option::take) {
-            self.lifetimes.retire(mesh.location);
-            self.coarser_levels.remove(&slot);
-            self.snapshot = None;
+    /// Whether a mesh in a slot is on the device, be it the current one or one that it replaced.
+    pub(crate) fn is_resident(&self, slot: u32) -> bool {
+        self.meshes.get(slot as usize).is_some_and(Option::is_some)
+    }
+
+    /// The number of meshes on the device.
+    pub(crate) fn resident_count(&self) -> usize {
+        self.resident_count
+    }
+
+    /// Whether what may be written once this reader is gone may be written now.
+    pub(crate) fn is_gone(&self, last_reader: LastReader) -> bool {
+        self.lifetimes.is_gone(last_reader)
+    }
+
+    /// Takes a mesh off the device. Its memory is free for those whose upload waits until nothing reads it.
+    fn take_off(&mut self, slot: u32) {
+        if let Some(location) = self.remove_resident(slot) {
+            self.lifetimes.retire(location);
+            self.pages.vacate(location);
+        }
+    }
+
+    /// Releases pages that are empty, and that no frame in flight reads any more.
+    fn release_unread(&mut self) {
+        for MeshLocation { vertices, indices } in self.lifetimes.reclaim() {
+            let reads =
+                |page: fn(&MeshLocation) -> u32, index| self.lifetimes.retired().any(|other| page(other) == index);
+            if !reads(|location| location.vertices.page, vertices.page) {
+                self.pages.vertices.release_if_empty(vertices.page);
+            }
+            if !reads(|location| location.indices.page, indices.page) {
+                self.pages.indices.release_if_empty(indices.page);
+            }
         }
     }
 
     /// A job is about to upload the mesh in a slot.
     pub(crate) fn begin_upload(&mut self, slot: u32) -> Arc<()> {
         self.in_flight.insert(slot);
+        self.missing.remove(&slot);
         Arc::clone(&self.epoch)
     }
 
-    /// A job has uploaded a mesh, or could not. Nothing is drawn with it if it changed meanwhile. Returns whether it is on the device.
+    /// Identifies the pages.
+    pub(crate) fn epoch(&self) -> &Arc<()> {
+        &self.epoch
+    }
+
+    /// Whether these are the pages of this cache.
+    pub(crate) fn is_current(&self, epoch: &Arc<()>) -> bool {
+        Arc::ptr_eq(epoch, &self.epoch)
+    }
+
+    /// A job has uploaded a mesh, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it is drawn until the next
+    /// one arrives.
     pub(crate) fn end_upload(
         &mut self,
         epoch: &Arc<()>,
-        (slot, revision, mesh): (u32, u64, &Mesh),
+        (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
         target: &MeshTarget,
-        (assets, is_complete): (&Assets, bool),
-    ) -> bool {
-        if !Arc::ptr_eq(epoch, &self.epoch) {
-            return false;
+        (assets, used, is_complete): (&Assets, &UsedMeshes, bool),
+    ) -> EndOfUpload {
+        if !self.is_current(epoch) {
+            return EndOfUpload::Stale;
         }
+        let slot = handle.index();
         self.in_flight.remove(&slot);
-        let current = assets.meshes.get_with_revision(slot).map(|(revision, _)| revision);
-        let is_needed = is_complete && current == Some(revision) && self.meshes[slot as usize].is_none();
+        let current = self.used_mesh(assets, used, slot).filter(|(current, ..)| *current == handle);
+        let before = self.meshes.get(slot as usize).copied().flatten();
+        let is_newer = before.is_none_or(|before| before.handle != handle || before.revision < revision);
+        let is_needed = is_complete && is_newer && current.is_some();
         if is_needed {
-            self.add_resident(slot, revision, mesh, target.location);
+            self.take_off(slot);
+            self.add_resident((handle, revision, mesh), target.location);
             self.snapshot = None;
         } else {
             // No snapshot refers to it.
             self.pages.free(target.location);
         }
-        is_needed
+        if current.is_some_and(|(_, current, _)| current != revision) {
+            self.outdated.extend(self.meshes[slot as usize].map(|_| slot));
+        }
+        if self.used_mesh(assets, used, slot).is_some() && self.is_missing(slot) {
+            self.missing.insert(slot);
+        }
+        if is_needed { EndOfUpload::Resident } else { EndOfUpload::Dropped }
     }
 
     /// The snapshot of what is on the device: the latest one if nothing changed.
@@ -149,5 +289,22 @@ impl MeshCache {
     /// The number of meshes on the way.
     pub(crate) fn in_flight(&self) -> usize {
         self.in_flight.len()
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::scene::{Topology, Vertex};
+
+    #[test]
+    fn a_mesh_is_too_large_for_the_budget_or_for_the_largest_buffer_by_name() {
+        let mesh = Mesh::new("sheet", Topology::TriangleList, vec![Vertex::default(); 100], vec![0; 300]).unwrap();
+        let cache = MeshCache::default();
+        let too_large = |bytes, limit, allowed| Some(Unplaced::TooLarge { bytes, limit, allowed });
+        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3200), None);
+        assert_eq!(cache.exceeded_limit(&mesh, 4399, 3200), too_large(4400, "mesh_bytes", 4399));
+        // Vertices and indices have buffers of their own.
+        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3199), too_large(3200, "max_buffer_size", 3199));
     }
 }

@@ -11,6 +11,10 @@ pub(crate) type PageBuffers<B> = Arc<OnceLock<B>>;
 pub(crate) struct PageSet<B> {
     /// By index, which stays the same while the page exists.
     pages: Vec<Option<Page<B>>>,
+    /// The length of all pages.
+    length: u64,
+    /// That of the pages in which nothing is.
+    empty_length: u64,
 }
 
 struct Page<B> {
@@ -27,9 +31,16 @@ pub(crate) struct PageRange {
     pub(crate) length: u32,
 }
 
+impl PageRange {
+    /// Whether both have a part of a page.
+    pub(super) fn overlaps(self, other: Self) -> bool {
+        self.page == other.page && self.start < other.start + other.length && other.start < self.start + self.length
+    }
+}
+
 impl<B> Default for PageSet<B> {
     fn default() -> Self {
-        Self { pages: Vec::new() }
+        Self { pages: Vec::new(), length: 0, empty_length: 0 }
     }
 }
 
@@ -37,42 +48,76 @@ impl<B> PageSet<B> {
     /// A range of this length in the first page that has room. If none has, adds a page of `page_length`, or longer if the range is.
     pub(super) fn allocate(&mut self, length: u32, page_length: u32) -> PageRange {
         let found = self.allocate_in_pages(length);
-        found.unwrap_or_else(|| {
-            let page_length = page_length.max(length);
-            let mut ranges = RangeAllocator::new(page_length);
-            // It fits, because the page is as long.
-            let start = ranges.allocate(length).unwrap_or_default();
-            let page = Page { ranges, length: page_length, buffers: PageBuffers::default() };
-            let index = self.pages.iter().position(Option::is_none).unwrap_or(self.pages.len());
-            if index == self.pages.len() {
-                self.pages.push(None);
-            }
-            self.pages[index] = Some(page);
-            PageRange { page: index as u32, start, length }
-        })
+        found.unwrap_or_else(|| self.allocate_in_new_page(length, page_length))
+    }
+
+    /// A range of this length in a new page of `page_length`, or longer if the range is.
+    pub(super) fn allocate_in_new_page(&mut self, length: u32, page_length: u32) -> PageRange {
+        let page_length = page_length.max(length);
+        let mut ranges = RangeAllocator::new(page_length);
+        // It fits, because the page is as long.
+        let start = ranges.allocate(length).unwrap_or_default();
+        let page = Page { ranges, length: page_length, buffers: PageBuffers::default() };
+        let index = self.pages.iter().position(Option::is_none).unwrap_or(self.pages.len());
+        if index == self.pages.len() {
+            self.pages.push(None);
+        }
+        self.length += u64::from(page_length);
+        self.empty_length += if page.ranges.is_empty() { u64::from(page_length) } else { 0 };
+        self.pages[index] = Some(page);
+        PageRange { page: index as u32, start, length }
     }
 
     /// A range of this length in the first page that has room, if one has.
     pub(super) fn allocate_in_pages(&mut self, length: u32) -> Option<PageRange> {
-        let mut pages = (0..).zip(&mut self.pages);
-        pages.find_map(|(page, entry)| {
-            let start = entry.as_mut()?.ranges.allocate(length)?;
-            Some(PageRange { page, start, length })
-        })
+        let mut pages = (0..).zip(&self.pages);
+        let page = pages.find_map(|(index, page)| (page.as_ref()?.ranges.longest() >= length).then_some(index))?;
+        let start = self.change_ranges(page, |ranges| ranges.allocate(length)).flatten()?;
+        Some(PageRange { page, start, length })
     }
 
     /// Frees a range, and releases the page if nothing else is in it.
     pub(super) fn free(&mut self, range: PageRange) {
-        let Some(entry) = self.pages.get_mut(range.page as usize) else { return };
-        if let Some(page) = entry {
-            page.ranges.free(range.start, range.length);
-            if page.ranges.is_empty() {
-                *entry = None;
-            }
-        }
+        self.vacate(range);
+        self.release_if_empty(range.page);
+    }
+
+    /// Frees a range. The page stays if nothing else is in it.
+    pub(super) fn vacate(&mut self, range: PageRange) {
+        self.change_ranges(range.page, |ranges| ranges.free(range.start, range.length));
+    }
+
+    /// Takes a range that was vacated.
+    pub(super) fn occupy(&mut self, range: PageRange) {
+        self.change_ranges(range.page, |ranges| ranges.occupy(range.start, range.length));
+    }
+
+    /// Releases a page in which nothing is. Returns whether it did.
+    pub(super) fn release_if_empty(&mut self, page: u32) -> bool {
+        let Some(entry) = self.pages.get_mut(page as usize) else { return false };
+        let Some(released) = entry.take_if(|page| page.ranges.is_empty()) else { return false };
+        self.length -= u64::from(released.length);
+        self.empty_length -= u64::from(released.length);
         while self.pages.last().is_some_and(Option::is_none) {
             self.pages.pop();
         }
+        true
+    }
+
+    /// The longest of the pages in which nothing is.
+    pub(super) fn longest_empty_page(&self) -> Option<(u32, u32)> {
+        let pages = (0..).zip(&self.pages).filter_map(|(index, page)| Some((index, page.as_ref()?)));
+        let empty = pages.filter(|(_, page)| page.ranges.is_empty()).map(|(index, page)| (index, page.length));
+        empty.max_by_key(|(_, length)| *length)
+    }
+
+    fn change_ranges<R>(&mut self, page: u32, change: impl FnOnce(&mut RangeAllocator) -> R) -> Option<R> {
+        let page = self.pages.get_mut(page as usize)?.as_mut()?;
+        let empty_length = |page: &Page<B>| if page.ranges.is_empty() { u64::from(page.length) } else { 0 };
+        self.empty_length -= empty_length(page);
+        let result = change(&mut page.ranges);
+        self.empty_length += empty_length(page);
+        Some(result)
     }
 
     /// The buffers of a page, and its length.
@@ -82,7 +127,12 @@ impl<B> PageSet<B> {
 
     /// The length of all pages.
     pub(super) fn length(&self) -> u64 {
-        self.pages.iter().flatten().map(|page| u64::from(page.length)).sum()
+        self.length
+    }
+
+    /// The length of all pages in which something is.
+    pub(super) fn occupied_length(&self) -> u64 {
+        self.length - self.empty_length
     }
 }
 
@@ -118,9 +168,27 @@ mod tests {
             assert_eq!(pages.pages.iter().flatten().count(), occupied.len());
             let used: u64 = pages.pages.iter().flatten().map(|page| u64::from(page.ranges.used())).sum();
             assert_eq!(used, live.iter().map(|range| u64::from(range.length)).sum::<u64>());
+            let length: u64 = pages.pages.iter().flatten().map(|page| u64::from(page.length)).sum();
+            assert_eq!((pages.length(), pages.occupied_length()), (length, length), "no page is empty");
         }
         live.drain(..).for_each(|range| pages.free(range));
         assert!(pages.pages.is_empty());
+    }
+
+    #[test]
+    fn a_page_that_is_vacated_stays_until_it_is_released_and_its_ranges_can_be_put_back() {
+        let mut pages = PageSet::<()>::default();
+        let [first, second] = [30, 70].map(|length| pages.allocate(length, 100));
+        let other = pages.allocate(50, 50);
+        pages.vacate(first);
+        pages.vacate(second);
+        assert_eq!((pages.length(), pages.occupied_length(), pages.longest_empty_page()), (150, 50, Some((0, 100))));
+        pages.occupy(second);
+        assert_eq!((pages.allocate_in_pages(30), pages.longest_empty_page()), (Some(first), None));
+        pages.vacate(first);
+        pages.vacate(second);
+        assert!(pages.release_if_empty(0) && !pages.release_if_empty(0) && !pages.release_if_empty(other.page));
+        assert_eq!((pages.length(), pages.occupied_length()), (50, 50));
     }
 
     #[test]

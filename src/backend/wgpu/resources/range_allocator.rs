@@ -5,16 +5,17 @@ use std::collections::BTreeMap;
 /// Hands out ranges of `0..capacity`, and takes them back. It places a range where it fits first, so that the end of a page stays free.
 #[derive(Debug)]
 pub(super) struct RangeAllocator {
-    capacity: u32,
     /// The start and length of each free range. No two of them touch.
     free: BTreeMap<u32, u32>,
     used: u32,
+    /// The length of the longest free range.
+    longest: u32,
 }
 
 impl RangeAllocator {
     pub(super) fn new(capacity: u32) -> Self {
         let free = if capacity == 0 { BTreeMap::new() } else { BTreeMap::from([(0, capacity)]) };
-        Self { capacity, free, used: 0 }
+        Self { free, used: 0, longest: capacity }
     }
 
     /// The start of a range of this length; `None` if none is free. An empty range is always at 0, and is not freed.
@@ -22,17 +23,32 @@ impl RangeAllocator {
         if length == 0 {
             return Some(0);
         }
-        if length > self.capacity - self.used {
+        if length > self.longest {
             return None;
         }
-        let (start, found) =
-            self.free.iter().find(|(_, free)| **free >= length).map(|(start, free)| (*start, *free))?;
-        self.free.remove(&start);
-        if found > length {
-            self.free.insert(start + length, found - length);
+        let start = self.free.iter().find(|(_, free)| **free >= length).map(|(start, _)| *start)?;
+        self.occupy(start, length);
+        Some(start)
+    }
+
+    /// Takes a range that is free as a whole.
+    pub(super) fn occupy(&mut self, start: u32, length: u32) {
+        if length == 0 {
+            return;
+        }
+        let Some((&first, &found)) = self.free.range(..=start).next_back() else { return };
+        debug_assert!(first + found >= start + length, "the range is free");
+        self.free.remove(&first);
+        if first < start {
+            self.free.insert(first, start - first);
+        }
+        if first + found > start + length {
+            self.free.insert(start + length, first + found - start - length);
         }
         self.used += length;
-        Some(start)
+        if found == self.longest {
+            self.longest = self.free.values().copied().max().unwrap_or(0);
+        }
     }
 
     /// Frees a range that was allocated.
@@ -50,7 +66,13 @@ impl RangeAllocator {
             first = before;
         }
         self.free.insert(first, end - first);
+        self.longest = self.longest.max(end - first);
         self.used -= length;
+    }
+
+    /// The length of the longest free range.
+    pub(super) fn longest(&self) -> u32 {
+        self.longest
     }
 
     /// The sum of all allocated ranges.
@@ -79,6 +101,11 @@ mod tests {
             Some(start as u32)
         }
 
+        fn longest_gap(&self) -> u32 {
+            let gaps = self.0.chunk_by(|one, next| one == next).filter(|range| !range[0]);
+            gaps.map(|range| range.len() as u32).max().unwrap_or(0)
+        }
+
         /// The number of free ranges.
         fn gaps(&self) -> usize {
             self.0.chunk_by(|one, next| one == next).filter(|range| !range[0]).count()
@@ -100,10 +127,16 @@ mod tests {
                 } else {
                     let (start, length) = live.swap_remove(random.usize(..live.len()));
                     ranges.free(start, length);
+                    if random.u8(..4) == 0 {
+                        // What made room in vain is put back where it was.
+                        ranges.occupy(start, length);
+                        ranges.free(start, length);
+                    }
                     marks.0[start as usize..(start + length) as usize].fill(false);
                 }
                 assert_eq!(ranges.used(), marks.0.iter().filter(|used| **used).count() as u32);
                 assert_eq!(ranges.free.len(), marks.gaps(), "free ranges that touch are one");
+                assert_eq!(ranges.longest(), marks.longest_gap());
                 assert_eq!(ranges.is_empty(), live.is_empty());
             }
         }

@@ -14,6 +14,10 @@ impl SnapshotToken {
     }
 }
 
+/// The latest snapshot that may read a resource: once it is gone, the resource may be written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct LastReader(u64);
+
 /// Resources that snapshots refer to, and that the next snapshot will not have: each is free once no snapshot is alive that may refer to it.
 ///
 /// Writes to the device are ordered by submissions. What is written after the last of these frames was submitted does not reach it, and
@@ -57,8 +61,24 @@ impl<T> SnapshotLifetimes<T> {
             return Vec::new();
         }
         self.snapshots.retain(|snapshot| snapshot.strong_count() > 0);
-        let oldest = self.snapshots.iter().find_map(Weak::upgrade).map_or(u64::MAX, |oldest| oldest.number);
+        let oldest = self.oldest();
         self.retired.extract_if(.., |(latest, _)| *latest < oldest).map(|(_, resource)| resource).collect()
+    }
+
+    /// The last reader of those retired resources that `is_written` says are about to be written.
+    pub(super) fn last_reader(&self, is_written: impl Fn(&T) -> bool) -> LastReader {
+        let readers = self.retired.iter().filter(|(_, resource)| is_written(resource));
+        LastReader(readers.map(|(latest, _)| *latest).max().unwrap_or(0))
+    }
+
+    /// Whether a snapshot and all before it are gone.
+    pub(super) fn is_gone(&self, LastReader(number): LastReader) -> bool {
+        number == 0 || self.oldest() > number
+    }
+
+    /// The number of the oldest living snapshot; `u64::MAX` if none lives.
+    fn oldest(&self) -> u64 {
+        self.snapshots.iter().find_map(Weak::upgrade).map_or(u64::MAX, |oldest| oldest.number)
     }
 
     /// Drops retired resources that no snapshot refers to any more, because they were replaced by others.
@@ -93,6 +113,25 @@ mod tests {
         assert_eq!(lifetimes.retired().copied().collect::<Vec<_>>(), ["of the third"]);
         drop(third);
         assert_eq!(lifetimes.reclaim(), ["of the third"]);
+    }
+
+    #[test]
+    fn what_is_retired_may_be_written_once_its_last_reader_is_gone() {
+        let mut lifetimes = SnapshotLifetimes::default();
+        let first = lifetimes.begin_snapshot();
+        lifetimes.retire("of the first");
+        let second = lifetimes.begin_snapshot();
+        lifetimes.retire("of both");
+        let [of_first, of_both, of_none] =
+            ["of the first", "of both", "of none"].map(|name| lifetimes.last_reader(|retired| *retired == name));
+        assert!(of_first < of_both && lifetimes.last_reader(|_| true) == of_both);
+        let gone =
+            |lifetimes: &SnapshotLifetimes<_>| [of_first, of_both, of_none].map(|reader| lifetimes.is_gone(reader));
+        assert_eq!(gone(&lifetimes), [false, false, true]);
+        drop(first);
+        assert_eq!(gone(&lifetimes), [true, false, true]);
+        drop(second);
+        assert_eq!(gone(&lifetimes), [true, true, true]);
     }
 
     #[test]

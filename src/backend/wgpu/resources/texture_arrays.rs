@@ -1,6 +1,6 @@
 //! Textures on the device, in texture arrays by size. All arrays are bound at once, so no batch changes a binding.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
@@ -40,8 +40,10 @@ pub(crate) struct TextureArrays {
     pub(super) changes: u64,
     /// Identifies the arrays: another one after all textures were dropped.
     pub(super) epoch: Arc<()>,
-    /// The slots of the textures that jobs are uploading.
-    pub(super) in_flight: HashSet<u32>,
+    /// The slots of the textures that jobs are uploading, each with its array.
+    pub(super) in_flight: HashMap<u32, u32>,
+    /// The slots of the textures that are to be streamed, and not on their way.
+    pub(super) missing: BTreeSet<u32>,
 }
 
 /// A texture on the device.
@@ -125,7 +127,18 @@ impl TextureArrays {
     }
 
     /// Retires textures that are out of date.
-    pub(super) fn retire_changed(&mut self, assets: &Assets, is_outdated: impl Fn(&ResidentTexture) -> bool) {
+    fn retire_changed(&mut self, assets: &Assets, is_outdated: impl Fn(&ResidentTexture) -> bool) {
+        self.begin_assets(assets);
+        for entry in &mut self.textures {
+            if let Some(texture) = entry.take_if(|texture| is_outdated(texture)) {
+                self.lifetimes.retire(texture.location);
+                self.changes += 1;
+            }
+        }
+    }
+
+    /// Has room for all slots of the assets. Drops everything if they are others.
+    pub(super) fn begin_assets(&mut self, assets: &Assets) {
         if self.identity != assets.textures.identity() {
             *self = Self {
                 identity: assets.textures.identity(),
@@ -136,16 +149,10 @@ impl TextureArrays {
             };
         }
         self.textures.resize(assets.textures.slot_count().max(self.textures.len()), None);
-        for entry in &mut self.textures {
-            if let Some(texture) = entry.take_if(|texture| is_outdated(texture)) {
-                self.lifetimes.retire(texture.location);
-                self.changes += 1;
-            }
-        }
     }
 
     /// Frees the layers of textures that are gone, as soon as no frame in flight may read them, and releases empty arrays.
-    pub(super) fn free_unread(&mut self) {
+    fn free_unread(&mut self) {
         for location in self.lifetimes.reclaim() {
             self.free_layer(location);
         }
@@ -153,9 +160,14 @@ impl TextureArrays {
 
     /// Frees a layer, and releases its array if nothing else is in it.
     pub(super) fn free_layer(&mut self, TextureLocation { array, layer }: TextureLocation) {
-        let layers = &mut self.arrays[array as usize];
-        layers.free(layer);
-        if layers.free_count() == layers.capacity() {
+        self.arrays[array as usize].free(layer);
+        self.release_if_empty(array as usize);
+    }
+
+    /// Releases an array if nothing is in it.
+    pub(super) fn release_if_empty(&mut self, array: usize) {
+        let layers = &mut self.arrays[array];
+        if layers.capacity() > 0 && layers.free_count() == layers.capacity() {
             layers.release();
             (self.moves, self.changes) = (self.moves + 1, self.changes + 1);
         }

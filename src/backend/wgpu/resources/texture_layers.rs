@@ -1,6 +1,7 @@
 //! One texture array, and which of its layers are in use.
 
 use super::upload_queue::UploadQueue;
+use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::scene::Texture;
 
@@ -11,6 +12,7 @@ pub(super) struct TextureLayers {
     texture: Option<wgpu::Texture>,
     /// By layer.
     is_used: Vec<bool>,
+    free_count: usize,
 }
 
 impl TextureLayers {
@@ -18,12 +20,14 @@ impl TextureLayers {
     pub(super) fn take(&mut self) -> Option<u32> {
         let free = self.is_used.iter().position(|is_used| !is_used)?;
         self.is_used[free] = true;
+        self.free_count -= 1;
         Some(free as u32)
     }
 
     /// Makes a layer free.
     pub(super) fn free(&mut self, layer: u32) {
         if let Some(is_used) = self.is_used.get_mut(layer as usize) {
+            self.free_count += usize::from(*is_used);
             *is_used = false;
         }
     }
@@ -33,7 +37,7 @@ impl TextureLayers {
     }
 
     pub(super) fn free_count(&self) -> usize {
-        self.is_used.iter().filter(|is_used| !**is_used).count()
+        self.free_count
     }
 
     pub(super) fn texture(&self) -> Option<&wgpu::Texture> {
@@ -63,7 +67,7 @@ impl TextureLayers {
             queue.submit([encoder.finish()]);
         }
         let is_used = (0..layers as usize).map(|layer| layer < live.len()).collect();
-        *self = Self { texture: Some(texture), is_used };
+        *self = Self { texture: Some(texture), is_used, free_count: layers as usize - live.len() };
     }
 }
 
@@ -100,8 +104,13 @@ pub(super) fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::
 }
 
 /// The size of a layer with all mip levels, in bytes.
-pub(crate) fn layer_bytes(side: u32) -> u64 {
-    (0..=side.ilog2()).map(|level| u64::from(side >> level).pow(2) * 4).sum()
+pub(crate) const fn layer_bytes(side: u32) -> u64 {
+    let (mut bytes, mut level) = (0, side as u64);
+    while level > 0 {
+        bytes += level * level * 4;
+        level /= 2;
+    }
+    bytes
 }
 
 /// Uploads a texture with all mip levels.
@@ -112,24 +121,71 @@ pub(super) fn write_layer(uploads: &UploadQueue, array: &wgpu::Texture, layer: u
 }
 
 /// Writes whole rows of a mip level of a layer, from row `first` on.
-pub(crate) fn write_rows(
-    uploads: &UploadQueue,
+fn write_rows(uploads: &UploadQueue, array: &wgpu::Texture, (layer, mip_level): (u32, u32), first: u32, pixels: &[u8]) {
+    let (destination, size) = rows_of(array, (layer, mip_level), first, pixels);
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(size.width * 4),
+        rows_per_image: Some(size.height),
+    };
+    uploads.write_texture(destination, pixels, layout, size);
+}
+
+/// Records that the device copies whole rows to a mip level of a layer, from row `first` on. They are in a buffer of their own until then:
+/// `Queue::write_texture` copies them under a lock that every submission takes.
+///
+/// # Errors
+/// If the device has no room.
+pub(crate) fn copy_rows(
+    device: &wgpu::Device,
+    encoder: &mut wgpu::CommandEncoder,
     array: &wgpu::Texture,
     (layer, mip_level): (u32, u32),
     first: u32,
     pixels: &[u8],
-) {
+) -> Result<(), BackendError> {
+    let (destination, extent) = rows_of(array, (layer, mip_level), first, pixels);
+    let row_bytes = extent.width * 4;
+    let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let label = "rows of a streamed texture";
+    let size = u64::from(stride) * u64::from(extent.height);
+    let usage = wgpu::BufferUsages::COPY_SRC;
+    let buffer =
+        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
+    {
+        let refused = |error: wgpu::MapRangeError| BackendError::Validation {
+            label: label.to_owned(),
+            message: error.to_string(),
+        };
+        let mut view = buffer.get_mapped_range_mut(..).map_err(refused)?;
+        if stride == row_bytes {
+            view.copy_from_slice(pixels);
+        } else {
+            for (row, bytes) in pixels.chunks_exact(row_bytes as usize).enumerate() {
+                let first = row * stride as usize;
+                view.slice(first..first + bytes.len()).copy_from_slice(bytes);
+            }
+        }
+    }
+    buffer.unmap();
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(stride), rows_per_image: Some(extent.height) };
+    encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer: &buffer, layout }, destination, extent);
+    Ok(())
+}
+
+/// Where whole rows of a mip level of a layer lie, from row `first` on.
+fn rows_of<'a>(
+    array: &'a wgpu::Texture,
+    (layer, mip_level): (u32, u32),
+    first: u32,
+    pixels: &[u8],
+) -> (wgpu::TexelCopyTextureInfo<'a>, wgpu::Extent3d) {
     let side = array.width() >> mip_level;
-    let rows = pixels.len() as u32 / (side * 4);
-    uploads.write_texture(
-        wgpu::TexelCopyTextureInfo {
-            texture: array,
-            mip_level,
-            origin: wgpu::Origin3d { x: 0, y: first, z: layer },
-            aspect: wgpu::TextureAspect::All,
-        },
-        pixels,
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(side * 4), rows_per_image: Some(rows) },
-        wgpu::Extent3d { width: side, height: rows, depth_or_array_layers: 1 },
-    );
+    let origin = wgpu::Origin3d { x: 0, y: first, z: layer };
+    let height = pixels.len() as u32 / (side * 4);
+    (
+        wgpu::TexelCopyTextureInfo { texture: array, mip_level, origin, aspect: wgpu::TextureAspect::All },
+        wgpu::Extent3d { width: side, height, depth_or_array_layers: 1 },
+    )
 }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::mesh_streaming::Room;
+use super::mesh_streaming::{EndOfUpload, Placed, Unplaced};
+use super::snapshot_lifetimes::LastReader;
 use super::texture_arrays::{ResidentTexture, TextureArrays, TextureLocation};
 use super::texture_layers::layer_bytes;
 use super::upload_queue::UploadQueue;
@@ -10,117 +11,292 @@ use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::handle::Handle;
 use crate::scene::{Assets, Texture};
 
+/// The device that arrays are on, and what they may take there.
+#[derive(Clone, Copy)]
+pub(crate) struct ArrayBudget<'a> {
+    device: &'a wgpu::Device,
+    uploads: &'a UploadQueue,
+    /// Of all arrays.
+    bytes: u64,
+    /// Of each array.
+    max_layers: u64,
+}
+
+impl<'a> ArrayBudget<'a> {
+    /// So many bytes, and what the device allows.
+    pub(crate) fn new(device: &'a wgpu::Device, uploads: &'a UploadQueue, bytes: u64) -> Self {
+        Self { device, uploads, bytes, max_layers: u64::from(device.limits().max_texture_array_layers) }
+    }
+}
+
+/// How much an array must gain, or give up, before it is copied for it.
+///
+/// Arrays grow and shrink as a whole. If one gave up each layer as soon as it is free, two arrays could be copied in turn for every texture
+/// that comes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Copying {
+    /// A part of its layers, so that copies of a layer are no more than a few for each texture.
+    Seldom,
+    /// A single layer: where nothing else makes room.
+    AnyTime,
+}
+
+impl Copying {
+    /// The layers that an array with so many grows by at least.
+    fn min_growth(self, capacity: u64) -> u64 {
+        if self == Self::Seldom { (capacity / 8).max(1) } else { 1 }
+    }
+
+    /// What an array with so many layers, of which so many are free, gives up for another one.
+    fn surplus(self, capacity: u64, free: u64) -> u64 {
+        let is_enough = free > 0 && (self == Self::AnyTime || free >= capacity / 4);
+        if is_enough { free } else { 0 }
+    }
+}
+
 impl TextureArrays {
     /// Begins a frame with textures that are streamed. One that was replaced stays until the new one arrives.
     pub(crate) fn begin_streamed_frame(&mut self, assets: &Assets) {
-        self.free_unread();
-        if self.revision != Some(assets.textures.revision()) || self.identity != assets.textures.identity() {
-            self.retire_changed(assets, |texture| assets.get(texture.handle).is_err());
-            self.revision = Some(assets.textures.revision());
+        for TextureLocation { array, .. } in self.lifetimes.reclaim() {
+            self.release_if_empty(array as usize);
         }
+        if self.revision == Some(assets.textures.revision()) && self.identity == assets.textures.identity() {
+            return;
+        }
+        self.begin_assets(assets);
+        for slot in 0..self.textures.len() as u32 {
+            if self.textures[slot as usize].is_some_and(|texture| assets.get(texture.handle).is_err()) {
+                self.evict(slot);
+            }
+        }
+        self.missing = (0..assets.textures.slot_count() as u32).filter(|slot| self.is_missing(assets, *slot)).collect();
+        self.revision = Some(assets.textures.revision());
     }
 
-    /// Whether a texture is neither on the device, in this revision, nor on its way.
-    pub(crate) fn is_missing(&self, handle: Handle<Texture>, revision: u64) -> bool {
-        let slot = handle.index();
+    /// Whether the texture in a slot is neither on the device, in this revision, nor on its way.
+    fn is_missing(&self, assets: &Assets, slot: u32) -> bool {
+        let Some((handle, revision, _)) = assets.textures.entry(slot) else { return false };
         let resident = self.textures.get(slot as usize).copied().flatten();
-        !self.in_flight.contains(&slot) && resident.is_none_or(|texture| texture.revision != revision)
+        let is_resident = resident.is_some_and(|texture| (texture.handle, texture.revision) == (handle, revision));
+        !self.in_flight.contains_key(&slot) && !is_resident
+    }
+
+    /// The textures that are neither on the device, as they are, nor on their way: with handle and revision.
+    pub(crate) fn missing<'a>(&self, assets: &'a Assets) -> impl Iterator<Item = (Handle<Texture>, u64, &'a Texture)> {
+        self.missing.iter().filter_map(|slot| assets.textures.entry(*slot))
     }
 
     /// Finds a layer for a texture, or moves an array to a larger one if the budget allows.
-    pub(crate) fn find_layer(
+    pub(crate) fn place_beside(
         &mut self,
-        device: &wgpu::Device,
-        uploads: &UploadQueue,
         texture: &Texture,
-        budget: u64,
-    ) -> Room<(TextureLocation, wgpu::Texture)> {
+        budget: ArrayBudget<'_>,
+    ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
         let index = array_for(texture);
-        if self.arrays[index].free_count() == 0 && !self.grow(device, uploads, index, budget) {
-            let is_awaited = !self.in_flight.is_empty() || self.lifetimes.retired().next().is_some();
-            return if is_awaited { Room::Awaited } else { Room::Missing(layer_bytes(ARRAY_SIDES[index])) };
+        let bytes = layer_bytes(ARRAY_SIDES[index]);
+        if bytes > budget.bytes {
+            return Err(Unplaced::TooLarge { bytes, limit: "texture_bytes", allowed: budget.bytes });
         }
-        let array = &mut self.arrays[index];
-        match (array.take(), array.texture()) {
-            (Some(layer), Some(on_device)) => {
-                Room::Found((TextureLocation { array: index as u32, layer }, on_device.clone()))
-            }
-            _ => Room::Awaited,
-        }
+        let location = self.take_layer(index, budget, Copying::Seldom)?;
+        self.placed(location)
     }
 
-    /// Moves an array to a larger one within the budget; the other arrays give up what they do not use. Returns whether there is a free layer.
-    fn grow(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, budget: u64) -> bool {
+    /// The same where candidates make room, the first ones first: those that have a layer of the same array, or enough of the others.
+    /// `evictions` counts them.
+    pub(crate) fn place_instead<C: Iterator<Item = u32>>(
+        &mut self,
+        texture: &Texture,
+        budget: ArrayBudget<'_>,
+        candidates: impl Fn() -> C,
+        evictions: &mut usize,
+    ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
+        let index = array_for(texture);
+        let evicted = self.evict_for(index, budget, Copying::Seldom, candidates());
+        *evictions += evicted;
+        let copying = if evicted > 0 { Copying::Seldom } else { Copying::AnyTime };
+        let mut found = self.take_layer(index, budget, copying);
+        if found == Err(Unplaced::Full) && evicted == 0 {
+            *evictions += self.evict_for(index, budget, Copying::AnyTime, candidates());
+            found = self.take_layer(index, budget, Copying::AnyTime);
+        }
+        if found == Err(Unplaced::Full) && self.arrays[index].capacity() as u64 == budget.max_layers {
+            found = Err(Unplaced::LayerLimit);
+        }
+        self.placed(found?)
+    }
+
+    fn placed(&self, location: TextureLocation) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
+        let on_device = self.arrays[location.array as usize].texture().cloned().ok_or(Unplaced::Full)?;
+        let last_reader = self.lifetimes.last_reader(|retired| *retired == location);
+        Ok(Placed { target: (location, on_device), last_reader })
+    }
+
+    /// Takes a free layer, or one of a larger array.
+    fn take_layer(
+        &mut self,
+        index: usize,
+        budget: ArrayBudget<'_>,
+        copying: Copying,
+    ) -> Result<TextureLocation, Unplaced> {
+        if self.arrays[index].free_count() == 0 {
+            self.grow(index, budget, copying)?;
+        }
+        let layer = self.arrays[index].take().ok_or(Unplaced::Full)?;
+        Ok(TextureLocation { array: index as u32, layer })
+    }
+
+    /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what they do not use.
+    fn grow(&mut self, index: usize, budget: ArrayBudget<'_>, copying: Copying) -> Result<(), Unplaced> {
+        let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.arrays[index].capacity() as u64);
+        let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers);
+        let growth = copying.min_growth(capacity).min(wanted - capacity);
+        let rest = budget.bytes.saturating_sub(self.resident_bytes());
+        if growth == 0 || self.surplus_bytes(index, copying, |_| 0) + rest < growth * bytes {
+            return Err(Unplaced::Full);
+        }
+        let gives_up = rest < growth * bytes;
+        let donors: Vec<_> = (0..ARRAY_SIDES.len())
+            .filter(|other| gives_up && *other != index && self.surplus(*other, copying, 0) > 0)
+            .collect();
         // What jobs upload stays where it is.
-        if !self.in_flight.is_empty() {
-            return false;
+        if donors.iter().chain([&index]).any(|array| self.in_flight.values().any(|busy| *busy as usize == *array)) {
+            return Err(Unplaced::Awaited);
         }
-        let (side, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.arrays[index].capacity() as u64);
-        let max_layers = u64::from(device.limits().max_texture_array_layers);
-        if self.resident_bytes() + side > budget {
-            for other in (0..ARRAY_SIDES.len()).filter(|other| *other != index) {
-                if self.arrays[other].free_count() > 0 {
-                    let live = self.live_layers(other).count();
-                    self.move_array(device, uploads.queue(), other, live as u32);
-                }
+        for other in donors {
+            let live = self.live_layers(other).count();
+            self.move_array(budget.device, budget.uploads.queue(), other, live as u32);
+        }
+        let affordable = capacity + budget.bytes.saturating_sub(self.resident_bytes()) / bytes;
+        self.move_array(budget.device, budget.uploads.queue(), index, wanted.min(affordable) as u32);
+        Ok(())
+    }
+
+    /// What an array gives up for another one if `evicted` more of its layers are free.
+    fn surplus(&self, array: usize, copying: Copying, evicted: u64) -> u64 {
+        let layers = &self.arrays[array];
+        copying.surplus(layers.capacity() as u64, layers.free_count() as u64 + evicted)
+    }
+
+    /// What all arrays but one give up for it, in bytes.
+    fn surplus_bytes(&self, index: usize, copying: Copying, evicted: impl Fn(usize) -> u64) -> u64 {
+        let others = (0..ARRAY_SIDES.len()).filter(|other| *other != index);
+        others.map(|other| self.surplus(other, copying, evicted(other)) * layer_bytes(ARRAY_SIDES[other])).sum()
+    }
+
+    /// Evicts candidates until there is a free layer in an array, or the array can grow; none if there are not enough. Returns how many.
+    fn evict_for(
+        &mut self,
+        index: usize,
+        budget: ArrayBudget<'_>,
+        copying: Copying,
+        candidates: impl Iterator<Item = u32>,
+    ) -> usize {
+        let capacity = self.arrays[index].capacity() as u64;
+        let may_grow = capacity < budget.max_layers;
+        let needed = copying.min_growth(capacity).min(budget.max_layers - capacity) * layer_bytes(ARRAY_SIDES[index]);
+        let rest = budget.bytes.saturating_sub(self.resident_bytes());
+        let (mut counts, mut chosen) = ([0; ARRAY_SIDES.len()], Vec::new());
+        for slot in candidates {
+            let Some(location) = self.location(slot) else { continue };
+            if location.array as usize == index {
+                self.evict(slot);
+                return 1;
+            }
+            if !may_grow {
+                continue;
+            }
+            counts[location.array as usize] += 1;
+            chosen.push((slot, location.array as usize));
+            if rest + self.surplus_bytes(index, copying, |array| counts[array]) >= needed {
+                // Those of arrays that give up nothing would make room in vain.
+                chosen.retain(|(_, array)| self.surplus(*array, copying, counts[*array]) > 0);
+                chosen.iter().for_each(|(slot, _)| self.evict(*slot));
+                return chosen.len();
             }
         }
-        let affordable = capacity + budget.saturating_sub(self.resident_bytes()) / side;
-        let layers = (capacity * 2).max(MIN_LAYERS).min(affordable).min(max_layers);
-        if layers <= capacity {
-            return false;
-        }
-        self.move_array(device, uploads.queue(), index, layers as u32);
-        true
+        0
     }
 
-    /// The slots of the textures on the device, with their bytes.
-    pub(crate) fn resident(&self) -> impl Iterator<Item = (u32, u64)> {
-        let textures = (0..).zip(&self.textures);
-        textures.filter_map(|(slot, texture)| {
-            let array = texture.as_ref()?.location.array;
-            Some((slot, layer_bytes(ARRAY_SIDES[array as usize])))
-        })
+    /// The slots of the textures on the device.
+    pub(crate) fn resident(&self) -> impl Iterator<Item = u32> {
+        (0..).zip(&self.textures).filter(|(_, texture)| texture.is_some()).map(|(slot, _)| slot)
     }
 
-    /// Takes a texture off the device.
-    pub(crate) fn evict(&mut self, slot: u32) {
+    /// Whether a texture in a slot is on the device, be it the current one or one that it replaced.
+    pub(crate) fn is_resident(&self, slot: u32) -> bool {
+        self.location(slot).is_some()
+    }
+
+    /// Whether what may be written once this reader is gone may be written now.
+    pub(crate) fn is_gone(&self, last_reader: LastReader) -> bool {
+        self.lifetimes.is_gone(last_reader)
+    }
+
+    /// The number of textures on the device.
+    pub(crate) fn resident_count(&self) -> usize {
+        self.arrays.iter().map(|array| array.capacity() - array.free_count()).sum::<usize>() - self.in_flight.len()
+    }
+
+    /// Takes a texture off the device. Its layer is free for those whose upload waits until nothing reads it.
+    fn evict(&mut self, slot: u32) {
         if let Some(texture) = self.textures.get_mut(slot as usize).and_then(Option::take) {
-            self.lifetimes.retire(texture.location);
-            self.changes += 1;
+            self.missing.insert(slot);
+            self.vacate(texture.location);
         }
     }
 
-    /// A job is about to upload a texture.
-    pub(crate) fn begin_upload(&mut self, handle: Handle<Texture>) -> Arc<()> {
-        self.in_flight.insert(handle.index());
+    fn vacate(&mut self, location: TextureLocation) {
+        self.lifetimes.retire(location);
+        self.arrays[location.array as usize].free(location.layer);
+        self.changes += 1;
+    }
+
+    /// A job is about to upload a texture to a layer of this array.
+    pub(crate) fn begin_upload(&mut self, handle: Handle<Texture>, location: TextureLocation) -> Arc<()> {
+        self.in_flight.insert(handle.index(), location.array);
+        self.missing.remove(&handle.index());
         Arc::clone(&self.epoch)
     }
 
-    /// A job has uploaded a texture, or could not. Nothing is drawn with it if it is gone meanwhile. Returns whether it is on the device.
+    /// Identifies the arrays.
+    pub(crate) fn epoch(&self) -> &Arc<()> {
+        &self.epoch
+    }
+
+    /// Whether these are the arrays of this cache.
+    pub(crate) fn is_current(&self, epoch: &Arc<()>) -> bool {
+        Arc::ptr_eq(epoch, &self.epoch)
+    }
+
+    /// A job has uploaded a texture, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it is drawn until the
+    /// next one arrives.
     pub(crate) fn end_upload(
         &mut self,
         epoch: &Arc<()>,
         (handle, revision): (Handle<Texture>, u64),
         location: TextureLocation,
         (assets, is_complete): (&Assets, bool),
-    ) -> bool {
-        if !Arc::ptr_eq(epoch, &self.epoch) {
-            return false;
+    ) -> EndOfUpload {
+        if !self.is_current(epoch) {
+            return EndOfUpload::Stale;
         }
-        self.in_flight.remove(&handle.index());
+        let slot = handle.index();
+        self.in_flight.remove(&slot);
         let is_needed = is_complete && assets.get(handle).is_ok();
         if is_needed {
             let new = ResidentTexture { handle, revision, location };
-            if let Some(before) = self.textures[handle.index() as usize].replace(new) {
-                self.lifetimes.retire(before.location);
+            if let Some(before) = self.textures[slot as usize].replace(new) {
+                self.vacate(before.location);
             }
             self.changes += 1;
         } else {
             // No snapshot refers to it.
             self.free_layer(location);
         }
-        is_needed
+        if self.is_missing(assets, slot) {
+            self.missing.insert(slot);
+        }
+        if is_needed { EndOfUpload::Resident } else { EndOfUpload::Dropped }
     }
 
     /// Counts how often what is on the device, or where it is, changed.
@@ -136,3 +312,106 @@ impl TextureArrays {
 
 /// The layers of a new array, if the budget allows.
 const MIN_LAYERS: u64 = 8;
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+
+    /// Arrays, and the textures in them, those that were used longest ago first.
+    struct Arrays {
+        arrays: TextureArrays,
+        assets: Assets,
+        device: wgpu::Device,
+        uploads: UploadQueue,
+        by_use: Vec<u32>,
+    }
+
+    const LAYER: u64 = layer_bytes(ARRAY_SIDES[0]);
+    /// A layer of 512 takes four bytes more than four of 256.
+    const SLACK: u64 = 64;
+
+    impl Arrays {
+        fn new() -> Self {
+            let (device, queue) = noop_device();
+            let (arrays, uploads) = (TextureArrays::default(), UploadQueue::new(queue));
+            Self { arrays, assets: Assets::default(), device, uploads, by_use: Vec::new() }
+        }
+
+        /// Places a new texture, which is on the device at once; the first `candidates` by use may make room.
+        fn place(&mut self, side: u32, (layers, max_layers): (u64, u64), candidates: usize) -> Result<usize, Unplaced> {
+            let texture = Texture::new("plain", side, side, vec![255; (side * side * 4) as usize]).unwrap();
+            let handle = self.assets.add(texture.clone()).unwrap();
+            self.arrays.begin_streamed_frame(&self.assets);
+            let (device, uploads) = (&self.device, &self.uploads);
+            let budget = ArrayBudget { device, uploads, bytes: layers * LAYER + SLACK, max_layers };
+            let (by_use, mut evictions) = (self.by_use[..candidates].to_vec(), 0);
+            let mut placed = self.arrays.place_beside(&texture, budget);
+            if matches!(placed, Err(Unplaced::Full)) {
+                placed = self.arrays.place_instead(&texture, budget, || by_use.iter().copied(), &mut evictions);
+            }
+            self.by_use.retain(|slot| self.arrays.is_resident(*slot));
+            let (location, _) = placed.inspect_err(|_| assert_eq!(evictions, 0, "nothing is evicted in vain"))?.target;
+            assert!(self.arrays.resident_bytes() <= budget.bytes);
+            let (_, revision, _) = self.assets.textures.entry(handle.index()).unwrap();
+            let epoch = self.arrays.begin_upload(handle, location);
+            let end = self.arrays.end_upload(&epoch, (handle, revision), location, (&self.assets, true));
+            assert_eq!(end, EndOfUpload::Resident);
+            self.by_use.push(handle.index());
+            Ok(evictions)
+        }
+    }
+
+    #[test]
+    fn at_the_limit_of_layers_only_textures_of_the_same_array_make_room() {
+        let mut arrays = Arrays::new();
+        let limits = (1000, 8);
+        // The larger ones were used longest ago.
+        for side in [512, 512, 512, 16, 16, 16, 16, 16, 16, 16, 16] {
+            assert_eq!(arrays.place(side, limits, 0), Ok(0));
+        }
+        assert_eq!(arrays.place(16, limits, 3), Err(Unplaced::LayerLimit), "larger ones would make room in vain");
+        assert_eq!(arrays.place(512, limits, 0), Ok(0), "the other array is not at its limit");
+        assert_eq!(arrays.place(16, limits, 4), Ok(1));
+        assert_eq!(arrays.by_use[..4], [0, 1, 2, 4], "the oldest one of its array");
+    }
+
+    #[test]
+    fn where_the_budget_is_full_too_few_candidates_make_no_room() {
+        let mut arrays = Arrays::new();
+        let limits = (8, 256);
+        for _ in 0..8 {
+            assert_eq!(arrays.place(16, limits, 0), Ok(0));
+        }
+        // One of 512 takes the room of four of 256.
+        assert_eq!(arrays.place(512, limits, 3), Err(Unplaced::Full));
+        assert_eq!(arrays.place(512, limits, 5), Ok(4));
+        assert_eq!(
+            arrays.place(2048, limits, 5),
+            Err(Unplaced::TooLarge { bytes: layer_bytes(2048), limit: "texture_bytes", allowed: 8 * LAYER + SLACK })
+        );
+    }
+
+    #[test]
+    fn arrays_that_grow_and_shrink_in_turn_are_copied_seldom() {
+        let mut arrays = Arrays::new();
+        let mut random = fastrand::Rng::with_seed(4);
+        let limits = (256, 2048);
+        let (mut placed, mut share) = (0, 0.5);
+        let mut after_filling = 0;
+        for step in 0..1200 {
+            if step % 50 == 0 {
+                // What is in sight has other sizes than before.
+                share = random.f64();
+            }
+            if step == 200 {
+                after_filling = arrays.arrays.moves();
+            }
+            let side = if random.f64() < share { 512 } else { 256 };
+            placed += usize::from(arrays.place(side, limits, arrays.by_use.len()).is_ok());
+        }
+        assert_eq!(placed, 1200);
+        let moves = arrays.arrays.moves() - after_filling;
+        assert!(moves < 150, "{moves} copies of arrays for 1000 textures");
+    }
+}

@@ -10,7 +10,7 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    /// The bytes of a piece. wgpu holds a lock while it copies one, which a frame may wait for.
+    /// The bytes of a piece: so small that a job looks at the time often.
     const PIECE: u64 = 1 << 18;
 
     pub(super) fn new(bytes: u64, end: Instant) -> Self {

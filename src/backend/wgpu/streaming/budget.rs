@@ -23,7 +23,8 @@ use crate::backend::BackendError;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamingBudget {
-    /// The device's memory for meshes, in bytes: that of whole pages, of which each takes up to a sixteenth of the budget, and 4 MiB at most.
+    /// The device's memory for meshes, in bytes: that of whole pages, of which each takes up to a sixteenth of the budget, and 4 MiB at most,
+    /// unless a mesh is larger.
     pub mesh_bytes: u64,
     /// The device's memory for textures, in bytes: that of whole texture arrays. A texture is scaled to a square of 256, 512, 1024 or 2048
     /// pixels, and takes a third more with its mip levels. While an array moves to a larger one, both are there.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::allowance::Allowance;
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{MeshTarget, UploadQueue};
+use crate::handle::Handle;
 use crate::quality::VertexFormat;
 use crate::scene::{Mesh, PackedVertex};
 
@@ -12,7 +13,7 @@ use crate::scene::{Mesh, PackedVertex};
 pub(crate) struct MeshUpload {
     /// Which pages its target is in: those of a cache that was not cleared since.
     pub(crate) epoch: Arc<()>,
-    pub(crate) slot: u32,
+    pub(crate) handle: Handle<Mesh>,
     /// In the assets.
     pub(crate) revision: u64,
     pub(crate) mesh: Mesh,
@@ -23,8 +24,8 @@ pub(crate) struct MeshUpload {
 }
 
 impl MeshUpload {
-    pub(crate) fn new(epoch: Arc<()>, (slot, revision): (u32, u64), mesh: Mesh, target: MeshTarget) -> Self {
-        Self { epoch, slot, revision, mesh, target, packed: Vec::new(), written: 0 }
+    pub(crate) fn new(epoch: Arc<()>, (handle, revision): (Handle<Mesh>, u64), mesh: Mesh, target: MeshTarget) -> Self {
+        Self { epoch, handle, revision, mesh, target, packed: Vec::new(), written: 0 }
     }
 
     /// All that it uploads.

@@ -4,6 +4,9 @@ mod allowance;
 mod budget;
 mod frame_use;
 mod mesh_upload;
+mod on_device;
+mod placement;
+mod refusals;
 mod request;
 mod statistics;
 mod streamer;
@@ -14,5 +17,6 @@ mod victims;
 
 pub use budget::StreamingBudget;
 pub(crate) use frame_use::FrameUse;
+pub(crate) use on_device::OnDevice;
 pub use statistics::StreamingStatistics;
-pub(crate) use streamer::{OnDevice, StreamedResources, Streamer};
+pub(crate) use streamer::{StreamedResources, Streamer};

@@ -13,9 +13,9 @@ pub(super) struct Request<'a> {
     pub(super) requested: Requested<'a>,
 }
 
-/// What is requested: with its slot or handle, and its revision.
+/// What is requested: with its handle and its revision.
 pub(super) enum Requested<'a> {
-    Mesh(u32, u64, &'a Mesh),
+    Mesh(Handle<Mesh>, u64, &'a Mesh),
     Texture(Handle<Texture>, u64, &'a Texture),
 }
 
@@ -23,7 +23,7 @@ impl Request<'_> {
     /// Meshes come before textures: without a texture something is drawn nevertheless. The rest is there so that any two differ.
     fn rank(&self) -> (bool, i32, bool, Reverse<u32>) {
         let (is_mesh, slot) = match self.requested {
-            Requested::Mesh(slot, ..) => (true, slot),
+            Requested::Mesh(handle, ..) => (true, handle.index()),
             Requested::Texture(handle, ..) => (false, handle.index()),
         };
         (self.is_wanted, self.priority, is_mesh, Reverse(slot))

@@ -24,6 +24,9 @@ pub struct StreamingStatistics {
     /// Of the wanted ones, those for which there is no room, because the latest frame draws everything that is on the device. If it is
     /// above 0 for long, what a frame draws exceeds the budget.
     pub over_budget: usize,
+    /// Meshes and textures that are used and can never be on the device: larger than the budget of their kind, or than the device's largest
+    /// buffer. They are not among the requested ones. Each is warned of once, by name.
+    pub too_large: usize,
 }
 
 impl StreamingStatistics {

@@ -1,6 +1,6 @@
 //! What a frame has on the device, what comes next, and what makes room for it (M 10.3).
 
-use std::collections::BinaryHeap;
+use std::mem;
 use std::sync::Arc;
 
 use parking_lot::Mutex;
@@ -8,14 +8,20 @@ use parking_lot::Mutex;
 use super::budget::StreamingBudget;
 use super::frame_use::FrameUse;
 use super::mesh_upload::MeshUpload;
-use super::request::{Request, Requested};
+use super::on_device::{Epochs, HeldUpload, OnDevice};
+use super::placement::Placement;
+use super::refusals::{Retries, TooLarge};
+use super::request::Requested;
 use super::statistics::StreamingStatistics;
 use super::texture_upload::TextureUpload;
 use super::upload_jobs::{Upload, UploadJobs};
-use super::uses::Uses;
-use crate::backend::wgpu::resources::{MaterialCache, MaterialSnapshot, MeshCache, MeshSnapshot, Room, UploadQueue};
+use super::uses::{TextureUsers, Uses};
+use crate::backend::wgpu::resources::{
+    EndOfUpload, MaterialCache, MaterialSnapshot, MeshSnapshot, Unplaced, UploadQueue,
+};
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
+use crate::view::{RejectionReason, Rejections, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
 ///
@@ -33,6 +39,13 @@ pub(crate) struct Streamer {
 struct Latest {
     frame_use: FrameUse,
     statistics: StreamingStatistics,
+    texture_users: TextureUsers,
+    /// What has room, and waits until no frame in flight reads there. The most important first.
+    held: Vec<HeldUpload>,
+    epochs: Epochs,
+    retries: Retries,
+    too_large: TooLarge,
+    warning: BudgetWarning,
 }
 
 /// What a frame begins with.
@@ -40,27 +53,6 @@ pub(crate) struct StreamedResources {
     pub(crate) meshes: Arc<MeshSnapshot>,
     pub(crate) materials: MaterialSnapshot,
     pub(crate) frame_use: FrameUse,
-}
-
-/// The device, and what is on it.
-pub(crate) struct OnDevice<'a> {
-    pub(crate) device: &'a wgpu::Device,
-    pub(crate) uploads: &'a UploadQueue,
-    pub(crate) meshes: &'a mut MeshCache,
-    pub(crate) materials: &'a mut MaterialCache,
-}
-
-impl OnDevice<'_> {
-    /// Drops what is gone.
-    ///
-    /// # Errors
-    /// If the device has no room for what was replaced.
-    fn begin_frame(&mut self, request: &FrameRequest<'_>, mesh_budget: u64) -> Result<(), BackendError> {
-        let (assets, used, vertices) = (request.scene.assets, request.objects.used_meshes(), request.quality.vertices);
-        self.meshes.begin_streamed_frame(self.device, self.uploads, (assets, used), vertices, mesh_budget)?;
-        self.materials.textures.begin_streamed_frame(assets);
-        Ok(())
-    }
 }
 
 impl Streamer {
@@ -82,36 +74,36 @@ impl Streamer {
         mut on_device: OnDevice<'_>,
         request: &FrameRequest<'_>,
     ) -> Result<StreamedResources, BackendError> {
-        let (assets, used) = (request.scene.assets, request.objects.used_meshes());
+        let assets = request.scene.assets;
         let mut latest = self.latest.lock();
-        let Latest { frame_use, statistics } = &mut *latest;
-        frame_use.frame += 1;
-        frame_use.meshes.reserve(assets.meshes.slot_count());
-        frame_use.materials.reserve(assets.materials.slot_count());
+        let latest = &mut *latest;
+        latest.frame_use.frame += 1;
+        latest.frame_use.meshes.reserve(assets.meshes.slot_count());
+        latest.frame_use.materials.reserve(assets.materials.slot_count());
         on_device.begin_frame(request, self.budget.mesh_bytes)?;
-        self.take_over(&mut on_device, request, frame_use)?;
-
-        let uses = Uses::new(assets, frame_use, Self::FRAMES_IN_SIGHT);
-        let requests = uses.requests(on_device.meshes, &on_device.materials.textures, assets, used);
-        statistics.requested = requests.len();
-        statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
-        let was_over_budget = statistics.over_budget > 0;
-        statistics.over_budget = self.place(&mut on_device, assets, &uses, requests, statistics)?;
-        if statistics.over_budget > 0 && !was_over_budget {
-            let count = statistics.over_budget;
-            tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
+        if on_device.update_epochs(&mut latest.epochs) {
+            latest.held.retain(|held| on_device.is_current(&held.upload));
+            self.jobs.drop_stale(|upload| on_device.is_current(upload));
         }
-        let OnDevice { device, meshes, materials, .. } = on_device;
-        let (snapshot, lacks_texture) =
-            materials.update_streamed(device, assets, request.plan.material_types(), request.rejections);
+        self.take_over(&mut on_device, (assets, request.objects.used_meshes()), &latest.frame_use)?;
+        self.place(&mut on_device, (assets, request.rejections), latest)?;
+        let Latest { frame_use, statistics, held, .. } = latest;
+        latest.warning.update(statistics.over_budget);
+        let (materials, lacks_texture) = on_device.materials.update_streamed(
+            on_device.device,
+            assets,
+            request.plan.material_types(),
+            request.rejections,
+        );
         frame_use.lacks_texture = lacks_texture;
+        // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in flight.
+        self.begin_uploads(&on_device, held);
+        let OnDevice { meshes, materials: MaterialCache { textures, .. }, .. } = on_device;
         statistics.mesh_bytes = meshes.resident_bytes();
-        statistics.texture_bytes = materials.textures.resident_bytes();
-        (statistics.meshes, statistics.textures) = (meshes.resident().count(), materials.textures.resident().count());
-        statistics.in_flight = meshes.in_flight() + materials.textures.in_flight();
-        let resources =
-            StreamedResources { meshes: meshes.streamed_snapshot(), materials: snapshot, frame_use: frame_use.clone() };
-        Ok(resources)
+        statistics.texture_bytes = textures.resident_bytes();
+        (statistics.meshes, statistics.textures) = (meshes.resident_count(), textures.resident_count());
+        statistics.in_flight = meshes.in_flight() + textures.in_flight();
+        Ok(StreamedResources { meshes: meshes.streamed_snapshot(), materials, frame_use: frame_use.clone() })
     }
 
     /// Whether something waits for a background job.
@@ -129,116 +121,170 @@ impl Streamer {
         StreamingStatistics { uploaded_bytes: self.jobs.uploaded_bytes(), ..self.latest.lock().statistics }
     }
 
-    /// Takes over what jobs have uploaded.
+    /// Takes over what jobs have uploaded. Errors of what was cleared since are nobody's any more.
     ///
     /// # Errors
     /// Returns the first error of the device.
     fn take_over(
         &self,
         on_device: &mut OnDevice<'_>,
-        request: &FrameRequest<'_>,
+        (assets, used): (&Assets, &UsedMeshes),
         frame_use: &FrameUse,
     ) -> Result<(), BackendError> {
-        let assets = request.scene.assets;
+        let (finished, commands) = self.jobs.take_finished();
+        if !commands.is_empty() {
+            on_device.uploads.queue().submit(commands);
+        }
         let mut outcome = Ok(());
-        for (upload, result) in self.jobs.take_finished() {
-            let arrived = (assets, result.is_ok());
-            match upload {
-                Upload::Mesh(MeshUpload { epoch, slot, revision, mesh, target, .. }) => {
-                    if on_device.meshes.end_upload(&epoch, (slot, revision, &mesh), &target, arrived) {
+        for (upload, result) in finished {
+            let is_complete = result.is_ok();
+            let end = match upload {
+                Upload::Mesh(MeshUpload { epoch, handle, revision, mesh, target, .. }) => {
+                    let arrived = (assets, used, is_complete);
+                    let end = on_device.meshes.end_upload(&epoch, (handle, revision, &mesh), &target, arrived);
+                    if end == EndOfUpload::Resident {
                         // As if it had been drawn, so that what was used before makes room first.
-                        frame_use.mark_arrival(slot, Self::FRAMES_IN_SIGHT);
+                        frame_use.mark_arrival(handle.index(), Self::FRAMES_IN_SIGHT);
                     }
+                    end
                 }
                 Upload::Texture(TextureUpload { epoch, handle, revision, location, .. }) => {
-                    on_device.materials.textures.end_upload(&epoch, (handle, revision), location, arrived);
+                    let textures = &mut on_device.materials.textures;
+                    textures.end_upload(&epoch, (handle, revision), location, (assets, is_complete))
                 }
+            };
+            if end != EndOfUpload::Stale {
+                outcome = outcome.and(result);
             }
-            outcome = outcome.and(result);
         }
         outcome
     }
 
-    /// Gives room and jobs to requests, the most important ones first, and evicts what is used less. Returns how many wanted ones
-    /// cannot have room.
+    /// Gives room to requests, the most important ones first, and evicts what is used less.
     ///
     /// # Errors
     /// If a page is missing. This is a bug in Drawloom.
     fn place(
         &self,
         on_device: &mut OnDevice<'_>,
-        assets: &Assets,
-        uses: &Uses,
-        mut requests: BinaryHeap<Request<'_>>,
-        statistics: &mut StreamingStatistics,
-    ) -> Result<usize, BackendError> {
-        let OnDevice { device, uploads, meshes, materials } = on_device;
-        let textures = &mut materials.textures;
+        (assets, rejections): (&Assets, &Rejections),
+        latest: &mut Latest,
+    ) -> Result<(), BackendError> {
+        let Latest { frame_use, texture_users, statistics, held, retries, too_large, .. } = latest;
+        texture_users.update(assets);
+        retries.begin_frame(frame_use.frame);
+        too_large.update(assets);
+        let uses = Uses::new(assets, (frame_use, texture_users), Self::FRAMES_IN_SIGHT);
+        let mut requests = uses.requests(on_device.meshes, &on_device.materials.textures);
+        statistics.requested = requests.len();
+        statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
+        statistics.over_budget = 0;
+
         let max_waiting = self.budget.upload_bytes_per_frame * Self::MAX_WAITING_FRAMES;
-        let (mut waiting, mut placed, mut over_budget) = (self.jobs.waiting_bytes(), Vec::new(), 0);
-        let (mut mesh_victims, mut texture_victims) = (None, None);
-        // While a request waits for the room that was made for it, no other one takes it. Where there is no room to make, smaller ones may
-        // still fit.
-        let (mut meshes_wait, mut textures_wait, mut meshes_are_full, mut textures_are_full) =
-            (false, false, false, false);
+        let mut waiting = self.jobs.waiting_bytes() + held.iter().map(|held| held.upload.bytes()).sum::<u64>();
+        let mut placement = Placement::new(on_device, &self.budget, &uses, retries);
         while waiting < max_waiting
-            && !(meshes_wait && textures_wait)
             && let Some(request) = requests.pop()
         {
-            let is_full = match request.requested {
-                Requested::Mesh(..) if meshes_wait => continue,
-                Requested::Texture(..) if textures_wait => continue,
-                Requested::Mesh(slot, revision, mesh) => match meshes.find_room(mesh, self.budget.mesh_bytes)? {
-                    Room::Found(target) => {
-                        let epoch = meshes.begin_upload(slot);
-                        let upload = MeshUpload::new(epoch, (slot, revision), mesh.clone(), target);
-                        waiting += upload.bytes();
-                        placed.push(Upload::Mesh(upload));
-                        continue;
-                    }
-                    Room::Awaited => {
-                        meshes_wait = true;
-                        continue;
-                    }
-                    Room::Missing(_) if meshes_are_full => true,
-                    Room::Missing(bytes) => {
-                        let victims = mesh_victims.get_or_insert_with(|| uses.mesh_victims(meshes, assets));
-                        let evicted = victims.take(&request, bytes);
-                        evicted.iter().for_each(|slot| meshes.evict(*slot));
-                        statistics.evictions += evicted.len() as u64;
-                        (meshes_wait, meshes_are_full) = (!evicted.is_empty(), evicted.is_empty());
-                        meshes_are_full
-                    }
-                },
-                Requested::Texture(handle, revision, texture) => {
-                    match textures.find_layer(device, uploads, texture, self.budget.texture_bytes) {
-                        Room::Found((location, array)) => {
-                            let epoch = textures.begin_upload(handle);
-                            let upload =
-                                TextureUpload::new(epoch, (handle, revision), texture.clone(), array, location);
-                            waiting += upload.bytes();
-                            placed.push(Upload::Texture(upload));
-                            continue;
-                        }
-                        Room::Awaited => {
-                            textures_wait = true;
-                            continue;
-                        }
-                        Room::Missing(_) if textures_are_full => true,
-                        Room::Missing(bytes) => {
-                            let victims = texture_victims.get_or_insert_with(|| uses.texture_victims(textures, assets));
-                            let evicted = victims.take(&request, bytes);
-                            evicted.iter().for_each(|slot| textures.evict(*slot));
-                            statistics.evictions += evicted.len() as u64;
-                            (textures_wait, textures_are_full) = (!evicted.is_empty(), evicted.is_empty());
-                            textures_are_full
-                        }
+            match placement.place(&request)? {
+                Ok(placed) => {
+                    waiting += placed.upload.bytes();
+                    held.push(placed);
+                    too_large.remove(&request.requested);
+                }
+                Err(Unplaced::TooLarge { bytes, limit, allowed }) => {
+                    too_large.tell(&request.requested, (bytes, limit, allowed));
+                    statistics.requested -= 1;
+                    statistics.wanted -= usize::from(request.is_wanted);
+                }
+                Err(Unplaced::Full) => statistics.over_budget += usize::from(request.is_wanted),
+                Err(Unplaced::LayerLimit) => {
+                    if let Requested::Texture(handle, ..) = request.requested
+                        && request.is_wanted
+                    {
+                        rejections.count(RejectionReason::TextureLimit, handle.index() as usize);
                     }
                 }
-            };
-            over_budget += usize::from(is_full && request.is_wanted);
+                Err(Unplaced::Awaited) => {}
+            }
         }
-        self.jobs.add(placed.into_iter());
-        Ok(over_budget)
+        statistics.evictions += placement.evictions as u64;
+        statistics.too_large = too_large.count();
+        Ok(())
+    }
+
+    /// Has jobs do the uploads whose memory no frame in flight reads any more.
+    fn begin_uploads(&self, on_device: &OnDevice<'_>, held: &mut Vec<HeldUpload>) {
+        self.jobs.add(held.extract_if(.., |held| on_device.may_begin(held)).map(|held| held.upload));
+    }
+}
+
+/// Tells once that frames draw more than the budget, and again only after they have not for a while.
+#[derive(Default)]
+struct BudgetWarning {
+    was_told: bool,
+    frames_within: u32,
+}
+
+impl BudgetWarning {
+    /// What is over the budget in one frame of a few is one state, not many.
+    const FRAMES_WITHIN: u32 = 600;
+
+    fn update(&mut self, over_budget: usize) {
+        if over_budget == 0 {
+            self.frames_within = self.frames_within.saturating_add(1);
+            self.was_told &= self.frames_within < Self::FRAMES_WITHIN;
+            return;
+        }
+        self.frames_within = 0;
+        if !mem::replace(&mut self.was_told, true) {
+            let count = over_budget;
+            tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
+        }
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use std::iter;
+
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::resources::MeshCache;
+    use crate::scene::{Mesh, Topology, Vertex};
+
+    #[test]
+    fn an_error_of_an_upload_to_pages_that_are_gone_is_nobodys() {
+        let (device, queue) = noop_device();
+        let (streamer, uploads) = (Streamer::new(StreamingBudget::default()), UploadQueue::new(queue));
+        let (mut assets, used) = (Assets::default(), UsedMeshes::default());
+        let mesh = Mesh::new("leaf", Topology::TriangleList, vec![Vertex::default(); 3], vec![0, 1, 2]).unwrap();
+        let handle = assets.add(mesh.clone()).unwrap();
+        for was_cleared in [true, false] {
+            let (mut meshes, mut materials) = (MeshCache::default(), MaterialCache::default());
+            let placed = meshes.place(&device, &mesh, 1 << 20, iter::empty(), &mut 0).unwrap().ok().unwrap();
+            let upload = MeshUpload::new(meshes.begin_upload(0), (handle, 1), mesh.clone(), placed.target);
+            let error = BackendError::OutOfMemory { label: "a leaf".to_owned() };
+            streamer.jobs.end(Upload::Mesh(upload), Err(error));
+            if was_cleared {
+                meshes = MeshCache::default();
+            }
+            let (device, uploads) = (&device, &uploads);
+            let mut on_device = OnDevice { device, uploads, meshes: &mut meshes, materials: &mut materials };
+            let outcome = streamer.take_over(&mut on_device, (&assets, &used), &FrameUse::default());
+            assert_eq!(outcome.is_ok(), was_cleared);
+        }
+    }
+
+    #[test]
+    fn what_exceeds_the_budget_in_some_frames_is_told_once_until_it_did_not_for_long() {
+        let mut warning = BudgetWarning::default();
+        let told = |warning: &BudgetWarning| warning.was_told;
+        for frame in 0..5000 {
+            warning.update(usize::from(frame % 7 == 0));
+            assert!(told(&warning), "it is not told again");
+        }
+        (0..BudgetWarning::FRAMES_WITHIN).for_each(|_| warning.update(0));
+        assert!(!told(&warning));
     }
 }

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::allowance::Allowance;
+use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
-use crate::backend::wgpu::resources::{TextureLocation, UploadQueue, layer_bytes, write_rows};
+use crate::backend::wgpu::resources::{TextureLocation, UploadQueue, copy_rows, layer_bytes};
 use crate::handle::Handle;
 use crate::scene::Texture;
 
@@ -39,28 +40,39 @@ impl TextureUpload {
         layer_bytes(self.array.width())
     }
 
-    /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded.
-    pub(super) fn advance(&mut self, uploads: &UploadQueue, allowance: &mut Allowance) -> bool {
+    /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded, once the device has executed the commands.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(super) fn advance(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        allowance: &mut Allowance,
+    ) -> Result<(bool, wgpu::CommandBuffer), BackendError> {
         if self.levels.is_empty() {
             self.levels = mip_chain(&self.texture, self.array.width());
             self.levels.reverse();
         }
+        let label = Some("a streamed texture");
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
         while let Some(level) = self.levels.last() {
             let number = self.array.mip_level_count() - self.levels.len() as u32;
             let row_bytes = u64::from(self.array.width() >> number) * 4;
             let first = u64::from(self.rows) * row_bytes;
             let length = allowance.take(level.len() as u64 - first, row_bytes);
             if length == 0 {
-                return false;
+                break;
             }
             let bytes = &level[first as usize..(first + length) as usize];
-            write_rows(uploads, &self.array, (self.location.layer, number), self.rows, bytes);
+            copy_rows(device, &mut encoder, &self.array, (self.location.layer, number), self.rows, bytes)?;
+            uploads.count(length);
             self.rows += (length / row_bytes) as u32;
             if first + length == level.len() as u64 {
                 self.levels.pop();
                 self.rows = 0;
             }
         }
-        true
+        Ok((self.levels.is_empty(), encoder.finish()))
     }
 }

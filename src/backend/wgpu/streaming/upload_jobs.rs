@@ -1,6 +1,7 @@
 //! What background jobs upload.
 
 use std::collections::VecDeque;
+use std::mem;
 use std::time::Instant;
 
 use parking_lot::Mutex;
@@ -19,6 +20,9 @@ pub(super) enum Upload {
     Texture(TextureUpload),
 }
 
+/// An upload, and whether the device had room for it.
+pub(super) type EndedUpload = (Upload, Result<(), BackendError>);
+
 /// What background jobs upload, and what they have uploaded. Frames add to it and take from it when they begin; one job at a time does
 /// what was added.
 #[derive(Default)]
@@ -29,7 +33,9 @@ pub(super) struct UploadJobs {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Upload>,
-    finished: Vec<(Upload, Result<(), BackendError>)>,
+    finished: Vec<EndedUpload>,
+    /// What the device has to execute before what is finished is there.
+    commands: Vec<wgpu::CommandBuffer>,
     uploaded_bytes: u64,
 }
 
@@ -39,14 +45,33 @@ impl UploadJobs {
         self.state.lock().waiting.extend(uploads);
     }
 
-    /// What was uploaded, or could not be.
-    pub(super) fn take_finished(&self) -> Vec<(Upload, Result<(), BackendError>)> {
-        std::mem::take(&mut self.state.lock().finished)
+    /// What was uploaded, or could not be, once the device has executed the commands.
+    pub(super) fn take_finished(&self) -> (Vec<EndedUpload>, Vec<wgpu::CommandBuffer>) {
+        let mut state = self.state.lock();
+        (mem::take(&mut state.finished), mem::take(&mut state.commands))
+    }
+
+    /// Ends an upload as a job does.
+    #[cfg(test)]
+    pub(super) fn end(&self, upload: Upload, result: Result<(), BackendError>) {
+        self.state.lock().finished.push((upload, result));
     }
 
     /// Whether something waits for a job.
     pub(super) fn has_work(&self) -> bool {
         !self.state.lock().waiting.is_empty()
+    }
+
+    /// Drops what waits for a job, and is not current any more.
+    pub(super) fn drop_stale(&self, is_current: impl Fn(&Upload) -> bool) {
+        let stale: VecDeque<_> = {
+            let mut state = self.state.lock();
+            let (current, stale) = mem::take(&mut state.waiting).into_iter().partition(is_current);
+            state.waiting = current;
+            stale
+        };
+        // Not under the lock.
+        drop(stale);
     }
 
     /// The bytes of what waits for a job, whether a part of it is uploaded already or not.
@@ -69,16 +94,25 @@ impl UploadJobs {
             let Some(mut upload) = next else { break };
             let before = allowance.bytes();
             let advance = || match &mut upload {
-                Upload::Mesh(mesh) => mesh.advance(device, uploads, &mut allowance),
-                Upload::Texture(texture) => Ok(texture.advance(uploads, &mut allowance)),
+                Upload::Mesh(mesh) => Ok((mesh.advance(device, uploads, &mut allowance)?, None)),
+                Upload::Texture(texture) => {
+                    let (is_complete, commands) = texture.advance(device, uploads, &mut allowance)?;
+                    Ok((is_complete, Some(commands)))
+                }
             };
             let label = "a streamed mesh or texture";
             let advanced = with_error_scope(device, label, || catch_wgpu_panic(label, advance)).flatten().flatten();
             let mut state = self.state.lock();
             state.uploaded_bytes += before - allowance.bytes();
             match advanced {
-                Ok(true) => state.finished.push((upload, Ok(()))),
-                Ok(false) => state.waiting.push_front(upload),
+                Ok((is_complete, commands)) => {
+                    state.commands.extend(commands);
+                    if is_complete {
+                        state.finished.push((upload, Ok(())));
+                    } else {
+                        state.waiting.push_front(upload);
+                    }
+                }
                 Err(error) => state.finished.push((upload, Err(error))),
             }
             if allowance.is_over() || matches!(state.waiting.front(), Some(next) if !next.can_advance(&allowance)) {
@@ -89,7 +123,8 @@ impl UploadJobs {
 }
 
 impl Upload {
-    fn bytes(&self) -> u64 {
+    /// All that it uploads.
+    pub(super) fn bytes(&self) -> u64 {
         match self {
             Self::Mesh(mesh) => mesh.bytes(),
             Self::Texture(texture) => texture.bytes(),

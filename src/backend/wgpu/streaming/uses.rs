@@ -6,70 +6,97 @@ use super::frame_use::FrameUse;
 use super::request::{Request, Requested};
 use super::victims::{Victim, Victims};
 use crate::backend::wgpu::resources::{MeshCache, TextureArrays};
+use crate::handle::Handle;
 use crate::scene::{Assets, Material, Mesh, Texture};
-use crate::view::UsedMeshes;
+
+/// The materials that have a texture, by texture.
+#[derive(Default)]
+pub(super) struct TextureUsers {
+    /// Identity and revision of the materials.
+    version: Option<(u64, u64)>,
+    /// Textures and the slots of their materials, by the textures' slots.
+    users: Vec<(Handle<Texture>, u32)>,
+}
+
+impl TextureUsers {
+    /// Brings it up to date, if materials changed.
+    pub(super) fn update(&mut self, assets: &Assets) {
+        let version = Some((assets.materials.identity(), assets.materials.revision()));
+        if self.version == version {
+            return;
+        }
+        self.version = version;
+        self.users.clear();
+        let materials = assets.iter::<Material>();
+        self.users.extend(materials.filter_map(|(handle, material)| Some((material.texture?, handle.index()))));
+        self.users.sort_unstable_by_key(|(texture, _)| texture.index());
+    }
+
+    /// The slots of a texture's materials.
+    fn of(&self, texture: Handle<Texture>) -> impl Iterator<Item = u32> {
+        let first = self.users.partition_point(|(user, _)| user.index() < texture.index());
+        let same_slot = self.users[first..].iter().take_while(move |(user, _)| user.index() == texture.index());
+        same_slot.filter(move |(user, _)| *user == texture).map(|(_, material)| *material)
+    }
+}
 
 /// When the meshes and textures of a frame were drawn last, as it begins.
 pub(super) struct Uses<'a> {
+    assets: &'a Assets,
     frame_use: &'a FrameUse,
-    /// By texture slot, the latest frame that drew a material with it; `None` for a texture that no material has.
-    textures: Vec<Option<u64>>,
+    users: &'a TextureUsers,
     /// What this frame or a later one drew is in sight.
     in_sight_from: u64,
 }
 
 impl<'a> Uses<'a> {
     /// For a frame that is about to draw. What one of so many frames before it drew is in sight.
-    pub(super) fn new(assets: &Assets, frame_use: &'a FrameUse, frames_in_sight: u64) -> Self {
-        let mut textures = vec![None; assets.textures.slot_count()];
-        for (handle, material) in assets.iter::<Material>() {
-            let Some(texture) = material.texture.filter(|texture| assets.get(*texture).is_ok()) else { continue };
-            let latest = frame_use.materials.latest_use(handle.index());
-            let entry = &mut textures[texture.index() as usize];
-            *entry = (*entry).max(Some(latest));
-        }
-        Self { frame_use, textures, in_sight_from: frame_use.frame.saturating_sub(frames_in_sight).max(1) }
+    pub(super) fn new(
+        assets: &'a Assets,
+        (frame_use, users): (&'a FrameUse, &'a TextureUsers),
+        frames_in_sight: u64,
+    ) -> Self {
+        Self { assets, frame_use, users, in_sight_from: frame_use.frame.saturating_sub(frames_in_sight).max(1) }
     }
 
     /// What is used, but neither on the device nor on its way.
-    pub(super) fn requests<'b>(
-        &self,
-        meshes: &MeshCache,
-        textures: &TextureArrays,
-        assets: &'b Assets,
-        used: &UsedMeshes,
-    ) -> BinaryHeap<Request<'b>> {
-        let meshes = meshes.missing(assets, used).map(|(slot, revision, mesh)| Request {
-            is_wanted: self.is_in_sight(self.frame_use.meshes.latest_use(slot)),
-            priority: assets.priority_of_slot::<Mesh>(slot),
-            requested: Requested::Mesh(slot, revision, mesh),
+    pub(super) fn requests(&self, meshes: &MeshCache, textures: &TextureArrays) -> BinaryHeap<Request<'a>> {
+        let meshes = meshes.missing(self.assets).map(|(handle, revision, mesh)| Request {
+            is_wanted: self.is_in_sight(self.frame_use.meshes.latest_use(handle.index())),
+            priority: self.assets.priority_of_slot::<Mesh>(handle.index()),
+            requested: Requested::Mesh(handle, revision, mesh),
         });
-        let textures = assets.textures.iter_with_revision().filter_map(|(handle, revision, texture)| {
-            let latest_use = self.textures[handle.index() as usize]?;
-            textures.is_missing(handle, revision).then(|| Request {
-                is_wanted: self.is_in_sight(latest_use),
-                priority: assets.priority_of_slot::<Texture>(handle.index()),
+        let textures = textures.missing(self.assets).filter_map(|(handle, revision, texture)| {
+            Some(Request {
+                is_wanted: self.is_in_sight(self.latest_use_of(handle)?),
+                priority: self.assets.priority_of_slot::<Texture>(handle.index()),
                 requested: Requested::Texture(handle, revision, texture),
             })
         });
         meshes.chain(textures).collect()
     }
 
-    pub(super) fn mesh_victims(&self, meshes: &MeshCache, assets: &Assets) -> Victims {
-        Victims::new(meshes.resident().map(|(slot, bytes)| {
-            self.victim(slot, bytes, self.frame_use.meshes.latest_use(slot), assets.priority_of_slot::<Mesh>(slot))
+    pub(super) fn mesh_victims(&self, meshes: &MeshCache) -> Victims {
+        Victims::new(meshes.resident().map(|slot| {
+            self.victim(slot, self.frame_use.meshes.latest_use(slot), self.assets.priority_of_slot::<Mesh>(slot))
         }))
     }
 
-    pub(super) fn texture_victims(&self, textures: &TextureArrays, assets: &Assets) -> Victims {
-        Victims::new(textures.resident().map(|(slot, bytes)| {
-            let latest_use = self.textures.get(slot as usize).copied().flatten().unwrap_or(0);
-            self.victim(slot, bytes, latest_use, assets.priority_of_slot::<Texture>(slot))
+    pub(super) fn texture_victims(&self, textures: &TextureArrays) -> Victims {
+        Victims::new(textures.resident().map(|slot| {
+            let entry = self.assets.textures.entry(slot);
+            let latest_use = entry.and_then(|(texture, ..)| self.latest_use_of(texture)).unwrap_or(0);
+            self.victim(slot, latest_use, self.assets.priority_of_slot::<Texture>(slot))
         }))
     }
 
-    fn victim(&self, slot: u32, bytes: u64, latest_use: u64, priority: i32) -> Victim {
-        Victim { slot, bytes, latest_use, priority, is_in_sight: self.is_in_sight(latest_use) }
+    /// The latest frame that drew a material with a texture; `None` for a texture that no material has.
+    fn latest_use_of(&self, texture: Handle<Texture>) -> Option<u64> {
+        self.users.of(texture).map(|material| self.frame_use.materials.latest_use(material)).max()
+    }
+
+    fn victim(&self, slot: u32, latest_use: u64, priority: i32) -> Victim {
+        Victim { slot, latest_use, priority, is_in_sight: self.is_in_sight(latest_use) }
     }
 
     fn is_in_sight(&self, latest_use: u64) -> bool {

@@ -1,0 +1,150 @@
+//! What has no room, so that a frame need not look for room that it knows not to be there.
+
+use std::collections::HashMap;
+
+use super::request::Requested;
+use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
+use crate::backend::wgpu::resources::Unplaced;
+use crate::scene::{Assets, Mesh, Texture};
+
+/// The meshes that had no room in a frame, and how much looking for it has cost.
+///
+/// Requests come by importance. So what made no room for one makes none for a later one that takes as much or more.
+#[derive(Default)]
+pub(super) struct RefusedMeshes {
+    /// Vertices and indices.
+    sizes: Vec<[usize; 2]>,
+    /// The number of candidates that were tried in vain.
+    tried: usize,
+}
+
+impl RefusedMeshes {
+    /// Once so many candidates were tried in vain, the rest of a frame's requests have room that is free, or none.
+    const MAX_TRIED: usize = 1024;
+
+    /// Whether there is no room for such a mesh.
+    pub(super) fn covers(&self, mesh: &Mesh) -> bool {
+        let size = size_of_mesh(mesh);
+        self.sizes.iter().any(|refused| refused[0] <= size[0] && refused[1] <= size[1])
+    }
+
+    /// Adds a mesh for which so many candidates were tried.
+    pub(super) fn add(&mut self, mesh: &Mesh, tried: usize) {
+        let size = size_of_mesh(mesh);
+        self.sizes.retain(|refused| refused[0] < size[0] || refused[1] < size[1]);
+        self.sizes.push(size);
+        self.tried += tried;
+    }
+
+    /// Whether candidates may be tried for a further mesh.
+    pub(super) fn may_try(&self) -> bool {
+        self.tried < Self::MAX_TRIED
+    }
+}
+
+fn size_of_mesh(mesh: &Mesh) -> [usize; 2] {
+    [
+        mesh.vertices().len(),
+        mesh.indices().len() + mesh.levels().iter().map(|level| level.indices().len()).sum::<usize>(),
+    ]
+}
+
+/// The textures that had no room in a frame, by array. All textures of an array take the same.
+#[derive(Default)]
+pub(super) struct RefusedTextures {
+    by_array: [Option<Unplaced>; ARRAY_SIDES.len()],
+}
+
+impl RefusedTextures {
+    /// Why there is no room for such a texture.
+    pub(super) fn of(&self, texture: &Texture) -> Option<Unplaced> {
+        self.by_array[array_for(texture)]
+    }
+
+    pub(super) fn add(&mut self, texture: &Texture, unplaced: Unplaced) {
+        match unplaced {
+            // An array moves when nothing is on its way to it. So nothing else begins until then.
+            Unplaced::Awaited => self.by_array.fill(Some(unplaced)),
+            Unplaced::Full | Unplaced::LayerLimit => self.by_array[array_for(texture)] = Some(unplaced),
+            Unplaced::TooLarge { .. } => {}
+        }
+    }
+}
+
+/// When candidates are tried again for meshes for which many were tried in vain: not in every frame, as that takes long.
+#[derive(Default)]
+pub(super) struct Retries {
+    frame: u64,
+    /// By mesh slot, the first frame in which it is tried again.
+    due: HashMap<u32, u64>,
+}
+
+impl Retries {
+    /// So many candidates may be tried for a mesh in every frame.
+    const MANY_CANDIDATES: usize = 256;
+    const FRAMES_BETWEEN: u64 = 16;
+
+    pub(super) fn begin_frame(&mut self, frame: u64) {
+        self.frame = frame;
+        self.due.retain(|_, due| *due > frame);
+    }
+
+    pub(super) fn is_due(&self, slot: u32) -> bool {
+        !self.due.contains_key(&slot)
+    }
+
+    /// So many candidates were tried in vain.
+    pub(super) fn add(&mut self, slot: u32, tried: usize) {
+        if tried > Self::MANY_CANDIDATES {
+            self.due.insert(slot, self.frame + Self::FRAMES_BETWEEN);
+        }
+    }
+}
+
+/// What can never be on the device. It is told once.
+#[derive(Default)]
+pub(super) struct TooLarge {
+    /// By slot, with the revision that is too large.
+    meshes: HashMap<u32, u64>,
+    textures: HashMap<u32, u64>,
+}
+
+impl TooLarge {
+    /// Forgets what is gone, or was replaced.
+    pub(super) fn update(&mut self, assets: &Assets) {
+        let is_current = |current: Option<u64>, revision| current == Some(revision);
+        self.meshes.retain(|slot, revision| {
+            is_current(assets.meshes.get_with_revision(*slot).map(|(revision, _)| revision), *revision)
+        });
+        self.textures.retain(|slot, revision| {
+            is_current(assets.textures.get_with_revision(*slot).map(|(revision, _)| revision), *revision)
+        });
+    }
+
+    /// Tells that something takes so many bytes, and the limit of a name allows so many, unless it was told already.
+    pub(super) fn tell(&mut self, requested: &Requested<'_>, (bytes, limit, allowed): (u64, &str, u64)) {
+        let (told, slot, revision, name, kind) = match *requested {
+            Requested::Mesh(handle, revision, mesh) => {
+                (&mut self.meshes, handle.index(), revision, mesh.name(), "mesh")
+            }
+            Requested::Texture(handle, revision, texture) => {
+                (&mut self.textures, handle.index(), revision, texture.name(), "texture")
+            }
+        };
+        if told.insert(slot, revision) != Some(revision) {
+            tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed, and is left out");
+        }
+    }
+
+    /// Something has room: in another format of vertices, for example.
+    pub(super) fn remove(&mut self, requested: &Requested<'_>) {
+        match requested {
+            Requested::Mesh(handle, ..) => self.meshes.remove(&handle.index()),
+            Requested::Texture(handle, ..) => self.textures.remove(&handle.index()),
+        };
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.meshes.len() + self.textures.len()
+    }
+}
