@@ -268,6 +268,7 @@ impl<T> Slots<T> {
     }
 
     /// The entry in a slot, with its handle and the revision of its last change.
+    #[cfg(feature = "wgpu")]
     pub(crate) fn entry(&self, slot: u32) -> Option<(Handle<T>, u64, &T)> {
         let entry = self.entries.get(slot as usize)?;
         entry.value.as_ref().map(|value| (self.handle(slot, entry.generation), entry.revision, value))

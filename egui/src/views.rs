@@ -54,6 +54,7 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
         ("sort", stages.sort),
         ("instance", stages.instance),
         ("record", stages.record),
+        ("nodes", stages.nodes),
     ];
     let texts = times.map(|(name, time)| format!("{name} {:.0} µs", time.as_secs_f64() * 1e6));
     ui.label(texts.join(", ")).on_hover_text("The thread time of each group of stages, over all views.");

@@ -31,6 +31,7 @@ mod pieces;
 mod plan_cache;
 mod record_with_nodes;
 mod recorded;
+mod recorded_piece;
 mod renderer;
 mod replace_backend;
 mod run_error;

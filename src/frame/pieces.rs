@@ -18,12 +18,10 @@ use std::ops::Range;
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::piece_statistics::PieceStatistics;
-use crate::command::{Batch, BinnedSegment, DrawList, Selection, Version};
+use super::recorded_piece::RecordedPiece;
+use crate::command::{Batch, DrawList, Selection, Version};
 use crate::scene::{Changes, Piece, SceneError, SceneRef};
-use crate::view::{
-    GroupBounds, ObjectTable, ObjectWord, RejectionReason, Rejections, SelectionFilter, bin_objects,
-    recordable_objects, set_bits,
-};
+use crate::view::{GroupBounds, ObjectTable, ObjectWord, RejectionReason, Rejections};
 
 /// The pieces of a scene.
 #[derive(Debug, Default)]
@@ -87,22 +85,6 @@ struct JoinedPieces {
     objects: Vec<u32>,
     /// In draw order, each with its piece.
     batches: Vec<(Batch, u32)>,
-}
-
-/// What is recorded of a piece.
-#[derive(Debug, Default)]
-struct RecordedPiece {
-    /// The objects that are recorded; others are drawn as if they were in no piece.
-    words: Vec<ObjectWord>,
-    /// Their number.
-    count: usize,
-    bounds: GroupBounds,
-    /// One for each selection.
-    lists: Vec<DrawList>,
-    /// The revisions of the meshes and materials that its objects have, by slot; `None` for an empty slot.
-    meshes: Vec<(u32, Option<u64>)>,
-    materials: Vec<(u32, Option<u64>)>,
-    scratch: BinnedSegment,
 }
 
 impl KnownPiece {
@@ -349,12 +331,7 @@ impl PieceTable {
         }
         let are_others = before.map(|(identity, _)| identity) != now.map(|(identity, _)| identity);
         for piece in 0..self.pieces.len() {
-            let recorded = self.pieces[piece].recorded.get_mut();
-            let is_same_mesh =
-                |&(slot, revision): &(u32, _)| meshes.get_with_revision(slot).map(|(now, _)| now) == revision;
-            let is_same_material =
-                |&(slot, revision): &(u32, _)| materials.get_with_revision(slot).map(|(now, _)| now) == revision;
-            let are_same = recorded.meshes.iter().all(is_same_mesh) && recorded.materials.iter().all(is_same_material);
+            let are_same = self.pieces[piece].recorded.get_mut().has_assets_of(scene.assets);
             if are_others || !are_same {
                 self.lose(piece);
             }
@@ -432,23 +409,7 @@ impl PieceTable {
         can_merge: impl Fn(u32) -> bool,
     ) {
         let known = &self.pieces[self.recording[index] as usize];
-        let RecordedPiece { words, count, bounds, lists, meshes, materials, scratch } = &mut *known.recorded.write();
-        *bounds = recordable_objects(table, &known.piece.objects, is_recordable, words);
-        *count = words.iter().map(|(_, mask)| mask.count_ones() as usize).sum();
-        lists.resize_with(self.selections.len(), DrawList::default);
-        for (&selection, list) in self.selections.iter().zip(lists) {
-            bin_objects(table, words, selection, SelectionFilter::new(table, scene, selection), scratch);
-            list.clear();
-            list.join_bins(&mut [&mut *scratch], &table.bins(), &can_merge);
-        }
-        let objects =
-            || known.piece.objects.iter().map(|object| object as usize).take_while(|object| *object < table.len());
-        collect_slots(meshes, objects().map(|object| scene.meshes[object].index()), |slot| {
-            scene.assets.meshes.get_with_revision(slot).map(|(revision, _)| revision)
-        });
-        collect_slots(materials, objects().map(|object| scene.materials[object].index()), |slot| {
-            scene.assets.materials.get_with_revision(slot).map(|(revision, _)| revision)
-        });
+        known.recorded.write().record(&known.piece, &self.selections, (scene, table), is_recordable, can_merge);
     }
 
     /// The version of what a process with a selection draws of pieces.
@@ -498,26 +459,6 @@ impl PieceTable {
             }
         }
         joined.version = version;
-    }
-}
-
-/// Makes `slots` the different ones of some slots, with their revisions.
-fn collect_slots(
-    slots: &mut Vec<(u32, Option<u64>)>,
-    all: impl Iterator<Item = u32>,
-    revision_of: impl Fn(u32) -> Option<u64>,
-) {
-    slots.clear();
-    let mut seen: Vec<u64> = Vec::new();
-    for slot in all {
-        let (word, bit) = (slot as usize / WORD, 1 << (slot as usize % WORD));
-        if word >= seen.len() {
-            seen.resize(word + 1, 0);
-        }
-        seen[word] |= bit;
-    }
-    for (word, &mask) in seen.iter().enumerate() {
-        slots.extend(set_bits(mask).map(|bit| (word * WORD + bit) as u32).map(|slot| (slot, revision_of(slot))));
     }
 }
 

@@ -49,7 +49,7 @@ pub fn index_count(frame: usize) -> usize {
 /// None.
 pub fn mesh(frame: usize) -> Result<Mesh, SceneError> {
     let vertices = (0..SIDE * SIDE).map(|index| vertex(frame, index)).collect();
-    let indices = (0..index_count(frame)).map(|number| index(number)).collect();
+    let indices = (0..index_count(frame)).map(index).collect();
     Mesh::new("hills", Topology::TriangleList, vertices, indices)
 }
 

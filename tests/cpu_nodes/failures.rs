@@ -2,7 +2,7 @@
 
 use drawloom::glam::DVec3;
 use drawloom::graph::GraphProblem;
-use drawloom::scene::{NodeColumn, SceneRef, WrittenColumns};
+use drawloom::scene::{Changes, NodeColumn, SceneError, SceneRef, WrittenColumns};
 use drawloom::{FrameData, FrameError, NodeAccesses};
 use drawloom_testing::scenes::field;
 
@@ -150,4 +150,34 @@ fn a_column_is_not_written_after_it_was_read() {
     let (mut renderer, _submitter) = renderer(2);
     let error = renderer.record_with_nodes(SceneRef { written, ..scene }, &[&late]).map(drop).unwrap_err().to_string();
     assert!(error.starts_with("late failed: chunk 1 of the column has been read"), "{error}");
+}
+
+/// The error of a frame with this column of positions, of which nodes change the first.
+fn error_of_column(objects: usize, changes: Changes<'_>) -> FrameError {
+    let scene = field(300);
+    let scene = scene.as_scene_ref();
+    let (mut renderer, _submitter) = renderer(2);
+    drop(renderer.record(scene).unwrap());
+    let mut positions: Vec<DVec3> = scene.positions[..objects].to_vec();
+    let column = NodeColumn::new(&mut positions);
+    let written = WrittenColumns { positions: Some(&column), ..WrittenColumns::default() };
+    let node = TestNode::new(
+        "move",
+        |accesses| _ = accesses.writes(FrameData::Transforms),
+        |_, _| {
+            column.write(0)?[0] += DVec3::Y;
+            Ok(())
+        },
+    );
+    renderer.record_with_nodes(SceneRef { written, changes, ..scene }, &[&node]).map(drop).unwrap_err()
+}
+
+#[test]
+fn a_column_of_another_length_and_a_change_without_a_report_are_named() {
+    let error = error_of_column(299, Changes::Unknown);
+    assert!(matches!(error, FrameError::Scene(SceneError::UnequalSlices { positions: 299, .. })), "{error}");
+    if cfg!(debug_assertions) {
+        let error = error_of_column(300, Changes::NONE);
+        assert!(matches!(error, FrameError::Scene(SceneError::UnreportedChange { object: 0 })), "{error}");
+    }
 }

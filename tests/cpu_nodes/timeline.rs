@@ -1,10 +1,15 @@
 //! Nodes are in timelines, reports, traces and statistics under their names, as stages are.
 
+use std::io;
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use drawloom::report::{FrameReport, Replay, SchedulerCosts, write_chrome_trace, write_page};
 use drawloom::{FrameData, NodeFrame};
 use drawloom_testing::scenes::field;
+use tracing::Dispatch;
+use tracing::subscriber::NoSubscriber;
+use tracing_subscriber::fmt::format::FmtSpan;
 
 use crate::{TestNode, lent, renderer};
 
@@ -91,4 +96,42 @@ fn a_changed_declaration_has_another_graph_and_an_equal_one_the_same() {
     assert!(early.contains("\"node\""), "{early}");
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     assert!(!renderer.stage_graph_to_dot().unwrap().contains("\"node\""));
+}
+
+/// What a subscriber writes.
+#[derive(Clone, Default)]
+struct Written(Arc<Mutex<Vec<u8>>>);
+
+impl io::Write for Written {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn spans_name_nodes() {
+    /// While there is only one subscriber, the thread that is first to reach a span decides for all threads whether a subscriber wants it.
+    static SECOND: LazyLock<Dispatch> = LazyLock::new(|| Dispatch::new(NoSubscriber::default()));
+    LazyLock::force(&SECOND);
+    let (scene, written) = (field(100), Written::default());
+    let writer = written.clone();
+    let subscriber = tracing_subscriber::fmt()
+        .with_max_level(tracing::Level::DEBUG)
+        .with_span_events(FmtSpan::NEW)
+        .with_writer(move || writer.clone())
+        .with_ansi(false)
+        .finish();
+    tracing::subscriber::with_default(subscriber, || {
+        let (mut renderer, _submitter) = renderer(1);
+        drop(renderer.record_with_nodes(scene.as_scene_ref(), &lent(&nodes())).unwrap());
+    });
+    let written = String::from_utf8(written.0.lock().unwrap().clone()).unwrap();
+    for name in ["animation", "sound"] {
+        let span = format!("node{{name=\"{name}\" stage=\"{name}\"}}");
+        assert!(written.contains(&span), "{span} is not in\n{written}");
+    }
 }

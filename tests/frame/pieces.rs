@@ -167,7 +167,7 @@ fn a_piece_is_recorded_once_and_executed_until_an_object_of_it_changes() {
     let moved = RenderObject { position: DVec3::Y, ..rows.scene.object(object).unwrap() };
     rows.scene.replace_object(object, moved).unwrap();
     assert_eq!(rows.frame(Changes::Objects(&[IN_ROW as u32])), [ROWS - 1, 0, 1, ROWS - 1]);
-    assert_eq!(rows.frame(Changes::Ranges(&[0..1])), [ROWS - 2, 1, 1, ROWS - 2]);
+    assert_eq!(rows.frame(Changes::Ranges(std::slice::from_ref(&(0..1)))), [ROWS - 2, 1, 1, ROWS - 2]);
     assert_eq!(rows.frame(Changes::NONE), [ROWS - 1, 1, 0, ROWS - 1]);
     assert_eq!(rows.frame(Changes::NONE), [ROWS, 0, 0, ROWS]);
 }

@@ -325,7 +325,7 @@ fn streamed() -> Result<(), Failed> {
     let mut with = on_the_device(|wgpu| wgpu.stream_resources(budget))?;
     let mut plain = on_the_device(Ok)?;
     let camera = scene.cameras[0].clone();
-    for round in 0..3 {
+    for (round, &changed) in meshes[..3].iter().enumerate() {
         // Looks away, and back.
         scene.cameras[0].orientation = Quat::from_rotation_y(PI) * camera.orientation;
         for _ in 0..3 {
@@ -345,7 +345,6 @@ fn streamed() -> Result<(), Failed> {
         expect(is_complete, || format!("round {round}: the scene never is on the device"))?;
         let executed = steady(&mut with, &mut plain, &mut scene, &format!("round {round}"))?;
         expect(executed > 0, || "no piece is executed".to_owned())?;
-        let changed = meshes[round];
         scene.replace(changed, disc(90, 0.5))?;
     }
     Ok(())

@@ -297,8 +297,8 @@ fn replaced_when_full() -> Result<(), Failed> {
     let variant = |number: u32| {
         let mesh = disc(3000 + number, 1.0);
         let level = LevelOfDetail::new(mesh.indices()[..6000].to_vec(), 1e-9);
-        let mesh = if number % 2 == 0 { mesh.with_levels([level])? } else { mesh };
-        Ok::<_, Failed>(mesh.with_triangle_culling(number % 3 == 0))
+        let mesh = if number.is_multiple_of(2) { mesh.with_levels([level])? } else { mesh };
+        Ok::<_, Failed>(mesh.with_triangle_culling(number.is_multiple_of(3)))
     };
     let mesh = scene.add(variant(0)?)?;
     add(&mut scene, 20, mesh, material)?;

@@ -113,10 +113,52 @@ fn main() -> Result<(), Box<dyn Error>> {
         ]);
     }
     table.print();
+
+    let counts = if arguments.is_quick() { (2, &sizes[..1]) } else { (100, &sizes[1..]) };
+    let changes = counts.1.iter().map(|&(blocks, in_block)| measure_changes(blocks, in_block, counts.0));
+    let changes = changes.collect::<Result<Vec<_>, _>>()?;
+    let mut table =
+        Table::new(&["pieces", "of objects", "steady, µs", "a box changes, µs", "recorded, µs", "executed again, µs"]);
+    for Changes { pieces, in_piece, microseconds } in &changes {
+        let mut cells = vec![pieces.to_string(), in_piece.to_string()];
+        cells.extend(microseconds.iter().map(|time| format!("{time:.1}")));
+        table.row(cells);
+    }
+    table.print();
     if !arguments.is_quick() {
-        results::write_json("pieces.json", &rows)?;
+        results::write_json("pieces.json", &(rows, changes))?;
     }
     Ok(())
+}
+
+/// What it costs that a box in a piece changes.
+#[derive(Serialize)]
+struct Changes {
+    pieces: usize,
+    in_piece: usize,
+    /// Of a steady frame, of the one with the change, and of the two that follow.
+    microseconds: [f64; 4],
+}
+
+/// Medians over changes of a box in a piece, another one each time, while a camera sees all.
+fn measure_changes(blocks: usize, in_block: usize, changes: usize) -> Result<Changes, Box<dyn Error>> {
+    let mut runner = Runner::new(Cameras::All, blocks, in_block, true)?;
+    for _ in 0..200 {
+        runner.frame()?;
+    }
+    let mut times: [Vec<Duration>; 4] = Default::default();
+    for change in 0..changes {
+        for _ in 0..8 {
+            runner.frame()?;
+        }
+        times[0].push(runner.frame()?);
+        runner.world.change_next(change % blocks * in_block);
+        for times in &mut times[1..] {
+            times.push(runner.frame()?);
+        }
+    }
+    let microseconds = times.map(|times| median_duration(times).as_secs_f64() * 1e6);
+    Ok(Changes { pieces: blocks, in_piece: in_block, microseconds })
 }
 
 enum Contender {

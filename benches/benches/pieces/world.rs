@@ -39,9 +39,11 @@ impl Cameras {
 pub struct World {
     pub scene: Scene,
     positions: Vec<DVec3>,
+    /// Those that move in this frame.
     moving: Vec<u32>,
     cameras: Cameras,
     frame: u32,
+    has_stepped_with_more: bool,
     pub blocks: usize,
     pub in_block: usize,
     /// The side of the plain, in metres.
@@ -84,7 +86,8 @@ impl World {
         let first = (blocks * in_block) as u32;
         let moving = (first..first + Self::MOVING as u32).collect();
         let positions = scene.as_scene_ref().positions.to_vec();
-        let mut world = Self { scene, positions, moving, cameras, frame: 0, blocks, in_block, side };
+        let mut world =
+            Self { scene, positions, moving, cameras, frame: 0, has_stepped_with_more: false, blocks, in_block, side };
         world.scene.cameras = world.new_cameras(per_side, width);
         Ok(world)
     }
@@ -118,8 +121,17 @@ impl World {
         }
     }
 
+    /// Has a box that stands still move as well, in the next frame alone.
+    pub fn change_next(&mut self, object: usize) {
+        self.moving.push(object as u32);
+    }
+
     /// Moves what moves.
     pub fn step(&mut self) {
+        if self.has_stepped_with_more {
+            self.moving.truncate(Self::MOVING);
+        }
+        self.has_stepped_with_more = self.moving.len() > Self::MOVING;
         self.frame += 1;
         let back_and_forth = f64::from((self.frame % 128).abs_diff(64)) - 32.0;
         let by = if self.frame % 128 < 64 { -0.05 } else { 0.05 };

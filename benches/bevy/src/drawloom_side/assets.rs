@@ -2,7 +2,9 @@
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Assets, Bounds, Camera, Changes, Light, Material, Mesh, Projection, SceneError, SceneRef};
+use drawloom::scene::{
+    Assets, Bounds, Camera, Changes, Light, Material, Mesh, Projection, SceneError, SceneRef, WrittenColumns,
+};
 
 use crate::layout::{self, Layout};
 
@@ -64,6 +66,7 @@ impl Surroundings {
             columns: &[],
             written: WrittenColumns::default(),
             changes: Changes::Unknown,
+            pieces: &[],
             assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,
