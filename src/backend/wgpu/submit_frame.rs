@@ -82,7 +82,7 @@ impl WgpuBackend {
         // Only now, because a submission that is refused uploads and copies nothing.
         frame.pending_uploads.submitted();
         frame.read_backs.drain(..).for_each(|copy| copy.submitted(&self.device, &index));
-        end_fences.into_iter().for_each(|fence| set_when_done(&self.device, self.queue(), &index, fence.setter));
+        end_fences.into_iter().for_each(|fence| set_when_done(&self.device, self.queue(), fence.setter));
         self.report_costs(frame);
         Ok(submission)
     }
@@ -97,21 +97,16 @@ impl WgpuBackend {
         commands: &mut impl Iterator<Item = wgpu::CommandBuffer>,
         fences: Vec<(usize, FenceSetter)>,
     ) -> Result<(), BackendError> {
-        let mut submitted = 0;
-        let mut latest = None;
+        let mut submitted = None;
         for (count, setter) in fences {
-            let index = match latest {
-                Some(index) if count == submitted => index,
-                _ => {
-                    // An error scope of its own, as a fence must not be set for what the device has refused.
-                    let part = commands.take(count - submitted);
-                    let index = with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
-                    check_device(&self.device)?;
-                    index
-                }
-            };
-            set_when_done(&self.device, self.queue(), &index, setter);
-            (submitted, latest) = (count, Some(index));
+            if submitted != Some(count) {
+                // An error scope of its own, as a fence must not be set for what the device has refused.
+                let part = commands.take(count - submitted.unwrap_or(0));
+                with_error_scope(&self.device, "a part of the frame", || self.queue().submit(part))?;
+                check_device(&self.device)?;
+                submitted = Some(count);
+            }
+            set_when_done(&self.device, self.queue(), setter);
         }
         Ok(())
     }
