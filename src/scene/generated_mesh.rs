@@ -70,6 +70,7 @@ impl Mesh {
     }
 
     /// Where its vertices come from, if nodes make them.
+    #[cfg(any(feature = "wgpu", feature = "software"))]
     pub(crate) fn generated_geometry(&self) -> Option<&Arc<GeneratedGeometry>> {
         self.generated.as_ref()
     }
