@@ -23,6 +23,8 @@ pub const ON_ADAPTER: &[Case] = &[
     ("a_slow_step_computes_the_newest_source_next", slow::<WgpuBackend>),
     ("a_step_that_panics_is_told_once_and_the_last_result_stays", panics::<WgpuBackend>),
     ("a_frame_that_is_dropped_has_no_result", dropped::<WgpuBackend>),
+    ("a_frame_that_is_dropped_costs_no_other", dropped_in_flight::<WgpuBackend>),
+    ("a_frame_of_another_renderer_is_refused", foreign_frame::<WgpuBackend>),
     ("one_worker_computes_the_step_when_the_next_frame_begins", one_worker::<WgpuBackend>),
     ("a_result_that_cannot_be_shown_is_told", unsuitable_results),
     ("another_backend_begins_anew", replaced),
@@ -35,6 +37,7 @@ pub const IN_SOFTWARE: &[Case] = &[
     ("software_a_slow_step_computes_the_newest_source_next", slow::<SoftwareBackend>),
     ("software_a_step_that_panics_is_told_once_and_the_last_result_stays", panics::<SoftwareBackend>),
     ("software_a_frame_that_is_dropped_has_no_result", dropped::<SoftwareBackend>),
+    ("software_a_frame_of_another_renderer_is_refused", foreign_frame::<SoftwareBackend>),
     ("software_one_worker_computes_the_step_when_the_next_frame_begins", one_worker::<SoftwareBackend>),
     ("a_submission_that_fails_has_no_result", failed_submission),
     ("a_backend_that_cannot_read_back_says_so_once", no_read_back),
@@ -184,6 +187,35 @@ fn dropped<B: DrawingBackend>() -> Result<(), Failed> {
     engine.check_no_errors()
 }
 
+/// A frame that is dropped costs no frame that the device still draws.
+fn dropped_in_flight<B: DrawingBackend>() -> Result<(), Failed> {
+    let mut engine = engine::<B>(2, |_| ())?;
+    let scene = scene();
+    let drawn = engine.draw(&scene)?;
+    engine.helper.begin_frame(&engine.renderer, &scene.cameras);
+    let mut recorded = engine.renderer.record(scene.as_scene_ref())?;
+    engine.helper.read_back(&mut recorded);
+    drop(recorded);
+    B::read(&drawn.submission, 0, engine.helper.source_target())?;
+    wait_until("the result", || engine.helper.latest("main").is_some_and(|(latest, _)| latest == 1))?;
+    engine.check_no_errors()
+}
+
+/// A frame of another renderer is not read back, and that is told.
+fn foreign_frame<B: DrawingBackend>() -> Result<(), Failed> {
+    let engine = engine::<B>(2, |_| ())?;
+    let mut other = self::engine::<B>(2, |_| ())?;
+    let scene = scene();
+    engine.helper.begin_frame(&engine.renderer, &scene.cameras);
+    other.helper.begin_frame(&other.renderer, &scene.cameras);
+    let mut recorded = other.renderer.record(scene.as_scene_ref())?;
+    engine.helper.read_back(&mut recorded);
+    other.submitter.submit(recorded)?;
+    let errors = engine.helper.take_errors();
+    let is_told = matches!(&errors[..], [error] if matches!(error.reason, HelperErrorReason::ForeignFrame));
+    if is_told { Ok(()) } else { Err(format!("{errors:?}").into()) }
+}
+
 fn one_worker<B: DrawingBackend>() -> Result<(), Failed> {
     let mut engine = engine::<B>(1, |_| ())?;
     let scene = scene();
@@ -238,7 +270,7 @@ fn unsuitable_results() -> Result<(), Failed> {
         })?;
         let errors = errors.into_inner()?;
         let is_expected = match errors[0].reason {
-            HelperErrorReason::InvalidPicture { .. } => is_invalid,
+            HelperErrorReason::InvalidPicture { .. } | HelperErrorReason::NotFilterable { .. } => is_invalid,
             HelperErrorReason::Backend(BackendError::Validation { .. }) => !is_invalid,
             _ => false,
         };

@@ -35,6 +35,15 @@ pub enum HelperErrorReason {
         /// What the panic said.
         message: String,
     },
+    /// The frame that is read back is another renderer's than the one that the helper's frame began with, or its backend was replaced between.
+    #[error("the frame is of another renderer, or its backend was replaced, since the helper's frame began")]
+    ForeignFrame,
+    /// The step's picture has a format that cannot be filtered.
+    #[error("its picture has the format {format:?}, which cannot be filtered")]
+    NotFilterable {
+        /// The format of a pixel.
+        format: Format,
+    },
     /// The step's picture has other bytes than its size and format say, or none.
     #[error("its picture of {width}x{height} pixels of the format {format:?} has {bytes} bytes")]
     InvalidPicture {
@@ -51,10 +60,13 @@ pub enum HelperErrorReason {
 
 impl HelperErrorReason {
     /// # Errors
-    /// If a step's picture is not whole, or its format cannot be sampled between pixels.
+    /// If a step's picture is not whole, or its format cannot be filtered.
     pub(super) fn check(picture: &Picture) -> Result<(), Self> {
         let Picture { width, height, format, ref bytes } = *picture;
-        if picture.is_whole() && format.is_filterable() {
+        if !format.is_filterable() {
+            return Err(Self::NotFilterable { format });
+        }
+        if picture.is_whole() {
             return Ok(());
         }
         Err(Self::InvalidPicture { width, height, format, bytes: bytes.len() })

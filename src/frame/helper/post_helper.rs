@@ -34,6 +34,11 @@ use crate::task::Scheduler;
 /// With [`Buffering::SameFrame`](crate::Buffering::SameFrame) the device is done before the next frame begins, so the step has the time of the
 /// engine's update to be one frame late.
 ///
+/// Pixels arrive when something polls the device: [`FrameLoop`](crate::FrameLoop) does, and so does `begin_frame`. An engine that has no loop, and
+/// wants results of the frame before, polls the device while it updates.
+///
+/// A helper serves one renderer; another one, that records no scene, may draw its [late picture](Self::late_picture_alone).
+///
 /// Call `begin_frame` before [`Renderer::prepare_pipelines`], too: until the first call the helper has no textures, and its processes other shaders.
 ///
 /// On a scheduler of one worker there is nobody to help: `begin_frame` computes the step itself.
@@ -41,7 +46,7 @@ use crate::task::Scheduler;
 pub struct PostHelper(Arc<Shared>);
 
 impl PostHelper {
-    /// So many errors are kept until the engine [takes](Self::take_errors) them.
+    /// The maximum number of errors that are kept until the engine [takes](Self::take_errors) them.
     pub const MAX_ERRORS: usize = MAX_ERRORS;
 
     /// A helper that computes a step from a source, on the workers of a scheduler: that of the renderer, as a rule.
@@ -113,7 +118,7 @@ impl PostHelper {
     }
 
     /// Begins a frame: chooses the results that it shows. Call it right before the frame is [recorded](Renderer::record), so that they are
-    /// as new as possible, with the cameras that are recorded. It does not wait, neither for the device nor for the step.
+    /// as new as possible, with the cameras that are recorded. It does not wait for the device, nor, with more than one worker, for the step.
     pub fn begin_frame<B: Backend>(&self, renderer: &Renderer<B>, cameras: &[Camera]) {
         let backend: Weak<dyn UploadPicture> = Arc::downgrade(renderer.shared_backend()) as _;
         self.0.begin_frame(&backend, cameras);

@@ -20,7 +20,7 @@ use crate::process::{Format, ShaderResource};
 use crate::scene::{Camera, ViewKind};
 use crate::task::{JobPanic, Scheduler, catch};
 
-/// So many errors are kept until the engine takes them.
+/// The maximum number of errors that are kept until the engine takes them.
 pub(super) const MAX_ERRORS: usize = 16;
 
 /// What a helper, its callbacks and its jobs share.
@@ -50,8 +50,10 @@ struct State {
     /// How many views there have been.
     view_count: u64,
     errors: Vec<HelperError>,
-    /// Whether what concerns all views has failed since it last worked.
-    has_failed: bool,
+    /// Whether the device has failed since it last drew a frame.
+    device_failed: bool,
+    /// Whether the neutral textures failed when they were last made.
+    neutral_failed: bool,
     /// Sources that are left out. They are dropped where the device may be used, which a fence's callback must not.
     retired: Vec<Source>,
 }
@@ -59,8 +61,8 @@ struct State {
 struct InFlight {
     number: u64,
     drawn: Fence,
-    /// Each with its view.
-    sources: Vec<(String, Source)>,
+    /// Each with the identity of its view.
+    sources: Vec<(u64, Source)>,
 }
 
 impl State {
@@ -109,9 +111,13 @@ impl Shared {
         let told = match neutral {
             Some(Ok(neutral)) => {
                 state.neutral = neutral;
+                state.neutral_failed = false;
                 None
             }
-            Some(Err(error)) => self.fail(&mut state, error.into()),
+            Some(Err(error)) => {
+                let is_told = !std::mem::replace(&mut state.neutral_failed, true);
+                is_told.then(|| self.add_error_of_all(&mut state, error.into()))
+            }
             None => None,
         };
         let camera_of = |view: &str| {
@@ -137,7 +143,16 @@ impl Shared {
     /// See [`PostHelper::read_back`](super::PostHelper::read_back).
     pub(super) fn read_back<B: Backend>(self: &Arc<Self>, recorded: &mut Recorded<B>) {
         self.add_statistics(recorded);
-        let number = self.state.lock().frame;
+        let number = {
+            let state = self.state.lock();
+            let is_same =
+                |backend: &Weak<dyn UploadPicture>| std::ptr::addr_eq(backend.as_ptr(), Arc::as_ptr(&recorded.backend));
+            if !state.backend.as_ref().is_some_and(is_same) {
+                drop(state);
+                return self.report_foreign_frame();
+            }
+            state.frame
+        };
         let mut drawn: Vec<(usize, String)> = Vec::new();
         for (index, view) in recorded.views.recorded().iter().enumerate() {
             let is_source = view.kind() == ViewKind::Main && !view.is_cached();
@@ -149,7 +164,10 @@ impl Shared {
         for (index, view) in drawn {
             let Some(camera) = recorded.camera(index).cloned() else { continue };
             match recorded.read_back_whole(index, &self.target) {
-                Ok(read_back) => sources.push((view, Source { number, camera, read_back })),
+                Ok(read_back) => {
+                    let identity = self.state.lock().view(&view).identity;
+                    sources.push((identity, Source { number, camera, read_back }));
+                }
                 Err(error) => self.fail_in_view(&view, number, error.into()),
             }
         }
@@ -207,14 +225,17 @@ impl Shared {
     /// The device has drawn a frame, or will not.
     fn arrive(self: &Arc<Self>, number: u64, outcome: Result<(), FenceError>) {
         let (mut state, now) = (self.state.lock(), Instant::now());
-        // Frames are drawn in their order, so nothing comes of those before this one.
-        let arrived = state.in_flight.iter().take_while(|frame| frame.number <= number).count();
-        let arrived: Vec<_> = state.in_flight.drain(..arrived).collect();
+        // Frames are drawn in their order, so with a drawn one come those before it. One that is dropped says nothing of others.
+        let has_arrived = |frame: &mut InFlight| match outcome {
+            Ok(()) => frame.number <= number,
+            Err(_) => frame.number == number,
+        };
+        let arrived: Vec<_> = state.in_flight.extract_if(.., has_arrived).collect();
         for (view, source) in arrived.into_iter().flat_map(|frame| frame.sources) {
-            let left_out = if source.number < number || outcome.is_err() {
-                Some(source)
-            } else {
-                state.view(&view).arrive(source, now)
+            // The view may be gone, and another one of its name have come.
+            let left_out = match state.views.iter_mut().find(|work| work.identity == view) {
+                Some(work) if outcome.is_ok() => work.arrive(source, now),
+                _ => Some(source),
             };
             state.retired.extend(left_out);
         }
@@ -222,10 +243,13 @@ impl Shared {
             // The engine dropped the frame, or knows why it was refused.
             Err(FenceError::Abandoned { .. }) => None,
             Ok(()) => {
-                state.has_failed = false;
+                state.device_failed = false;
                 None
             }
-            Err(error) => self.fail(&mut state, error.into()),
+            Err(error) => {
+                let is_told = !std::mem::replace(&mut state.device_failed, true);
+                is_told.then(|| self.add_error_of_all(&mut state, error.into()))
+            }
         };
         drop(state);
         tell(told);
@@ -324,11 +348,16 @@ impl Shared {
         }
     }
 
+    /// A frame is not of the renderer that the helper's frame began with.
+    fn report_foreign_frame(&self) {
+        let told = self.add_error_of_all(&mut self.state.lock(), HelperErrorReason::ForeignFrame);
+        tell(Some(told));
+    }
+
     /// Something failed for all views. Returns what is to be told.
-    fn fail(&self, state: &mut State, reason: HelperErrorReason) -> Option<String> {
-        let is_told = !std::mem::replace(&mut state.has_failed, true);
+    fn add_error_of_all(&self, state: &mut State, reason: HelperErrorReason) -> String {
         let number = state.frame;
-        is_told.then(|| self.add_error(state, String::new(), number, reason))
+        self.add_error(state, String::new(), number, reason)
     }
 
     /// Something failed for one view.

@@ -11,12 +11,12 @@ pub struct HelperStatistics {
     pub view: String,
     /// The number of the frame, counted by the helper.
     pub frame: u64,
-    /// The number of the frame whose result this one shows; `None` if there is no result for it: in the first frames, in those after a
-    /// view has another size, and while all results fail.
+    /// The number of the frame whose result this one shows; `None` if there is no result for it: in the first frames, in those after
+    /// the view has another size, and until a first result succeeds.
     pub result: Option<u64>,
     /// How many sources have been computed for the view so far.
     pub computed: u64,
-    /// How many sources were left out, because a newer one came before the step had time for them.
+    /// How many sources were skipped, because a newer one came before the step had time for them.
     pub skipped: u64,
     /// How long the latest result took, from the arrival of its pixels until it was uploaded.
     pub latest_took: Duration,

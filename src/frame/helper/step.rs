@@ -35,9 +35,9 @@ pub trait HelperStep: Send + Sync + 'static {
     fn name(&self) -> &str;
 
     /// Computes the step, in a [background job](Scheduler::background): on a worker that nothing else needs. A later frame samples what it
-    /// returns, in any size, and any format but those of depth.
+    /// returns, in any size, and any [format that can be filtered](crate::process::Format::is_filterable).
     ///
-    /// It is called once at a time for a view, while that is there in every frame, and for several views at once. If it panics, the result is dropped, and
+    /// Calls for one view do not overlap, unless the view was absent for a frame. Calls for several views may. If it panics, the result is dropped, and
     /// [reported](super::PostHelper::take_errors).
     fn compute(&self, frame: &HelperFrame<'_>) -> Picture;
 }

@@ -65,7 +65,7 @@ impl ViewWork {
         }
     }
 
-    /// The pixels of a source have arrived. Returns the source that waited before, which is left out.
+    /// The pixels of a source have arrived. Returns the older source, which is skipped, if one waits.
     pub(super) fn arrive(&mut self, source: Source, now: Instant) -> Option<Source> {
         let (replaced, _) = self.arrived.replace((source, now))?;
         self.skipped += 1;
