@@ -116,7 +116,8 @@ pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &Frame
     let (before, after) = controls.split_at_mut(first);
     for (view, control) in (first..).zip(after).chain((0..).zip(before)).filter(|(_, control)| control.is_possible()) {
         let occlusion = &tables.occlusion[view];
-        let objects = tables.visibility[view].set.count() + occlusion.hidden();
+        let visibility = &tables.visibility[view];
+        let objects = visibility.set.count() + visibility.pieces.object_count() + occlusion.hidden();
         control.update(occlusion.nanoseconds(), objects, occlusion.is_on(), &mut may_try);
     }
 }

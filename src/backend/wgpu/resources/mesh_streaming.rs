@@ -161,7 +161,10 @@ impl MeshCache {
         for slot in &room.evicted {
             if let Some(location) = self.remove_resident(*slot) {
                 self.lifetimes.retire(location);
-                self.missing.insert(*slot);
+                // One that is being uploaded, in place of this version, is not missing.
+                if !self.in_flight.contains(slot) {
+                    self.missing.insert(*slot);
+                }
             }
         }
         let target = self.pages.target(room.location)?;

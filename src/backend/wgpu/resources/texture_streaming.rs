@@ -240,7 +240,10 @@ impl TextureArrays {
     /// Takes a texture off the device. Its layer is free for those whose upload waits until nothing reads it.
     fn evict(&mut self, slot: u32) {
         if let Some(texture) = self.textures.get_mut(slot as usize).and_then(Option::take) {
-            self.missing.insert(slot);
+            // One that is being uploaded, in place of this version, is not missing.
+            if !self.in_flight.contains_key(&slot) {
+                self.missing.insert(slot);
+            }
             self.vacate(texture.location);
         }
     }
