@@ -105,9 +105,8 @@ pub use bytemuck;
 pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
     FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,
-    NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung, StageTimes,
-    SubmitError, Submitted, Submitter, UndeclaredFill, UndeclaredRead, ViewBudget, ViewForm, ViewStatistics, WarmUp,
-    helper,
+    NodeAccessError, NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung,
+    StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp, helper,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

@@ -175,7 +175,7 @@ fn stages_around(resource: NodeResource) -> (&'static [&'static str], &'static [
     match resource {
         NodeResource::Frame(FrameData::Transforms) => (&[], &["objects"]),
         NodeResource::Frame(FrameData::VisibleObjects) => (&["compact"], &[]),
-        NodeResource::Frame(FrameData::DrawLists) => (&["join", "triangles"], &[]),
+        NodeResource::Frame(FrameData::DrawLists) => (&["join", "cull list"], &[]),
         NodeResource::Frame(FrameData::PassInputs) => (&[], &["prepare", "record", "finish"]),
         NodeResource::Frame(FrameData::RecordedPasses) => (&["finish"], &[]),
         NodeResource::Own(_) | NodeResource::Buffer { .. } => (&[], &[]),

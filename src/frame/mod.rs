@@ -71,7 +71,7 @@ pub use granularity::Granularity;
 #[cfg(feature = "report")]
 pub(crate) use job_size::job_size;
 pub use node_accesses::{FrameData, NodeAccesses, NodeResource};
-pub use node_frame::{NodeFrame, UndeclaredFill, UndeclaredRead};
+pub use node_frame::{NodeAccessError, NodeFrame};
 pub use piece_statistics::PieceStatistics;
 pub use recorded::{Recorded, Submitted, Submitter};
 pub use renderer::Renderer;

@@ -11,7 +11,7 @@ use super::tables::FrameTables;
 use super::{FrameData, NodeResource};
 use crate::backend::FrameRequest;
 use crate::command::DrawList;
-use crate::scene::{GeneratedBuffer, GeneratedContents};
+use crate::scene::{ChunkError, GeneratedBuffer, GeneratedContents};
 use crate::view::{RenderView, set_bits};
 
 /// What a [`CpuNode`](super::CpuNode) sees of the frame while it runs: what it declares to read of it.
@@ -29,21 +29,27 @@ impl<'a> NodeFrame<'a> {
         self.request.views
     }
 
-    /// The objects that a view sees, by its index, in ascending order; none of a view in which no object is drawn.
+    /// The objects that a view sees, by its index, in ascending order: of a [piece](crate::scene::Piece) that it executes, all that are drawn. There
+    /// are none in a view that does not exist or draws no object.
     ///
     /// # Errors
     /// If the node does not declare that it reads [`FrameData::VisibleObjects`].
-    ///
-    /// # Panics
-    /// If there is no such view.
-    pub fn visible_objects(&self, view: usize) -> Result<impl Iterator<Item = usize> + use<'a>, UndeclaredRead> {
+    pub fn visible_objects(&self, view: usize) -> Result<impl Iterator<Item = usize> + use<>, NodeAccessError> {
         self.check(FrameData::VisibleObjects)?;
-        let set = &self.tables.visibility[view].set;
-        let words = (0..set.word_count()).map(|word| (word, set.word(word)));
-        Ok(words.flat_map(|(word, mask)| set_bits(mask).map(move |bit| word * u64::BITS as usize + bit)))
+        let mut words: Vec<u64> = Vec::new();
+        if let Some(visibility) = self.tables.visibility.get(view) {
+            words.extend((0..visibility.set.word_count()).map(|word| visibility.set.word(word)));
+            for &piece in visibility.pieces.executed() {
+                self.tables.pieces.visit_words(piece as usize, |&(word, mask)| words[word] |= mask);
+            }
+        }
+        Ok(words
+            .into_iter()
+            .enumerate()
+            .flat_map(|(word, mask)| set_bits(mask).map(move |bit| word * u64::BITS as usize + bit)))
     }
 
-    /// What a process draws in a view, by its index; `None` where it draws no commands.
+    /// What a process draws in a view, by its index: the [batches](DrawList::batches) of the list. `None` where it draws no commands.
     ///
     /// # Errors
     /// If the node does not declare that it reads [`FrameData::DrawLists`].
@@ -51,7 +57,7 @@ impl<'a> NodeFrame<'a> {
         &self,
         process: &str,
         view: usize,
-    ) -> Result<Option<RwLockReadGuard<'a, DrawList>>, UndeclaredRead> {
+    ) -> Result<Option<RwLockReadGuard<'a, DrawList>>, NodeAccessError> {
         self.check(FrameData::DrawLists)?;
         let FrameRequest { plan, passes, .. } = self.request;
         let name = |index: usize| plan.processes()[index].name.as_str();
@@ -63,67 +69,152 @@ impl<'a> NodeFrame<'a> {
     /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with elements that
     /// [count](Self::set_count) must be filled in each frame.
     ///
+    /// Other jobs that access the chunk wait while it is held, so hold one at a time.
+    ///
     /// # Errors
-    /// If no node of the frame declares that it [fills](super::NodeAccesses::fills) the buffer, or there is no such chunk.
+    /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk, or if somebody, such as
+    /// this job, holds it for a second.
     pub fn fill<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
         chunk: usize,
-    ) -> Result<impl DerefMut<Target = [T]> + use<'a, T>, UndeclaredFill> {
-        let resource = buffer.into();
-        self.contents(buffer).and_then(|contents| contents.fill(chunk)).ok_or(UndeclaredFill { resource, chunk })
+    ) -> Result<impl DerefMut<Target = [T]> + use<'a, T>, NodeAccessError> {
+        let contents = self.contents(buffer, Access::Write)?;
+        contents.fill(chunk).map_err(|error| NodeAccessError::new(error, buffer.into(), chunk))
     }
 
-    /// A chunk of a buffer that other nodes have filled in this frame.
+    /// A chunk of a buffer that other nodes have filled in this frame: its elements that [count](Self::set_count).
     ///
     /// # Errors
-    /// If no node of the frame declares that it fills the buffer, or there is no such chunk.
+    /// If the node does not declare that it reads the buffer, if no node of the frame fills it, or not this chunk, if there is no such chunk, or if
+    /// somebody fills it for a second.
     pub fn filled<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
         chunk: usize,
-    ) -> Result<impl Deref<Target = [T]> + use<'a, T>, UndeclaredFill> {
-        let resource = buffer.into();
-        self.contents(buffer).and_then(|contents| contents.read(chunk)).ok_or(UndeclaredFill { resource, chunk })
+    ) -> Result<impl Deref<Target = [T]> + use<'a, T>, NodeAccessError> {
+        let contents = self.contents(buffer, Access::Read)?;
+        contents.read(chunk).map_err(|error| NodeAccessError::new(error, buffer.into(), chunk))
     }
 
-    /// Sets how many elements of a buffer count in this frame, from the first one on. Without it all do.
+    /// How many elements of a buffer count in this frame.
     ///
     /// # Errors
-    /// If no node of the frame declares that it fills the buffer.
-    pub fn set_count<T: Pod>(&self, buffer: &GeneratedBuffer<T>, count: usize) -> Result<(), UndeclaredFill> {
-        let contents = self.contents(buffer).ok_or(UndeclaredFill { resource: buffer.into(), chunk: 0 })?;
-        contents.set_count(count);
+    /// If the node does not declare that it reads the buffer, or no node of the frame fills it.
+    pub fn count<T: Pod>(&self, buffer: &GeneratedBuffer<T>) -> Result<usize, NodeAccessError> {
+        Ok(self.contents(buffer, Access::Read)?.count())
+    }
+
+    /// Sets how many elements of a buffer count in this frame, from the first one on: at most its capacity. Without it all do. A node that may have
+    /// no items calls it in [`width`](super::CpuNode::width), as it is then not run.
+    ///
+    /// # Errors
+    /// If the node does not declare that it fills the buffer.
+    pub fn set_count<T: Pod>(&self, buffer: &GeneratedBuffer<T>, count: usize) -> Result<(), NodeAccessError> {
+        self.contents(buffer, Access::Write)?.set_count(count);
         Ok(())
     }
 
-    fn contents<T: Pod>(&self, buffer: &GeneratedBuffer<T>) -> Option<&'a GeneratedContents> {
+    /// What the frame's nodes fill a buffer with, if this one may access it.
+    fn contents<T: Pod>(
+        &self,
+        buffer: &GeneratedBuffer<T>,
+        access: Access,
+    ) -> Result<&'a GeneratedContents, NodeAccessError> {
+        let resource = NodeResource::from(buffer);
+        let is_declared = self.accesses.iter().any(|declared| match declared {
+            // Who fills a buffer may also look at what it has filled.
+            NodeAccess::Writes(declared) | NodeAccess::Modifies(declared) => *declared == resource,
+            NodeAccess::Reads(declared) => access == Access::Read && *declared == resource,
+            NodeAccess::After(_) => false,
+        });
+        if !is_declared {
+            return Err(NodeAccessError::Undeclared { resource, access: access.name() });
+        }
         let identity = buffer.source().layout.identity;
         let is_it = |contents: &&Arc<GeneratedContents>| contents.layout().identity == identity;
-        self.request.generated.iter().find(is_it).map(|contents| &**contents)
+        // A node that only declares to write a buffer, and not to fill it, fills none.
+        self.request
+            .generated
+            .iter()
+            .find(is_it)
+            .map(|contents| &**contents)
+            .ok_or(NodeAccessError::NeverFilled { resource })
     }
 
-    fn check(&self, data: FrameData) -> Result<(), UndeclaredRead> {
+    fn check(&self, data: FrameData) -> Result<(), NodeAccessError> {
         let resource = NodeResource::Frame(data);
         let is_declared = self.accesses.contains(&NodeAccess::Reads(resource));
-        is_declared.then_some(()).ok_or(UndeclaredRead { resource })
+        is_declared.then_some(()).ok_or(NodeAccessError::Undeclared { resource, access: "reads" })
     }
 }
 
-/// A node asks for something that it does not declare to read, so that it may not be there yet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the node does not declare that it reads {resource:?}")]
-pub struct UndeclaredRead {
-    /// What it asks for.
-    pub resource: NodeResource,
+/// How a node accesses a buffer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Access {
+    Read,
+    Write,
 }
 
-/// No node of the frame declares that it fills a buffer, or the buffer has no such chunk.
+impl Access {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Read => "reads",
+            Self::Write => "fills",
+        }
+    }
+}
+
+/// Why a node does not get what it asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no node of the frame declares that it fills {resource:?}, or it has no chunk {chunk}")]
-pub struct UndeclaredFill {
-    /// The buffer.
-    pub resource: NodeResource,
-    /// The chunk.
-    pub chunk: usize,
+#[non_exhaustive]
+pub enum NodeAccessError {
+    /// The node does not declare it, so that it may not be there yet.
+    #[error("the node does not declare that it {access} {resource:?}")]
+    Undeclared {
+        /// What it asks for.
+        resource: NodeResource,
+        /// What it does with that: "reads" or "fills".
+        access: &'static str,
+    },
+    /// No node of the frame declares that it fills the buffer.
+    #[error("no node of the frame declares that it fills {resource:?}")]
+    NeverFilled {
+        /// The buffer.
+        resource: NodeResource,
+    },
+    /// The buffer has no such chunk.
+    #[error("{resource:?} has no chunk {chunk}")]
+    UnknownChunk {
+        /// The buffer.
+        resource: NodeResource,
+        /// The chunk.
+        chunk: usize,
+    },
+    /// No node has filled the chunk in this frame.
+    #[error("no node has filled chunk {chunk} of {resource:?} in this frame")]
+    UnfilledChunk {
+        /// The buffer.
+        resource: NodeResource,
+        /// The chunk.
+        chunk: usize,
+    },
+    /// The chunk was held for a second: by the same job, or by one that waits for it.
+    #[error("chunk {chunk} of {resource:?} is held by a job that does not let go of it")]
+    HeldChunk {
+        /// The buffer.
+        resource: NodeResource,
+        /// The chunk.
+        chunk: usize,
+    },
+}
+
+impl NodeAccessError {
+    fn new(error: ChunkError, resource: NodeResource, chunk: usize) -> Self {
+        match error {
+            ChunkError::Unknown => Self::UnknownChunk { resource, chunk },
+            ChunkError::Held => Self::HeldChunk { resource, chunk },
+            ChunkError::Unfilled => Self::UnfilledChunk { resource, chunk },
+        }
+    }
 }

@@ -414,7 +414,12 @@ impl<B: Backend> Default for GraphBuilder<B> {
 impl<B: Backend> GraphBuilder<B> {
     /// Adds the needed ones of some stages, each after the stage that it names, and returns the scope with them.
     fn add(&mut self, mut scope: Scope, stages: Vec<Box<dyn Stage<B>>>, needs: StageNeeds) -> Scope {
-        for stage in stages.into_iter().filter(|stage| stage.is_needed(&needs)) {
+        for stage in stages {
+            // Also of stages that this frame does without, so that no node has such a name.
+            self.nodes_of_stages.entry(stage.info().name).or_default();
+            if !stage.is_needed(&needs) {
+                continue;
+            }
             let info = stage.info();
             let mut labels_of = |stage: &'static str| {
                 let name = self.stage_names.entry(stage).or_insert_with(|| stage.into());

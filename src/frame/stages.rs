@@ -9,7 +9,7 @@ mod of_pieces;
 mod of_view;
 
 use of_frame::{Bins, Objects, Upload};
-use of_pass::{Bin, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
+use of_pass::{Bin, CullList, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
 use of_pieces::{ExecutePieces, RecordPieces};
 use of_view::{CoarseDepth, Compact, Levels, Occluders, Occlusion, Visibility};
 
@@ -44,6 +44,7 @@ pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> 
         Box::new(ExecutePieces { pass }),
         Box::new(Join { pass }),
         Box::new(Triangles { pass }),
+        Box::new(CullList { pass }),
         Box::new(Prepare { pass }),
         Box::new(Record { pass }),
         Box::new(Finish { pass }),

@@ -34,8 +34,8 @@ impl<T: Pod> StorageBuffer<T> {
         Self { layout, element: PhantomData }
     }
 
-    /// The same buffer, which [CPU nodes](crate::CpuNode) fill before all processes: see [`generated`](Self::generated). So processes may
-    /// read it that no other process writes for.
+    /// The same buffer, which [CPU nodes](crate::CpuNode) fill before all processes: see [`generated`](Self::generated). Processes may then
+    /// read it even if no process writes it.
     pub const fn filled_by_nodes(mut self) -> Self {
         self.layout.is_filled_by_nodes = true;
         self
@@ -61,7 +61,11 @@ impl<T: Pod> StorageBuffer<T> {
     /// ```
     ///
     /// The engine makes it once and keeps it. Of two that fill one buffer in the same frame, one is lost.
+    ///
+    /// # Panics
+    /// If the buffer is not [filled by nodes](Self::filled_by_nodes): processes would not read what nodes fill.
     pub fn generated(self) -> GeneratedBuffer<T> {
+        assert!(self.layout.is_filled_by_nodes, "call `filled_by_nodes` where {:?} is made", self.layout.name);
         GeneratedBuffer::of_storage(self.layout.name, self.layout.bytes as usize / size_of::<T>())
     }
 

@@ -5,13 +5,17 @@ use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use bytemuck::Pod;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
+use super::Topology;
+
 /// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
 /// terrain (S 9.5). When the frame is submitted, its content goes to the device, ahead of all passes. Each frame has a content of its own
-/// until then, so that frames in flight do not meet. What no frame fills keeps what the latest one has put there.
+/// until then, so that frames in flight do not meet. A frame that does not fill a buffer draws what the last submitted frame has filled, as
+/// long as what draws it stays on the device; a mesh that comes later, and another device, begin without a content.
 ///
 /// A [mesh](super::Mesh::generated) is drawn from it by the whole pipeline. One that a
 /// [`StorageBuffer`](crate::process::StorageBuffer::generated) makes is read by shaders.
@@ -157,6 +161,12 @@ impl GeneratedLayout {
     }
 }
 
+/// Free contents that are kept for frames to come: as many as were in flight at most, as a rule.
+const MAX_FREE_CONTENTS: usize = 3;
+
+/// How long a job waits for a chunk that another one holds. Who waits longer waits for itself, or for a job that waits for it.
+const MAX_WAIT: Duration = Duration::from_secs(1);
+
 /// Where the contents of a buffer come from: they are used again when the frames that had them are gone.
 pub(crate) struct GeneratedSource {
     pub(crate) layout: GeneratedLayout,
@@ -179,14 +189,21 @@ impl GeneratedSource {
     /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled.
     pub(crate) fn begin_frame(&self) -> Arc<GeneratedContents> {
         let mut contents = self.contents.lock();
+        let mut free_count = 0;
+        contents.retain(|contents| {
+            let is_free = Arc::strong_count(contents) == 1;
+            free_count += usize::from(is_free);
+            !is_free || free_count <= MAX_FREE_CONTENTS
+        });
         for free in &mut *contents {
             if let Some(unused) = Arc::get_mut(free) {
                 unused.reset();
                 return Arc::clone(free);
             }
         }
-        contents.push(Arc::new(GeneratedContents::new(self.layout)));
-        contents.last().map(Arc::clone).expect("one was pushed")
+        let new = Arc::new(GeneratedContents::new(self.layout));
+        contents.push(Arc::clone(&new));
+        new
     }
 }
 
@@ -209,6 +226,7 @@ pub struct GeneratedContents {
     count: Mutex<usize>,
 }
 
+#[derive(Default)]
 struct Chunk {
     /// Aligned for every element.
     words: Box<[u128]>,
@@ -221,6 +239,14 @@ impl Chunk {
     }
 }
 
+/// Why a chunk cannot be filled or read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ChunkError {
+    Unknown,
+    Held,
+    Unfilled,
+}
+
 impl GeneratedContents {
     fn new(layout: GeneratedLayout) -> Self {
         let words = |elements: usize| vec![0; (elements * layout.stride).div_ceil(size_of::<u128>())].into();
@@ -230,7 +256,13 @@ impl GeneratedContents {
 
     fn reset(&mut self) {
         *self.count.get_mut() = self.layout.capacity;
-        self.chunks.iter_mut().for_each(|chunk| chunk.get_mut().is_filled = false);
+        for chunk in &mut self.chunks {
+            if chunk.is_locked() {
+                // A node has leaked what it filled.
+                *chunk = RwLock::new(std::mem::take(chunk.get_mut()));
+            }
+            chunk.get_mut().is_filled = false;
+        }
     }
 
     /// What the buffer is.
@@ -253,34 +285,61 @@ impl GeneratedContents {
         *self.count.lock() = count.min(self.layout.capacity);
     }
 
-    /// A chunk to fill; `None` if there is no such chunk.
+    /// A chunk to fill.
+    ///
+    /// # Errors
+    /// If there is no such chunk, or somebody holds it for too long.
     ///
     /// # Panics
     /// If the elements are not of this type.
-    pub(crate) fn fill<T: Pod>(&self, chunk: usize) -> Option<impl DerefMut<Target = [T]> + use<'_, T>> {
+    pub(crate) fn fill<T: Pod>(&self, chunk: usize) -> Result<impl DerefMut<Target = [T]> + use<'_, T>, ChunkError> {
         let elements = self.layout.chunk_range(chunk).len();
-        let mut guard = self.chunks.get(chunk)?.write();
+        let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
+        let mut guard = lock.try_write_for(MAX_WAIT).ok_or(ChunkError::Held)?;
         guard.is_filled = true;
         let bytes = elements * self.layout.stride;
-        Some(RwLockWriteGuard::map(guard, move |chunk| {
+        Ok(RwLockWriteGuard::map(guard, move |chunk| {
             bytemuck::cast_slice_mut(&mut bytemuck::cast_slice_mut::<u128, u8>(&mut chunk.words)[..bytes])
         }))
     }
 
-    /// A chunk that is filled; `None` if there is no such chunk.
+    /// The elements of a chunk that is filled, of those that count.
+    ///
+    /// # Errors
+    /// If there is no such chunk, nobody has filled it in this frame, or somebody fills it for too long.
     ///
     /// # Panics
     /// If the elements are not of this type.
-    pub(crate) fn read<T: Pod>(&self, chunk: usize) -> Option<impl Deref<Target = [T]> + use<'_, T>> {
-        let elements = self.layout.chunk_range(chunk).len();
-        let guard = self.chunks.get(chunk)?.read();
-        Some(RwLockReadGuard::map(guard, |chunk| bytemuck::cast_slice(chunk.bytes(&self.layout, elements))))
+    pub(crate) fn read<T: Pod>(&self, chunk: usize) -> Result<impl Deref<Target = [T]> + use<'_, T>, ChunkError> {
+        let range = self.layout.chunk_range(chunk);
+        let elements = range.end.min(self.count()).saturating_sub(range.start);
+        let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
+        let guard = lock.try_read_for(MAX_WAIT).ok_or(ChunkError::Held)?;
+        if elements > 0 && !guard.is_filled {
+            return Err(ChunkError::Unfilled);
+        }
+        Ok(RwLockReadGuard::map(guard, |chunk| bytemuck::cast_slice(chunk.bytes(&self.layout, elements))))
     }
 
     /// A chunk with elements that no node has filled; `None` if there is none.
     pub(crate) fn unfilled_chunk(&self) -> Option<usize> {
         let used = self.count().div_ceil(self.layout.chunk);
-        self.chunks[..used].iter().position(|chunk| !chunk.read().is_filled)
+        // What is still held was leaked.
+        self.chunks[..used].iter().position(|chunk| !chunk.try_read().is_some_and(|chunk| chunk.is_filled))
+    }
+
+    /// If its elements are indices: how many of those that count form whole triangles, and the last one of these. Further ones that are equal to
+    /// it form triangles without area.
+    pub(crate) fn whole_triangles(&self, topology: Topology) -> (usize, u32) {
+        let count = match (topology, self.count()) {
+            (_, 0..3) => 0,
+            (Topology::TriangleList, count) => count - count % 3,
+            (Topology::TriangleStrip, count) => count,
+        };
+        let Some(last) = count.checked_sub(1) else { return (0, 0) };
+        let chunk = self.chunks[last / self.layout.chunk].read();
+        let indices: &[u32] = bytemuck::cast_slice(&chunk.words);
+        (count, indices[last % self.layout.chunk])
     }
 
     /// Calls `visit` with the bytes of consecutive elements and where they begin in the buffer, for all that there are.
@@ -331,7 +390,8 @@ mod tests {
         let second = buffer.source().begin_frame();
         fill(&second, 2.0);
         assert_eq!(first.elements::<[f32; 3]>(), [[1.0; 3]; 10]);
-        assert_eq!((first.unfilled_chunk(), first.fill::<[f32; 3]>(3).is_none()), (None, true));
+        assert_eq!(first.unfilled_chunk(), None);
+        assert_eq!(first.fill::<[f32; 3]>(3).err(), Some(ChunkError::Unknown));
         let memory = |contents: &GeneratedContents| std::ptr::from_ref(contents);
         let before = memory(&first);
         drop(first);
@@ -353,5 +413,54 @@ mod tests {
         assert_eq!(contents.count(), 10);
         contents.set_count(0);
         assert_eq!((contents.unfilled_chunk(), contents.elements::<u32>()), (None, vec![]));
+    }
+
+    #[test]
+    fn indices_beyond_whole_triangles_repeat_the_last_one() {
+        let buffer = GeneratedBuffer::<u32>::with_chunk("indices", 10, 4);
+        let contents = buffer.source().begin_frame();
+        for chunk in 0..3 {
+            let indices = buffer.chunk_range(chunk);
+            contents
+                .fill::<u32>(chunk)
+                .unwrap()
+                .iter_mut()
+                .zip(indices)
+                .for_each(|(index, value)| *index = 100 + value as u32);
+        }
+        for (count, list, strip) in [
+            (0, (0, 0), (0, 0)),
+            (2, (0, 0), (0, 0)),
+            (3, (3, 102), (3, 102)),
+            (5, (3, 102), (5, 104)),
+            (10, (9, 108), (10, 109)),
+        ] {
+            contents.set_count(count);
+            assert_eq!(contents.whole_triangles(Topology::TriangleList), list, "{count}");
+            assert_eq!(contents.whole_triangles(Topology::TriangleStrip), strip, "{count}");
+        }
+    }
+
+    #[test]
+    fn what_nobody_has_filled_is_not_read_and_a_leaked_chunk_costs_one_frame() {
+        let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 8, 4);
+        let contents = buffer.source().begin_frame();
+        assert_eq!(contents.read::<u32>(0).err(), Some(ChunkError::Unfilled));
+        std::mem::forget(contents.fill::<u32>(0).unwrap());
+        contents.fill::<u32>(1).unwrap().fill(1);
+        assert_eq!((contents.unfilled_chunk(), contents.fill::<u32>(0).err()), (Some(0), Some(ChunkError::Held)));
+        drop(contents);
+        let contents = buffer.source().begin_frame();
+        contents.fill::<u32>(0).unwrap().fill(2);
+        assert_eq!(contents.read::<u32>(0).unwrap()[3], 2);
+    }
+
+    #[test]
+    fn the_contents_of_many_frames_at_once_are_dropped_again() {
+        let buffer = GeneratedBuffer::<u32>::new("numbers", 8);
+        let all: Vec<_> = (0..50).map(|_| buffer.source().begin_frame()).collect();
+        drop(all);
+        drop(buffer.source().begin_frame());
+        assert_eq!(buffer.source().contents.lock().len(), MAX_FREE_CONTENTS);
     }
 }

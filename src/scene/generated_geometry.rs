@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::GeneratedBuffer;
 use super::generated_buffer::GeneratedSource;
+use super::{GeneratedBuffer, Topology};
 
 /// The vertices and indices of a [generated mesh](super::Mesh::generated).
 #[derive(Debug, PartialEq)]
 pub(crate) struct GeneratedGeometry {
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "no other backend reads it"))]
+    pub(crate) topology: Topology,
     pub(crate) vertices: Arc<GeneratedSource>,
     pub(crate) indices: GeneratedIndices,
 }
@@ -32,7 +34,7 @@ impl From<Vec<u32>> for GeneratedIndices {
 
 impl From<&GeneratedBuffer<u32>> for GeneratedIndices {
     /// Those that nodes fill the buffer with. Each is less than the number of vertices. The number of triangles is that of a full buffer;
-    /// indices beyond the [count](crate::NodeFrame::set_count) are 0, so that they form triangles without area.
+    /// of indices beyond the [count](crate::NodeFrame::set_count), and of a triangle that these would complete, nothing is drawn.
     fn from(buffer: &GeneratedBuffer<u32>) -> Self {
         Self(IndexSource::Generated(Arc::clone(buffer.source())))
     }

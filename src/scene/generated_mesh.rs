@@ -42,11 +42,13 @@ impl Mesh {
         if !(low.cmple(high).all() && mesh.bounds.is_valid()) {
             return Err(SceneError::MeshTooLarge { mesh: mesh.name });
         }
-        mesh.generated = Some(Arc::new(GeneratedGeometry { vertices: Arc::clone(vertices.source()), indices }));
+        mesh.generated =
+            Some(Arc::new(GeneratedGeometry { topology, vertices: Arc::clone(vertices.source()), indices }));
         Ok(mesh)
     }
 
-    /// The mesh of one frame as one that the CPU knows, from what its buffers are filled with; `None` while one never was.
+    /// The mesh of one frame as one that the CPU knows, from what its buffers are filled with; `None` while one never was, and if no
+    /// triangle counts.
     ///
     /// # Errors
     /// If a vertex is not finite, or an index is not one of a vertex.
@@ -55,17 +57,20 @@ impl Mesh {
         &self,
         contents_of: impl Fn(u64) -> Option<Arc<GeneratedContents>>,
     ) -> Result<Option<Self>, SceneError> {
-        let Some(GeneratedGeometry { vertices, indices }) = self.generated.as_deref() else { return Ok(None) };
+        let Some(GeneratedGeometry { vertices, indices, .. }) = self.generated.as_deref() else { return Ok(None) };
         let Some(vertices) = contents_of(vertices.layout.identity) else { return Ok(None) };
         let indices = match &indices.0 {
             IndexSource::Fixed(fixed) => fixed.clone(),
             IndexSource::Generated(source) => {
                 let Some(contents) = contents_of(source.layout.identity) else { return Ok(None) };
                 let mut made = contents.elements();
-                made.resize(indices.count(), 0);
+                made.truncate(contents.whole_triangles(self.topology()).0);
                 made
             }
         };
+        if indices.is_empty() {
+            return Ok(None);
+        }
         Self::new(self.name(), self.topology(), vertices.elements(), indices).map(Some)
     }
 

@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::MeshBuffers;
 use super::generated_geometry::GeneratedGeometry;
 use super::vertex_attribute::MeshAttribute;
-use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, VertexAttribute};
+use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, Topology, VertexAttribute};
 
 /// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise. Clones share
 /// their vertices and indices.
@@ -352,17 +352,6 @@ impl Vertex {
     fn is_finite(&self) -> bool {
         self.position.iter().chain(&self.normal).chain(&self.uv).all(|value| value.is_finite())
     }
-}
-
-/// How indices form triangles (M listing 10.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Topology {
-    /// Every three indices form a triangle.
-    #[default]
-    TriangleList = 0,
-    /// Every index from the third on forms a triangle with the two before it, with alternating winding.
-    TriangleStrip = 1,
 }
 
 /// A bounding sphere in object space.

@@ -40,6 +40,7 @@ mod scene_ref;
 #[cfg(feature = "meshopt")]
 mod simplified_levels;
 mod subdivision;
+mod topology;
 mod transform;
 mod vertex_attribute;
 
@@ -52,7 +53,7 @@ pub(crate) use camera_motion::PreciseMotion;
 pub use changes::Changes;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;
-pub(crate) use generated_buffer::GeneratedSource;
+pub(crate) use generated_buffer::{ChunkError, GeneratedSource};
 pub use generated_buffer::{GeneratedBuffer, GeneratedContents, GeneratedLayout};
 pub use generated_geometry::GeneratedIndices;
 #[cfg(feature = "wgpu")]
@@ -63,7 +64,7 @@ pub use light::{Light, LightKind};
 pub use material::{Blend, Material, Texture};
 pub use material_predicate::MaterialPredicate;
 pub use material_type::{MaterialLayout, MaterialType, MaterialValues};
-pub use mesh::{Bounds, Mesh, Topology, Vertex};
+pub use mesh::{Bounds, Mesh, Vertex};
 #[cfg(feature = "wgpu")]
 pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, VertexStream};
 #[cfg(feature = "wgpu")]
@@ -78,5 +79,6 @@ pub use packed_vertex::PackedVertex;
 pub use piece::Piece;
 pub use redraw::Redraw;
 pub use scene_ref::SceneRef;
+pub use topology::Topology;
 pub(crate) use transform::is_unit;
 pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VertexAttribute};

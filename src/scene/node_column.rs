@@ -3,6 +3,7 @@
 use std::fmt;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use glam::{DVec3, Quat, Vec3};
 use parking_lot::{Mutex, MutexGuard};
@@ -14,8 +15,8 @@ use super::Bounds;
 /// [`record_with_nodes`](crate::Renderer::record_with_nodes) returns.
 ///
 /// It is cut into chunks of [`NodeColumn::CHUNK`] objects. Nodes write a chunk as often as they like, each after those that it is ordered
-/// after, until somebody reads it. From then on it is as it is until the frame has ended. Chunks that no node writes keep what the engine
-/// has put there.
+/// after, until its first read; after that, a write is an error. So an engine makes a column for each recording. Chunks that no node writes keep
+/// what the engine has put there.
 ///
 /// ```
 /// use drawloom::glam::DVec3;
@@ -69,28 +70,31 @@ impl<'a, T> NodeColumn<'a, T> {
         self.chunks.len()
     }
 
-    /// A chunk to write, by index. While it is held, others wait who write or read the same chunk.
+    /// A chunk to write, by index. Other jobs that access the chunk wait while it is held, so hold one at a time.
     ///
     /// # Errors
-    /// If it has been read in this frame: the node does not declare that it writes the column, or not what for.
+    /// If it has been read in this frame, because the node does not declare that it writes [`FrameData::Transforms`](crate::FrameData::Transforms);
+    /// or if somebody, such as this job, holds it for a second.
     ///
     /// # Panics
     /// If there is no such chunk.
     pub fn write(&self, chunk: usize) -> Result<ColumnChunk<'_, 'a, T>, ChunkInUse> {
-        let values = self.chunks[chunk].writable.lock();
-        if values.is_none() {
-            return Err(ChunkInUse { chunk });
-        }
+        let values = self.chunks[chunk].writable.try_lock_for(MAX_WAIT).filter(|values| values.is_some());
+        let values = values.ok_or(ChunkInUse { chunk })?;
         Ok(ColumnChunk { values, first: chunk * Self::CHUNK })
     }
 
     /// The values of a chunk, by index. Nobody writes it from now on.
     ///
     /// # Panics
-    /// If there is no such chunk.
+    /// If there is no such chunk, or somebody, such as this job, holds it for a second.
     pub fn read(&self, chunk: usize) -> &[T] {
         let Chunk { writable, readable } = &self.chunks[chunk];
-        readable.get_or_init(|| writable.lock().take().map_or(&[], |values| values))
+        let freeze = || {
+            let mut writable = writable.try_lock_for(MAX_WAIT).expect("a job holds a chunk that is read");
+            writable.take().map_or(&[][..], |values| values)
+        };
+        readable.get_or_init(freeze)
     }
 }
 
@@ -144,15 +148,18 @@ impl<T> fmt::Debug for ColumnChunk<'_, '_, T> {
     }
 }
 
-/// A chunk of a [`NodeColumn`] that has been read in this frame cannot be written any more.
+/// A chunk of a [`NodeColumn`] cannot be written: it has been read, or is held by a job that does not let go of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "chunk {chunk} of the column has been read in this frame already: the node must declare that it writes the transforms"
+    "chunk {chunk} of the column has been read in this frame already, so the node must declare that it writes the transforms, or a job holds it"
 )]
 pub struct ChunkInUse {
     /// The chunk.
     pub chunk: usize,
 }
+
+/// How long a job waits for a chunk that another one holds. Who waits longer waits for itself, or for a job that waits for it.
+const MAX_WAIT: Duration = Duration::from_secs(1);
 
 /// A [`NodeColumn`] as a scene lends it.
 pub trait WrittenColumn<T>: fmt::Debug + Sync + sealed::Sealed {

@@ -52,7 +52,10 @@ fn nodes_that_make_no_graph_are_named() {
     assert!(matches!(problem_of(&writers), GraphProblem::UnorderedWriters { .. }));
     let same = ["one", "one"].map(|name| idle(name, |_| ()));
     assert_eq!(problem_of(&same), GraphProblem::DuplicateNode { name: "one".to_owned() });
-    for stage in ["objects", "visibility", "finish"] {
+    // Also those that these frames do without.
+    for stage in
+        ["objects", "visibility", "finish", "triangles", "cull list", "levels", "occlusion", "bin", "record pieces"]
+    {
         assert_eq!(problem_of(&[idle(stage, |_| ())]), GraphProblem::DuplicateNode { name: stage.to_owned() });
     }
 }

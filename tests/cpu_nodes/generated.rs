@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::backend::{BackendError, SoftwareBackend};
-use drawloom::graph::GraphProblem;
+use drawloom::graph::{GraphProblem, NodeError};
 use drawloom::process::Deferred;
 use drawloom::scene::{GeneratedBuffer, SceneError, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::{FrameError, Renderer, SubmitError, Submitter};
+use drawloom::{FrameError, NodeAccesses, NodeFrame, Renderer, SubmitError, Submitter};
 use drawloom_testing::hills::{self, GeneratedHills};
 
 use crate::{TestNode, renderer};
@@ -123,7 +123,7 @@ fn a_buffer_is_filled_as_declared() {
             },
         );
         let error = renderer.record_with_nodes(scene.as_scene_ref(), &[&undeclared]).map(drop).unwrap_err().to_string();
-        assert!(error.starts_with("sly failed: no node of the frame declares that it fills"), "{error}");
+        assert!(error.starts_with("sly failed: the node does not declare that it fills Buffer"), "{error}");
         let both =
             ["one", "two"].map(|name| TestNode::new(name, |accesses| _ = accesses.fills(&buffer), |_, _| Ok(())));
         match renderer.record_with_nodes(scene.as_scene_ref(), &[&both[0], &both[1]]).map(drop) {
@@ -159,7 +159,62 @@ fn a_buffer_is_filled_as_declared() {
         );
         let (fill, add) = (fill.with_width(2), add.with_width(2));
         let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &[&add, &fill]).unwrap();
-        assert_eq!((sum.load(Ordering::Relaxed), recorded.statistics().generated), (28, 28));
+        // 0 to 6, in 7 elements of 4 bytes.
+        assert_eq!((sum.load(Ordering::Relaxed), recorded.statistics().generated), (21, 28));
         drop(submitter.submit(recorded).unwrap());
     }
+}
+
+/// The error of a frame in which one node fills a buffer, and another one that comes after it does this.
+fn error_of_reader(
+    declare: impl Fn(&mut NodeAccesses, &GeneratedBuffer<u32>) + Send + Sync,
+    run: impl Fn(&NodeFrame<'_>, &GeneratedBuffer<u32>) -> Result<(), NodeError> + Send + Sync,
+) -> String {
+    let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 8, 4);
+    let scene = drawloom_testing::scenes::field(50);
+    let (mut renderer, _submitter) = renderer(2);
+    let make = TestNode::new(
+        "make",
+        |accesses| _ = accesses.fills(&buffer),
+        |frame, _| {
+            frame.fill(&buffer, 0)?.fill(1);
+            frame.set_count(&buffer, 4)?;
+            Ok(())
+        },
+    );
+    let reader = TestNode::new(
+        "reader",
+        |accesses| {
+            accesses.after("make");
+            declare(accesses, &buffer);
+        },
+        |frame, _| run(frame, &buffer),
+    );
+    renderer.record_with_nodes(scene.as_scene_ref(), &[&make, &reader]).map(drop).unwrap_err().to_string()
+}
+
+#[test]
+fn a_node_gets_what_it_declares_and_waits_for_nobody_who_never_ends() {
+    let reads = |accesses: &mut NodeAccesses, buffer: &GeneratedBuffer<u32>| _ = accesses.reads(buffer);
+    let error = error_of_reader(|_, _| (), |frame, buffer| Ok(drop(frame.filled(buffer, 0)?)));
+    assert!(error.starts_with("reader failed: the node does not declare that it reads Buffer"), "{error}");
+    let error = error_of_reader(reads, |frame, buffer| Ok(frame.set_count(buffer, 3)?));
+    assert!(error.starts_with("reader failed: the node does not declare that it fills Buffer"), "{error}");
+    let error = error_of_reader(reads, |frame, buffer| {
+        assert_eq!((frame.count(buffer)?, frame.filled(buffer, 1)?.len()), (4, 0));
+        Ok(drop(frame.filled(buffer, 2)?))
+    });
+    assert!(error.contains("has no chunk 2"), "{error}");
+    let modifies = |accesses: &mut NodeAccesses, buffer: &GeneratedBuffer<u32>| _ = accesses.modifies(buffer);
+    let error = error_of_reader(modifies, |frame, buffer| {
+        let _held = frame.fill(buffer, 0)?;
+        Ok(drop(frame.fill(buffer, 0)?))
+    });
+    assert!(error.contains("chunk 0 of") && error.contains("does not let go of it"), "{error}");
+}
+
+#[test]
+#[should_panic(expected = "filled_by_nodes")]
+fn a_storage_buffer_that_nodes_do_not_fill_has_no_generated_buffer() {
+    let _ = drawloom::process::StorageBuffer::<u32>::new("sparks", 10).generated();
 }

@@ -8,13 +8,46 @@ use drawloom::command::DrawList;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Bounds, Changes, NodeColumn, Scene, SceneRef, WrittenColumns};
+use drawloom::scene::{Bounds, Changes, NodeColumn, Piece, Scene, SceneRef, WrittenColumns};
 use drawloom::task::Scheduler;
 use drawloom::{FrameData, Renderer};
 use drawloom_testing::scenes::field;
 use drawloom_testing::scenes::leveled::plates;
 
 use crate::{TestNode, renderer};
+
+#[test]
+fn nodes_see_the_objects_of_executed_pieces() {
+    let mut scene = field(300);
+    scene.pieces.push(Piece::new("most", scene.object_set(scene.objects().take(250)).unwrap()));
+    let seen = Mutex::new(Vec::new());
+    let node = TestNode::new(
+        "look",
+        |accesses| _ = accesses.reads(FrameData::VisibleObjects),
+        |frame, _| {
+            assert_eq!(frame.visible_objects(frame.views().len())?.count(), 0);
+            seen.lock().unwrap().push(frame.visible_objects(0)?.collect::<Vec<_>>());
+            Ok(())
+        },
+    );
+    let (mut renderer, submitter) = renderer(2);
+    renderer.set_quality(Quality { occlusion: None, ..Quality::balanced() }).unwrap();
+    let mut executed = Vec::new();
+    for changes in [Changes::Unknown, Changes::NONE, Changes::NONE, Changes::NONE] {
+        let scene = SceneRef { changes, ..scene.as_scene_ref() };
+        let recorded = renderer.record_with_nodes(scene, &[&node]).unwrap();
+        executed.push(recorded.statistics().views[0].pieces);
+        submitter.submit(recorded).unwrap();
+    }
+    assert_eq!(executed, [0, 0, 1, 1]);
+    let seen = seen.lock().unwrap();
+    assert!(seen.iter().all(|objects| objects.is_sorted()));
+    let of_pieces: BTreeSet<_> = seen[2].iter().collect();
+    assert!(
+        !seen[0].is_empty() && seen[0].iter().all(|object| of_pieces.contains(object)),
+        "an object that is seen is missing"
+    );
+}
 
 const FRAMES: usize = 4;
 

@@ -82,8 +82,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         mut fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
         let mut generated = self.context.drawing.lock();
-        generated.keep(&self.generated, &self.meshes);
-        let meshes = generated.complete(&self.meshes)?;
+        let meshes = generated.update(&self.generated, &self.meshes)?;
         for (before, (pass, commands)) in queues.iter().flat_map(|queue| &queue.passes).enumerate() {
             FrameFence::set_up_to(before, &mut fences);
             let known = self.passes.iter().find(|known| known.pass == *pass);

@@ -15,20 +15,30 @@ pub(super) struct GeneratedMeshes {
 }
 
 impl GeneratedMeshes {
-    /// Takes over what nodes have filled in the frame that is drawn. What none of its meshes needs is dropped.
-    pub(super) fn keep(&mut self, generated: &[Arc<GeneratedContents>], meshes: &Meshes) {
-        for contents in generated {
-            self.latest.insert(contents.layout().identity, Arc::clone(contents));
-        }
+    /// Takes over what nodes have filled in the frame that is drawn, and returns its meshes, with the triangles of those that nodes make. What
+    /// none of its meshes needs is dropped.
+    ///
+    /// # Errors
+    /// If nodes have made a mesh that cannot be drawn. Then everything is as before.
+    pub(super) fn update(
+        &mut self,
+        generated: &[Arc<GeneratedContents>],
+        meshes: &Meshes,
+    ) -> Result<Meshes, BackendError> {
+        let mut next = Self { latest: self.latest.clone() };
+        next.latest.extend(generated.iter().map(|contents| (contents.layout().identity, Arc::clone(contents))));
+        let complete = next.complete(meshes)?;
         let geometries = || meshes.iter().flatten().filter_map(|mesh| mesh.generated_geometry());
-        self.latest.retain(|identity, _| geometries().any(|geometry| geometry.reads(*identity)));
+        next.latest.retain(|identity, _| geometries().any(|geometry| geometry.reads(*identity)));
+        *self = next;
+        Ok(complete)
     }
 
     /// The meshes of the frame, with the triangles of those that nodes make.
     ///
     /// # Errors
     /// If nodes have made a mesh that cannot be drawn.
-    pub(super) fn complete(&self, meshes: &Meshes) -> Result<Meshes, BackendError> {
+    fn complete(&self, meshes: &Meshes) -> Result<Meshes, BackendError> {
         let is_generated = |mesh: &Option<Arc<Mesh>>| mesh.as_ref().is_some_and(|mesh| !mesh.has_triangles());
         if !meshes.iter().any(is_generated) {
             return Ok(Arc::clone(meshes));

@@ -302,6 +302,34 @@ impl<B: Backend> Stage<B> for Triangles {
     }
 }
 
+/// Leaves culled triangles out of the draw list.
+pub(super) struct CullList {
+    pub(super) pass: usize,
+}
+
+impl<B: Backend> Stage<B> for CullList {
+    fn info(&self) -> &'static StageInfo {
+        &StageInfo {
+            name: "cull list",
+            after: &["triangles"],
+            group: StageGroup::Instance,
+            chunking: Chunking::PerItem,
+            cost_kind: "cull list",
+            depends_on_occlusion: true,
+        }
+    }
+
+    fn is_needed(&self, needs: &StageNeeds) -> bool {
+        needs.draws_commands && needs.culls_triangles
+    }
+
+    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+        let table = &frame.tables.passes[self.pass];
+        table.triangles.read().apply(&mut table.list.write());
+        Ok(())
+    }
+}
+
 /// Uploads which objects the pass draws, and makes its pipelines.
 pub(super) struct Prepare {
     pub(super) pass: usize,
@@ -311,7 +339,7 @@ impl<B: Backend> Stage<B> for Prepare {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "prepare",
-            after: &["triangles", "join"],
+            after: &["cull list", "join"],
             group: StageGroup::Record,
             chunking: Chunking::PerItem,
             cost_kind: "prepare",
@@ -321,7 +349,6 @@ impl<B: Backend> Stage<B> for Prepare {
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let table = &frame.tables.passes[self.pass];
-        table.triangles.read().apply(&mut table.list.write());
         frame.recordings[self.pass].reserve(frame.part_count(self.pass));
         let list = table.list.read();
         frame.backend.prepare(job.worker, frame.backend_frame, &frame.pass_request(self.pass, &list))

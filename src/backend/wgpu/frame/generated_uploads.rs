@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::backend::FrameRequest;
 use crate::backend::wgpu::resources::{ImportedMeshes, StorageBuffers};
 use crate::process::BufferLayout;
-use crate::scene::GeneratedContents;
+use crate::scene::{GeneratedContents, Topology};
 
 /// The contents that CPU nodes fill in a frame, with the buffers that they are for.
 ///
@@ -18,8 +18,8 @@ pub(crate) struct GeneratedUploads {
 struct GeneratedUpload {
     contents: Arc<GeneratedContents>,
     buffer: wgpu::Buffer,
-    /// Whether zeros follow the content, because the device reads the whole buffer.
-    is_padded: bool,
+    /// If it has indices, what triangles these form. The device reads all that the buffer has room for.
+    indices_of: Option<Topology>,
 }
 
 impl GeneratedUploads {
@@ -27,14 +27,14 @@ impl GeneratedUploads {
         let mut uploads = Vec::new();
         for contents in request.generated {
             let layout = contents.layout();
-            let mut add = |buffer: &wgpu::Buffer, is_padded| {
-                uploads.push(GeneratedUpload { contents: Arc::clone(contents), buffer: buffer.clone(), is_padded });
+            let mut add = |buffer: &wgpu::Buffer, indices_of| {
+                uploads.push(GeneratedUpload { contents: Arc::clone(contents), buffer: buffer.clone(), indices_of });
             };
-            meshes.filled_by(layout.identity).for_each(|(buffer, is_index)| add(buffer, is_index));
+            meshes.filled_by(layout.identity).for_each(|(buffer, indices_of)| add(buffer, indices_of));
             let (name, bytes) = (layout.name, layout.bytes() as u64);
             let storage = BufferLayout { name, bytes, is_filled_by_nodes: true };
             if let Some(buffer) = buffers.find(storage).filter(|_| layout.fills_storage) {
-                add(buffer, false);
+                add(buffer, None);
             }
         }
         Self { uploads }
@@ -42,16 +42,17 @@ impl GeneratedUploads {
 
     /// Uploads them, ahead of the next submission.
     pub(crate) fn write(&self, queue: &wgpu::Queue) {
-        for GeneratedUpload { contents, buffer, is_padded } in &self.uploads {
+        for GeneratedUpload { contents, buffer, indices_of } in &self.uploads {
             contents.for_each_part(|offset, bytes| queue.write_buffer(buffer, offset as u64, bytes));
-            if *is_padded {
-                let end = contents.layout().bytes();
-                for start in (contents.byte_count()..end).step_by(ZEROS.len()) {
-                    queue.write_buffer(buffer, start as u64, &ZEROS[..ZEROS.len().min(end - start)]);
+            if let Some(topology) = *indices_of {
+                let (count, last) = contents.whole_triangles(topology);
+                let padding = [last; 1024];
+                let capacity = contents.layout().capacity;
+                for start in (count..capacity).step_by(padding.len()) {
+                    let indices = &padding[..padding.len().min(capacity - start)];
+                    queue.write_buffer(buffer, (start * size_of::<u32>()) as u64, bytemuck::cast_slice(indices));
                 }
             }
         }
     }
 }
-
-static ZEROS: [u8; 4096] = [0; 4096];

@@ -134,18 +134,18 @@ impl ImportedMeshes {
         Ok(updated)
     }
 
-    /// The buffers on the device that nodes fill by the identity of a [`GeneratedBuffer`](crate::scene::GeneratedBuffer), and whether they
-    /// are indices.
-    pub(crate) fn filled_by(&self, identity: u64) -> impl Iterator<Item = (&wgpu::Buffer, bool)> {
+    /// The buffers on the device that nodes fill by the identity of a [`GeneratedBuffer`](crate::scene::GeneratedBuffer), and the
+    /// topology of those that are indices.
+    pub(crate) fn filled_by(&self, identity: u64) -> impl Iterator<Item = (&wgpu::Buffer, Option<Topology>)> {
         let meshes = self.meshes.values().filter_map(|mesh| Some((mesh, mesh.generated.as_ref()?)));
         meshes.flat_map(move |(mesh, generated)| {
             let is_it = |source: &GeneratedSource| source.layout.identity == identity;
-            let vertices = is_it(&generated.vertices).then(|| (&mesh.buffers.streams[0].buffer, false));
+            let vertices = is_it(&generated.vertices).then(|| (&mesh.buffers.streams[0].buffer, None));
             let indices = match &generated.indices.0 {
                 IndexSource::Generated(source) if is_it(source) => mesh.buffers.indices.as_ref(),
                 _ => None,
             };
-            vertices.into_iter().chain(indices.map(|indices| (&indices.buffer, true)))
+            vertices.into_iter().chain(indices.map(|indices| (&indices.buffer, Some(generated.topology))))
         })
     }
 
@@ -214,7 +214,7 @@ impl<'a> BufferSource<'a> {
 /// If the device has no room.
 fn new_buffers(device: &wgpu::Device, generated: &GeneratedGeometry) -> Result<Arc<MeshBuffers>, BackendError> {
     use wgpu::{BufferUsages, VertexFormat};
-    let GeneratedGeometry { vertices, indices } = generated;
+    let GeneratedGeometry { vertices, indices, .. } = generated;
     let usage = BufferUsages::VERTEX | BufferUsages::COPY_DST;
     let buffer = new_buffer(device, vertices.layout.name, vertices.layout.bytes() as u64, usage)?;
     let attributes = vec![
