@@ -196,19 +196,19 @@ fn error_of_reader(
 #[test]
 fn a_node_gets_what_it_declares_and_waits_for_nobody_who_never_ends() {
     let reads = |accesses: &mut NodeAccesses, buffer: &GeneratedBuffer<u32>| _ = accesses.reads(buffer);
-    let error = error_of_reader(|_, _| (), |frame, buffer| Ok(drop(frame.filled(buffer, 0)?)));
+    let error = error_of_reader(|_, _| (), |frame, buffer| frame.filled(buffer, 0).map(drop).map_err(Into::into));
     assert!(error.starts_with("reader failed: the node does not declare that it reads Buffer"), "{error}");
-    let error = error_of_reader(reads, |frame, buffer| Ok(frame.set_count(buffer, 3)?));
+    let error = error_of_reader(reads, |frame, buffer| frame.set_count(buffer, 3).map_err(Into::into));
     assert!(error.starts_with("reader failed: the node does not declare that it fills Buffer"), "{error}");
     let error = error_of_reader(reads, |frame, buffer| {
         assert_eq!((frame.count(buffer)?, frame.filled(buffer, 1)?.len()), (4, 0));
-        Ok(drop(frame.filled(buffer, 2)?))
+        frame.filled(buffer, 2).map(drop).map_err(Into::into)
     });
     assert!(error.contains("has no chunk 2"), "{error}");
     let modifies = |accesses: &mut NodeAccesses, buffer: &GeneratedBuffer<u32>| _ = accesses.modifies(buffer);
     let error = error_of_reader(modifies, |frame, buffer| {
         let _held = frame.fill(buffer, 0)?;
-        Ok(drop(frame.fill(buffer, 0)?))
+        frame.fill(buffer, 0).map(drop).map_err(Into::into)
     });
     assert!(error.contains("chunk 0 of") && error.contains("does not let go of it"), "{error}");
 }
