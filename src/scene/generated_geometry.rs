@@ -8,7 +8,6 @@ use super::{GeneratedBuffer, Topology};
 /// The vertices and indices of a [generated mesh](super::Mesh::generated).
 #[derive(Debug, PartialEq)]
 pub(crate) struct GeneratedGeometry {
-    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "no other backend reads it"))]
     pub(crate) topology: Topology,
     pub(crate) vertices: Arc<GeneratedSource>,
     pub(crate) indices: GeneratedIndices,
