@@ -10,6 +10,7 @@ use std::time::Duration;
 use bytemuck::Pod;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
+#[cfg(any(feature = "wgpu", feature = "software", test))]
 use super::Topology;
 
 /// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
@@ -330,6 +331,7 @@ impl GeneratedContents {
 
     /// If its elements are indices: how many of those that count form whole triangles, and the last one of these. Further ones that are equal to
     /// it form triangles without area.
+    #[cfg(any(feature = "wgpu", feature = "software", test))]
     pub(crate) fn whole_triangles(&self, topology: Topology) -> (usize, u32) {
         let count = match (topology, self.count()) {
             (_, 0..3) => 0,
