@@ -12,7 +12,7 @@ use super::{FrameData, NodeResource};
 use crate::backend::FrameRequest;
 use crate::command::DrawList;
 use crate::scene::{ChunkError, GeneratedBuffer, GeneratedContents};
-use crate::view::{RenderView, set_bits};
+use crate::view::{RenderView, VisibleSet, set_bits};
 
 /// What a [`CpuNode`](super::CpuNode) sees of the frame while it runs: what it declares to read of it.
 #[derive(Clone, Copy)]
@@ -34,19 +34,22 @@ impl<'a> NodeFrame<'a> {
     ///
     /// # Errors
     /// If the node does not declare that it reads [`FrameData::VisibleObjects`].
-    pub fn visible_objects(&self, view: usize) -> Result<impl Iterator<Item = usize> + use<>, NodeAccessError> {
+    pub fn visible_objects(&self, view: usize) -> Result<impl Iterator<Item = usize> + use<'a>, NodeAccessError> {
         self.check(FrameData::VisibleObjects)?;
-        let mut words: Vec<u64> = Vec::new();
-        if let Some(visibility) = self.tables.visibility.get(view) {
-            words.extend((0..visibility.set.word_count()).map(|word| visibility.set.word(word)));
-            for &piece in visibility.pieces.executed() {
-                self.tables.pieces.visit_words(piece as usize, |&(word, mask)| words[word] |= mask);
-            }
-        }
-        Ok(words
-            .into_iter()
-            .enumerate()
-            .flat_map(|(word, mask)| set_bits(mask).map(move |bit| word * u64::BITS as usize + bit)))
+        const WORD: usize = VisibleSet::OBJECTS_PER_WORD;
+        let pieces = &self.tables.pieces;
+        let seen = self.tables.visibility.get(view).map(|visibility| {
+            (0..visibility.set.word_count()).flat_map(move |word| {
+                let is_executed = |bit: &usize| {
+                    pieces.owner(word * WORD + bit).is_some_and(|owner| visibility.pieces.executes(owner))
+                };
+                // What is excluded from the view's tests lies outside, or is executed.
+                let executed = set_bits(visibility.pieces.excluded(word)).filter(is_executed);
+                let mask = executed.fold(visibility.set.word(word), |mask, bit| mask | 1 << bit);
+                set_bits(mask).map(move |bit| word * WORD + bit)
+            })
+        });
+        Ok(seen.into_iter().flatten())
     }
 
     /// What a process draws in a view, by its index: the [batches](DrawList::batches) of the list. `None` where it draws no commands.

@@ -316,7 +316,7 @@ impl PieceTable {
     }
 
     fn change_object(&mut self, object: usize) {
-        if let Some(&owner) = self.owners.get(object).filter(|owner| **owner != NO_PIECE) {
+        if let Some(owner) = self.owner(object) {
             self.change(owner as usize);
         }
     }
@@ -371,6 +371,11 @@ impl PieceTable {
     /// Calls `visit` with the objects of a recorded piece that are executed.
     pub(super) fn visit_words(&self, piece: usize, visit: impl FnMut(&ObjectWord)) {
         self.pieces[piece].recorded.read().words.iter().for_each(visit);
+    }
+
+    /// The index of the piece that has an object.
+    pub(super) fn owner(&self, object: usize) -> Option<u32> {
+        self.owners.get(object).copied().filter(|owner| *owner != NO_PIECE)
     }
 
     /// The number of objects of all pieces.
