@@ -4,7 +4,7 @@ use std::path::Path;
 
 use drawloom_benches::chart::{self, Bars, Failure, Panel};
 
-use crate::contender::Kind;
+use crate::contender::Variant;
 use crate::{errors, rates};
 
 /// Draws a panel for the time of a frame, one for its latency, and one for the errors of each layer.
@@ -14,9 +14,13 @@ pub fn draw(path: &Path, rates: &[rates::Row], errors: &[errors::Row]) -> Result
         Panel::Bars(Bars { title, series, groups, marks, mark_name, line })
     };
     let of_rates = |title: &str, value: fn(&rates::Row) -> f64| {
-        let groups = rates.chunks(Kind::ALL.len());
+        let groups = rates.chunks(Variant::ALL.len());
         let groups = groups.map(|rows| (rows[0].device.clone(), rows.iter().map(value).collect())).collect();
-        bars(title, Kind::ALL.map(|kind| kind.name().to_owned()).to_vec(), groups)
+        bars(
+            title,
+            Variant::ALL.map(|variant| format!("{}, {}", variant.kind.name(), variant.buffering_name())).to_vec(),
+            groups,
+        )
     };
     let mut panels = vec![
         of_rates("The time of a frame in ms, by the time that the device takes for it", |row| row.frame_ms),

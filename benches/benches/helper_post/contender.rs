@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, WgpuSubmission};
+use drawloom::fence::Fence;
 use drawloom::glam::DVec3;
 use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStatistics, HelperStep, PostHelper};
 use drawloom::process::{
@@ -16,36 +17,75 @@ use drawloom::task::Scheduler;
 use drawloom::{Buffering, FrameLoop, FramePlace, Renderer, Submitter, wgpu};
 use drawloom_benches::moving::Moving;
 
-use crate::steps::Grade;
+use crate::steps::{self, Grade};
 
 /// Longer than any frame.
 const LONG: Duration = Duration::from_secs(60);
 
 const STRENGTH: f32 = 0.3;
 
-/// Where the step is computed.
+/// The step, and where it is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Without,
-    OnDevice,
-    OnCpuInSameFrame,
-    Layer,
-    LatePicture,
-    LatePictureAlone,
+    BloomOnDevice,
+    BloomOnCpuInSameFrame,
+    BloomLayer,
+    GradeOnDevice,
+    GradeOnCpuInSameFrame,
+    /// In a later frame of the same renderer.
+    LateGrade,
+    /// In a frame of its own, before the next scene.
+    LateGradeAlone,
 }
 
 impl Kind {
-    pub const ALL: [Self; 6] =
-        [Self::Without, Self::OnDevice, Self::OnCpuInSameFrame, Self::Layer, Self::LatePicture, Self::LatePictureAlone];
-
     pub fn name(self) -> &'static str {
         match self {
             Self::Without => "none",
-            Self::OnDevice => "bloom on the device",
-            Self::OnCpuInSameFrame => "bloom on the CPU, waiting",
-            Self::Layer => "bloom on a helper, late layer",
-            Self::LatePicture => "grade on a helper, in a later frame",
-            Self::LatePictureAlone => "grade on a helper, before the next frame",
+            Self::BloomOnDevice => "bloom on the device",
+            Self::BloomOnCpuInSameFrame => "bloom on the CPU, waiting",
+            Self::BloomLayer => "bloom on a helper, late layer",
+            Self::GradeOnDevice => "grade on the device",
+            Self::GradeOnCpuInSameFrame => "grade on the CPU, waiting",
+            Self::LateGrade => "grade on a helper, in a later frame",
+            Self::LateGradeAlone => "grade on a helper, before the next frame",
+        }
+    }
+}
+
+/// What is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Variant {
+    pub kind: Kind,
+    pub buffering: Buffering,
+}
+
+impl Variant {
+    pub const ALL: [Self; 12] = [
+        Self::new(Kind::Without, Buffering::SameFrame),
+        Self::new(Kind::GradeOnDevice, Buffering::SameFrame),
+        Self::new(Kind::GradeOnCpuInSameFrame, Buffering::SameFrame),
+        Self::new(Kind::LateGradeAlone, Buffering::SameFrame),
+        Self::new(Kind::BloomOnCpuInSameFrame, Buffering::SameFrame),
+        Self::new(Kind::BloomLayer, Buffering::SameFrame),
+        Self::new(Kind::Without, Buffering::Double),
+        Self::new(Kind::GradeOnDevice, Buffering::Double),
+        Self::new(Kind::LateGradeAlone, Buffering::Double),
+        Self::new(Kind::LateGrade, Buffering::Double),
+        Self::new(Kind::BloomOnDevice, Buffering::Double),
+        Self::new(Kind::BloomLayer, Buffering::Double),
+    ];
+
+    const fn new(kind: Kind, buffering: Buffering) -> Self {
+        Self { kind, buffering }
+    }
+
+    pub fn buffering_name(self) -> &'static str {
+        match self.buffering {
+            Buffering::SameFrame => "same frame",
+            Buffering::Double => "double",
+            Buffering::Triple => "triple",
         }
     }
 }
@@ -93,7 +133,11 @@ struct Presenter<B: Backend> {
 
 impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
     /// `open` opens a backend: the first one on a device, or one beside the first, whose frames only draw a finished picture.
-    pub fn new(kind: Kind, open: impl Fn(Kind, Option<&B>) -> B, world: Moving) -> Result<Self, Box<dyn Error>> {
+    pub fn new(
+        Variant { kind, buffering }: Variant,
+        open: impl Fn(Kind, Option<&B>) -> B,
+        world: Moving,
+    ) -> Result<Self, Box<dyn Error>> {
         let scheduler = Arc::new(Scheduler::new(2)?);
         let bloom = Bloom::default();
         let first = open(kind, None);
@@ -109,31 +153,34 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         let mut helper = None;
         let builder = match kind {
             Kind::Without => builder.deferred(Deferred::to_picture()),
-            Kind::OnDevice => {
+            Kind::BloomOnDevice => {
                 let (processes, step) = bloom.on_device(STRENGTH);
                 let builder = builder.deferred(Deferred::new().post(step).post(ToneMapping::default()));
                 processes.into_iter().fold(builder, |builder, process| builder.process(process))
             }
-            Kind::OnCpuInSameFrame => {
+            Kind::BloomOnCpuInSameFrame => {
                 // Never begun: only its process and the name of its target are used.
                 let source = PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source());
                 let shrink = source.shrink().ok_or("bloom is computed from a smaller picture")?;
                 builder.deferred(Deferred::new()).process(shrink).output(source.source_target())
             }
-            Kind::Layer => {
+            Kind::BloomLayer => {
                 let helper = helper.insert(PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source()));
                 let layer = helper.layer(HelperLayer { strength: STRENGTH, ..HelperLayer::default() });
                 let shrink = helper.shrink().ok_or("bloom is computed from a smaller picture")?;
                 let deferred = Deferred::new().post(layer).post(ToneMapping::default());
                 builder.deferred(deferred).process(shrink).output(helper.source_target())
             }
-            Kind::LatePicture => {
+            Kind::GradeOnDevice => {
+                builder.deferred(Deferred::new().post(ToneMapping::default()).post(steps::grade_on_device))
+            }
+            Kind::LateGrade => {
                 let source = HelperSource::whole("picture");
                 let helper = helper.insert(PostHelper::new(Arc::clone(&scheduler), Grade, source));
                 let late = helper.late_picture("late picture", Format::Rgba8Srgb);
                 builder.deferred(Deferred::to_picture()).process(late).output("late picture")
             }
-            Kind::LatePictureAlone => {
+            Kind::LateGradeAlone | Kind::GradeOnCpuInSameFrame => {
                 let source = HelperSource::whole("picture");
                 helper = Some(PostHelper::new(Arc::clone(&scheduler), Grade, source));
                 builder.deferred(Deferred::to_picture())
@@ -142,10 +189,10 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
         let (mut presenter, mut waiting) = (None, None);
         match (kind, &helper) {
-            (Kind::OnCpuInSameFrame, _) => {
+            (Kind::BloomOnCpuInSameFrame, _) => {
                 waiting = Some(Waiting::new(second, bloom, scene, Arc::clone(&scheduler))?);
             }
-            (Kind::LatePictureAlone, Some(helper)) => {
+            (Kind::LateGradeAlone | Kind::GradeOnCpuInSameFrame, Some(helper)) => {
                 let late = helper.late_picture_alone("late picture", Format::Rgba8Srgb);
                 let builder = Renderer::builder(second).process(late).output("late picture");
                 let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
@@ -155,7 +202,7 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         }
         let frames = match waiting {
             Some(waiting) => Frames::Waiting(renderer, submitter, waiting),
-            None => Frames::Loop(FrameLoop::new(renderer, submitter, Buffering::Double)?),
+            None => Frames::Loop(FrameLoop::new(renderer, submitter, buffering)?),
         };
         Ok(Self { kind, frames, helper, presenter, world })
     }
@@ -195,21 +242,33 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
             if let Some(helper) = &self.helper {
                 let cameras = world.as_scene_ref().cameras;
                 helper.begin_frame(frames.renderer(), cameras);
-                if let (Some(presenter), Some(number)) = (&mut self.presenter, helper.shown(&cameras[0].name))
-                    && number > presenter.latest
+                if let (Kind::LateGradeAlone, Some(presenter)) = (self.kind, &mut self.presenter)
+                    && let Some((number, drawn)) = presenter.draw(helper.shown(&cameras[0].name))?
                 {
-                    let mut recorded = presenter.renderer.record(presenter.scene.as_scene_ref())?;
-                    presented.push((number, statistics.len(), recorded.fence_at(FramePlace::End)?));
-                    presenter.submitter.submit(recorded)?;
-                    presenter.latest = number;
+                    presented.push((number, statistics.len(), drawn));
                 }
             }
             let mut recorded = frames.renderer().record(world.as_scene_ref())?;
             if let Some(helper) = &self.helper {
                 helper.read_back(&mut recorded);
             }
-            statistics.push(recorded.statistics().helpers.first().cloned());
+            let of_helper = recorded.statistics().helpers.first().cloned();
+            statistics.push(of_helper);
             slot.submit(recorded);
+            if let (Kind::GradeOnCpuInSameFrame, Some(presenter), Some(helper)) =
+                (self.kind, &mut self.presenter, &self.helper)
+            {
+                let cameras = world.as_scene_ref().cameras;
+                let current = statistics.last().and_then(Option::as_ref).map_or(0, |of_view| of_view.frame);
+                while helper.latest(&cameras[0].name).is_none_or(|(number, _)| number < current) {
+                    thread::sleep(Duration::from_micros(20));
+                }
+                helper.begin_frame(frames.renderer(), cameras);
+                if let Some((number, drawn)) = presenter.draw(helper.shown(&cameras[0].name))? {
+                    drawn.wait(LONG)?;
+                    presented.push((number, statistics.len() - 1, drawn));
+                }
+            }
         }
         while finished.len() < count {
             thread::sleep(Duration::from_micros(100));
@@ -225,22 +284,24 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
         if let Some(error) = self.helper.as_ref().and_then(|helper| helper.take_errors().into_iter().next()) {
             return Err(error.into());
         }
-        if self.kind == Kind::LatePictureAlone {
-            let first = statistics[0].as_ref().map_or(0, |of_view: &HelperStatistics| of_view.frame);
+        if self.presenter.is_some() {
             for (number, index, drawn) in presented {
                 drawn.wait(LONG)?;
                 let finished = drawn.set_at().ok_or("it is set")?;
-                let Some(shown) = number.checked_sub(first) else { continue };
-                let latency = finished.saturating_duration_since(times[shown as usize].begun);
+                let is_shown =
+                    |of_frame: &Option<HelperStatistics>| of_frame.as_ref().is_some_and(|of| of.frame == number);
+                // What shows a picture of the turn before is not counted.
+                let Some(shown) = statistics.iter().position(is_shown) else { continue };
+                let latency = finished.saturating_duration_since(times[shown].begun);
                 let step = statistics[index].as_ref().map(|of_view| of_view.latest_took);
-                samples.push(FrameSample { finished, latency, age: Some(first + index as u64 - number), step });
+                samples.push(FrameSample { finished, latency, age: Some((index - shown) as u64), step });
             }
             return Ok(samples);
         }
         for (index, (frame, statistics)) in times.iter().zip(&statistics).enumerate() {
             let age = statistics.as_ref().and_then(|statistics| statistics.age());
             let shown = match (self.kind, age) {
-                (Kind::LatePicture, Some(age)) => index.checked_sub(age as usize),
+                (Kind::LateGrade, Some(age)) => index.checked_sub(age as usize),
                 _ => Some(index),
             };
             // What shows a picture of the turn before is not counted.
@@ -253,6 +314,18 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
             });
         }
         Ok(samples)
+    }
+}
+
+impl<B: Backend> Presenter<B> {
+    /// Draws the picture of this frame, unless it was drawn. Returns the frame's number, and when it is drawn.
+    fn draw(&mut self, shown: Option<u64>) -> Result<Option<(u64, Fence)>, Box<dyn Error>> {
+        let Some(number) = shown.filter(|&number| number > self.latest) else { return Ok(None) };
+        let mut recorded = self.renderer.record(self.scene.as_scene_ref())?;
+        let drawn = recorded.fence_at(FramePlace::End)?;
+        self.submitter.submit(recorded)?;
+        self.latest = number;
+        Ok(Some((number, drawn)))
     }
 }
 

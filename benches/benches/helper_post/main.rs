@@ -4,8 +4,8 @@
 //!     cargo bench -p drawloom-benches --bench helper_post -- --quick
 //!     cargo bench -p drawloom-benches --bench helper_post -- --backend noop
 //!
-//! The first table compares loops with two frames in flight: without the step, with it on the device, with it on the CPU in the same frame,
-//! which waits for the device, and with it on a helper. On `noop`, a simulated device takes the given time for a frame, and for the step, and
+//! The first table compares loops without the step, with it on the device, with it on the CPU in the same frame, which waits for the device, and
+//! with it on a helper. A bloom is a layer, and a grade the whole picture. On `noop`, a simulated device takes the given time for a frame, and for the step, and
 //! the CPU computes what it would compute of any picture. On an adapter everything is drawn; lavapipe's threads are those of the CPU, so
 //! there nothing is idle.
 //!
@@ -59,11 +59,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
 
-    let headings = ["device", "the step", "frame, ms", "latency, ms", "99th percentile, ms", "age, frames", "step, ms"];
+    let headings = [
+        "device",
+        "buffering",
+        "the step",
+        "frame, ms",
+        "latency, ms",
+        "99th percentile, ms",
+        "age, frames",
+        "step, ms",
+    ];
     let mut table = Table::new(&headings);
     for row in &rates {
         table.row([
             row.device.clone(),
+            row.buffering.to_owned(),
             row.name.to_owned(),
             format!("{:.2}", row.frame_ms),
             format!("{:.2}", row.latency_ms),

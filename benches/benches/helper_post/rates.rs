@@ -14,7 +14,7 @@ use drawloom_testing::simulated_device::SimulatedDevice;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use crate::contender::{Contender, FrameSample, Kind};
+use crate::contender::{Contender, FrameSample, Kind, Variant};
 
 /// The time of the engine's update.
 const UPDATE: Duration = Duration::from_millis(2);
@@ -29,6 +29,7 @@ const FIRST_FRAMES: usize = 10;
 pub struct Row {
     pub device: String,
     pub name: &'static str,
+    pub buffering: &'static str,
     /// Medians.
     pub frame_ms: f64,
     pub latency_ms: f64,
@@ -51,7 +52,9 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
                     let backend = WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom");
                     match (first, kind) {
                         (Some(first), _) => first.beside(backend, COMPOSITION),
-                        (None, Kind::OnDevice) => SimulatedDevice::new(backend, frame_time + STEP_ON_DEVICE),
+                        (None, Kind::BloomOnDevice | Kind::GradeOnDevice) => {
+                            SimulatedDevice::new(backend, frame_time + STEP_ON_DEVICE)
+                        }
                         (None, _) => SimulatedDevice::new(backend, frame_time),
                     }
                 };
@@ -80,18 +83,18 @@ fn of_device<B: Backend<Submission = WgpuSubmission>>(
     progress: &ProgressBar,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut contenders = Vec::new();
-    for kind in Kind::ALL {
+    for variant in Variant::ALL {
         let mut scene = city::new(boxes, picture)?;
         scene.cameras.truncate(1);
-        contenders.push(Contender::new(kind, &open, Moving::new(scene, Motion::Cameras))?);
+        contenders.push(Contender::new(variant, &open, Moving::new(scene, Motion::Cameras))?);
     }
     let rounds = Rounds { warm_up: 1, measured: turns };
     let measured =
         Harness::new(rounds, progress).measure(&mut contenders, |contender, _| contender.draw(FRAMES, UPDATE))?;
-    Ok(Kind::ALL.into_iter().zip(measured).map(|(kind, turns)| row(device, kind, &turns)).collect())
+    Ok(Variant::ALL.into_iter().zip(measured).map(|(variant, turns)| row(device, variant, &turns)).collect())
 }
 
-fn row(device: &str, kind: Kind, turns: &[Vec<FrameSample>]) -> Row {
+fn row(device: &str, variant: Variant, turns: &[Vec<FrameSample>]) -> Row {
     let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
     // On a machine that is busy, a turn may have few late pictures.
     let first_of = |turn: &[FrameSample]| FIRST_FRAMES.min(turn.len() / 2);
@@ -107,7 +110,8 @@ fn row(device: &str, kind: Kind, turns: &[Vec<FrameSample>]) -> Row {
     let steps: Vec<_> = samples().filter_map(|sample| sample.step).map(milliseconds).collect();
     Row {
         device: device.to_owned(),
-        name: kind.name(),
+        name: variant.kind.name(),
+        buffering: variant.buffering_name(),
         frame_ms: median(turns.iter().map(frame).filter(|time| time.is_finite())),
         latency_ms: median(latencies()),
         latency_99_ms: percentile(99, latencies()),

@@ -2,7 +2,7 @@
 
 use drawloom::backend::Picture;
 use drawloom::helper::{HelperFrame, HelperStep};
-use drawloom::process::Format;
+use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
 
 /// The grade of a finished picture of bytes: a curve for each channel, darker towards the corners.
 pub struct Grade;
@@ -31,6 +31,54 @@ impl HelperStep for Grade {
         });
         outcome.expect("a row does not panic");
         picture
+    }
+}
+
+/// The same grade on the device.
+pub fn grade_on_device(source: &str, target: &str) -> impl RenderProcess + use<> {
+    GradeProcess { source: source.to_owned(), target: target.to_owned() }
+}
+
+struct GradeProcess {
+    source: String,
+    target: String,
+}
+
+impl RenderProcess for GradeProcess {
+    fn name(&self) -> &str {
+        "grade"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples(&self.source);
+        declare.clears_color(&self.target, Format::Rgba8Srgb, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        // The curve is of sRGB encoded values, as on the CPU.
+        let shader = "
+            @group(2) @binding(1) var source: texture_2d<f32>;
+
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                let linear = textureLoad(source, vec2<i32>(in.position.xy), 0);
+                let encoded = select(
+                    1.055 * pow(linear.rgb, vec3<f32>(1.0 / 2.4)) - 0.055,
+                    12.92 * linear.rgb,
+                    linear.rgb <= vec3<f32>(0.0031308),
+                );
+                let from_center = in.clip * 0.5;
+                let shade = 1.0 - 0.6 * dot(from_center, from_center);
+                let graded = shade * mix(encoded, encoded * encoded * (3.0 - 2.0 * encoded), 0.3);
+                let decoded = select(
+                    pow((graded + 0.055) / 1.055, vec3<f32>(2.4)),
+                    graded / 12.92,
+                    graded <= vec3<f32>(0.04045),
+                );
+                return vec4<f32>(decoded, linear.a);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
     }
 }
 
