@@ -5,8 +5,8 @@ use super::ObjectSet;
 /// A piece of the scene: objects that stand still together, such as a room's furniture, a block of a city, or a forest. It is recorded once,
 /// and executed by every view that sees any of it, in this frame and in later ones: L 3.2's command buffers, which other contexts execute.
 ///
-/// A piece that a view executes costs that view one culling test, and no visibility, sort or merge of its objects; the backend keeps its
-/// bundles and what it has uploaded. In exchange a view that sees a corner of a piece draws all of it. So a piece is worth it if its objects are
+/// A piece that a view executes costs that view one culling test, and no visibility, sort or merge of its objects. What the backend has uploaded
+/// of it stays, and so do its bundles while the view executes the same pieces. In exchange a view that sees a corner of a piece draws all of it. So a piece is worth it if its objects are
 /// seen together: some hundreds or thousands of them, close to each other.
 ///
 /// Pieces change no picture, except where surfaces of two objects lie at the same depth: objects of pieces are drawn before the others. What cannot

@@ -16,8 +16,9 @@
 //! There are two ways to use a result:
 //!
 //! - [`PostHelper::late_picture`]: the whole picture comes from the helper. It is exact, and that of an earlier frame.
-//!   [`PostHelper::late_picture_alone`] draws it in a frame of its own, which stands before the next scene in the device's queue: one frame more of
-//!   latency, as in the figure.
+//!   [`PostHelper::late_picture_alone`] draws it in a frame of its own, which stands before the next scene in the device's queue: with
+//!   [`Buffering::SameFrame`](crate::Buffering::SameFrame) that is one frame more of latency, as in the figure. With more frames in flight it stands
+//!   behind those that were submitted before.
 //! - [`PostHelper::layer`]: the step computes a layer, such as a glow or ambient occlusion, which is composited over the current picture.
 //!   Only the layer is late. [Reprojection](HelperLayer::reprojection) looks it up where the surface of each pixel was in the frame that the
 //!   layer is of, by the cameras of both and the current depth.

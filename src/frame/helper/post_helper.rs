@@ -94,7 +94,8 @@ impl PostHelper {
     /// The same, for a renderer of its own on the same device, whose frames are only this picture, and transparent black where there is no
     /// result (S figure 9.6). The engine begins a frame of the helper with the renderer of the scene, then records and submits the picture with
     /// this one, if [something is shown](Self::shown), and then the scene of the next frame. So the picture stands in the device's queue before
-    /// that scene, and not behind it: its latency is that of the scene and one frame more.
+    /// that scene, and not behind it. With [`Buffering::SameFrame`](crate::Buffering::SameFrame) its latency is that of the scene and one
+    /// frame more; with more frames in flight it also waits for those that were submitted before it.
     ///
     /// Its scenes have cameras of the same names and sizes, and need no objects.
     pub fn late_picture_alone(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
