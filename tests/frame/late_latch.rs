@@ -1,14 +1,17 @@
 //! Late latching: the camera of a recorded frame is replaced, and no object that the new one sees is missing.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::{BackendError, NullBackend};
+use drawloom::command::Batch;
 use drawloom::glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::{
-    Camera, CameraMotion, ClipPlane, Light, Material, Projection, Redraw, RenderObject, Scene, SceneError, ViewKind,
+    Camera, CameraMotion, Changes, ClipPlane, Light, Material, Piece, Projection, Redraw, RenderObject, Scene,
+    SceneError, SceneRef, ViewKind,
 };
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Granularity, LatchError, Renderer};
@@ -111,18 +114,28 @@ fn any_share(random: &mut Random) -> f64 {
     if random.below(2) == 0 { 1.0 } else { random.between(0.0, 1.0) }
 }
 
-/// Small and large cubes around the origin, whose triangles are culled where they may be, and lamps.
+/// Small and large cubes around the origin, whose triangles are culled where they may be, and clusters of others, each a piece.
 fn any_scene(random: &mut Random) -> (Scene, Vec<Cube>) {
     let mut scene = Scene::new();
-    let mesh = scene.add(cube().with_triangle_culling(true)).unwrap();
+    let meshes = [cube().with_triangle_culling(true), cube()].map(|mesh| scene.add(mesh).unwrap());
     let material = scene.add(Material::default()).unwrap();
     let mut cubes = Vec::new();
-    for index in 0..120 {
-        let position = random.direction() * random.between(1.0, 30.0);
+    let mut center = DVec3::ZERO;
+    for index in 0..180 {
+        let is_in_piece = index >= 120;
+        if is_in_piece && index % 10 == 0 {
+            center = random.direction() * random.between(1.0, 30.0);
+            scene.pieces.push(Piece::new(format!("from {index}"), (index..index + 10).collect()));
+        }
+        let position = match is_in_piece {
+            true => center + random.direction() * random.between(0.0, 3.0),
+            false => random.direction() * random.between(1.0, 30.0),
+        };
+        let mesh = meshes[usize::from(is_in_piece)];
         let orientation =
             Quat::from_axis_angle(random.direction().as_vec3().normalize(), random.between(0.0, 3.0) as f32);
         // One in eight hides others.
-        let scale = if index % 8 == 0 { Vec3::new(4.0, 4.0, 0.1) } else { random.vector(0.02, 0.8) };
+        let scale = if index % 8 == 0 && !is_in_piece { Vec3::new(4.0, 4.0, 0.1) } else { random.vector(0.02, 0.8) };
         scene.add_object(RenderObject { orientation, scale, ..RenderObject::new(mesh, material, position) }).unwrap();
         cubes.push(Cube { position, orientation: orientation.as_dquat().normalize(), scale: scale.as_dvec3() });
     }
@@ -132,27 +145,32 @@ fn any_scene(random: &mut Random) -> (Scene, Vec<Cube>) {
 #[test]
 fn no_object_that_an_allowed_camera_sees_is_missing() {
     let mut random = Random::new();
-    let (mut seen, mut replaced_hidden) = (0, 0);
-    for volume in [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox] {
-        let quality = Quality { culling: volume, occlusion: Some(8), ..Quality::balanced() };
+    let (mut seen, mut replaced_hidden, mut executed) = (0, 0, 0);
+    let volumes = [CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox];
+    // Without occlusion tests pieces are executed.
+    for (volume, occlusion) in volumes.into_iter().flat_map(|volume| [(volume, Some(8)), (volume, None)]) {
+        let quality = Quality { culling: volume, occlusion, ..Quality::balanced() };
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
         let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
         let (mut renderer, submitter) = builder.build(scheduler).unwrap();
-        for _ in 0..25 {
+        for _ in 0..15 {
             let (mut scene, cubes) = any_scene(&mut random);
             // Later frames of a scene keep what did not change.
-            for _ in 0..4 {
+            for frame in 0..4 {
                 let motion = any_motion(&mut random);
                 let camera = Camera { late_latch: Some(motion), ..any_camera(&mut random) };
                 scene.cameras = vec![camera.clone()];
-                let mut recorded = renderer.record(scene.as_scene_ref()).unwrap();
-                let drawn = {
+                let changes = if frame == 0 { Changes::Unknown } else { Changes::Objects(&[]) };
+                let mut recorded = renderer.record(SceneRef { changes, ..scene.as_scene_ref() }).unwrap();
+                executed += recorded.statistics().views[0].objects_of_pieces;
+                let drawn: BTreeSet<u32> = {
                     let list = renderer.draw_list("geometry buffer", 0).unwrap();
                     assert!(
                         (0..list.batches.len()).all(|batch| list.remaining(batch).is_none()),
                         "a triangle is missing"
                     );
-                    list.objects.clone()
+                    let objects_of = |batch: &Batch| &list.objects[batch.first as usize..][..batch.count as usize];
+                    list.batches.iter().flat_map(objects_of).copied().collect()
                 };
                 for _ in 0..5 {
                     let shares = [any_share(&mut random), any_share(&mut random)];
@@ -174,8 +192,8 @@ fn no_object_that_an_allowed_camera_sees_is_missing() {
         }
     }
     assert!(
-        seen > 10_000 && replaced_hidden > 2_000,
-        "{seen} seen, {replaced_hidden} of them not by the recorded camera"
+        seen > 10_000 && replaced_hidden > 2_000 && executed > 1_000,
+        "{seen} seen, {replaced_hidden} of them not by the recorded camera; {executed} drawn as a piece"
     );
 }
 

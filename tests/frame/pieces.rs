@@ -112,6 +112,25 @@ proptest! {
     }
 }
 
+/// So that the property is one of executed pieces.
+#[test]
+fn worlds_that_change_at_random_execute_pieces() {
+    let executed = |seed| {
+        let (mut world, mut random) = (ChangingWorld::new(seed, 300), Random::stream(seed));
+        let pieces = some_pieces(&mut random, 300, 150);
+        let (mut renderer, _) = renderer(Quality::balanced(), 1);
+        let frames = (0..20).map(|_| {
+            let recorded = renderer.record(SceneRef { pieces: &pieces, ..world.as_scene_ref() }).unwrap();
+            let executed = recorded.statistics().views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
+            world.step().unwrap();
+            executed
+        });
+        frames.filter(|executed| *executed > 0).count()
+    };
+    let frames: Vec<_> = (0..16).map(executed).collect();
+    assert!(frames.iter().sum::<usize>() >= 32, "of 20 frames of each world: {frames:?}");
+}
+
 /// Rows of cubes in front of a camera, each row a piece.
 struct Rows {
     scene: Scene,

@@ -1,5 +1,5 @@
 //! A world is updated and recorded for frame N + 1 while frame N is submitted, which on the software backend is when it is drawn. The
-//! pictures are those of a loop that does one thing after the other.
+//! pictures are those of a loop that does one thing after the other, and has no pieces.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,31 +9,45 @@ use std::thread;
 use drawloom::backend::SoftwareBackend;
 use drawloom::glam::{DVec3, Quat};
 use drawloom::process::Deferred;
-use drawloom::scene::Scene;
+use drawloom::scene::{Changes, Piece, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Buffering, FrameLoop, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
 const FRAMES: usize = 12;
+const OBJECTS: usize = 60;
+/// Of these. The others stand in pieces.
+const MOVING: usize = 30;
 
 fn world() -> Scene {
-    let mut scene = field(60);
+    let mut scene = field(OBJECTS);
     for camera in &mut scene.cameras {
         camera.size = [48, 32];
+    }
+    for first in (MOVING..OBJECTS).step_by(10) {
+        scene.pieces.push(Piece::new(format!("from {first}"), (first as u32..first as u32 + 10).collect()));
     }
     scene
 }
 
-/// Moves every object, differently in each frame.
-fn update(scene: &mut Scene, frame: usize) {
+/// Moves the first half of the objects, differently in each frame. Now and then another one, so that a piece is recorded anew. Returns what moved.
+fn update(scene: &mut Scene, frame: usize) -> Vec<u32> {
     let handles: Vec<_> = scene.objects().collect();
-    for (index, handle) in handles.into_iter().enumerate() {
+    let moving = (0..MOVING as u32).chain((frame % 5 == 4).then_some(MOVING as u32 + frame as u32)).collect::<Vec<_>>();
+    for &index in &moving {
+        let handle = handles[index as usize];
         let mut object = scene.object(handle).unwrap();
-        let angle = (frame * 7 + index) as f64 * 0.37;
+        let angle = (frame * 7 + index as usize) as f64 * 0.37;
         object.position += DVec3::new(angle.sin(), angle.cos(), 0.0) * 0.2;
         object.orientation = Quat::from_rotation_y(angle as f32);
         scene.replace_object(handle, object).unwrap();
     }
+    moving
+}
+
+/// Which objects changed: in the first frame all.
+fn changes(frame: usize, moved: &[u32]) -> Changes<'_> {
+    if frame == 0 { Changes::Unknown } else { Changes::Objects(moved) }
 }
 
 /// The scheduler that records also draws, so both have the same workers at the same time.
@@ -49,8 +63,9 @@ fn serial_pictures() -> Vec<Vec<u8>> {
     let mut scene = world();
     (0..FRAMES)
         .map(|frame| {
-            update(&mut scene, frame);
-            let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+            let moved = update(&mut scene, frame);
+            let scene = SceneRef { changes: changes(frame, &moved), pieces: &[], ..scene.as_scene_ref() };
+            let recorded = renderer.record(scene).unwrap();
             let submitted = submitter.submit(recorded).unwrap();
             (0..2).flat_map(|view| submitted.submission.read(view, "picture").unwrap().bytes).collect()
         })
@@ -62,10 +77,13 @@ fn overlapped_pictures(workers: usize, buffering: Buffering) -> Vec<Vec<u8>> {
     let mut frames = FrameLoop::new(renderer, submitter, buffering).unwrap();
     let (pictures, drawn) = channel();
     let mut scene = world();
+    let mut executed = 0;
     for frame in 0..FRAMES {
         let (slot, _) = frames.begin();
-        update(&mut scene, frame);
-        let recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
+        let moved = update(&mut scene, frame);
+        let scene = SceneRef { changes: changes(frame, &moved), ..scene.as_scene_ref() };
+        let recorded = frames.renderer().record(scene).unwrap();
+        executed += recorded.statistics().views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
         let pictures = pictures.clone();
         slot.submit_then(recorded, move |submitted| {
             let of_view = |view| submitted.submission.read(view, "picture").unwrap().bytes;
@@ -74,6 +92,7 @@ fn overlapped_pictures(workers: usize, buffering: Buffering) -> Vec<Vec<u8>> {
     }
     let (_, finished) = frames.finish();
     assert!(finished.iter().all(|frame| frame.outcome.is_ok()));
+    assert!(executed > FRAMES, "pieces are executed");
     drop(pictures);
     drawn.iter().collect()
 }
