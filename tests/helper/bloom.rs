@@ -82,7 +82,7 @@ fn same_as_on_device<B: DrawingBackend>() -> Result<(), Failed> {
 
 fn with<B: DrawingBackend>(builder: RendererBuilder<B>, helper: &PostHelper) -> RendererBuilder<B> {
     let deferred = Deferred::new().post(helper.layer(HelperLayer::default())).post(ToneMapping::default());
-    builder.deferred(deferred).process(helper.shrink().expect("it is shrunk"))
+    builder.deferred(deferred).process(helper.downsample().expect("it is downsampled"))
 }
 
 fn source<B: DrawingBackend>() -> Result<(), Failed> {
@@ -91,7 +91,7 @@ fn source<B: DrawingBackend>() -> Result<(), Failed> {
         let bloom = Bloom { divisor: divisor as u32, ..Bloom::default() };
         let mut engine = Engine::<B>::new(bloom.on_cpu(), bloom.source(), |builder, helper| {
             let deferred = Deferred::new().post(helper.layer(HelperLayer::default()));
-            builder.deferred(deferred).process(helper.shrink().expect("it is shrunk")).output("radiance")
+            builder.deferred(deferred).process(helper.downsample().expect("it is downsampled")).output("radiance")
         })?;
         let frame = engine.draw(&scene)?;
         let [radiance, source] = ["radiance", "bloom source"].map(|target| B::read(&frame.submission, 0, target));

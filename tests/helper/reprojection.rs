@@ -24,22 +24,22 @@ pub const IN_SOFTWARE: &[Case] = &[
     ("software_a_layer_without_reprojection_stays_in_its_place", in_place::<SoftwareBackend>),
 ];
 
-/// A layer whose red and green are the place in the layer, from (0, 0) to (1, 1): between pixels, too.
-struct Places;
+/// A layer whose red and green are the coordinates in the layer, from (0, 0) to (1, 1): between pixels, too.
+struct TextureCoordinates;
 
 const LAYER: [u32; 2] = [256, 128];
 
-impl HelperStep for Places {
+impl HelperStep for TextureCoordinates {
     fn name(&self) -> &str {
-        "places"
+        "texture coordinates"
     }
 
     fn compute(&self, _frame: &HelperFrame<'_>) -> Picture {
         let [width, height] = LAYER;
-        let place = |index: u32, count: u32| f16::from_f64((f64::from(index) + 0.5) / f64::from(count));
+        let coordinate = |index: u32, count: u32| f16::from_f64((f64::from(index) + 0.5) / f64::from(count));
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
         let bytes = pixels.flat_map(|[x, y]| {
-            let channels = [place(x, width), place(y, height), f16::ONE, f16::ONE];
+            let channels = [coordinate(x, width), coordinate(y, height), f16::ONE, f16::ONE];
             channels.into_iter().flat_map(f16::to_le_bytes)
         });
         Picture { width, height, format: Format::Rgba16Float, bytes: bytes.collect() }
@@ -48,7 +48,7 @@ impl HelperStep for Places {
 
 fn engine<B: DrawingBackend>(reprojection: HelperReprojection) -> Result<Engine<B>, Failed> {
     let layer = HelperLayer { reprojection, ..HelperLayer::default() };
-    Engine::new(Places, HelperSource::whole("depth"), |builder: RendererBuilder<B>, helper: &PostHelper| {
+    Engine::new(TextureCoordinates, HelperSource::whole("depth"), |builder: RendererBuilder<B>, helper: &PostHelper| {
         builder.deferred(Deferred::new().post(helper.layer(layer)))
     })
 }

@@ -161,15 +161,15 @@ impl<B: Backend<Submission = WgpuSubmission>> Contender<B> {
             Kind::BloomOnCpuInSameFrame => {
                 // Never begun: only its process and the name of its target are used.
                 let source = PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source());
-                let shrink = source.shrink().ok_or("bloom is computed from a smaller picture")?;
-                builder.deferred(Deferred::new()).process(shrink).output(source.source_target())
+                let downsample = source.downsample().ok_or("bloom is computed from a smaller picture")?;
+                builder.deferred(Deferred::new()).process(downsample).output(source.source_target())
             }
             Kind::BloomLayer => {
                 let helper = helper.insert(PostHelper::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source()));
                 let layer = helper.layer(HelperLayer { strength: STRENGTH, ..HelperLayer::default() });
-                let shrink = helper.shrink().ok_or("bloom is computed from a smaller picture")?;
+                let downsample = helper.downsample().ok_or("bloom is computed from a smaller picture")?;
                 let deferred = Deferred::new().post(layer).post(ToneMapping::default());
-                builder.deferred(deferred).process(shrink).output(helper.source_target())
+                builder.deferred(deferred).process(downsample).output(helper.source_target())
             }
             Kind::GradeOnDevice => {
                 builder.deferred(Deferred::new().post(ToneMapping::default()).post(steps::grade_on_device))

@@ -18,7 +18,7 @@ use drawloom_benches::results;
 use image::{ImageFormat, RgbImage};
 use serde::Serialize;
 
-use crate::steps::Openness;
+use crate::steps::AmbientOcclusion;
 
 /// Longer than any step.
 const LONG: Duration = Duration::from_secs(60);
@@ -160,15 +160,15 @@ impl Engine {
                 (helper, HelperLayer { strength: 0.5, reprojection, ..HelperLayer::default() })
             }
             Layer::Occlusion => {
-                let helper = PostHelper::new(Arc::clone(&scheduler), Openness, HelperSource::whole("depth"));
+                let helper = PostHelper::new(Arc::clone(&scheduler), AmbientOcclusion, HelperSource::whole("depth"));
                 (helper, HelperLayer { blend: HelperBlend::Multiply, reprojection, ..HelperLayer::default() })
             }
         };
         let mut builder = Renderer::builder(BackendName::Adapter.open()?)
             .deferred(Deferred::new().post(helper.layer(layer)).post(ToneMapping::default()))
             .output(helper.source_target());
-        if let Some(shrink) = helper.shrink() {
-            builder = builder.process(shrink);
+        if let Some(downsample) = helper.downsample() {
+            builder = builder.process(downsample);
         }
         let (renderer, submitter) = builder.build(scheduler)?;
         Ok(Self { renderer, submitter, helper })

@@ -83,13 +83,13 @@ impl RenderProcess for GradeProcess {
 }
 
 /// How much of each pixel's surroundings is open, at half the size, from depth: a layer with sharp edges, and so one that shows when it is late.
-pub struct Openness;
+pub struct AmbientOcclusion;
 
 /// Offsets of the pixels that are compared, in pixels of the depth.
 const OFFSETS: [[i64; 2]; 12] =
     [[2, 1], [-2, -1], [1, -3], [-1, 3], [5, -2], [-5, 2], [3, 6], [-3, -6], [9, 4], [-9, -4], [4, -10], [-4, 10]];
 
-impl HelperStep for Openness {
+impl HelperStep for AmbientOcclusion {
     fn name(&self) -> &str {
         "occlusion"
     }

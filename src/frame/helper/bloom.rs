@@ -11,7 +11,7 @@ use std::sync::Arc;
 use self::kernel::{Kernel, MAX_RADIUS, NAME};
 use self::on_cpu::BloomStep;
 use self::on_device::{BloomColumns, BloomLayer, BloomRows};
-use super::shrink::Shrink;
+use super::downsample::Downsample;
 use super::source::HelperSource;
 use super::step::HelperStep;
 use crate::process::{PostStep, RenderProcess};
@@ -38,7 +38,7 @@ use crate::process::{PostStep, RenderProcess};
 ///     .post(ToneMapping::default());
 /// let (renderer, submitter) = Renderer::builder(NullBackend)
 ///     .deferred(deferred)
-///     .process(helper.shrink().expect("bloom is computed from a smaller picture"))
+///     .process(helper.downsample().expect("bloom is computed from a smaller picture"))
 ///     .output(helper.source_target())
 ///     .build(scheduler)?;
 /// // In each frame: helper.begin_frame(&renderer, cameras), record, helper.read_back(&mut recorded), submit.
@@ -69,7 +69,7 @@ impl Bloom {
 
     /// What it is computed from.
     pub fn source(&self) -> HelperSource {
-        HelperSource::shrunk("radiance", self.divisor.max(1))
+        HelperSource::downsampled("radiance", self.divisor.max(1))
     }
 
     /// The step for a [`PostHelper`](super::PostHelper). Its source must be in [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), as
@@ -81,11 +81,12 @@ impl Bloom {
     /// The processes of the same step on the device, in the same frame, and the step of post-processing that adds `strength` times their result.
     pub fn on_device(&self, strength: f32) -> (Vec<Arc<dyn RenderProcess>>, impl PostStep + 'static) {
         let source = self.source();
-        let target = Shrink::target_of(NAME, &source);
-        let shrink = Shrink::new(NAME, &source).map(|shrink| Arc::new(shrink) as Arc<dyn RenderProcess>);
+        let target = Downsample::target_of(NAME, &source);
+        let downsample =
+            Downsample::new(NAME, &source).map(|downsample| Arc::new(downsample) as Arc<dyn RenderProcess>);
         let (divisor, kernel) = (self.divisor.max(1), self.kernel());
         let rows = Arc::new(BloomRows { source: target, divisor, kernel: kernel.clone() });
-        let processes = shrink.into_iter().chain([rows as _, Arc::new(BloomColumns { divisor, kernel }) as _]);
+        let processes = downsample.into_iter().chain([rows as _, Arc::new(BloomColumns { divisor, kernel }) as _]);
         (processes.collect(), BloomLayer { strength })
     }
 

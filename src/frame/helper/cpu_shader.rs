@@ -151,12 +151,12 @@ impl<R: Real> FullScreenCpuShader<R> for LatePictureCpuShader {
     }
 }
 
-/// `shrink.wgsl`.
-pub(super) struct ShrinkCpuShader {
+/// `downsample.wgsl`.
+pub(super) struct DownsampleCpuShader {
     pub(super) divisor: usize,
 }
 
-impl<R: Real> FullScreenCpuShader<R> for ShrinkCpuShader {
+impl<R: Real> FullScreenCpuShader<R> for DownsampleCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &FullScreenPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let source = pass.sampled[0];
         let [width, height] = source.size();

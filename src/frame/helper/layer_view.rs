@@ -12,7 +12,7 @@ const WORDS: usize = 24;
 /// The view that a result is of, as a row of words for `layer_view` in `layer_lookup.wgsl`. It is a texture of whole numbers, because each view
 /// has its own, and devices may have no storage buffers left; and so that positions are exact, and nothing flushes a denormal. `None` stands for
 /// no result.
-pub(super) fn view_words(camera: Option<&Camera>) -> Picture {
+pub(super) fn view_picture(camera: Option<&Camera>) -> Picture {
     let view = camera.and_then(|camera| GpuView::new(&RenderView::new(camera), Vec3::ZERO, 0));
     let mut words = [0_u32; WORDS];
     if let Some(view) = view {

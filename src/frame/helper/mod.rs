@@ -40,7 +40,7 @@ mod late_picture;
 mod post_helper;
 mod selection;
 mod shared;
-mod shrink;
+mod downsample;
 mod source;
 mod statistics;
 mod step;

@@ -2,12 +2,12 @@
 
 use std::sync::{Arc, Weak};
 
+use super::downsample::Downsample;
 use super::error::HelperError;
 use super::late_picture::LatePicture;
 use super::layer::LayerStep;
 use super::layer_settings::HelperLayer;
 use super::shared::{MAX_ERRORS, Shared, UploadPicture};
-use super::shrink::Shrink;
 use super::source::HelperSource;
 use super::step::HelperStep;
 use crate::backend::{Backend, Picture};
@@ -71,8 +71,8 @@ impl PostHelper {
 
     /// The process that draws the source smaller, called `name source`: for [`RendererBuilder::process`](crate::RendererBuilder::process). `None` if
     /// the source is read back as it is.
-    pub fn shrink(&self) -> Option<impl RenderProcess + 'static> {
-        Shrink::new(&self.0.name, &self.0.source)
+    pub fn downsample(&self) -> Option<impl RenderProcess + 'static> {
+        Downsample::new(&self.0.name, &self.0.source)
     }
 
     /// The step of post-processing that composites the helper's result over the picture: for [`Deferred::post`](crate::process::Deferred::post).

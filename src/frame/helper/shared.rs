@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use parking_lot::Mutex;
 
+use super::downsample::Downsample;
 use super::error::{HelperError, HelperErrorReason};
-use super::layer_view::view_words;
+use super::layer_view::view_picture;
 use super::selection::{Selection, SharedSelection};
-use super::shrink::Shrink;
 use super::source::HelperSource;
 use super::statistics::HelperStatistics;
 use super::step::{HelperFrame, HelperStep};
@@ -91,7 +91,7 @@ impl<B: Backend> UploadPicture for B {
 impl Shared {
     pub(super) fn new(scheduler: Arc<Scheduler>, step: impl HelperStep, source: HelperSource) -> Self {
         let name: Arc<str> = step.name().into();
-        let target = Shrink::target_of(&name, &source);
+        let target = Downsample::target_of(&name, &source);
         let (step, state, shown) = (Box::new(step), Mutex::default(), SharedSelection::default());
         Self { name, step, source, target, scheduler, state, shown }
     }
@@ -108,7 +108,7 @@ impl Shared {
         let mut state = self.state.lock();
         let retired = std::mem::take(&mut state.retired);
         state.frame += 1;
-        let told = match neutral {
+        let message = match neutral {
             Some(Ok(neutral)) => {
                 state.neutral = neutral;
                 state.neutral_failed = false;
@@ -137,7 +137,7 @@ impl Shared {
         // These may be the last references to what is on the device. To destroy that may wait for a thread that polls the device, whose callbacks
         // wait for the state.
         drop((retired, gone, of_other_sizes, before));
-        tell(told);
+        log(message);
     }
 
     /// See [`PostHelper::read_back`](super::PostHelper::read_back).
@@ -239,7 +239,7 @@ impl Shared {
             };
             state.retired.extend(left_out);
         }
-        let told = match outcome {
+        let message = match outcome {
             // The engine dropped the frame, or knows why it was refused.
             Err(FenceError::Abandoned { .. }) => None,
             Ok(()) => {
@@ -252,7 +252,7 @@ impl Shared {
             }
         };
         drop(state);
-        tell(told);
+        log(message);
         if self.scheduler.workers() > 1 {
             self.queue_jobs();
         }
@@ -305,7 +305,7 @@ impl Shared {
         let error = error.filter(|_| is_told).map(|reason| self.add_error(&mut state, name, number, reason));
         drop(state);
         drop(before);
-        tell(error);
+        log(error);
     }
 
     fn compute(
@@ -350,11 +350,11 @@ impl Shared {
 
     /// A frame is not of the renderer that the helper's frame began with.
     fn report_foreign_frame(&self) {
-        let told = self.add_error_of_all(&mut self.state.lock(), HelperErrorReason::ForeignFrame);
-        tell(Some(told));
+        let message = self.add_error_of_all(&mut self.state.lock(), HelperErrorReason::ForeignFrame);
+        log(Some(message));
     }
 
-    /// Something failed for all views. Returns what is to be told.
+    /// Something failed for all views. Returns what is to be logged.
     fn add_error_of_all(&self, state: &mut State, reason: HelperErrorReason) -> String {
         let number = state.frame;
         self.add_error(state, String::new(), number, reason)
@@ -364,12 +364,12 @@ impl Shared {
     fn fail_in_view(&self, view: &str, number: u64, reason: HelperErrorReason) {
         let mut state = self.state.lock();
         let is_told = state.view(view).fail();
-        let told = is_told.then(|| self.add_error(&mut state, view.to_owned(), number, reason));
+        let message = is_told.then(|| self.add_error(&mut state, view.to_owned(), number, reason));
         drop(state);
-        tell(told);
+        log(message);
     }
 
-    /// Keeps an error for the engine, and returns what is to be [told](tell) when the state is not locked.
+    /// Keeps an error for the engine, and returns what is to be [logged](log) when the state is not locked.
     fn add_error(&self, state: &mut State, view: String, frame: u64, reason: HelperErrorReason) -> String {
         let error = HelperError { step: self.name.to_string(), view, frame, reason };
         let message = error.to_string();
@@ -382,7 +382,7 @@ impl Shared {
 }
 
 /// Tells of an error through `tracing`, whose subscriber is code of the engine's.
-fn tell(message: Option<String>) {
+fn log(message: Option<String>) {
     if let Some(message) = message {
         crate::unwind::emit(|| tracing::warn!(target: "drawloom", message));
     }
@@ -405,5 +405,5 @@ fn layer_textures(
     camera: Option<&Camera>,
 ) -> Result<Option<LayerTextures>, BackendError> {
     let picture = backend.upload_picture(picture)?;
-    Ok(picture.zip(backend.upload_picture(&view_words(camera))?).map(<[_; 2]>::from))
+    Ok(picture.zip(backend.upload_picture(&view_picture(camera))?).map(<[_; 2]>::from))
 }

@@ -8,19 +8,19 @@ pub struct HelperSource {
     /// The target: an output of the frame, or any other that is not [transient](crate::backend::WgpuBackend::transient_targets).
     pub target: String,
     /// If the target is to be made smaller first, what width and height are divided by, rounded up, and the format of the smaller one: see
-    /// [`PostHelper::shrink`](super::PostHelper::shrink).
-    pub shrunk: Option<(u32, Format)>,
+    /// [`PostHelper::downsample`](super::PostHelper::downsample).
+    pub downsampled: Option<(u32, Format)>,
 }
 
 impl HelperSource {
     /// A target as it is, such as `picture`.
     pub fn whole(target: impl Into<String>) -> Self {
-        Self { target: target.into(), shrunk: None }
+        Self { target: target.into(), downsampled: None }
     }
 
     /// A target with so much less width and height, in [`Format::Rgba16Float`]: each pixel is the mean of `divisor` ×
     /// `divisor`.
-    pub fn shrunk(target: impl Into<String>, divisor: u32) -> Self {
-        Self { shrunk: Some((divisor, Format::Rgba16Float)), ..Self::whole(target) }
+    pub fn downsampled(target: impl Into<String>, divisor: u32) -> Self {
+        Self { downsampled: Some((divisor, Format::Rgba16Float)), ..Self::whole(target) }
     }
 }

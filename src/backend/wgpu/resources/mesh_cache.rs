@@ -230,7 +230,7 @@ impl MeshCache {
     ) -> Result<(), BackendError> {
         target.create_buffers(device)?;
         with_vertex_bytes(mesh, target.format, |vertices| {
-            target.for_each_piece(mesh, vertices, |buffer, offset, bytes| uploads.write_buffer(buffer, offset, bytes))
+            target.for_each_write(mesh, vertices, |buffer, offset, bytes| uploads.write_buffer(buffer, offset, bytes))
         })?;
         self.add_resident((handle, revision, mesh), target.location);
         Ok(())

@@ -204,12 +204,12 @@ impl MeshTarget {
         Ok(())
     }
 
-    /// Calls `write` with each piece of a mesh: the buffer, the offset in bytes, and the bytes. `vertices` are those of the mesh, in the
-    /// pages' format. The pieces are the same, in the same order, every time.
+    /// Calls `write` for each buffer write of a mesh, with the buffer, the offset in bytes, and the bytes. `vertices` are those of the mesh, in the
+    /// pages' format. The writes are the same, in the same order, every time.
     ///
     /// # Errors
     /// If the pages have no buffers. This is a bug in Drawloom.
-    pub(crate) fn for_each_piece(
+    pub(crate) fn for_each_write(
         &self,
         mesh: &Mesh,
         vertices: &[u8],

@@ -10,17 +10,17 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    /// The bytes of a piece: so small that a job looks at the time often.
-    const PIECE: u64 = 1 << 18;
+    /// The bytes of a portion: so small that a job looks at the time often.
+    const PORTION: u64 = 1 << 18;
 
     pub(super) fn new(bytes: u64, end: Instant) -> Self {
         Self { bytes, end, has_begun: false }
     }
 
-    /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first piece is allowed at any
+    /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first portion is allowed at any
     /// time, so that something is uploaded even if the time is over before it begins.
     pub(super) fn take(&mut self, bytes: u64, unit: u64) -> u64 {
-        let taken = bytes.min(Self::PIECE.max(unit)).min(self.bytes) / unit * unit;
+        let taken = bytes.min(Self::PORTION.max(unit)).min(self.bytes) / unit * unit;
         if taken == 0 || self.is_late() {
             return 0;
         }
@@ -29,7 +29,7 @@ impl Allowance {
         taken
     }
 
-    /// Whether the time is over, or there are too few bytes for any piece.
+    /// Whether the time is over, or there are too few bytes for any portion.
     pub(super) fn is_over(&self) -> bool {
         self.bytes < 4 || self.is_late()
     }
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_are_whole_units_and_add_up_to_the_bytes() {
+    fn portions_are_whole_units_and_add_up_to_the_bytes() {
         let mut allowance = Allowance::new(1_000_003, Instant::now() + Duration::from_secs(1000));
         let mut sum = 0;
         while !allowance.is_over() {
@@ -58,7 +58,7 @@ mod tests {
             if taken == 0 {
                 break;
             }
-            assert!(taken.is_multiple_of(12) && taken <= Allowance::PIECE);
+            assert!(taken.is_multiple_of(12) && taken <= Allowance::PORTION);
             sum += taken;
         }
         assert_eq!(sum, 1_000_003 / 12 * 12);
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn one_piece_is_allowed_when_the_time_is_over() {
+    fn one_portion_is_allowed_when_the_time_is_over() {
         let mut allowance = Allowance::new(100, Instant::now());
         assert_eq!((allowance.take(8, 4), allowance.take(8, 4), allowance.is_over()), (8, 0, true));
     }

@@ -31,7 +31,7 @@ pub struct StreamingBudget {
     pub texture_bytes: u64,
     /// At most so many bytes are uploaded from one frame to the next. Larger meshes and textures take several frames.
     pub upload_bytes_per_frame: u64,
-    /// A background job that uploads ends after this time, once it has done what it began: a piece of 256 KiB at most, or the mip levels of
+    /// A background job that uploads ends after this time, once it has done what it began: a portion of 256 KiB at most, or the mip levels of
     /// one texture.
     pub upload_time_per_frame: Duration,
 }

@@ -1,4 +1,4 @@
-//! The upload of a mesh, in pieces.
+//! The upload of a mesh, in portions.
 
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ impl MeshUpload {
             }
         };
         let (mut begin, mut written) = (0, self.written);
-        self.target.for_each_piece(&self.mesh, vertices, |buffer, offset, bytes| {
+        self.target.for_each_write(&self.mesh, vertices, |buffer, offset, bytes| {
             let end = begin + bytes.len() as u64;
             while written < end {
                 let length = allowance.take(end - written, 4);

@@ -1,4 +1,4 @@
-//! The upload of a texture, in pieces.
+//! The upload of a texture, in portions.
 
 use std::sync::Arc;
 

@@ -131,7 +131,7 @@ impl Upload {
         }
     }
 
-    /// Whether its next piece may fit into what is left.
+    /// Whether its next portion may fit into what is left.
     fn can_advance(&self, allowance: &Allowance) -> bool {
         match self {
             Self::Mesh(_) => allowance.bytes() >= 4,

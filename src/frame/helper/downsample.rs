@@ -1,14 +1,14 @@
 //! The source of a step, made smaller.
 
 #[cfg(feature = "software")]
-use super::cpu_shader::ShrinkCpuShader;
+use super::cpu_shader::DownsampleCpuShader;
 use super::source::HelperSource;
 #[cfg(feature = "software")]
 use crate::process::CpuShader;
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
 
 /// Draws the source of a step into a smaller target.
-pub(super) struct Shrink {
+pub(super) struct Downsample {
     name: String,
     target: String,
     source: String,
@@ -16,21 +16,21 @@ pub(super) struct Shrink {
     format: Format,
 }
 
-impl Shrink {
+impl Downsample {
     /// The name of the target that a step with this source reads back.
     pub(super) fn target_of(step: &str, source: &HelperSource) -> String {
-        if source.shrunk.is_some() { format!("{step} source") } else { source.target.clone() }
+        if source.downsampled.is_some() { format!("{step} source") } else { source.target.clone() }
     }
 
     /// `None` for a source that is read back as it is.
     pub(super) fn new(step: &str, source: &HelperSource) -> Option<Self> {
-        let (divisor, format) = source.shrunk?;
+        let (divisor, format) = source.downsampled?;
         let (name, target) = (format!("{step} source"), Self::target_of(step, source));
         Some(Self { name, target, source: source.target.clone(), divisor, format })
     }
 }
 
-impl RenderProcess for Shrink {
+impl RenderProcess for Downsample {
     fn name(&self) -> &str {
         &self.name
     }
@@ -44,12 +44,12 @@ impl RenderProcess for Shrink {
     fn draws(&self) -> Draws<'_> {
         // A shader that does not branch on it may read its first bytes; this one loops, so they are 0: see `Parameters`.
         let parameters = bytemuck::cast_slice(&[0, 0, 0, self.divisor]).to_vec().into();
-        Draws::FullScreen(FullScreen { shader: include_str!("shrink.wgsl"), parameters, ..FullScreen::default() })
+        Draws::FullScreen(FullScreen { shader: include_str!("downsample.wgsl"), parameters, ..FullScreen::default() })
     }
 
     #[cfg(feature = "software")]
     fn cpu_shader(&self) -> Option<CpuShader> {
         let divisor = self.divisor as usize;
-        Some(CpuShader::full_screen(ShrinkCpuShader { divisor }))
+        Some(CpuShader::full_screen(DownsampleCpuShader { divisor }))
     }
 }
