@@ -48,8 +48,8 @@ pub(crate) enum EndOfUpload {
 }
 
 impl MeshCache {
-    /// Begins a frame with meshes that are streamed. A mesh that replaces one on the device is uploaded at once, if there is room. Otherwise
-    /// the one before stays, and is drawn, until the new one arrives.
+    /// Begins a frame with meshes that are streamed. Meshes that replace others on the device are uploaded at once, if there is room, up to so many
+    /// bytes. Otherwise the one before stays, and is drawn, until the new one arrives.
     ///
     /// # Errors
     /// If the device has no room.
@@ -59,7 +59,7 @@ impl MeshCache {
         uploads: &UploadQueue,
         (assets, used): (&Assets, &UsedMeshes),
         vertices: VertexFormat,
-        budget: u64,
+        (budget, mut bytes_at_once): (u64, u64),
     ) -> Result<(), BackendError> {
         self.release_unread();
         let requested = MeshVersion::new(assets, used);
@@ -79,7 +79,12 @@ impl MeshCache {
                 Some((handle, revision, mesh)) if handle == resident.handle => {
                     self.snapshot = None;
                     self.outdated.insert(slot);
-                    self.replace_at_once(device, uploads, (handle, revision, mesh), budget)?;
+                    let bytes = self.pages.bytes_of(mesh).total();
+                    if bytes <= bytes_at_once
+                        && self.replace_at_once(device, uploads, (handle, revision, mesh), budget)?
+                    {
+                        bytes_at_once -= bytes;
+                    }
                 }
                 _ => self.take_off(slot),
             }
@@ -96,7 +101,7 @@ impl MeshCache {
         Ok(())
     }
 
-    /// Uploads a mesh that replaces one on the device, if there is room that no frame in flight reads.
+    /// Uploads a mesh that replaces one on the device, if there is room that no frame in flight reads. Returns whether there is.
     ///
     /// # Errors
     /// If the device has no room.
@@ -106,17 +111,18 @@ impl MeshCache {
         uploads: &UploadQueue,
         (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
         budget: u64,
-    ) -> Result<(), BackendError> {
+    ) -> Result<bool, BackendError> {
         let Ok(Placed { target, last_reader }) = self.place(device, mesh, budget, iter::empty(), &mut 0)? else {
-            return Ok(());
+            return Ok(false);
         };
-        if self.lifetimes.is_gone(last_reader) {
+        let is_free = self.lifetimes.is_gone(last_reader);
+        if is_free {
             self.take_off(handle.index());
-            self.write(device, uploads, (handle, revision, mesh), &target)
+            self.write(device, uploads, (handle, revision, mesh), &target)?;
         } else {
             self.pages.free(target.location);
-            Ok(())
         }
+        Ok(is_free)
     }
 
     /// The mesh in a slot if it is used and lies in pages, with its handle and revision.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::budget::StreamingBudget;
 use super::upload_jobs::Upload;
 use crate::backend::wgpu::resources::{LastReader, MaterialCache, MeshCache, UploadQueue};
 use crate::backend::{BackendError, FrameRequest};
@@ -33,9 +34,14 @@ impl OnDevice<'_> {
     ///
     /// # Errors
     /// If the device has no room for what was replaced.
-    pub(super) fn begin_frame(&mut self, request: &FrameRequest<'_>, mesh_budget: u64) -> Result<(), BackendError> {
+    pub(super) fn begin_frame(
+        &mut self,
+        request: &FrameRequest<'_>,
+        budget: &StreamingBudget,
+    ) -> Result<(), BackendError> {
         let (assets, used, vertices) = (request.scene.assets, request.objects.used_meshes(), request.quality.vertices);
-        self.meshes.begin_streamed_frame(self.device, self.uploads, (assets, used), vertices, mesh_budget)?;
+        let budget = (budget.mesh_bytes, budget.upload_bytes_per_frame);
+        self.meshes.begin_streamed_frame(self.device, self.uploads, (assets, used), vertices, budget)?;
         self.materials.textures.begin_streamed_frame(assets);
         Ok(())
     }

@@ -132,7 +132,7 @@ impl TooLarge {
             }
         };
         if told.insert(slot, revision) != Some(revision) {
-            tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed, and is left out");
+            tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed: what it replaces stays, or nothing is drawn");
         }
     }
 

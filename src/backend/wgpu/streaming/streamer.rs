@@ -80,7 +80,7 @@ impl Streamer {
         latest.frame_use.frame += 1;
         latest.frame_use.meshes.reserve(assets.meshes.slot_count());
         latest.frame_use.materials.reserve(assets.materials.slot_count());
-        on_device.begin_frame(request, self.budget.mesh_bytes)?;
+        on_device.begin_frame(request, &self.budget)?;
         if on_device.update_epochs(&mut latest.epochs) {
             latest.held.retain(|held| on_device.is_current(&held.upload));
             self.jobs.drop_stale(|upload| on_device.is_current(upload));
