@@ -444,15 +444,16 @@ fn a_mesh_that_is_replaced_in_every_frame_keeps_up() {
 
 #[test]
 fn meshes_that_are_replaced_together_do_not_all_arrive_with_the_frame() {
-    let budget = StreamingBudget { upload_bytes_per_frame: 1 << 17, ..budget(32 << 20) };
+    let budget = StreamingBudget { upload_bytes_per_frame: 1 << 18, ..budget(32 << 20) };
     let mut world = World::new(0, budget);
-    let meshes: Vec<_> = (0..10).map(|number| world.add(sized_mesh("first", 4_000), f64::from(number))).collect();
+    let meshes: Vec<_> =
+        (0..10).map(|number| world.add(sized_mesh("first", 4_000), f64::from(number) * 0.01)).collect();
     assert!(world.frames_until_complete(40) < 40);
     for mesh in meshes {
         world.scene.replace(mesh, sized_mesh("second", 4_000)).unwrap();
     }
     assert_eq!(world.missing(), 0);
-    assert_eq!(world.statistics().requested, 8, "of 10 meshes of 47 KiB each: two fit into 128 KiB");
+    assert_eq!(world.statistics().requested, 8, "of 10 meshes of 125 KiB each: two fit into 256 KiB");
     assert!(world.frames_until_complete(40) < 40);
 }
 
