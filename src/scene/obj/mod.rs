@@ -6,12 +6,19 @@
 
 mod emission;
 mod error;
+mod files;
 mod geometry;
+mod ignored;
 mod import;
 mod library;
+mod limits;
 mod material;
 mod polygon;
 mod preprocessing;
+mod statements;
+mod texture;
+mod warnings;
 
-pub use error::{ObjError, ObjWarning};
-pub use import::{Imported, load, read};
+pub use error::{IgnoredKeyword, ObjError, ObjWarning};
+pub use import::{Imported, load, load_within, read, read_within};
+pub use limits::ObjLimits;
