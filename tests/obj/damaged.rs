@@ -113,8 +113,10 @@ fn names_in_any_encoding_match() {
     let imported = Folder::new().with("a.obj", text).with("a.mtl", library).load().unwrap();
     assert_eq!(diffuse(&imported), [Vec3::X, Vec3::Y, Vec3::Z]);
     // The comment is not text either, but nothing of it is read.
-    let [ObjWarning::NotUtf8 { lines: 3, first_line: 6, .. }, ObjWarning::NotUtf8 { file, lines: 3, first_line: 1 }] =
-        &imported.warnings[..]
+    let [
+        ObjWarning::NotUnicode { lines: 3, first_line: 6, .. },
+        ObjWarning::NotUnicode { file, lines: 3, first_line: 1 },
+    ] = &imported.warnings[..]
     else {
         panic!("{:?}", imported.warnings);
     };

@@ -94,7 +94,7 @@ fn a_device_is_refused() {
 }
 
 fn a_sparse_file_is_refused() {
-    let limits = [("scene_bytes", 2_u64 << 30), ("library_bytes", 64 << 20), ("texture_file_bytes", 256 << 20)];
+    let limits = [("scene_bytes", 1_u64 << 30), ("library_bytes", 64 << 20), ("texture_file_bytes", 256 << 20)];
     for (name, (field, limit)) in FILES.into_iter().zip(limits) {
         let reason = reason(name, ObjLimits::default(), |path| File::create(path).unwrap().set_len(10 << 30).unwrap());
         assert_eq!(reason, format!("it takes 10737418240 bytes or more, and `ObjLimits::{field}` is {limit}"));

@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::io;
 
+use super::statements::excerpt;
 use crate::scene::SceneError;
 
 /// Why an OBJ file could not be loaded. Every message names the file.
@@ -23,7 +24,7 @@ pub enum ObjError {
     NotText {
         /// The file.
         file: String,
-        /// The first line that is neither UTF-8 nor, in a file of UTF-16, that; counted from 1.
+        /// The first line that is not Unicode, counted from 1.
         line: usize,
     },
     /// The file has nothing to draw, and a malformed line may be why.
@@ -81,9 +82,13 @@ pub enum ObjWarning {
         /// What is wrong with it, and what was done about it.
         reason: String,
     },
-    /// Lines of the OBJ file or a material library that are not UTF-8, nor text in the file's encoding if that is another.
-    #[error("`{file}`: {lines} lines are not UTF-8 and were read as Latin-1, the first is line {first_line}")]
-    NotUtf8 {
+    /// Lines of the OBJ file or a material library that are not Unicode: invalid UTF-8, of which each byte was read as a
+    /// character of Latin-1, or invalid UTF-16.
+    #[error(
+        "`{}`: {lines} lines are not Unicode, and names in them may look wrong; the first is line {first_line}",
+        excerpt(file)
+    )]
+    NotUnicode {
         /// The file.
         file: String,
         /// The number of lines.
@@ -94,8 +99,9 @@ pub enum ObjWarning {
     /// Lines of the OBJ file or a material library that are longer than
     /// [`ObjLimits::line_bytes`](super::ObjLimits::line_bytes). They were left out.
     #[error(
-        "`{file}`: {lines} lines have more than {limit} bytes (`ObjLimits::line_bytes`) and were left out, the first is line \
-         {first_line}"
+        "`{}`: {lines} lines have more than {limit} bytes (`ObjLimits::line_bytes`) and were left out, the first is line \
+         {first_line}",
+        excerpt(file)
     )]
     LongLines {
         /// The file.
@@ -109,7 +115,7 @@ pub enum ObjWarning {
     },
     /// Statements of the OBJ file or a material library that are unknown, or that say what is not drawn. Those whose values
     /// change nothing, such as a black `Ks`, are not listed.
-    #[error("`{file}`: {} left out", Keywords(keywords, *others))]
+    #[error("`{}`: {} left out", excerpt(file), Keywords(keywords, *others))]
     IgnoredStatements {
         /// The file.
         file: String,
@@ -131,13 +137,13 @@ pub enum ObjWarning {
         faces: usize,
     },
     /// A material that is used and has opacity 0.
-    #[error("material `{material}` has opacity 0: what it covers is invisible")]
+    #[error("material `{}` has opacity 0: what it covers is invisible", excerpt(material))]
     InvisibleMaterial {
         /// Its name.
         material: String,
     },
     /// A `.mtl` file that cannot be read. Its materials are then undefined.
-    #[error("material library `{library}` cannot be read: {reason}")]
+    #[error("material library `{}` cannot be read: {reason}", excerpt(library))]
     MissingLibrary {
         /// Its name in the OBJ file.
         library: String,
@@ -145,7 +151,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A line of a `.mtl` file that was left out or changed.
-    #[error("material library `{library}`, line {line}: {reason}")]
+    #[error("material library `{}`, line {line}: {reason}", excerpt(library))]
     LibraryLine {
         /// Its name in the OBJ file.
         library: String,
@@ -155,7 +161,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A material that is used but not defined. Objects that use it get the default material.
-    #[error("material `{material}` is not defined and was replaced by the default material")]
+    #[error("material `{}` is not defined and was replaced by the default material", excerpt(material))]
     UndefinedMaterial {
         /// Its name in `usemtl`.
         material: String,
@@ -170,7 +176,7 @@ pub enum ObjWarning {
         materials: usize,
     },
     /// A texture that is missing or cannot be decoded. The material keeps its plain colour.
-    #[error("texture `{texture}` of material `{material}` cannot be used: {reason}")]
+    #[error("texture `{}` of material `{}` cannot be used: {reason}", excerpt(texture), excerpt(material))]
     UnusableTexture {
         /// Its path, relative to the OBJ file.
         texture: String,
@@ -180,7 +186,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A texture larger than [`Texture::MAX_SIZE`](crate::scene::Texture::MAX_SIZE), which was scaled down to it.
-    #[error("texture `{texture}` of {width}x{height} pixels was scaled down")]
+    #[error("texture `{}` of {width}x{height} pixels was scaled down", excerpt(texture))]
     ScaledTexture {
         /// Its path, relative to the OBJ file.
         texture: String,
@@ -190,7 +196,7 @@ pub enum ObjWarning {
         height: u32,
     },
     /// A model without a triangle that can be drawn.
-    #[error("model `{model}` has no triangle to draw ({degenerate_triangles} degenerate) and was left out")]
+    #[error("model `{}` has no triangle to draw ({degenerate_triangles} degenerate) and was left out", excerpt(model))]
     EmptyModel {
         /// Its name.
         model: String,
@@ -227,7 +233,10 @@ pub enum ObjWarning {
         corners: usize,
     },
     /// Polygons that intersect themselves, or are concave with more than 256 corners. They became triangle fans.
-    #[error("model `{model}` has {polygons} polygons that intersect themselves or are too large, and may look wrong")]
+    #[error(
+        "model `{}` has {polygons} polygons that intersect themselves or are too large, and may look wrong",
+        excerpt(model)
+    )]
     FannedPolygons {
         /// Its name.
         model: String,
@@ -241,7 +250,7 @@ impl ObjWarning {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Line { .. } => "malformed line",
-            Self::NotUtf8 { .. } => "file with lines that are not UTF-8",
+            Self::NotUnicode { .. } => "file with lines that are not Unicode",
             Self::LongLines { .. } => "file with long lines",
             Self::IgnoredStatements { .. } => "file with ignored statements",
             Self::VertexColors { .. } => "vertex colours",

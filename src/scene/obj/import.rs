@@ -38,7 +38,8 @@ pub struct Imported {
 /// - The origin of an object is the centre of its bounding box.
 /// - Polygons are triangulated, including concave ones. Points, lines, free-form surfaces and vertex colours are left out.
 /// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
-///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1 somewhere is blended.
+///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1
+///   somewhere is blended, and casts no shadow.
 /// - A model without normals is shaded flat.
 /// - An emissive mesh (`Ke`) adds a light. There are no other lights, and no cameras.
 /// - What is malformed or not supported is left out, with a warning. Lines may end in LF, CR or both; text may be UTF-8 or

@@ -41,13 +41,14 @@ pub(super) struct TextureStatement {
     pub line: usize,
 }
 
-/// Every material that a library defines. A malformed line is left out, with a warning.
+/// The materials of a library that are used. A malformed line is left out, with a warning.
 ///
 /// # Errors
 /// Never, since the library is in memory.
 pub(super) fn definitions(
     library: &str,
     bytes: &[u8],
+    is_used: impl Fn(&str) -> bool,
     max_line_bytes: u64,
     warnings: &mut Warnings,
 ) -> io::Result<Vec<Definition>> {
@@ -60,6 +61,8 @@ pub(super) fn definitions(
         let mut warn =
             |reason: String| warnings.push(ObjWarning::LibraryLine { library: library.to_owned(), line, reason });
         if keyword == "newmtl" {
+            // A library of many materials may be used for a few.
+            found.pop_if(|definition| !is_used(&definition.name));
             found.push(Definition { name: rest.to_owned(), ..Definition::default() });
             continue;
         }
@@ -94,6 +97,7 @@ pub(super) fn definitions(
             }
         }
     }
+    found.pop_if(|definition| !is_used(&definition.name));
     for Definition { ambient, diffuse, .. } in &found {
         // Ambient light is reflected by the diffuse colour.
         if let Some((color, line)) = ambient
@@ -206,7 +210,8 @@ mod tests {
 
     fn parse(text: &str) -> (Vec<Definition>, Vec<ObjWarning>) {
         let mut warnings = Warnings::new(99);
-        let found = definitions("folder\\a.mtl", text.as_bytes(), 1 << 20, &mut warnings).unwrap();
+        let found =
+            definitions("folder\\a.mtl", text.as_bytes(), |name| name != "unused", 1 << 20, &mut warnings).unwrap();
         (found, warnings.listed)
     }
 
@@ -244,6 +249,8 @@ mod tests {
         }
         let (clamped, warnings) = parse_one("Kd -1 2 0.5");
         assert_eq!((clamped.diffuse, warnings), (Some(Vec3::new(0.0, 1.0, 0.5)), 1));
+        let (found, _) = parse("newmtl unused\nKd 1\nnewmtl used\nKd 1\nnewmtl unused\nKd 1\n");
+        assert_eq!(found.iter().map(|definition| definition.name.as_str()).collect::<Vec<_>>(), ["used"]);
         let (found, warnings) = parse("Kd 1 1 1");
         assert_eq!((found.len(), warnings.len()), (0, 1));
     }

@@ -14,7 +14,7 @@ use std::io;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjLimits {
-    /// The bytes of the OBJ file. Default: 2 GiB.
+    /// The bytes of the OBJ file. While it is imported, a usual one takes some ten times as much memory. Default: 1 GiB.
     pub scene_bytes: u64,
     /// The bytes of one line of an OBJ file or a material library, with the lines that continue it. Longer lines are left
     /// out, with a warning. Default: 32 MiB.
@@ -23,9 +23,9 @@ pub struct ObjLimits {
     pub library_bytes: u64,
     /// The bytes of the file of a texture. Default: 256 MiB.
     pub texture_file_bytes: u64,
-    /// The bytes that a texture takes while it is decoded, which are known before: 4 for each pixel, and where a channel
-    /// has more than 8 bits, those of the file's own format as well. Scaling takes no more. Default: 256 MiB, which is
-    /// enough for the largest [`Texture`](crate::scene::Texture).
+    /// The bytes that a texture takes while it is decoded, which are known before: 4 for each pixel, and besides those of
+    /// the file's own format where a channel has more than 8 bits, and the coefficients of a progressive JPEG. Scaling
+    /// takes no more. Default: 256 MiB, which is enough for the largest [`Texture`](crate::scene::Texture).
     pub texture_bytes: u64,
     /// The bytes that all textures take together when they are decoded, 4 for each pixel. Default: 4 GiB.
     pub all_textures_bytes: u64,
@@ -36,7 +36,7 @@ pub struct ObjLimits {
 impl Default for ObjLimits {
     fn default() -> Self {
         Self {
-            scene_bytes: 2 << 30,
+            scene_bytes: 1 << 30,
             line_bytes: 32 << 20,
             library_bytes: 64 << 20,
             texture_file_bytes: 256 << 20,

@@ -1,6 +1,6 @@
 //! Materials and textures of the scene, from the definitions in libraries.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io;
 
 use glam::Vec3;
@@ -15,7 +15,7 @@ use super::warnings::Warnings;
 use crate::handle::Handle;
 use crate::scene::{Blend, Material, Scene, SceneError, Texture};
 
-/// If at least this share of materials has opacity 0, the exporter wrote transparency as opacity, as 3ds Max does.
+/// If at least this share of the materials that are used has opacity 0, the exporter wrote transparency as opacity, as 3ds Max does.
 const INVERTED_SHARE: f64 = 0.8;
 
 /// Adds the materials that an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default material.
@@ -29,7 +29,8 @@ pub(super) fn add_materials(
     limits: &ObjLimits,
     warnings: &mut Warnings,
 ) -> Result<Vec<Handle<Material>>, SceneError> {
-    let mut libraries = Libraries { fetch, limits, bytes: 0, definitions: Vec::new() };
+    let used = file.materials.iter().map(String::as_str).collect();
+    let mut libraries = Libraries { fetch, limits, used, bytes: 0, definitions: Vec::new() };
     for library in &file.libraries {
         libraries.add(library, warnings);
     }
@@ -58,6 +59,8 @@ pub(super) fn add_materials(
 struct Libraries<'a> {
     fetch: Fetch<'a>,
     limits: &'a ObjLimits,
+    /// The names of the materials that the OBJ file uses.
+    used: HashSet<&'a str>,
     /// The bytes of those that were read.
     bytes: u64,
     definitions: Vec<Definition>,
@@ -69,7 +72,8 @@ impl Libraries<'_> {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
         let definitions = read_one_of(&possible_names("", library), limit, self.fetch).and_then(|(name, bytes)| {
             self.bytes += bytes.len() as u64;
-            library::definitions(&name.name, &bytes, self.limits.line_bytes, warnings)
+            let is_used = |name: &str| self.used.contains(name);
+            library::definitions(&name.name, &bytes, is_used, self.limits.line_bytes, warnings)
         });
         match definitions {
             Ok(definitions) => self.definitions.extend(definitions),

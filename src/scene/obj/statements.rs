@@ -1,8 +1,8 @@
 //! The statements of OBJ and MTL files, read as streams.
 //!
-//! Lines end in LF, CR or both. Text is UTF-8 or, with a byte order mark or recognised by its first character, UTF-16. A line that
-//! is not UTF-8 is read as Latin-1, in which every byte is a character: names in other encodings look wrong, but those of an
-//! OBJ file still match those of its libraries. Control characters are escaped, so that none reaches a terminal.
+//! Lines end in LF, CR or both. Text is UTF-8 or, with a byte order mark or recognised by its first two characters, UTF-16. A
+//! line that is not UTF-8 is read as Latin-1, in which every byte is a character: names in other encodings look wrong, but
+//! those of an OBJ file still match those of its libraries. Control characters are escaped, so that none reaches a terminal.
 
 use std::io::{self, BufRead};
 
@@ -120,7 +120,7 @@ impl<R: BufRead> Statements<R> {
         let file = || file.to_owned();
         let (lines, first_line) = self.not_text;
         if lines > 0 {
-            warnings.push(ObjWarning::NotUtf8 { file: file(), lines, first_line });
+            warnings.push(ObjWarning::NotUnicode { file: file(), lines, first_line });
         }
         let (lines, first_line) = self.too_long;
         if lines > 0 {
@@ -261,7 +261,7 @@ fn push_escaped(text: &mut String, character: char) {
 
 /// The first characters of a text, for messages.
 pub(super) fn excerpt(text: &str) -> String {
-    const MAX_CHARACTERS: usize = 80;
+    const MAX_CHARACTERS: usize = 160;
     match text.char_indices().nth(MAX_CHARACTERS) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
@@ -326,7 +326,7 @@ mod tests {
         // Half a surrogate pair.
         let (found, warnings) = statements(&[0xff, 0xfe, b'o', 0, b' ', 0, 0x3d, 0xd8]);
         assert_eq!(found, [(1, String::from("o \u{fffd}"))]);
-        assert!(matches!(warnings[..], [ObjWarning::NotUtf8 { lines: 1, first_line: 1, .. }]), "{warnings:?}");
+        assert!(matches!(warnings[..], [ObjWarning::NotUnicode { lines: 1, first_line: 1, .. }]), "{warnings:?}");
     }
 
     #[test]
@@ -335,7 +335,7 @@ mod tests {
         let (found, warnings) = statements(b"v 1\n# caf\xe9\no caf\xe9\no \xc3\xa9\nusemtl \x95\\\nv 2");
         let expected = [(1, "v 1"), (3, "o café"), (4, "o é"), (5, "usemtl \\u{95}\\"), (6, "v 2")];
         assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
-        assert!(matches!(warnings[..], [ObjWarning::NotUtf8 { lines: 2, first_line: 3, .. }]), "{warnings:?}");
+        assert!(matches!(warnings[..], [ObjWarning::NotUnicode { lines: 2, first_line: 3, .. }]), "{warnings:?}");
     }
 
     #[test]

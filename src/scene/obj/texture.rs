@@ -23,6 +23,7 @@ pub(super) struct Pixels {
 /// # Errors
 /// Says why it cannot be decoded, or which limit it exceeds.
 pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: Limit) -> Result<Pixels, String> {
+    let coefficients = progressive_components(&file) * 2;
     let mut reader = ImageReader::new(Cursor::new(file));
     // The guess from the contents comes first, but TGA has no magic number.
     if let Ok(format) = ImageFormat::from_path(name) {
@@ -34,9 +35,11 @@ pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: L
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(message)?;
     let (width, height) = decoder.dimensions();
-    let rgba_bytes = (u64::from(width) * u64::from(height)).saturating_mul(4);
+    let pixels = u64::from(width) * u64::from(height);
+    let rgba_bytes = pixels.saturating_mul(4);
     let has_bytes = decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count();
-    let other_bytes = if has_bytes { 0 } else { decoder.total_bytes() };
+    let other_bytes =
+        if has_bytes { 0 } else { decoder.total_bytes() }.saturating_add(pixels.saturating_mul(coefficients));
     while_decoded
         .check(rgba_bytes.saturating_add(other_bytes))
         .map_err(|error| format!("{width}x{height}: {error}"))?;
@@ -56,6 +59,29 @@ pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: L
 
 fn message(error: impl ToString) -> String {
     error.to_string()
+}
+
+/// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
+/// scan is read.
+fn progressive_components(file: &[u8]) -> u64 {
+    let Some(mut segments) = file.strip_prefix(b"\xff\xd8") else {
+        return 0;
+    };
+    loop {
+        match *segments {
+            // The header of a progressive frame: its length, bits, height, width, and number of components.
+            [0xff, 0xc2 | 0xc6 | 0xca | 0xce, _, _, _, _, _, _, _, components, ..] => return u64::from(components),
+            // The first scan.
+            [0xff, 0xda, ..] => return 0,
+            // A fill byte.
+            [0xff, 0xff, ..] => segments = &segments[1..],
+            [0xff, _, high, low, ..] => {
+                let length = usize::from(u16::from_be_bytes([high, low]));
+                segments = segments.get(2 + length..).unwrap_or_default();
+            }
+            _ => return 0,
+        }
+    }
 }
 
 /// Decodes channels of 8 bits into the memory of the result.
@@ -186,19 +212,38 @@ mod tests {
     fn the_size_is_checked_before_decoding() {
         let file = png([30, 20], ExtendedColorType::L8, &[7; 600]);
         assert!(decode_within(file.clone(), 2400).is_ok());
-        let error = decode_within(file.clone(), 2399).unwrap_err();
+        let error = decode_within(file.clone(), 2399).map(drop).unwrap_err();
         assert_eq!(error, "30x20: it takes 2400 bytes or more, and `ObjLimits::texture_bytes` is 2399");
         // Up to the pixels, which are missing.
         let header = file.windows(4).position(|tag| tag == b"IDAT").unwrap() + 4;
-        let error = decode_within(file[..header].to_vec(), 2399).unwrap_err();
+        let error = decode_within(file[..header].to_vec(), 2399).map(drop).unwrap_err();
         assert!(error.contains("texture_bytes"), "{error}");
         let file = png([10, 10], ExtendedColorType::L16, &[7; 200]);
         assert!(decode_within(file.clone(), 600).is_ok() && decode_within(file, 599).is_err());
         // 18 bytes that claim 65,535 × 65,535 pixels.
         let header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 32, 0];
         let limit = Limit::new("texture_bytes", 256 << 20);
-        let error = decode("a.tga", header.to_vec(), limit, limit).unwrap_err();
+        let error = decode("a.tga", header.to_vec(), limit, limit).map(drop).unwrap_err();
         assert!(error.contains("`ObjLimits::texture_bytes` is 268435456"), "{error}");
+    }
+
+    #[test]
+    fn the_coefficients_of_a_progressive_jpeg_count() {
+        let mut file = Vec::new();
+        let encoder = image::codecs::jpeg::JpegEncoder::new(&mut file);
+        encoder.write_image(&[7; 600 * 3], 30, 20, ExtendedColorType::Rgb8).unwrap();
+        assert_eq!(progressive_components(&file), 0);
+        let header = file.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        file[header + 1] = 0xc2;
+        assert_eq!(progressive_components(&file), 3);
+        let error = decode("a.jpg", file.clone(), Limit::new("texture_bytes", 5999), Limit::new("", 9999))
+            .map(drop)
+            .unwrap_err();
+        assert_eq!(error, "30x20: it takes 6000 bytes or more, and `ObjLimits::texture_bytes` is 5999");
+        for end in 0..file.len() {
+            progressive_components(&file[..end]);
+        }
+        assert_eq!(progressive_components(b"\xff\xd8\xff\xe0\0\0\xff\xe0\0\0"), 0);
     }
 
     #[test]
