@@ -8,6 +8,7 @@ mod folder;
 mod fuzz;
 mod geometry;
 mod materials;
+mod mutants;
 mod shared;
 
 use std::process::ExitCode;
@@ -16,8 +17,15 @@ use libtest_mimic::{Arguments, Failed, Trial, run};
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
-    let trials =
-        [shared::trials(), geometry::trials(), materials::trials(), files::trials(), damaged::trials(), fuzz::trials()];
+    let trials = [
+        shared::trials(),
+        geometry::trials(),
+        materials::trials(),
+        files::trials(),
+        damaged::trials(),
+        mutants::trials(),
+        fuzz::trials(),
+    ];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
 

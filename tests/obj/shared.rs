@@ -82,7 +82,7 @@ pub fn trials() -> Vec<Trial> {
     malformed.chain(more).map(|trial| trial.with_ignored_flag(missing)).collect()
 }
 
-fn scenes() -> PathBuf {
+pub fn scenes() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
 }
 

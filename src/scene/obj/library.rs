@@ -41,18 +41,30 @@ pub(super) struct TextureStatement {
     pub line: usize,
 }
 
-/// The materials of a library that are used. A malformed line is left out, with a warning.
+/// What libraries define.
+#[derive(Debug, Default)]
+pub(super) struct Definitions {
+    /// The materials that are used. A library of many materials may be used for a few.
+    pub used: Vec<Definition>,
+    /// The number of all materials with an opacity.
+    pub with_opacity: usize,
+    /// The number of all materials with opacity 0.
+    pub invisible: usize,
+}
+
+/// Adds the materials of a library to others. A malformed line is left out, with a warning.
 ///
 /// # Errors
 /// Never, since the library is in memory.
-pub(super) fn definitions(
+pub(super) fn add_definitions(
+    definitions: &mut Definitions,
     library: &str,
     bytes: &[u8],
     is_used: impl Fn(&str) -> bool,
     max_line_bytes: u64,
     warnings: &mut Warnings,
-) -> io::Result<Vec<Definition>> {
-    let mut found: Vec<Definition> = Vec::new();
+) -> io::Result<()> {
+    let mut current: Option<Definition> = None;
     let mut ignored = IgnoredStatements::default();
     let mut statements = Statements::new(bytes, max_line_bytes)?;
     while let Some((line, statement)) = statements.next()? {
@@ -61,9 +73,8 @@ pub(super) fn definitions(
         let mut warn =
             |reason: String| warnings.push(ObjWarning::LibraryLine { library: library.to_owned(), line, reason });
         if keyword == "newmtl" {
-            // A library of many materials may be used for a few.
-            found.pop_if(|definition| !is_used(&definition.name));
-            found.push(Definition { name: rest.to_owned(), ..Definition::default() });
+            let new = Definition { name: rest.to_owned(), ..Definition::default() };
+            definitions.add(current.replace(new), &is_used, &mut ignored);
             continue;
         }
         if !["Kd", "Ke", "Ka", "d", "Tr", "map_Kd", "map_d"].contains(&keyword) {
@@ -72,7 +83,7 @@ pub(super) fn definitions(
             }
             continue;
         }
-        let Some(definition) = found.last_mut() else {
+        let Some(definition) = &mut current else {
             warn(format!("`{keyword}` before the first `newmtl` was left out"));
             continue;
         };
@@ -97,19 +108,29 @@ pub(super) fn definitions(
             }
         }
     }
-    found.pop_if(|definition| !is_used(&definition.name));
-    for Definition { ambient, diffuse, .. } in &found {
-        // Ambient light is reflected by the diffuse colour.
-        if let Some((color, line)) = ambient
-            && *color != Vec3::ZERO
-            && diffuse != &Some(*color)
-        {
-            ignored.add("Ka", *line);
-        }
-    }
+    definitions.add(current, is_used, &mut ignored);
     ignored.warn(library, warnings);
     statements.warn(library, warnings);
-    Ok(found)
+    Ok(())
+}
+
+impl Definitions {
+    /// Adds a material that is defined as a whole.
+    fn add(&mut self, definition: Option<Definition>, is_used: impl Fn(&str) -> bool, ignored: &mut IgnoredStatements) {
+        let Some(definition) = definition else { return };
+        self.with_opacity += usize::from(definition.opacity.is_some());
+        self.invisible += usize::from(definition.opacity == Some(0.0));
+        // Ambient light is reflected by the diffuse colour.
+        if let Some((color, line)) = definition.ambient
+            && color != Vec3::ZERO
+            && definition.diffuse != Some(color)
+        {
+            ignored.add("Ka", line);
+        }
+        if is_used(&definition.name) {
+            self.used.push(definition);
+        }
+    }
 }
 
 impl Definition {
@@ -210,9 +231,10 @@ mod tests {
 
     fn parse(text: &str) -> (Vec<Definition>, Vec<ObjWarning>) {
         let mut warnings = Warnings::new(99);
-        let found =
-            definitions("folder\\a.mtl", text.as_bytes(), |name| name != "unused", 1 << 20, &mut warnings).unwrap();
-        (found, warnings.listed)
+        let mut found = Definitions::default();
+        let is_used = |name: &str| name != "unused";
+        add_definitions(&mut found, "folder\\a.mtl", text.as_bytes(), is_used, 1 << 20, &mut warnings).unwrap();
+        (found.used, warnings.listed)
     }
 
     fn parse_one(text: &str) -> (Definition, usize) {

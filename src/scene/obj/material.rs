@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::error::ObjWarning;
 use super::files::{Fetch, PossibleName, possible_names, read_one_of};
-use super::library::{self, Definition, TextureStatement};
+use super::library::{self, Definition, Definitions, TextureStatement};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::Preprocessed;
 use super::texture::{self, Pixels};
@@ -15,7 +15,7 @@ use super::warnings::Warnings;
 use crate::handle::Handle;
 use crate::scene::{Blend, Material, Scene, SceneError, Texture};
 
-/// If at least this share of the materials that are used has opacity 0, the exporter wrote transparency as opacity, as 3ds Max does.
+/// If at least this share of materials has opacity 0, the exporter wrote transparency as opacity, as 3ds Max does.
 const INVERTED_SHARE: f64 = 0.8;
 
 /// Adds the materials that an OBJ file uses, in the order of [`Preprocessed::materials`], and last the default material.
@@ -30,14 +30,15 @@ pub(super) fn add_materials(
     warnings: &mut Warnings,
 ) -> Result<Vec<Handle<Material>>, SceneError> {
     let used = file.materials.iter().map(String::as_str).collect();
-    let mut libraries = Libraries { fetch, limits, used, bytes: 0, definitions: Vec::new() };
+    let mut libraries = Libraries { fetch, limits, used, bytes: 0, definitions: Definitions::default() };
     for library in &file.libraries {
         libraries.add(library, warnings);
     }
     let mut definitions = libraries.definitions;
     correct_opacity(&mut definitions, warnings);
     // A later definition of the same name replaces an earlier one.
-    let defined: HashMap<_, _> = definitions.iter().map(|definition| (definition.name.as_str(), definition)).collect();
+    let defined: HashMap<_, _> =
+        definitions.used.iter().map(|definition| (definition.name.as_str(), definition)).collect();
     let mut textures = TextureCache { fetch, limits, decoded_bytes: 0, by_names: HashMap::new() };
     let default = || Material { double_sided: true, ..Material::default() };
     let mut handles = Vec::new();
@@ -63,20 +64,21 @@ struct Libraries<'a> {
     used: HashSet<&'a str>,
     /// The bytes of those that were read.
     bytes: u64,
-    definitions: Vec<Definition>,
+    definitions: Definitions,
 }
 
 impl Libraries<'_> {
     /// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
-        let definitions = read_one_of(&possible_names("", library), limit, self.fetch).and_then(|(name, bytes)| {
+        let read = read_one_of(&possible_names("", library), limit, self.fetch).and_then(|(name, bytes)| {
             self.bytes += bytes.len() as u64;
             let is_used = |name: &str| self.used.contains(name);
-            library::definitions(&name.name, &bytes, is_used, self.limits.line_bytes, warnings)
+            let max_line_bytes = self.limits.line_bytes;
+            library::add_definitions(&mut self.definitions, &name.name, &bytes, is_used, max_line_bytes, warnings)
         });
-        match definitions {
-            Ok(definitions) => self.definitions.extend(definitions),
+        match read {
+            Ok(()) => {}
             Err(error) if error.kind() == io::ErrorKind::NotFound && library.contains(char::is_whitespace) => {
                 for part in library.split_whitespace() {
                     self.add(part, warnings);
@@ -89,12 +91,11 @@ impl Libraries<'_> {
     }
 }
 
-fn correct_opacity(definitions: &mut [Definition], warnings: &mut Warnings) {
-    let materials = definitions.iter().filter(|definition| definition.opacity.is_some()).count();
-    let invisible = definitions.iter().filter(|definition| definition.opacity == Some(0.0)).count();
-    if invisible > 0 && invisible as f64 >= INVERTED_SHARE * materials as f64 {
-        warnings.push(ObjWarning::InvertedOpacity { invisible, materials });
-        definitions.iter_mut().for_each(|definition| definition.opacity = None);
+fn correct_opacity(definitions: &mut Definitions, warnings: &mut Warnings) {
+    let Definitions { used, with_opacity: materials, invisible } = definitions;
+    if *invisible > 0 && *invisible as f64 >= INVERTED_SHARE * *materials as f64 {
+        warnings.push(ObjWarning::InvertedOpacity { invisible: *invisible, materials: *materials });
+        used.iter_mut().for_each(|definition| definition.opacity = None);
     }
 }
 
