@@ -26,6 +26,10 @@ pub fn trials() -> Vec<Trial> {
         on_unix("a_device_is_refused", a_device_is_refused),
         on_unix("a_sparse_file_of_10_gb_is_refused", a_sparse_file_is_refused),
         trial("files::every_limit_is_named_with_its_value", every_limit_is_named_with_its_value),
+        trial(
+            "files::a_file_of_one_long_line_is_an_error_that_says_so",
+            a_file_of_one_long_line_is_an_error_that_says_so,
+        ),
         trial("files::libraries_share_a_limit", libraries_share_a_limit),
         trial("files::textures_share_a_limit", textures_share_a_limit),
     ]
@@ -133,6 +137,12 @@ fn every_limit_is_named_with_its_value() {
     let long = ObjLimits { line_bytes: 11, ..default() };
     let warnings = load(folder(), long).unwrap().warnings;
     assert!(matches!(warnings[0], ObjWarning::LongLines { lines: 1, first_line: 1, limit: 11, .. }), "{warnings:?}");
+}
+
+fn a_file_of_one_long_line_is_an_error_that_says_so() {
+    let folder = Folder::new().with("a.obj", vec![0; 1000]);
+    let error = folder.load_within(&ObjLimits { line_bytes: 999, ..ObjLimits::default() }).unwrap_err();
+    assert!(error.to_string().ends_with("line 1: the line has more bytes than `ObjLimits::line_bytes`"), "{error}");
 }
 
 fn libraries_share_a_limit() {

@@ -120,7 +120,11 @@ fn a_texture_is_found() {
         assert!(named(&imported, "one").texture.is_some(), "{statement}: {:?}", imported.warnings);
         assert_eq!(imported.warnings.len(), warnings, "{statement}: {:?}", imported.warnings);
     }
-    // So is a library.
+    // So is a library, also in a list that is longer than the name of a file may be.
+    let list = format!("mtllib my\\ materials.mtl\nmtllib {}b.mtl", "a.mtl ".repeat(99));
+    let folder = Folder::new().with("a.obj", format!("{list}\nusemtl two\n{TRIANGLE}")).with("a.mtl", "newmtl one\n");
+    let folder = folder.with("b.mtl", "newmtl two\nKd 0 1 0").with("my materials.mtl", "newmtl two\nKd 1 0 0");
+    assert_eq!(named(&folder.load().unwrap(), "two").diffuse, Vec3::Y);
     for statement in ["mtllib \"my materials.mtl\"", "mtllib my materials.mtl # all", "mtllib my\\ materials.mtl"] {
         let text = format!("{statement}\nusemtl one\n{TRIANGLE}");
         let imported =

@@ -73,7 +73,12 @@ pub fn load_within(path: impl AsRef<Path>, limits: &ObjLimits) -> Result<Importe
     let reader = files::open(path, Limit::new("scene_bytes", limits.scene_bytes))
         .map_err(|source| ObjError::Unreadable { file: escaped(&file), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    import(&file, BufReader::new(reader), &|name, limit| files::read(&folder.join(name), limit), limits)
+    import(
+        &file,
+        BufReader::with_capacity(1 << 16, reader),
+        &|name, limit| files::read(&folder.join(name), limit),
+        limits,
+    )
 }
 
 /// As [`load`], from bytes that an engine already has. `file` names them in errors; `fetch` reads the `.mtl` files and

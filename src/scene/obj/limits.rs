@@ -14,7 +14,7 @@ use std::io;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjLimits {
-    /// The bytes of the OBJ file. While it is imported, a usual one takes some ten times as much memory. Default: 1 GiB.
+    /// The bytes of the OBJ file. While it is imported, a usual one takes some six times as much memory. Default: 1 GiB.
     pub scene_bytes: u64,
     /// The bytes of one line of an OBJ file or a material library, with the lines that continue it. Longer lines are left
     /// out, with a warning. Default: 32 MiB.

@@ -79,7 +79,7 @@ impl Libraries<'_> {
         });
         match read {
             Ok(()) => {}
-            Err(error) if error.kind() == io::ErrorKind::NotFound && library.contains(char::is_whitespace) => {
+            Err(error) if library.contains(char::is_whitespace) && !is_there(&error) => {
                 for part in library.split_whitespace() {
                     self.add(part, warnings);
                 }
@@ -89,6 +89,12 @@ impl Libraries<'_> {
             }
         }
     }
+}
+
+/// Whether there is a file that cannot be read, of which this is the error.
+fn is_there(error: &io::Error) -> bool {
+    // What exceeds a limit, and what is no regular file.
+    matches!(error.kind(), io::ErrorKind::FileTooLarge | io::ErrorKind::InvalidInput | io::ErrorKind::PermissionDenied)
 }
 
 fn correct_opacity(definitions: &mut Definitions, warnings: &mut Warnings) {

@@ -108,6 +108,10 @@ impl Preprocessed {
             }
         }
         preprocessed.first_binary_line = statements.first_binary_line();
+        if let Some(line) = statements.first_long_line() {
+            let reason = String::from("the line has more bytes than `ObjLimits::line_bytes`");
+            preprocessed.first_malformed.get_or_insert(MalformedLine { line, reason });
+        }
         std::mem::take(&mut preprocessed.ignored).warn(file, warnings);
         statements.warn(file, warnings);
         preprocessed.write_positions();

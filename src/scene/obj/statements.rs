@@ -115,6 +115,12 @@ impl<R: BufRead> Statements<R> {
         (lines > 0).then_some(first)
     }
 
+    /// The first line that is too long.
+    pub(super) fn first_long_line(&self) -> Option<usize> {
+        let (lines, first) = self.too_long;
+        (lines > 0).then_some(first)
+    }
+
     /// Warns about lines that were left out or may be misread.
     pub(super) fn warn(&self, file: &str, warnings: &mut Warnings) {
         let file = || file.to_owned();
@@ -181,7 +187,7 @@ impl<R: BufRead> Statements<R> {
                 continue;
             }
             is_end = false;
-            let end = available.iter().position(|&byte| byte == b'\n' || byte == b'\r');
+            let end = line_end(available);
             let part = &available[..end.unwrap_or(available.len())];
             if (self.bytes.len() + part.len()) as u64 <= self.max_line_bytes {
                 self.bytes.extend_from_slice(part);
@@ -232,6 +238,15 @@ impl<R: BufRead> Statements<R> {
             Err(error) => Err(error),
         }
     }
+}
+
+/// The index of the first LF or CR.
+fn line_end(bytes: &[u8]) -> Option<usize> {
+    let is_end = |byte: u8| byte == b'\n' || byte == b'\r';
+    // Without an early exit, so that it takes a few instructions for all.
+    let has_end = |chunk: &&[u8]| chunk.iter().fold(false, |found, &byte| found | is_end(byte));
+    let skipped = bytes.chunks(64).take_while(|chunk| !has_end(chunk)).map(<[u8]>::len).sum::<usize>();
+    bytes[skipped..].iter().position(|&byte| is_end(byte)).map(|end| skipped + end)
 }
 
 fn count((lines, first): &mut (usize, usize), line: usize) {
@@ -310,6 +325,19 @@ mod tests {
             let units = |to_bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(to_bytes).collect::<Vec<_>>();
             for bytes in [units(u16::to_le_bytes), units(u16::to_be_bytes)] {
                 assert_eq!(statements(&bytes).0, expected, "{end:?} in UTF-16");
+            }
+        }
+    }
+
+    #[test]
+    fn the_end_of_a_line_is_found_wherever_it_is() {
+        for length in 0..200 {
+            assert_eq!(line_end(&vec![b'x'; length]), None);
+            for end in 0..length {
+                let mut bytes = vec![b'x'; length];
+                bytes[end] = b'\r';
+                bytes[length - 1] = if end + 1 < length { b'\n' } else { b'\r' };
+                assert_eq!(line_end(&bytes), Some(end), "{length}");
             }
         }
     }
