@@ -6,6 +6,7 @@
 //!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
 
 mod arguments;
+mod content;
 mod device;
 mod report;
 mod timeline;
@@ -26,6 +27,7 @@ use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use arguments::{Arguments, BackendName};
+use content::Content;
 use device::{Device, NoDevice, WgpuDevice};
 use report::Report;
 
@@ -41,7 +43,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let scene = load_scene(arguments)?;
+    let (scene, content) = load_scene(arguments)?;
     let (report, log) = match arguments.backend {
         Some(BackendName::Null) => {
             let drawn = draw(arguments, BackendName::Null, &scene, |_| NullBackend, NoDevice)?;
@@ -63,6 +65,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             Err(error) => draw_in_software(arguments, BackendName::Software, &scene, Some(&*error))?,
         },
     };
+    let report = report.with_content(content);
     report.print();
     timeline::write_outputs(arguments, &log)?;
     match &arguments.report {
@@ -115,14 +118,13 @@ fn wgpu_backend(
     })
 }
 
-fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
+fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>> {
+    let mut content = Content::default();
     let mut scene = match &arguments.scene {
         None => demo::colonnade()?,
         Some(path) => {
             let mut imported = obj::load(path)?;
-            for warning in &imported.warnings {
-                eprintln!("warning: {warning}");
-            }
+            content = Content::of_file(&imported);
             println!(
                 "{}: {} triangles, and {} degenerate ones left out",
                 path.display(),
@@ -140,13 +142,14 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
         camera.size = arguments.size.0;
     }
     scene.duplicate_objects(arguments.copies as usize);
+    content.count(&scene);
     if arguments.cull_triangles {
         let meshes: Vec<_> = scene.assets().iter::<Mesh>().map(|(handle, mesh)| (handle, mesh.clone())).collect();
         for (handle, mesh) in meshes {
             scene.replace(handle, mesh.with_triangle_culling(true))?;
         }
     }
-    Ok(scene)
+    Ok((scene, content))
 }
 
 /// The results of all frames.

@@ -8,6 +8,7 @@ use drawloom::FrameStatistics;
 use serde::Serialize;
 
 use crate::arguments::{Arguments, BackendName, StrategyName};
+use crate::content::Content;
 
 /// The report on all frames.
 #[derive(Serialize)]
@@ -19,16 +20,25 @@ pub struct Report {
     /// The recording strategy; `None` if it is tuned.
     record: Option<&'static str>,
     objects: usize,
+    content: Content,
     frames: usize,
     views: Vec<View>,
     stages_ms: Stages,
     cpu_ms: Cpu,
-    /// Rejections: what was left out or drawn differently. They are printed, but not in the file.
-    #[serde(skip)]
-    rejections: Vec<String>,
+    /// What was left out or drawn differently, of the median frame.
+    rejections: Vec<Rejections>,
     /// Why the preferred backend did not draw the frames. It is printed, but not in the file.
     #[serde(skip)]
     reason: Option<String>,
+}
+
+/// Rejections of one kind.
+#[derive(Serialize)]
+struct Rejections {
+    kind: &'static str,
+    count: usize,
+    /// The number of the first object, light or material that was rejected.
+    first: usize,
 }
 
 #[derive(Serialize)]
@@ -88,7 +98,11 @@ impl Report {
             triangles: view.culled_triangles.triangles,
             culled_triangles: view.culled_triangles.culled(),
         };
-        let rejections = frame.rejections.iter();
+        let rejections = frame.rejections.iter().map(|rejection| Rejections {
+            kind: rejection.reason.name(),
+            count: rejection.count,
+            first: rejection.first,
+        });
         Self {
             adapter,
             backend: backend.name(),
@@ -96,6 +110,7 @@ impl Report {
             granularity: arguments.granularity.name(),
             record: arguments.record.map(StrategyName::name),
             objects: frame.objects,
+            content: Content::default(),
             frames: measured.len(),
             views: frame.views.iter().map(view).collect(),
             stages_ms: Stages {
@@ -107,16 +122,7 @@ impl Report {
                 submit: milliseconds(frame.stages.submit),
             },
             cpu_ms: Cpu { median: milliseconds(*median), p95: milliseconds(at_share(0.95).0) },
-            rejections: rejections
-                .map(|rejection| {
-                    format!(
-                        "{} × {}, the first is number {}",
-                        rejection.count,
-                        rejection.reason.name(),
-                        rejection.first
-                    )
-                })
-                .collect(),
+            rejections: rejections.collect(),
             reason: None,
         }
     }
@@ -126,6 +132,11 @@ impl Report {
         Self { reason, ..self }
     }
 
+    /// Adds what the scene consists of.
+    pub fn with_content(self, content: Content) -> Self {
+        Self { content, ..self }
+    }
+
     /// As a table.
     pub fn print(&self) {
         let Self { adapter, backend, workers, granularity, objects, frames, .. } = self;
@@ -133,9 +144,10 @@ impl Report {
         println!("drawn by {adapter}{reason}");
         let record = self.record.map_or(String::new(), |record| format!(", {record}"));
         println!("frames   {frames} on {backend}, {workers} workers, {granularity}{record}");
-        println!("objects  {objects}");
-        for rejection in &self.rejections {
-            println!("rejected: {rejection}");
+        let Content { triangles, vertices, .. } = self.content;
+        println!("objects  {objects} of {triangles} triangles and {vertices} vertices");
+        for Rejections { kind, count, first } in &self.rejections {
+            println!("rejected: {count} × {kind}, the first is number {first}");
         }
         println!();
         println!(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::scene::Mesh;
-use drawloom::scene::obj::{self, Imported, ObjError};
+use drawloom::scene::obj::{self, Imported, ObjError, ObjLimits};
 use image::RgbaImage;
 
 /// A temporary folder, which is removed on drop.
@@ -29,6 +29,10 @@ impl Folder {
     pub fn with_image(self, name: &str, image: &RgbaImage) -> Self {
         image.save(self.0.join(name)).unwrap();
         self
+    }
+
+    pub fn load_within(&self, limits: &ObjLimits) -> Result<Imported, ObjError> {
+        obj::load_within(self.0.join("a.obj"), limits)
     }
 
     pub fn load(&self) -> Result<Imported, ObjError> {

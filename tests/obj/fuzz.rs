@@ -10,9 +10,9 @@ use proptest::test_runner::{Config, TestRunner};
 
 use crate::trial;
 
-const FILE: &str = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 1 0 0\nv 0 1 0.5\nv 2 2 -1e3\nvt 0 0\nvt 1 0.5\n\
+pub const FILE: &str = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 1 0 0\nv 0 1 0.5\nv 2 2 -1e3\nvt 0 0\nvt 1 0.5\n\
     vn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nusemtl glow\nf -5//-1 -4//1 -3//1 \\\n -2 5/1\nl 1 2\np 3\n";
-const LIBRARY: &str = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 a.png\nnewmtl glow\nKe 1 1 1\nTr 0\n";
+pub const LIBRARY: &str = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 a.png\nnewmtl glow\nKe 1 1 1\nTr 0\n";
 const SNIPPETS: [&str; 14] = [
     "f 1 2 3\n",
     "f -1 -2 -3\n",

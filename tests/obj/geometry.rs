@@ -155,8 +155,8 @@ fn malformed_lines_are_reported_with_their_number() {
 }
 
 fn a_file_that_is_not_text_is_an_error() {
-    let error = Folder::new().with("a.obj", b"v 0 0 \xff\n").load().unwrap_err();
-    assert!(matches!(error, ObjError::NotText { offset: 6, .. }), "{error}");
+    let error = Folder::new().with("a.obj", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff\n").load().unwrap_err();
+    assert!(matches!(error, ObjError::NotText { line: 1, .. }), "{error}");
     assert!(error.to_string().contains("a.obj"));
     // A byte order mark is allowed.
     assert_eq!(load(&format!("\u{feff}{TRIANGLE}")).triangles, 1);

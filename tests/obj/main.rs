@@ -2,10 +2,13 @@
 //!
 //! Cases that need the shared scenes are ignored if those are missing.
 
+mod damaged;
+mod files;
 mod folder;
 mod fuzz;
 mod geometry;
 mod materials;
+mod mutants;
 mod shared;
 
 use std::process::ExitCode;
@@ -14,7 +17,15 @@ use libtest_mimic::{Arguments, Failed, Trial, run};
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
-    let trials = [shared::trials(), geometry::trials(), materials::trials(), fuzz::trials()];
+    let trials = [
+        shared::trials(),
+        geometry::trials(),
+        materials::trials(),
+        files::trials(),
+        damaged::trials(),
+        mutants::trials(),
+        fuzz::trials(),
+    ];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
 

@@ -16,6 +16,10 @@ pub fn trials() -> Vec<Trial> {
         trial("materials::a_missing_texture_is_reported", a_missing_texture_is_reported),
         trial("materials::a_large_texture_is_scaled_down", a_large_texture_is_scaled_down),
         trial("materials::a_texture_is_shared", a_texture_is_shared),
+        trial("materials::a_texture_is_found_behind_options_quotes_and_comments", a_texture_is_found),
+        trial("materials::a_mask_becomes_the_alpha_of_a_blended_material", a_mask_becomes_the_alpha),
+        trial("materials::a_mask_that_hides_nothing_does_not_blend", a_mask_that_hides_nothing_does_not_blend),
+        trial("materials::d_wins_over_tr", d_wins_over_tr),
         trial("materials::a_missing_library_is_reported", a_missing_library_is_reported),
         trial("materials::an_undefined_material_is_reported", an_undefined_material_is_reported),
         trial("materials::a_colour_of_one_number_is_gray", a_colour_of_one_number_is_gray),
@@ -99,6 +103,92 @@ fn a_texture_is_shared() {
     assert_eq!(named(&imported, "two").diffuse, Vec3::splat(0.5));
 }
 
+fn a_texture_is_found() {
+    for (statement, warnings) in [
+        ("map_Kd a leaf.png", 0),
+        ("map_Kd \"a leaf.png\"", 0),
+        ("map_Kd a leaf.png # from the garden", 0),
+        ("map_Kd a\\ leaf.png", 0),
+        ("map_Kd -s 2 2 2 \"a leaf.png\"", 1),
+        ("map_Kd a leaf.png -s 2 2 2", 1),
+        ("map_Kd -colorspace sRGB leaf.png", 1),
+    ] {
+        let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
+        let folder = Folder::new().with("a.obj", text).with("a.mtl", format!("newmtl one\n{statement}\n"));
+        let folder = folder.with_image("a leaf.png", &red_above_blue()).with_image("leaf.png", &red_above_blue());
+        let imported = folder.load().unwrap();
+        assert!(named(&imported, "one").texture.is_some(), "{statement}: {:?}", imported.warnings);
+        assert_eq!(imported.warnings.len(), warnings, "{statement}: {:?}", imported.warnings);
+    }
+    // So is a library, also in a list that is longer than the name of a file may be.
+    let list = format!("mtllib my\\ materials.mtl\nmtllib {}b.mtl", "a.mtl ".repeat(99));
+    let folder = Folder::new().with("a.obj", format!("{list}\nusemtl two\n{TRIANGLE}")).with("a.mtl", "newmtl one\n");
+    let folder = folder.with("b.mtl", "newmtl two\nKd 0 1 0").with("my materials.mtl", "newmtl two\nKd 1 0 0");
+    assert_eq!(named(&folder.load().unwrap(), "two").diffuse, Vec3::Y);
+    for statement in ["mtllib \"my materials.mtl\"", "mtllib my materials.mtl # all", "mtllib my\\ materials.mtl"] {
+        let text = format!("{statement}\nusemtl one\n{TRIANGLE}");
+        let imported =
+            Folder::new().with("a.obj", text).with("my materials.mtl", "newmtl one\nKd 1 0 0").load().unwrap();
+        assert_eq!((named(&imported, "one").diffuse, imported.warnings), (Vec3::X, vec![]), "{statement}");
+    }
+}
+
+/// The alphas of the texture of material `one`, row by row.
+fn alphas(imported: &Imported) -> Vec<u8> {
+    let texture = imported.scene.assets().get(named(imported, "one").texture.unwrap()).unwrap();
+    texture.pixels().chunks(4).map(|pixel| pixel[3]).collect()
+}
+
+fn load_masked(library: &str, colors: &RgbaImage, mask: &RgbaImage) -> Imported {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", library);
+    folder.with_image("a.png", colors).with_image("mask.png", mask).load().unwrap()
+}
+
+fn a_mask_becomes_the_alpha() {
+    let gray = RgbaImage::from_fn(1, 2, |_, y| Rgba([[40, 40, 40, 255], [255; 4]][y as usize]));
+    let alpha = RgbaImage::from_fn(4, 4, |x, _| Rgba([9, 9, 9, if x < 2 { 0 } else { 200 }]));
+    let both = "newmtl one\nmap_Kd a.png\nmap_d mask.png\n";
+    for (mask, expected) in [(&gray, [40, 40, 255, 255]), (&alpha, [0, 200, 0, 200])] {
+        let imported = load_masked(both, &red_above_blue(), mask);
+        let material = named(&imported, "one");
+        assert_eq!((material.blend, material.opacity, material.diffuse), (Blend::Alpha, 1.0, Vec3::ONE));
+        assert_eq!(alphas(&imported), expected);
+        let texture = imported.scene.assets().get(material.texture.unwrap()).unwrap();
+        assert_eq!(texture.pixels()[..3], [255, 0, 0]);
+        assert_eq!(imported.warnings, []);
+    }
+    // Without colours, or if they cannot be used.
+    let alone = load_masked("newmtl one\nKd 0 1 0\nmap_d mask.png\n", &gray, &gray);
+    assert_eq!((named(&alone, "one").diffuse, alphas(&alone)), (Vec3::Y, vec![40, 255]));
+    let colors_missing = load_masked("newmtl one\nKd 0 1 0\nmap_Kd no.png\nmap_d mask.png\n", &gray, &gray);
+    assert_eq!((named(&colors_missing, "one").diffuse, alphas(&colors_missing)), (Vec3::Y, vec![40, 255]));
+    assert_eq!(colors_missing.warnings.len(), 1);
+}
+
+fn a_mask_that_hides_nothing_does_not_blend() {
+    let both = "newmtl one\nmap_Kd a.png\nmap_d mask.png\n";
+    let white = RgbaImage::from_pixel(2, 2, Rgba([255; 4]));
+    let imported = load_masked(both, &red_above_blue(), &white);
+    assert_eq!((named(&imported, "one").blend, imported.warnings), (Blend::None, vec![]));
+    let black = RgbaImage::from_pixel(2, 2, Rgba([0, 0, 0, 255]));
+    let imported = load_masked(both, &red_above_blue(), &black);
+    assert_eq!(imported.warnings, [ObjWarning::InvisibleMaterial { material: String::from("one") }]);
+    let imported = load_masked(&both.replace("mask.png", "no.png"), &red_above_blue(), &black);
+    assert_eq!(named(&imported, "one").blend, Blend::None);
+    assert!(matches!(&imported.warnings[..], [ObjWarning::UnusableTexture { texture, .. }] if texture == "no.png"));
+}
+
+fn d_wins_over_tr() {
+    let library = "newmtl one\nd 1\nTr 1\nnewmtl two\nd 0.5\nTr 0.5\n";
+    let (material, imported) = load_material(library);
+    assert_eq!((material.opacity, material.blend), (1.0, Blend::None));
+    let [ObjWarning::LibraryLine { line: 3, reason, .. }] = &imported.warnings[..] else {
+        panic!("{:?}", imported.warnings);
+    };
+    assert_eq!(reason, "`Tr 1` contradicts `d 1` and was left out");
+}
+
 fn a_missing_library_is_reported() {
     let imported = load(&format!("mtllib no.mtl\n{TRIANGLE}"));
     let [ObjWarning::MissingLibrary { library, .. }] = &imported.warnings[..] else {
@@ -137,7 +227,7 @@ fn opacity_0_everywhere_is_treated_as_opaque() {
 fn opacity_0_of_one_material_is_kept() {
     let (material, imported) = load_material("newmtl one\nd 0\nnewmtl two\nd 1\n");
     assert_eq!((material.opacity, material.blend), (0.0, Blend::Alpha));
-    assert_eq!(imported.warnings, []);
+    assert_eq!(imported.warnings, [ObjWarning::InvisibleMaterial { material: String::from("one") }]);
     let (material, _) = load_material("newmtl one\nTr 0.25\n");
     assert_eq!((material.opacity, material.blend), (0.75, Blend::Alpha));
 }

@@ -1,14 +1,17 @@
 //! Errors and warnings about OBJ files.
 
+use std::fmt::{self, Display, Formatter};
 use std::io;
 
+use super::statements::excerpt;
 use crate::scene::SceneError;
 
 /// Why an OBJ file could not be loaded. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjError {
-    /// The file is missing, is a directory, or may not be read.
+    /// The file is missing, is no regular file, is larger than [`ObjLimits::scene_bytes`](super::ObjLimits::scene_bytes)
+    /// (then the error has the kind [`io::ErrorKind::FileTooLarge`]), or may not be read.
     #[error("cannot read `{file}`: {source}")]
     Unreadable {
         /// The file.
@@ -16,20 +19,20 @@ pub enum ObjError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file is not UTF-8 text.
-    #[error("`{file}` is not UTF-8 text: byte {offset} is invalid")]
+    /// The file has nothing to draw, and is not text.
+    #[error("`{file}` has no triangle to draw, and line {line} is not text")]
     NotText {
         /// The file.
         file: String,
-        /// The first invalid byte, counted from 0.
-        offset: usize,
+        /// The first line that is not Unicode, counted from 1.
+        line: usize,
     },
-    /// A malformed line.
-    #[error("`{file}`, line {line}: {reason}")]
+    /// The file has nothing to draw, and a malformed line may be why.
+    #[error("`{file}` has no triangle to draw; line {line}: {reason}")]
     Malformed {
         /// The file.
         file: String,
-        /// The line, counted from 1.
+        /// The first malformed line, counted from 1.
         line: usize,
         /// Why it is malformed.
         reason: String,
@@ -70,8 +73,77 @@ pub enum ObjError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjWarning {
+    /// A line of the OBJ file that was left out or changed. A malformed vertex, normal or pair of texture coordinates still
+    /// counts where faces refer to it by number.
+    #[error("line {line}: {reason}")]
+    Line {
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it, and what was done about it.
+        reason: String,
+    },
+    /// Lines of the OBJ file or a material library that are not Unicode: invalid UTF-8, of which each byte was read as a
+    /// character of Latin-1, or invalid UTF-16.
+    #[error(
+        "`{}`: {lines} lines are not Unicode, and names in them may look wrong; the first is line {first_line}",
+        excerpt(file)
+    )]
+    NotUnicode {
+        /// The file.
+        file: String,
+        /// The number of lines.
+        lines: usize,
+        /// The first of them, counted from 1.
+        first_line: usize,
+    },
+    /// Lines of the OBJ file or a material library that are longer than
+    /// [`ObjLimits::line_bytes`](super::ObjLimits::line_bytes). They were left out.
+    #[error(
+        "`{}`: {lines} lines have more than {limit} bytes (`ObjLimits::line_bytes`) and were left out, the first is line \
+         {first_line}",
+        excerpt(file)
+    )]
+    LongLines {
+        /// The file.
+        file: String,
+        /// The number of lines.
+        lines: usize,
+        /// The first of them, counted from 1.
+        first_line: usize,
+        /// The limit in bytes.
+        limit: u64,
+    },
+    /// Statements of the OBJ file or a material library that are unknown, or that say what is not drawn. Those whose values
+    /// change nothing, such as a black `Ks`, are not listed.
+    #[error("`{}`: {} left out", excerpt(file), Keywords(keywords, *others))]
+    IgnoredStatements {
+        /// The file.
+        file: String,
+        /// The first keywords of such statements.
+        keywords: Vec<IgnoredKeyword>,
+        /// The number of statements with other keywords.
+        others: usize,
+    },
+    /// Vertices with a colour, which is not drawn.
+    #[error("{vertices} vertices have a colour, which is not drawn")]
+    VertexColors {
+        /// Their number.
+        vertices: usize,
+    },
+    /// Faces of a smoothing group without normals. They are shaded flat.
+    #[error("{faces} faces of smoothing groups have no normals and are shaded flat")]
+    NotSmoothed {
+        /// Their number.
+        faces: usize,
+    },
+    /// A material that is used and has opacity 0.
+    #[error("material `{}` has opacity 0: what it covers is invisible", excerpt(material))]
+    InvisibleMaterial {
+        /// Its name.
+        material: String,
+    },
     /// A `.mtl` file that cannot be read. Its materials are then undefined.
-    #[error("material library `{library}` cannot be read: {reason}")]
+    #[error("material library `{}` cannot be read: {reason}", excerpt(library))]
     MissingLibrary {
         /// Its name in the OBJ file.
         library: String,
@@ -79,7 +151,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A line of a `.mtl` file that was left out or changed.
-    #[error("material library `{library}`, line {line}: {reason}")]
+    #[error("material library `{}`, line {line}: {reason}", excerpt(library))]
     LibraryLine {
         /// Its name in the OBJ file.
         library: String,
@@ -89,7 +161,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A material that is used but not defined. Objects that use it get the default material.
-    #[error("material `{material}` is not defined and was replaced by the default material")]
+    #[error("material `{}` is not defined and was replaced by the default material", excerpt(material))]
     UndefinedMaterial {
         /// Its name in `usemtl`.
         material: String,
@@ -104,7 +176,7 @@ pub enum ObjWarning {
         materials: usize,
     },
     /// A texture that is missing or cannot be decoded. The material keeps its plain colour.
-    #[error("texture `{texture}` of material `{material}` cannot be used: {reason}")]
+    #[error("texture `{}` of material `{}` cannot be used: {reason}", excerpt(texture), excerpt(material))]
     UnusableTexture {
         /// Its path, relative to the OBJ file.
         texture: String,
@@ -114,7 +186,7 @@ pub enum ObjWarning {
         reason: String,
     },
     /// A texture larger than [`Texture::MAX_SIZE`](crate::scene::Texture::MAX_SIZE), which was scaled down to it.
-    #[error("texture `{texture}` of {width}x{height} pixels was scaled down")]
+    #[error("texture `{}` of {width}x{height} pixels was scaled down", excerpt(texture))]
     ScaledTexture {
         /// Its path, relative to the OBJ file.
         texture: String,
@@ -124,7 +196,7 @@ pub enum ObjWarning {
         height: u32,
     },
     /// A model without a triangle that can be drawn.
-    #[error("model `{model}` has no triangle to draw ({degenerate_triangles} degenerate) and was left out")]
+    #[error("model `{}` has no triangle to draw ({degenerate_triangles} degenerate) and was left out", excerpt(model))]
     EmptyModel {
         /// Its name.
         model: String,
@@ -161,11 +233,78 @@ pub enum ObjWarning {
         corners: usize,
     },
     /// Polygons that intersect themselves, or are concave with more than 256 corners. They became triangle fans.
-    #[error("model `{model}` has {polygons} polygons that intersect themselves or are too large, and may look wrong")]
+    #[error(
+        "model `{}` has {polygons} polygons that intersect themselves or are too large, and may look wrong",
+        excerpt(model)
+    )]
     FannedPolygons {
         /// Its name.
         model: String,
         /// Their number.
         polygons: usize,
     },
+}
+
+impl ObjWarning {
+    /// The kind of the warning, in a few words. [`Imported::warning_counts`](super::Imported::warning_counts) counts by it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Line { .. } => "malformed line",
+            Self::NotUnicode { .. } => "file with lines that are not Unicode",
+            Self::LongLines { .. } => "file with long lines",
+            Self::IgnoredStatements { .. } => "file with ignored statements",
+            Self::VertexColors { .. } => "vertex colours",
+            Self::NotSmoothed { .. } => "smoothing groups without normals",
+            Self::InvisibleMaterial { .. } => "invisible material",
+            Self::MissingLibrary { .. } => "missing material library",
+            Self::LibraryLine { .. } => "malformed line of a material library",
+            Self::UndefinedMaterial { .. } => "undefined material",
+            Self::InvertedOpacity { .. } => "inverted opacity",
+            Self::UnusableTexture { .. } => "unusable texture",
+            Self::ScaledTexture { .. } => "scaled texture",
+            Self::EmptyModel { .. } => "model without triangles",
+            Self::NotDrawn { .. } => "points, lines or surfaces",
+            Self::ReplacedNormals { .. } => "replaced normals",
+            Self::ReplacedTextureCoordinates { .. } => "replaced texture coordinates",
+            Self::DanglingCorners { .. } => "corners without normal or texture coordinates",
+            Self::FannedPolygons { .. } => "model with crossing polygons",
+        }
+    }
+}
+
+/// A keyword whose statements were left out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IgnoredKeyword {
+    /// The keyword.
+    pub keyword: String,
+    /// The number of its statements.
+    pub statements: usize,
+    /// The line of the first one, counted from 1.
+    pub first_line: usize,
+}
+
+impl Display for IgnoredKeyword {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        let Self { keyword, statements, first_line } = self;
+        match statements {
+            1 => write!(formatter, "`{keyword}` in line {first_line}"),
+            _ => write!(formatter, "{statements} × `{keyword}` from line {first_line} on"),
+        }
+    }
+}
+
+/// Ignored keywords and the number of statements with others.
+struct Keywords<'a>(&'a [IgnoredKeyword], usize);
+
+impl Display for Keywords<'_> {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        for (index, keyword) in self.0.iter().enumerate() {
+            let separator = if index == 0 { "" } else { ", " };
+            write!(formatter, "{separator}{keyword}")?;
+        }
+        match self.1 {
+            0 => Ok(()),
+            others => write!(formatter, " and {others} statements with other keywords"),
+        }
+    }
 }

@@ -1,24 +1,32 @@
 //! Loading an OBJ file into a scene.
 
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
-use std::{fs, io};
 
 use glam::{DVec3, Vec3};
 
 use super::error::{ObjError, ObjWarning};
+use super::files::{self, Fetch};
 use super::geometry::ModelGeometry;
-use super::preprocessing::Preprocessed;
+use super::limits::{Limit, ObjLimits};
+use super::preprocessing::{MalformedLine, Preprocessed};
+use super::statements::{Statements, escaped};
+use super::warnings::Warnings;
 use super::{emission, material};
 use crate::handle::Handle;
 use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology};
 
 /// A scene from an OBJ file, without cameras.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Imported {
     /// One object, with a mesh of its own, for every material of every model, and a light for every emissive mesh.
     pub scene: Scene,
-    /// What was left out or replaced.
+    /// What was left out or replaced: of each kind, the first [`ObjLimits::warnings`]. Control characters of the files are
+    /// escaped in them.
     pub warnings: Vec<ObjWarning>,
+    /// The number of warnings of each [kind](ObjWarning::kind), with those that are not listed.
+    pub warning_counts: BTreeMap<&'static str, usize>,
     /// The triangles of the scene.
     pub triangles: usize,
     /// Triangles of the file that were left out, because they have no area or are not finite.
@@ -29,10 +37,13 @@ pub struct Imported {
 ///
 /// - The origin of an object is the centre of its bounding box.
 /// - Polygons are triangulated, including concave ones. Points, lines, free-form surfaces and vertex colours are left out.
-/// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke` and `d` or `Tr`
-///   are read; PNG, JPEG, TGA and BMP textures are decoded.
+/// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
+///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1
+///   somewhere is blended, and casts no shadow.
 /// - A model without normals is shaded flat.
 /// - An emissive mesh (`Ke`) adds a light. There are no other lights, and no cameras.
+/// - What is malformed or not supported is left out, with a warning. Lines may end in LF, CR or both; text may be UTF-8 or
+///   UTF-16, and lines in other encodings are read as Latin-1.
 ///
 /// ```no_run
 /// use drawloom::scene::obj;
@@ -46,18 +57,33 @@ pub struct Imported {
 /// ```
 ///
 /// # Errors
-/// If the file cannot be read, is not UTF-8 text, has a line that cannot be parsed, or has no triangle to draw. Problems
-/// with the files that it names are warnings.
+/// If the file cannot be read or exceeds a limit of [`ObjLimits::default`], or if it has no triangle to draw. Problems with the
+/// files that it names are warnings.
 pub fn load(path: impl AsRef<Path>) -> Result<Imported, ObjError> {
+    load_within(path, &ObjLimits::default())
+}
+
+/// As [`load`], with other limits.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_within(path: impl AsRef<Path>, limits: &ObjLimits) -> Result<Imported, ObjError> {
     let path = path.as_ref();
     let file = path.display().to_string();
-    let bytes = fs::read(path).map_err(|source| ObjError::Unreadable { file: file.clone(), source })?;
+    let reader = files::open(path, Limit::new("scene_bytes", limits.scene_bytes))
+        .map_err(|source| ObjError::Unreadable { file: escaped(&file), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    read(&file, &bytes, |name| fs::read(folder.join(name)))
+    import(
+        &file,
+        BufReader::with_capacity(1 << 16, reader),
+        &|name, limit| files::read(&folder.join(name), limit),
+        limits,
+    )
 }
 
 /// As [`load`], from bytes that an engine already has. `file` names them in errors; `fetch` reads the `.mtl` files and
-/// textures, by their paths relative to the OBJ file, with `/` between folders.
+/// textures, by their paths relative to the OBJ file, with `/` between folders. It is asked for several names where it is not
+/// clear which one is meant.
 ///
 /// ```
 /// use std::io;
@@ -73,28 +99,57 @@ pub fn load(path: impl AsRef<Path>) -> Result<Imported, ObjError> {
 /// # Errors
 /// As [`load`].
 pub fn read(file: &str, bytes: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>) -> Result<Imported, ObjError> {
-    let text = str::from_utf8(bytes)
-        .map_err(|error| ObjError::NotText { file: file.to_owned(), offset: error.valid_up_to() })?;
-    let preprocessed = Preprocessed::new(text).map_err(|bad| ObjError::Malformed {
-        file: file.to_owned(),
-        line: bad.line,
-        reason: bad.reason,
-    })?;
+    read_within(file, bytes, fetch, &ObjLimits::default())
+}
+
+/// As [`read`], with other limits.
+///
+/// # Errors
+/// As [`load`].
+pub fn read_within(
+    file: &str,
+    bytes: &[u8],
+    fetch: impl Fn(&str) -> io::Result<Vec<u8>>,
+    limits: &ObjLimits,
+) -> Result<Imported, ObjError> {
+    Limit::new("scene_bytes", limits.scene_bytes)
+        .check(bytes.len() as u64)
+        .map_err(|source| ObjError::Unreadable { file: escaped(file), source })?;
+    let fetch = |name: &str, limit: Limit| {
+        let bytes = fetch(name)?;
+        limit.check(bytes.len() as u64)?;
+        Ok(bytes)
+    };
+    import(file, bytes, &fetch, limits)
+}
+
+fn import(file: &str, reader: impl BufRead, fetch: Fetch<'_>, limits: &ObjLimits) -> Result<Imported, ObjError> {
+    let file = escaped(file);
+    let mut warnings = Warnings::new(limits.warnings);
+    let preprocessed = Statements::new(reader, limits.line_bytes)
+        .and_then(|statements| Preprocessed::new(statements, &file, &mut warnings))
+        .map_err(|source| ObjError::Unreadable { file: file.clone(), source })?;
     let models =
-        parse(&preprocessed).map_err(|error| ObjError::Refused { file: file.to_owned(), reason: error.to_string() })?;
-    let mut imported = Imported { scene: Scene::new(), warnings: Vec::new(), triangles: 0, degenerate_triangles: 0 };
+        parse(&preprocessed).map_err(|error| ObjError::Refused { file: file.clone(), reason: error.to_string() })?;
+    let mut imported = Imported::default();
     imported
-        .fill(&models, &preprocessed, &fetch)
-        .map_err(|source| ObjError::Scene { file: file.to_owned(), source })?;
+        .fill(&models, &preprocessed, fetch, limits, &mut warnings)
+        .map_err(|source| ObjError::Scene { file: file.clone(), source })?;
     if imported.triangles == 0 {
-        return Err(ObjError::NoTriangles {
-            file: file.to_owned(),
-            degenerate_triangles: imported.degenerate_triangles,
-            points: preprocessed.points,
-            lines: preprocessed.lines,
-        });
+        return Err(nothing_to_draw(file, preprocessed, imported.degenerate_triangles));
     }
+    (imported.warnings, imported.warning_counts) = (warnings.listed, warnings.counts);
     Ok(imported)
+}
+
+/// The error of a file without a triangle, with the likeliest reason.
+fn nothing_to_draw(file: String, preprocessed: Preprocessed, degenerate_triangles: usize) -> ObjError {
+    let Preprocessed { first_malformed, first_binary_line, points, lines, .. } = preprocessed;
+    match (first_binary_line, first_malformed) {
+        (Some(line), _) => ObjError::NotText { file, line },
+        (None, Some(MalformedLine { line, reason })) => ObjError::Malformed { file, line, reason },
+        (None, None) => ObjError::NoTriangles { file, degenerate_triangles, points, lines },
+    }
 }
 
 /// Parses the text with tobj: a model for every run of faces with one name and one material. Polygons are not triangulated.
@@ -114,11 +169,14 @@ fn parse(file: &Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
 /// Warnings about what preprocessing replaced or left out.
 fn warnings_of(file: &Preprocessed) -> impl Iterator<Item = ObjWarning> {
     let Preprocessed { points, lines, surfaces, bad_normals, bad_texture_coordinates, dangling_corners, .. } = *file;
+    let Preprocessed { colored_vertices, unsmoothed_faces, .. } = *file;
     [
         (points + lines + surfaces, ObjWarning::NotDrawn { points, lines, surfaces }),
         (bad_normals, ObjWarning::ReplacedNormals { normals: bad_normals }),
         (bad_texture_coordinates, ObjWarning::ReplacedTextureCoordinates { coordinates: bad_texture_coordinates }),
         (dangling_corners, ObjWarning::DanglingCorners { corners: dangling_corners }),
+        (colored_vertices, ObjWarning::VertexColors { vertices: colored_vertices }),
+        (unsmoothed_faces, ObjWarning::NotSmoothed { faces: unsmoothed_faces }),
     ]
     .into_iter()
     .filter_map(|(count, warning)| (count > 0).then_some(warning))
@@ -129,14 +187,16 @@ impl Imported {
         &mut self,
         models: &[tobj::Model],
         file: &Preprocessed,
-        fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
+        fetch: Fetch<'_>,
+        limits: &ObjLimits,
+        warnings: &mut Warnings,
     ) -> Result<(), SceneError> {
-        self.warnings.extend(warnings_of(file));
-        let materials = material::add_materials(&mut self.scene, file, fetch, &mut self.warnings)?;
+        warnings_of(file).for_each(|warning| warnings.push(warning));
+        let materials = material::add_materials(&mut self.scene, file, fetch, limits, warnings)?;
         let mut emissive = Vec::new();
         for model in models {
             let geometry = ModelGeometry::new(&model.mesh);
-            self.report(&model.name, &geometry);
+            self.report(&model.name, &geometry, warnings);
             if geometry.indices.is_empty() {
                 continue;
             }
@@ -175,15 +235,15 @@ impl Imported {
         self.scene.lights.extend(lights);
     }
 
-    fn report(&mut self, model: &str, geometry: &ModelGeometry) {
+    fn report(&mut self, model: &str, geometry: &ModelGeometry, warnings: &mut Warnings) {
         let model = model.to_owned();
         let degenerate_triangles = geometry.degenerate_triangles;
         self.degenerate_triangles += degenerate_triangles;
         if geometry.indices.is_empty() {
-            self.warnings.push(ObjWarning::EmptyModel { model: model.clone(), degenerate_triangles });
+            warnings.push(ObjWarning::EmptyModel { model: model.clone(), degenerate_triangles });
         }
         if geometry.fanned_polygons > 0 {
-            self.warnings.push(ObjWarning::FannedPolygons { model, polygons: geometry.fanned_polygons });
+            warnings.push(ObjWarning::FannedPolygons { model, polygons: geometry.fanned_polygons });
         }
     }
 }

@@ -3,10 +3,15 @@
 //! tobj does not parse them, because it rejects a whole library for one malformed line without naming the line, and panics on
 //! a colour of one number, which the format allows.
 
+use std::io;
+
 use glam::Vec3;
 
 use super::error::ObjWarning;
-use super::preprocessing::statements;
+use super::files::{PossibleName, possible_names};
+use super::ignored::IgnoredStatements;
+use super::statements::{Statements, excerpt};
+use super::warnings::Warnings;
 
 /// A material as its library defines it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,43 +19,147 @@ pub(super) struct Definition {
     pub name: String,
     pub diffuse: Option<Vec3>,
     pub emission: Vec3,
-    /// 1 is opaque.
+    /// 1 is opaque. `d` where there is one, else 1 − `Tr`.
     pub opacity: Option<f32>,
-    /// Relative to the OBJ file.
-    pub texture: Option<String>,
+    /// `map_Kd`.
+    pub texture: Option<TextureStatement>,
+    /// `map_d`.
+    pub mask: Option<TextureStatement>,
+    dissolve: Option<f32>,
+    transparency: Option<f32>,
+    /// `Ka`, and its line.
+    ambient: Option<(Vec3, usize)>,
 }
 
-/// Every material that `text` defines. A malformed line is left out, with a warning.
-pub(super) fn definitions(library: &str, text: &str, warnings: &mut Vec<ObjWarning>) -> Vec<Definition> {
-    let mut found: Vec<Definition> = Vec::new();
-    for (line, statement) in statements(text) {
-        let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((&statement, ""));
+/// A statement that names a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TextureStatement {
+    /// The names that its file may have, relative to the OBJ file, the likeliest first. There is at least one.
+    pub names: Vec<PossibleName>,
+    pub library: String,
+    /// Counted from 1.
+    pub line: usize,
+}
+
+/// What libraries define.
+#[derive(Debug, Default)]
+pub(super) struct Definitions {
+    /// The materials that are used. A library of many materials may be used for a few.
+    pub used: Vec<Definition>,
+    /// The number of all materials with an opacity.
+    pub with_opacity: usize,
+    /// The number of all materials with opacity 0.
+    pub invisible: usize,
+}
+
+/// Adds the materials of a library to others. A malformed line is left out, with a warning.
+///
+/// # Errors
+/// Never, since the library is in memory.
+pub(super) fn add_definitions(
+    definitions: &mut Definitions,
+    library: &str,
+    bytes: &[u8],
+    is_used: impl Fn(&str) -> bool,
+    max_line_bytes: u64,
+    warnings: &mut Warnings,
+) -> io::Result<()> {
+    let mut current: Option<Definition> = None;
+    let mut ignored = IgnoredStatements::default();
+    let mut statements = Statements::new(bytes, max_line_bytes)?;
+    while let Some((line, statement)) = statements.next()? {
+        let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();
         let mut warn =
             |reason: String| warnings.push(ObjWarning::LibraryLine { library: library.to_owned(), line, reason });
         if keyword == "newmtl" {
-            found.push(Definition { name: rest.to_owned(), ..Definition::default() });
+            let new = Definition { name: rest.to_owned(), ..Definition::default() };
+            definitions.add(current.replace(new), &is_used, &mut ignored);
             continue;
         }
-        if !["Kd", "Ke", "d", "Tr", "map_Kd"].contains(&keyword) {
+        if !["Kd", "Ke", "Ka", "d", "Tr", "map_Kd", "map_d"].contains(&keyword) {
+            if !changes_nothing(keyword, rest) {
+                ignored.add(keyword, line);
+            }
             continue;
         }
-        let Some(definition) = found.last_mut() else {
+        let Some(definition) = &mut current else {
             warn(format!("`{keyword}` before the first `newmtl` was left out"));
             continue;
         };
         match keyword {
             "Kd" => definition.diffuse = color(rest, 1.0, &mut warn).or(definition.diffuse),
             "Ke" => definition.emission = color(rest, f32::MAX, &mut warn).unwrap_or(definition.emission),
-            "d" => definition.opacity = opacity(rest, &mut warn).or(definition.opacity),
-            "Tr" => {
-                definition.opacity =
-                    opacity(rest, &mut warn).map(|transparency| 1.0 - transparency).or(definition.opacity)
+            "Ka" => definition.ambient = color(rest, 1.0, &mut |_| ()).map(|color| (color, line)),
+            "d" => {
+                definition.dissolve = opacity(rest, &mut warn).or(definition.dissolve);
+                definition.resolve_opacity(&mut warn);
             }
-            _ => definition.texture = texture(library, rest, &mut warn).or(definition.texture.take()),
+            "Tr" => {
+                definition.transparency = opacity(rest, &mut warn).or(definition.transparency);
+                definition.resolve_opacity(&mut warn);
+            }
+            _ => {
+                let names = texture(library, rest, &mut warn);
+                let slot = if keyword == "map_Kd" { &mut definition.texture } else { &mut definition.mask };
+                if let Some(names) = names {
+                    *slot = Some(TextureStatement { names, library: library.to_owned(), line });
+                }
+            }
         }
     }
-    found
+    definitions.add(current, is_used, &mut ignored);
+    ignored.warn(library, warnings);
+    statements.warn(library, warnings);
+    Ok(())
+}
+
+impl Definitions {
+    /// Adds a material that is defined as a whole.
+    fn add(&mut self, definition: Option<Definition>, is_used: impl Fn(&str) -> bool, ignored: &mut IgnoredStatements) {
+        let Some(definition) = definition else { return };
+        self.with_opacity += usize::from(definition.opacity.is_some());
+        self.invisible += usize::from(definition.opacity == Some(0.0));
+        // Ambient light is reflected by the diffuse colour.
+        if let Some((color, line)) = definition.ambient
+            && color != Vec3::ZERO
+            && definition.diffuse != Some(color)
+        {
+            ignored.add("Ka", line);
+        }
+        if is_used(&definition.name) {
+            self.used.push(definition);
+        }
+    }
+}
+
+impl Definition {
+    /// Computes the opacity from `d` and `Tr`, of which programs write either or both.
+    fn resolve_opacity(&mut self, warn: &mut impl FnMut(String)) {
+        self.opacity = match (self.dissolve, self.transparency) {
+            (Some(dissolve), Some(transparency)) => {
+                if (1.0 - transparency - dissolve).abs() > 1e-3 {
+                    warn(format!("`Tr {transparency}` contradicts `d {dissolve}` and was left out"));
+                }
+                Some(dissolve)
+            }
+            (dissolve, transparency) => dissolve.or(transparency.map(|transparency| 1.0 - transparency)),
+        };
+    }
+}
+
+/// Whether a statement that is not supported would change nothing, or changes only what another one says, which is not
+/// supported either: `Ns` and `Ni` are details of `Ks` and `illum`.
+fn changes_nothing(keyword: &str, values: &str) -> bool {
+    let mut numbers = values.split_whitespace().map_while(|word| word.parse::<f32>().ok());
+    match keyword {
+        "Ns" | "Ni" => true,
+        "Ks" => numbers.all(|number| number == 0.0),
+        "Tf" => numbers.all(|number| number == 1.0),
+        // Without light, with it, and with highlights, which are those of `Ks`.
+        "illum" => numbers.next().is_some_and(|number| number <= 2.0),
+        _ => false,
+    }
 }
 
 /// A colour: one number for all channels, or one for each, clamped to 0 to `max`.
@@ -63,12 +172,12 @@ fn color(values: &str, max: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> 
         _ => Vec3::NAN,
     };
     if !color.is_finite() {
-        warn(format!("`{values}` is not a colour, and was left out"));
+        warn(format!("`{}` is not a colour, and was left out", excerpt(values)));
         return None;
     }
     let clamped = color.clamp(Vec3::ZERO, Vec3::splat(max));
     if clamped != color {
-        warn(format!("the colour `{values}` was clamped"));
+        warn(format!("the colour `{}` was clamped", excerpt(values)));
     }
     Some(clamped)
 }
@@ -79,14 +188,14 @@ fn opacity(values: &str, warn: &mut impl FnMut(String)) -> Option<f32> {
     match number {
         Some(opacity) if (0.0..=1.0).contains(&opacity) => Some(opacity),
         _ => {
-            warn(format!("`{values}` is not a number from 0 to 1, and was left out"));
+            warn(format!("`{}` is not a number from 0 to 1, and was left out", excerpt(values)));
             None
         }
     }
 }
 
-/// The name of a texture file, which may contain spaces, after options with values.
-fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option<String> {
+/// The names that a texture file may have, after options with values.
+fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option<Vec<PossibleName>> {
     let mut rest = values;
     while rest.starts_with('-') {
         let (option, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
@@ -113,19 +222,30 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
         return None;
     }
     let folder = library.rfind(['/', '\\']).map_or("", |slash| &library[..=slash]);
-    Some(format!("{folder}{rest}").replace('\\', "/"))
+    Some(possible_names(&folder.replace('\\', "/"), rest))
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;
 
+    fn parse(text: &str) -> (Vec<Definition>, Vec<ObjWarning>) {
+        let mut warnings = Warnings::new(99);
+        let mut found = Definitions::default();
+        let is_used = |name: &str| name != "unused";
+        add_definitions(&mut found, "folder\\a.mtl", text.as_bytes(), is_used, 1 << 20, &mut warnings).unwrap();
+        (found.used, warnings.listed)
+    }
+
     fn parse_one(text: &str) -> (Definition, usize) {
-        let mut warnings = Vec::new();
-        let found = definitions("folder\\a.mtl", &format!("newmtl\ta name\t\n{text}"), &mut warnings);
+        let (found, warnings) = parse(&format!("newmtl\ta name\t\n{text}"));
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].name, "a name");
         (found[0].clone(), warnings.len())
+    }
+
+    fn texture_name(text: &str) -> String {
+        parse_one(text).0.texture.unwrap().names[0].name.clone()
     }
 
     #[test]
@@ -135,11 +255,10 @@ mod tests {
         assert_eq!(parse_one("Ke 17 12 4").0.emission, Vec3::new(17.0, 12.0, 4.0));
         assert_eq!(parse_one("Tr 0.25").0.opacity, Some(0.75));
         assert_eq!(parse_one("d -halo 0.25").0.opacity, Some(0.25));
-        assert_eq!(parse_one("map_Kd in\\a file.png").0.texture.as_deref(), Some("folder/in/a file.png"));
-        assert_eq!(parse_one("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), {
-            let texture = Some(String::from("folder/-x.png"));
-            (Definition { name: String::from("a name"), texture, ..Definition::default() }, 3)
-        });
+        assert_eq!(texture_name("map_Kd in\\a file.png"), "folder/in/a file.png");
+        assert_eq!(texture_name("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), "folder/-x.png");
+        assert_eq!(parse_one("map_Kd -s 2 2 -bm 1 -clamp on -x.png").1, 3);
+        assert_eq!(parse_one("map_d a.png").0.mask.unwrap().names[0].name, "folder/a.png");
     }
 
     #[test]
@@ -150,12 +269,48 @@ mod tests {
             assert_eq!((definition.opacity, definition.texture), (None, None), "{bad}");
             assert!(warnings >= 1, "{bad}");
         }
-        assert_eq!(parse_one("Kd -1 2 0.5"), {
-            let diffuse = Some(Vec3::new(0.0, 1.0, 0.5));
-            (Definition { name: String::from("a name"), diffuse, ..Definition::default() }, 1)
-        });
-        let mut warnings = Vec::new();
-        assert!(definitions("a.mtl", "Kd 1 1 1", &mut warnings).is_empty());
-        assert_eq!(warnings.len(), 1);
+        let (clamped, warnings) = parse_one("Kd -1 2 0.5");
+        assert_eq!((clamped.diffuse, warnings), (Some(Vec3::new(0.0, 1.0, 0.5)), 1));
+        let (found, _) = parse("newmtl unused\nKd 1\nnewmtl used\nKd 1\nnewmtl unused\nKd 1\n");
+        assert_eq!(found.iter().map(|definition| definition.name.as_str()).collect::<Vec<_>>(), ["used"]);
+        let (found, warnings) = parse("Kd 1 1 1");
+        assert_eq!((found.len(), warnings.len()), (0, 1));
+    }
+
+    #[test]
+    fn d_wins_over_a_contradicting_tr_in_either_order() {
+        for text in ["d 1\nTr 1", "Tr 1\nd 1"] {
+            let (definition, warnings) = parse_one(text);
+            assert_eq!((definition.opacity, warnings), (Some(1.0), 1), "{text}");
+        }
+        for text in ["d 0.3\nTr 0.7", "Tr 0.7\nd 0.3"] {
+            let (definition, warnings) = parse_one(text);
+            assert_eq!((definition.opacity, warnings), (Some(0.3), 0), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_drawn_is_counted_unless_it_changes_nothing() {
+        let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0\nNs 10\nNi 1.5\nTf 1 1 1\nillum 2";
+        assert_eq!(parse_one(neutral).1, 0);
+        let mut text =
+            format!("newmtl a\n{neutral}\nKs 0 0 1\nnewmtl b\nKa 1 0 0\nKs 1\nillum 3\nTf 0 1 1\nmap_Ke b.png");
+        for index in 0..99 {
+            text += &format!("\nodd{index} 1");
+        }
+        let warnings = parse(&text).1;
+        let [ObjWarning::IgnoredStatements { file, keywords, others }] = &warnings[..] else {
+            panic!("{warnings:?}");
+        };
+        let counts: Vec<_> = keywords[..5].iter().map(ToString::to_string).collect();
+        assert_eq!(file, "folder\\a.mtl");
+        assert_eq!(counts[0], "2 × `Ks` from line 9 on");
+        assert_eq!(counts[1..4], ["`illum` in line 13", "`Tf` in line 14", "`map_Ke` in line 15"]);
+        assert_eq!(keywords.len() + others, 99 + 5);
+        assert!(
+            warnings[0].to_string().ends_with("`odd11` in line 27 and 88 statements with other keywords left out"),
+            "{}",
+            warnings[0]
+        );
     }
 }

@@ -7,6 +7,9 @@ use glam::{DVec2, DVec3};
 /// Ear clipping takes cubic time in the worst case, so it is limited to polygons of this many corners.
 const MAX_EAR_CLIPPING_CORNERS: usize = 256;
 
+/// A polygon with less area than this share of that of its largest part is one whose parts cancel each other.
+const MIN_RELATIVE_AREA: f64 = 1e-9;
+
 /// Triangulates a polygon into `corners.len() - 2` triangles of corner indices, with the winding of the polygon. Returns
 /// false if the triangles may not cover the polygon exactly: it intersects itself, or is concave and too large.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) -> bool {
@@ -80,7 +83,11 @@ fn signed_area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
 fn project(corners: &[DVec3]) -> Vec<DVec2> {
     let origin = corners[0];
     let next = corners.iter().cycle().skip(1);
-    let normal: DVec3 = corners.iter().zip(next).map(|(&from, &to)| (from - origin).cross(to - origin)).sum();
+    let areas = corners.iter().zip(next).map(|(&from, &to)| (from - origin).cross(to - origin));
+    let sum: DVec3 = areas.clone().sum();
+    // The parts of a polygon that intersects itself may cancel each other, and say nothing of its plane then. One part does.
+    let largest = areas.fold(DVec3::ZERO, |one, other| if other.length() > one.length() { other } else { one });
+    let normal = if sum.length() > MIN_RELATIVE_AREA * largest.length() { sum } else { largest };
     let size = normal.abs();
     let to_plane = move |point: DVec3| {
         if size.x >= size.y && size.x >= size.z {
@@ -130,10 +137,16 @@ mod tests {
 
     #[test]
     fn a_self_intersecting_polygon_is_reported() {
-        let bow = [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
-        let mut triangles = Vec::new();
-        assert!(!triangulate(&bow, &mut triangles));
-        assert_eq!(triangles.len(), 2);
+        // The parts of the second one have the same area.
+        for height in [2.0, 1.0] {
+            let bow = [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, height, 0.0)];
+            let turned = bow.map(|point| glam::DQuat::from_rotation_x(0.7) * glam::DQuat::from_rotation_y(0.4) * point);
+            for bow in [bow, turned] {
+                let mut triangles = Vec::new();
+                assert!(!triangulate(&bow, &mut triangles));
+                assert_eq!(triangles.len(), 2);
+            }
+        }
     }
 
     #[test]

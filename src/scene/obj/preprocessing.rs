@@ -9,8 +9,14 @@
 //! - It overflows on some indices.
 
 use std::fmt::Write;
+use std::io::{self, BufRead};
 
 use glam::DVec3;
+
+use super::error::ObjWarning;
+use super::ignored::IgnoredStatements;
+use super::statements::{Statements, excerpt};
+use super::warnings::Warnings;
 
 /// The text for tobj, and what preprocessing took out of it.
 #[derive(Debug, Default)]
@@ -36,6 +42,17 @@ pub(super) struct Preprocessed {
     pub bad_texture_coordinates: usize,
     /// The number of corners that refer to a missing normal or missing texture coordinates.
     pub dangling_corners: usize,
+    /// The number of vertices with a colour, which is left out.
+    pub colored_vertices: usize,
+    /// The number of faces of smoothing groups that have a corner without normal.
+    pub unsmoothed_faces: usize,
+    /// The first malformed line.
+    pub first_malformed: Option<MalformedLine>,
+    /// The first line that is not text.
+    pub first_binary_line: Option<usize>,
+    ignored: IgnoredStatements,
+    /// Whether faces belong to a smoothing group.
+    is_smoothed: bool,
     counts: Counts,
     positions: Vec<DVec3>,
     /// The index of the position of the first corner of the first face.
@@ -65,33 +82,51 @@ const PLACEHOLDERS: &str = "vt 0 1\nvn 0 0 0\n";
 /// coordinates of a land survey.
 const ORIGIN_STEP: f64 = 4096.0;
 
+/// The most bytes of a word that is not a number in which one is looked for.
+const MAX_NUMBER_BYTES: usize = 64;
+
 /// The largest coordinate of an origin. Frames draw nothing as far away, so a vertex farther out is a mistake in the file,
 /// and others are not relative to it.
 const MAX_ORIGIN: f64 = 1e10;
 
 impl Preprocessed {
-    /// Reads the statements of a file.
+    /// Reads the statements of a file. What is malformed is left out, with a warning.
     ///
     /// # Errors
-    /// Returns the first line that is malformed.
-    pub(super) fn new(source: &str) -> Result<Self, MalformedLine> {
+    /// If reading fails.
+    pub(super) fn new(
+        mut statements: Statements<impl BufRead>,
+        file: &str,
+        warnings: &mut Warnings,
+    ) -> io::Result<Self> {
         let mut preprocessed = Self { text: String::from(PLACEHOLDERS), ..Self::default() };
-        for (line, statement) in statements(source) {
-            preprocessed.statement(&statement).map_err(|reason| MalformedLine { line, reason })?;
+        while let Some((line, statement)) = statements.next()? {
+            let mut warn = |reason: String| warnings.push(ObjWarning::Line { line, reason });
+            if let Err(reason) = preprocessed.statement(line, statement, &mut warn) {
+                preprocessed.first_malformed.get_or_insert_with(|| MalformedLine { line, reason: reason.clone() });
+                warn(format!("{reason}; the line was left out"));
+            }
         }
+        preprocessed.first_binary_line = statements.first_binary_line();
+        if let Some(line) = statements.first_long_line() {
+            let reason = String::from("the line has more bytes than `ObjLimits::line_bytes`");
+            preprocessed.first_malformed.get_or_insert(MalformedLine { line, reason });
+        }
+        std::mem::take(&mut preprocessed.ignored).warn(file, warnings);
+        statements.warn(file, warnings);
         preprocessed.write_positions();
         Ok(preprocessed)
     }
 
-    fn statement(&mut self, statement: &str) -> Result<(), String> {
+    fn statement(&mut self, line: usize, statement: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
         let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();
         // Names may contain `#`; numbers are followed by comments.
         let values = rest.split_once('#').map_or(rest, |(values, _)| values);
         match keyword {
-            "v" => self.position(values),
-            "vt" => self.texture_coordinates(values),
-            "vn" => self.normal(values),
+            "v" => self.position(values, warn),
+            "vt" => self.texture_coordinates(values, warn),
+            "vn" => self.normal(values, warn),
             "f" => self.face(values),
             "p" => {
                 self.points += values.split_whitespace().count();
@@ -124,24 +159,48 @@ impl Preprocessed {
                 }
                 Ok(())
             }
-            _ => Ok(()),
+            "s" => {
+                self.is_smoothed = !matches!(values.trim(), "off" | "0" | "");
+                Ok(())
+            }
+            // Parts of curves and surfaces, which are counted.
+            "vp" | "cstype" | "deg" | "bmat" | "step" | "parm" | "trim" | "hole" | "scrv" | "sp" | "con" | "end" => {
+                Ok(())
+            }
+            _ => {
+                self.ignored.add(keyword, line);
+                Ok(())
+            }
         }
     }
 
+    /// The numbers of a statement. A word that only starts with a number counts as that number, as in other programs.
+    fn numbers(values: &str, warn: &mut impl FnMut(String)) -> Result<Vec<f64>, String> {
+        let number = |word| match number(word) {
+            Some((number, true)) => Ok(number),
+            Some((number, false)) => {
+                warn(format!("`{}` is not a number and was read as {number}", excerpt(word)));
+                Ok(number)
+            }
+            None => Err(format!("`{}` is not a number", excerpt(word))),
+        };
+        values.split_whitespace().map(number).collect()
+    }
+
     /// Three coordinates. A fourth number is a weight, which divides them; further numbers are a colour.
-    fn position(&mut self, values: &str) -> Result<(), String> {
-        let numbers = numbers(values)?;
-        let [x, y, z, ..] = numbers[..] else {
-            return Err(format!("a vertex needs 3 coordinates and has {}", numbers.len()));
-        };
-        let position = match numbers[..] {
-            [_, _, _, 0.0] => return Err(String::from("a vertex has the weight 0")),
-            [_, _, _, weight] => DVec3::new(x, y, z) / weight,
-            _ => DVec3::new(x, y, z),
-        };
-        self.positions.push(position);
+    fn position(&mut self, values: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
+        let numbers = Self::numbers(values, warn);
+        self.colored_vertices += usize::from(numbers.as_ref().is_ok_and(|numbers| numbers.len() >= 6));
+        let position = numbers.and_then(|numbers| match numbers[..] {
+            [_, _, _, 0.0] => Err(String::from("a vertex has the weight 0")),
+            [x, y, z, weight] => Ok(DVec3::new(x, y, z) / weight),
+            [x, y, z, ..] => Ok(DVec3::new(x, y, z)),
+            _ => Err(format!("a vertex needs 3 coordinates and has {}", numbers.len())),
+        });
+        // Faces count a malformed vertex as well. Triangles that have it as a corner are left out.
+        self.positions.push(*position.as_ref().unwrap_or(&DVec3::NAN));
         self.counts.positions += 1;
-        Ok(())
+        position.map(drop)
     }
 
     /// Writes the positions at the start of the text, relative to an origin near the first corner of a face. Vertices that no
@@ -159,53 +218,63 @@ impl Preprocessed {
         self.text.insert_str(0, &text);
     }
 
-    fn texture_coordinates(&mut self, values: &str) -> Result<(), String> {
-        let numbers = numbers(values)?;
-        let [u, ..] = numbers[..] else {
-            return Err(String::from("texture coordinates need a number and have none"));
-        };
-        let v = numbers.get(1).copied().unwrap_or(0.0);
+    fn texture_coordinates(&mut self, values: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
+        let numbers = Self::numbers(values, warn);
+        let coordinates = numbers.and_then(|numbers| match numbers[..] {
+            [u, v, ..] => Ok([u, v]),
+            [u] => Ok([u, 0.0]),
+            [] => Err(String::from("texture coordinates need a number and have none")),
+        });
+        let [u, v] = *coordinates.as_ref().unwrap_or(&[0.0, 1.0]);
         // Checked as f32, the type of the result.
         let is_finite = (u as f32).is_finite() && (v as f32).is_finite();
         self.bad_texture_coordinates += usize::from(!is_finite);
         self.counts.texture_coordinates += 1;
         let [u, v] = if is_finite { [u, v] } else { [0.0, 1.0] };
         self.emit(format_args!("vt {u:e} {v:e}"));
-        Ok(())
+        coordinates.map(drop)
     }
 
-    fn normal(&mut self, values: &str) -> Result<(), String> {
-        let numbers = numbers(values)?;
-        let [x, y, z, ..] = numbers[..] else {
-            return Err(format!("a normal needs 3 numbers and has {}", numbers.len()));
-        };
-        let normal = DVec3::new(x, y, z).try_normalize();
-        self.bad_normals += usize::from(normal.is_none());
+    fn normal(&mut self, values: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
+        let numbers = Self::numbers(values, warn);
+        let given = numbers.and_then(|numbers| match numbers[..] {
+            [x, y, z, ..] => Ok(DVec3::new(x, y, z)),
+            _ => Err(format!("a normal needs 3 numbers and has {}", numbers.len())),
+        });
+        let normal = given.as_ref().ok().and_then(|given| given.try_normalize());
+        self.bad_normals += usize::from(given.is_ok() && normal.is_none());
         self.counts.normals += 1;
         let DVec3 { x, y, z } = normal.unwrap_or_default();
         self.emit(format_args!("vn {x:e} {y:e} {z:e}"));
-        Ok(())
+        given.map(drop)
     }
 
     fn face(&mut self, values: &str) -> Result<(), String> {
         let mut face = String::from("f");
         let mut corners = 0;
+        let mut has_normals = true;
         for corner in values.split_whitespace() {
-            face.push_str(&self.corner(corner)?);
+            let [position, texture, normal] = self.corner(corner)?;
+            has_normals &= normal > 1;
+            // Writing to a string cannot fail.
+            let _ = write!(face, " {position}/{texture}/{normal}");
             corners += 1;
         }
         match corners {
             0 => return Err(String::from("a face without a corner")),
             1 => self.points += 1,
             2 => self.lines += 1,
-            _ => self.emit(format_args!("{face}")),
+            _ => {
+                self.unsmoothed_faces += usize::from(self.is_smoothed && !has_normals);
+                self.emit(format_args!("{face}"));
+            }
         }
         Ok(())
     }
 
-    /// A corner is `position`, `position/texture`, `position//normal` or `position/texture/normal`.
-    fn corner(&mut self, corner: &str) -> Result<String, String> {
-        let malformed = || format!("`{corner}` is not a corner of a face");
+    /// Position, texture coordinates and normal of a corner: `position`, `position/texture`, `position//normal` or `position/texture/normal`.
+    fn corner(&mut self, corner: &str) -> Result<[u64; 3], String> {
+        let malformed = || format!("`{}` is not a corner of a face", excerpt(corner));
         let mut indices = [None; 3];
         for (number, index) in corner.split('/').enumerate().filter(|(_, index)| !index.is_empty()) {
             *indices.get_mut(number).ok_or_else(malformed)? = Some(index.parse::<i64>().map_err(|_| malformed())?);
@@ -222,34 +291,13 @@ impl Preprocessed {
         self.dangling_corners += usize::from(resolved.contains(&Some(None)));
         // Index 1 of either is that of `PLACEHOLDERS`.
         let [texture, normal] = resolved.map(|index| index.flatten().map_or(1, |index| index + 1));
-        Ok(format!(" {position}/{texture}/{normal}"))
+        Ok([position, texture, normal])
     }
 
     fn emit(&mut self, line: std::fmt::Arguments<'_>) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.text, "{line}");
     }
-}
-
-/// The statements of an OBJ or MTL file, each with the number of its last line. A backslash at the end continues a line.
-pub(super) fn statements(source: &str) -> impl Iterator<Item = (usize, String)> {
-    let mut statement_so_far = String::new();
-    let lines = source.strip_prefix('\u{feff}').unwrap_or(source).lines().chain([""]);
-    lines.enumerate().filter_map(move |(index, line)| {
-        // A comment is not continued: many end with the path of a folder.
-        if statement_so_far.is_empty() && line.trim_start().starts_with('#') {
-            return None;
-        }
-        if let Some(part) = line.strip_suffix('\\') {
-            statement_so_far.push_str(part);
-            statement_so_far.push(' ');
-            return None;
-        }
-        statement_so_far.push_str(line);
-        let statement = statement_so_far.trim().to_owned();
-        statement_so_far.clear();
-        (!statement.is_empty() && !statement.starts_with('#')).then_some((index + 1, statement))
-    })
 }
 
 /// The index counted from 1, if there is such an entry. A negative index counts back from the last entry.
@@ -259,9 +307,14 @@ fn absolute_index(index: i64, count: usize) -> Option<u64> {
     (1..=count).contains(&distance).then(|| if index > 0 { distance } else { count + 1 - distance })
 }
 
-fn numbers(values: &str) -> Result<Vec<f64>, String> {
-    let number = |word: &str| word.parse().map_err(|_| format!("`{word}` is not a number"));
-    values.split_whitespace().map(number).collect()
+/// The number at the start of a word, and whether it is the whole word.
+fn number(word: &str) -> Option<(f64, bool)> {
+    if let Ok(number) = word.parse() {
+        return Some((number, true));
+    }
+    // No character of a number has more than a byte.
+    let ends = (1..word.len().min(MAX_NUMBER_BYTES)).rev().filter(|&end| word.is_char_boundary(end));
+    ends.into_iter().find_map(|end| word[..end].parse().ok()).map(|number| (number, false))
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -272,18 +325,12 @@ mod tests {
     fn a_distant_scene_keeps_millimetre_precision() {
         let stray_vertex = "v 999999999 0 0\n";
         let face = "v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\nf 2 3 2\n";
-        let preprocessed = Preprocessed::new(&format!("{stray_vertex}{face}")).unwrap();
+        let text = format!("{stray_vertex}{face}");
+        let statements = Statements::new(text.as_bytes(), 1 << 20).unwrap();
+        let preprocessed = Preprocessed::new(statements, "a.obj", &mut Warnings::default()).unwrap();
         assert_eq!(preprocessed.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
         let second: Vec<f32> =
             preprocessed.text.lines().nth(2).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
         assert!((f64::from(second[1]) + preprocessed.origin.y - 4_500_000.002).abs() < 5e-4);
-    }
-
-    #[test]
-    fn a_continued_line_has_the_number_of_its_last_line() {
-        let parsed: Vec<_> = statements("# head\r\nf 1 2 \\\r\n 3\r\n\nv 1\\").collect();
-        assert_eq!(parsed, [(3, String::from("f 1 2   3")), (6, String::from("v 1"))]);
-        let parsed: Vec<_> = statements("# C:\\models\\\nv 1\n  # D:\\\nv 2").collect();
-        assert_eq!(parsed, [(2, String::from("v 1")), (4, String::from("v 2"))]);
     }
 }

@@ -1,0 +1,186 @@
+//! Opening and reading files whose names come from other files.
+
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, Read};
+use std::path::Path;
+
+use super::limits::Limit;
+
+/// Reads the file of a name, relative to the OBJ file, within a limit.
+pub(super) type Fetch<'a> = &'a dyn Fn(&str, Limit) -> io::Result<Vec<u8>>;
+
+/// Opens a regular file of at most `limit` bytes. What is no file, such as a FIFO or a device, may never end, and opening
+/// a FIFO waits for whoever writes to it.
+///
+/// # Errors
+/// If it cannot be opened, is no regular file, or is larger.
+pub(super) fn open(path: &Path, limit: Limit) -> io::Result<Bounded<File>> {
+    check(&fs::metadata(path)?, limit)?;
+    let file = without_waiting().open(path)?;
+    // By now, the path may be that of something else.
+    check(&file.metadata()?, limit)?;
+    Ok(Bounded { inner: file, read: 0, limit })
+}
+
+/// Reads a regular file of at most `limit` bytes.
+///
+/// # Errors
+/// As [`open`], and if reading fails or there is no memory for it.
+pub(super) fn read(path: &Path, limit: Limit) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path, limit)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Reads up to a limit, and then fails: a file may grow while it is read.
+#[derive(Debug)]
+pub(super) struct Bounded<R> {
+    inner: R,
+    read: u64,
+    limit: Limit,
+}
+
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        self.read += count as u64;
+        self.limit.check(self.read)?;
+        Ok(count)
+    }
+}
+
+fn check(metadata: &Metadata, limit: Limit) -> io::Result<()> {
+    if metadata.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    limit.check(metadata.len())
+}
+
+/// Options with which opening a FIFO does not wait, in case that a file is replaced by one between its check and its opening.
+fn without_waiting() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
+    options
+}
+
+/// A name that the text behind a keyword may mean.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct PossibleName {
+    pub name: String,
+    /// Whether it leaves out options before or behind the name.
+    pub drops_options: bool,
+}
+
+/// The names that the text behind a keyword may mean, the likeliest first. Names may contain spaces, quotes, `#` and `-`, but
+/// programs also write quotes around them, a comment or options behind them, and a backslash before a space.
+pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
+    let quoted = text.strip_prefix('"').and_then(|rest| rest.split_once('"'));
+    let comment = text.match_indices('#').map(|(index, _)| &text[..index]);
+    let comment = comment.into_iter().find(|before| before.ends_with(char::is_whitespace));
+    let readings = [
+        Some((text, false)),
+        quoted.map(|(name, behind)| (name, behind.trim_start().starts_with('-'))),
+        comment.map(|before| (before.trim_end(), false)),
+        text.split_once(" -").map(|(before, _)| (before.trim_end(), true)),
+        text.rsplit_once(char::is_whitespace).filter(|_| text.starts_with('-')).map(|(_, last)| (last, true)),
+    ];
+    let mut names: Vec<PossibleName> = Vec::new();
+    for (name, drops_options) in readings.into_iter().flatten().filter(|(name, _)| !name.is_empty()) {
+        // A backslash separates folders, or belongs to the space behind it.
+        for name in [name.replace('\\', "/"), name.replace("\\ ", " ").replace('\\', "/")] {
+            let name = format!("{folder}{name}");
+            if names.iter().all(|known| known.name != name) {
+                names.push(PossibleName { name, drops_options });
+            }
+        }
+    }
+    names
+}
+
+/// Reads the first of several possible names of a file that can be read. Returns its name as well.
+///
+/// # Errors
+/// Returns an error of a name under which there is something, or else says that nothing is found.
+pub(super) fn read_one_of<'n>(
+    names: &'n [PossibleName],
+    limit: Limit,
+    fetch: Fetch<'_>,
+) -> io::Result<(&'n PossibleName, Vec<u8>)> {
+    let mut reason = io::Error::from(io::ErrorKind::NotFound);
+    for name in names {
+        match fetch(&name.name, limit) {
+            Ok(bytes) => return Ok((name, bytes)),
+            Err(error) if reason.kind() == io::ErrorKind::NotFound => reason = error,
+            Err(_) => {}
+        }
+    }
+    Err(reason)
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_found_behind_what_programs_write_around_it() {
+        for (text, name, drops_options) in [
+            ("a.png", "a.png", false),
+            ("in\\a file.png", "in/a file.png", false),
+            ("\"a file.png\"", "a file.png", false),
+            ("\"a file.png\" # the leaf", "a file.png", false),
+            ("\"a file.png\" -s 2 2", "a file.png", true),
+            ("a.png # the leaf", "a.png", false),
+            ("a\\ file.png", "a file.png", false),
+            ("a.png -s 2 2 2", "a.png", true),
+            ("-colorspace sRGB a.png", "a.png", true),
+            ("-x.png", "-x.png", false),
+            ("a #1.png", "a #1.png", false),
+        ] {
+            let names = possible_names("folder/", text);
+            let expected = PossibleName { name: format!("folder/{name}"), drops_options };
+            assert!(names.contains(&expected), "{text}: {names:?}");
+            assert_eq!(names[0].name, format!("folder/{}", text.replace('\\', "/")));
+        }
+    }
+
+    #[test]
+    fn a_limit_is_named_and_applies_to_what_is_read() {
+        let path = std::env::temp_dir().join(format!("drawloom-limit-{}", std::process::id()));
+        fs::write(&path, [7; 100]).unwrap();
+        let limit = |bytes| Limit::new("library_bytes", bytes);
+        assert_eq!(read(&path, limit(100)).unwrap(), [7; 100]);
+        let error = read(&path, limit(99)).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(error.to_string(), "it takes 100 bytes or more, and `ObjLimits::library_bytes` is 99");
+        let error = read(&path, Limit { taken: 50, ..limit(120) }).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "it takes 100 bytes or more, others take 50, and `ObjLimits::library_bytes` is 120"
+        );
+        fs::remove_file(&path).unwrap();
+        let mut endless = Bounded { inner: io::repeat(7), read: 0, limit: limit(5000) };
+        assert_eq!(endless.read_to_end(&mut Vec::new()).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_that_is_replaced_by_a_fifo_after_its_check_is_opened_without_waiting() {
+        let path = std::env::temp_dir().join(format!("drawloom-fifo-{}", std::process::id()));
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let opened = path.clone();
+        std::thread::spawn(move || {
+            // Nobody receives what comes after the deadline.
+            let _ = sender.send(without_waiting().open(opened).and_then(|file| file.metadata()));
+        });
+        let metadata = receiver.recv_timeout(std::time::Duration::from_secs(60));
+        fs::remove_file(&path).unwrap();
+        let error = check(&metadata.unwrap().unwrap(), Limit::new("scene_bytes", 9)).unwrap_err();
+        assert_eq!(error.to_string(), "it is not a regular file");
+    }
+}

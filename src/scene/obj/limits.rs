@@ -1,0 +1,92 @@
+//! What the files of an import may take.
+
+use std::io;
+
+/// What the files of an import may take, so that a damaged or hostile file cannot exhaust memory. A file that exceeds a
+/// limit is refused, and the message names the limit.
+///
+/// ```no_run
+/// use drawloom::scene::obj::{self, ObjLimits};
+///
+/// let limits = ObjLimits { texture_bytes: 1 << 30, ..ObjLimits::default() };
+/// let imported = obj::load_within("assets/sponza.obj", &limits)?;
+/// # Ok::<(), obj::ObjError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObjLimits {
+    /// The bytes of the OBJ file. While it is imported, a usual one takes some six times as much memory. Default: 1 GiB.
+    pub scene_bytes: u64,
+    /// The bytes of one line of an OBJ file or a material library, with the lines that continue it. Longer lines are left
+    /// out, with a warning. Default: 32 MiB.
+    pub line_bytes: u64,
+    /// The bytes of all material libraries together. Default: 64 MiB.
+    pub library_bytes: u64,
+    /// The bytes of the file of a texture. Default: 256 MiB.
+    pub texture_file_bytes: u64,
+    /// The bytes that a texture takes while it is decoded, which are known before: 4 for each pixel, and besides those of
+    /// the file's own format where a channel has more than 8 bits, and the coefficients of a progressive JPEG. Scaling
+    /// takes no more. Default: 256 MiB, which is enough for the largest [`Texture`](crate::scene::Texture).
+    pub texture_bytes: u64,
+    /// The bytes that all textures take together when they are decoded, 4 for each pixel. Default: 4 GiB.
+    pub all_textures_bytes: u64,
+    /// The warnings of each kind that are listed. All are counted. Default: 100.
+    pub warnings: usize,
+}
+
+impl Default for ObjLimits {
+    fn default() -> Self {
+        Self {
+            scene_bytes: 1 << 30,
+            line_bytes: 32 << 20,
+            library_bytes: 64 << 20,
+            texture_file_bytes: 256 << 20,
+            texture_bytes: 256 << 20,
+            all_textures_bytes: 4 << 30,
+            warnings: 100,
+        }
+    }
+}
+
+/// One of the limits in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limit {
+    /// Its field in [`ObjLimits`].
+    pub field: &'static str,
+    pub bytes: u64,
+    /// The bytes that others take, where a limit is that of several files.
+    pub taken: u64,
+}
+
+/// More bytes than a limit allows.
+#[derive(Debug, thiserror::Error)]
+#[error("it takes {at_least} bytes or more{}, and `ObjLimits::{}` is {}", self.others(), limit.field, limit.bytes)]
+struct OverLimit {
+    at_least: u64,
+    limit: Limit,
+}
+
+impl OverLimit {
+    fn others(&self) -> String {
+        match self.limit.taken {
+            0 => String::new(),
+            taken => format!(", others take {taken}"),
+        }
+    }
+}
+
+impl Limit {
+    pub(super) fn new(field: &'static str, bytes: u64) -> Self {
+        Self { field, bytes, taken: 0 }
+    }
+
+    /// Checks a size in bytes, of which at least so many are known.
+    ///
+    /// # Errors
+    /// If it is above what is left of the limit, with the kind [`io::ErrorKind::FileTooLarge`].
+    pub(super) fn check(self, at_least: u64) -> io::Result<()> {
+        if self.taken.saturating_add(at_least) <= self.bytes {
+            return Ok(());
+        }
+        Err(io::Error::new(io::ErrorKind::FileTooLarge, OverLimit { at_least, limit: self }))
+    }
+}

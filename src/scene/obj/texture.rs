@@ -1,0 +1,281 @@
+//! Decoding of textures, whose size is known and checked before.
+
+use std::io::{self, Cursor};
+
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+
+use super::limits::Limit;
+use crate::scene::Texture;
+
+/// RGBA bytes, rows from top to bottom.
+#[derive(Debug)]
+pub(super) struct Pixels {
+    pub width: u32,
+    pub height: u32,
+    pub bytes: Vec<u8>,
+    /// Width and height in the file, if it is scaled down.
+    pub scaled_from: Option<[u32; 2]>,
+}
+
+/// Decodes a PNG, JPEG, TGA or BMP, and scales it to [`Texture::MAX_SIZE`] if it is larger. `while_decoded` limits the bytes that
+/// this takes, and `decoded` those of the result.
+///
+/// # Errors
+/// Says why it cannot be decoded, or which limit it exceeds.
+pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: Limit) -> Result<Pixels, String> {
+    let coefficients = progressive_components(&file) * 2;
+    let mut reader = ImageReader::new(Cursor::new(file));
+    // The guess from the contents comes first, but TGA has no magic number.
+    if let Ok(format) = ImageFormat::from_path(name) {
+        reader.set_format(format);
+    }
+    let mut reader = reader.with_guessed_format().map_err(message)?;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(while_decoded.bytes);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(message)?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    let rgba_bytes = pixels.saturating_mul(4);
+    let has_bytes = decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count();
+    let other_bytes =
+        if has_bytes { 0 } else { decoder.total_bytes() }.saturating_add(pixels.saturating_mul(coefficients));
+    while_decoded
+        .check(rgba_bytes.saturating_add(other_bytes))
+        .map_err(|error| format!("{width}x{height}: {error}"))?;
+    let [wide, high] = [width, height].map(|side| side.min(Texture::MAX_SIZE));
+    decoded.check(u64::from(wide) * u64::from(high) * 4).map_err(message)?;
+    let mut bytes = if has_bytes {
+        decode_bytes(decoder, rgba_bytes)?
+    } else {
+        DynamicImage::from_decoder(decoder).map_err(message)?.into_rgba8().into_raw()
+    };
+    let is_scaled = [wide, high] != [width, height];
+    if is_scaled {
+        scale_down(&mut bytes, [width, height], [wide, high]);
+    }
+    Ok(Pixels { width: wide, height: high, bytes, scaled_from: is_scaled.then_some([width, height]) })
+}
+
+fn message(error: impl ToString) -> String {
+    error.to_string()
+}
+
+/// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
+/// scan is read.
+fn progressive_components(file: &[u8]) -> u64 {
+    let Some(mut segments) = file.strip_prefix(b"\xff\xd8") else {
+        return 0;
+    };
+    loop {
+        match *segments {
+            // The header of a progressive frame: its length, bits, height, width, and number of components.
+            [0xff, 0xc2 | 0xc6 | 0xca | 0xce, _, _, _, _, _, _, _, components, ..] => return u64::from(components),
+            // The first scan.
+            [0xff, 0xda, ..] => return 0,
+            // A fill byte.
+            [0xff, 0xff, ..] => segments = &segments[1..],
+            [0xff, _, high, low, ..] => {
+                let length = usize::from(u16::from_be_bytes([high, low]));
+                segments = segments.get(2 + length..).unwrap_or_default();
+            }
+            _ => return 0,
+        }
+    }
+}
+
+/// Decodes channels of 8 bits into the memory of the result.
+fn decode_bytes(decoder: impl ImageDecoder, rgba_bytes: u64) -> Result<Vec<u8>, String> {
+    let channels = usize::from(decoder.color_type().channel_count());
+    let size = usize::try_from(rgba_bytes).map_err(message)?;
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(size).map_err(|_| message(io::Error::from(io::ErrorKind::OutOfMemory)))?;
+    bytes.resize(size, 0);
+    decoder.read_image(&mut bytes[..size / 4 * channels]).map_err(message)?;
+    to_rgba(&mut bytes, channels);
+    Ok(bytes)
+}
+
+/// Converts pixels of so many channels, which lie at the start, to RGBA, from the last one to the first.
+fn to_rgba(bytes: &mut [u8], channels: usize) {
+    for pixel in (0..bytes.len() / 4).rev() {
+        let from = &bytes[pixel * channels..][..channels];
+        let rgba = match *from {
+            [gray] => [gray, gray, gray, 255],
+            [gray, alpha] => [gray, gray, gray, alpha],
+            [red, green, blue] => [red, green, blue, 255],
+            [red, green, blue, alpha, ..] => [red, green, blue, alpha],
+            [] => continue,
+        };
+        bytes[pixel * 4..][..4].copy_from_slice(&rgba);
+    }
+}
+
+/// Replaces RGBA pixels by a smaller picture, whose pixels are the means of those that they cover. A pixel is written where none is
+/// read afterwards, so this takes no memory.
+fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [wide, high]: [u32; 2]) {
+    let covered = |index: u32, from: u32, to: u32| {
+        let start = |index: u32| (u64::from(index) * u64::from(from) / u64::from(to)) as usize;
+        start(index)..start(index + 1)
+    };
+    for row in 0..high {
+        let rows = covered(row, height, high);
+        for column in 0..wide {
+            let columns = covered(column, width, wide);
+            let mut sums = [0_u64; 4];
+            for line in rows.clone() {
+                let first = line * width as usize;
+                for pixel in bytes[(first + columns.start) * 4..(first + columns.end) * 4].as_chunks::<4>().0 {
+                    sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += u64::from(*value));
+                }
+            }
+            let count = (rows.len() * columns.len()) as u64;
+            let mean = sums.map(|sum| ((sum + count / 2) / count) as u8);
+            bytes[(row as usize * wide as usize + column as usize) * 4..][..4].copy_from_slice(&mean);
+        }
+    }
+    bytes.truncate(wide as usize * high as usize * 4);
+    bytes.shrink_to_fit();
+}
+
+impl Pixels {
+    /// White pixels of this size.
+    pub(super) fn to_white(&self) -> Self {
+        Self { bytes: vec![255; self.bytes.len()], scaled_from: None, ..*self }
+    }
+
+    /// Makes a mask of a picture of `map_d`: the alpha is its own if that is not 255 everywhere, else its luminance.
+    pub(super) fn into_mask(mut self) -> Self {
+        let is_opaque = self.opacities().0 == 255;
+        for pixel in self.bytes.as_chunks_mut::<4>().0.iter_mut().filter(|_| is_opaque) {
+            let [red, green, blue, _] = pixel.map(u32::from);
+            pixel[3] = ((77 * red + 150 * green + 29 * blue) >> 8) as u8;
+        }
+        self
+    }
+
+    /// Takes the opacity of a mask, which may have another size.
+    pub(super) fn set_opacity(&mut self, mask: &Self) {
+        let nearest = |index: u32, size: u32, of: u32| (u64::from(index) * u64::from(of) / u64::from(size)) as usize;
+        for row in 0..self.height {
+            let from_row = nearest(row, self.height, mask.height) * mask.width as usize;
+            for column in 0..self.width {
+                let from = from_row + nearest(column, self.width, mask.width);
+                let to = row as usize * self.width as usize + column as usize;
+                self.bytes[to * 4 + 3] = mask.bytes[from * 4 + 3];
+            }
+        }
+    }
+
+    /// The least and the greatest opacity.
+    pub(super) fn opacities(&self) -> (u8, u8) {
+        let alphas = self.bytes.as_chunks::<4>().0.iter().map(|pixel| pixel[3]);
+        alphas.fold((255, 0), |(low, high), alpha| (low.min(alpha), high.max(alpha)))
+    }
+}
+
+#[cfg(all(test, not(drawloom_loom)))]
+mod tests {
+    use super::*;
+    use image::{ExtendedColorType, ImageEncoder};
+
+    fn png(size: [u32; 2], color: ExtendedColorType, bytes: &[u8]) -> Vec<u8> {
+        let mut file = Vec::new();
+        image::codecs::png::PngEncoder::new(&mut file).write_image(bytes, size[0], size[1], color).unwrap();
+        file
+    }
+
+    fn decode_within(file: Vec<u8>, bytes: u64) -> Result<Pixels, String> {
+        decode("a.png", file, Limit::new("texture_bytes", bytes), Limit::new("all_textures_bytes", 1 << 20))
+    }
+
+    #[test]
+    fn every_number_of_channels_and_bits_becomes_rgba() {
+        let bytes: Vec<u8> = (0..48).map(|value| value * 5).collect();
+        for (color, channels, depth) in [
+            (ExtendedColorType::L8, 1, 1),
+            (ExtendedColorType::La8, 2, 1),
+            (ExtendedColorType::Rgb8, 3, 1),
+            (ExtendedColorType::Rgba8, 4, 1),
+            (ExtendedColorType::L16, 1, 2),
+            (ExtendedColorType::Rgba16, 4, 2),
+        ] {
+            let bytes = &bytes[..6 * channels * depth];
+            let file = png([3, 2], color, bytes);
+            let expected = image::load_from_memory(&file).unwrap().into_rgba8().into_raw();
+            let decoded = decode_within(file, 1000).unwrap();
+            assert_eq!((decoded.width, decoded.height, decoded.bytes), (3, 2, expected), "{color:?}");
+        }
+    }
+
+    #[test]
+    fn the_size_is_checked_before_decoding() {
+        let file = png([30, 20], ExtendedColorType::L8, &[7; 600]);
+        assert!(decode_within(file.clone(), 2400).is_ok());
+        let error = decode_within(file.clone(), 2399).map(drop).unwrap_err();
+        assert_eq!(error, "30x20: it takes 2400 bytes or more, and `ObjLimits::texture_bytes` is 2399");
+        // Up to the pixels, which are missing.
+        let header = file.windows(4).position(|tag| tag == b"IDAT").unwrap() + 4;
+        let error = decode_within(file[..header].to_vec(), 2399).map(drop).unwrap_err();
+        assert!(error.contains("texture_bytes"), "{error}");
+        let file = png([10, 10], ExtendedColorType::L16, &[7; 200]);
+        assert!(decode_within(file.clone(), 600).is_ok() && decode_within(file, 599).is_err());
+        // 18 bytes that claim 65,535 × 65,535 pixels.
+        let header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 32, 0];
+        let limit = Limit::new("texture_bytes", 256 << 20);
+        let error = decode("a.tga", header.to_vec(), limit, limit).map(drop).unwrap_err();
+        assert!(error.contains("`ObjLimits::texture_bytes` is 268435456"), "{error}");
+    }
+
+    #[test]
+    fn the_coefficients_of_a_progressive_jpeg_count() {
+        let mut file = Vec::new();
+        let encoder = image::codecs::jpeg::JpegEncoder::new(&mut file);
+        encoder.write_image(&[7; 600 * 3], 30, 20, ExtendedColorType::Rgb8).unwrap();
+        assert_eq!(progressive_components(&file), 0);
+        let header = file.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        file[header + 1] = 0xc2;
+        assert_eq!(progressive_components(&file), 3);
+        let error = decode("a.jpg", file.clone(), Limit::new("texture_bytes", 5999), Limit::new("", 9999))
+            .map(drop)
+            .unwrap_err();
+        assert_eq!(error, "30x20: it takes 6000 bytes or more, and `ObjLimits::texture_bytes` is 5999");
+        for end in 0..file.len() {
+            progressive_components(&file[..end]);
+        }
+        assert_eq!(progressive_components(b"\xff\xd8\xff\xe0\0\0\xff\xe0\0\0"), 0);
+    }
+
+    #[test]
+    fn scaling_takes_the_means_of_what_each_pixel_covers() {
+        for (from, to) in [([7, 5], [3, 5]), ([6, 4], [3, 2]), ([9, 1], [8, 1]), ([1, 9], [1, 2])] {
+            let value = |x: u32, y: u32, channel: u32| (x * 31 + y * 57 + channel * 101) as u8;
+            let mut bytes = Vec::new();
+            for y in 0..from[1] {
+                for x in 0..from[0] {
+                    bytes.extend([0, 1, 2, 3].map(|channel| value(x, y, channel)));
+                }
+            }
+            scale_down(&mut bytes, from, to);
+            assert_eq!(bytes.len() as u32, to[0] * to[1] * 4);
+            for y in 0..to[1] {
+                for x in 0..to[0] {
+                    for channel in 0..4 {
+                        let covered = |index: u32, axis: usize| {
+                            (0..from[axis]).filter(move |&at| {
+                                let (start, end) = (index * from[axis] / to[axis], (index + 1) * from[axis] / to[axis]);
+                                start <= at && at < end
+                            })
+                        };
+                        let values: Vec<f64> = covered(y, 1)
+                            .flat_map(|y| covered(x, 0).map(move |x| f64::from(value(x, y, channel))))
+                            .collect();
+                        let mean = values.iter().sum::<f64>() / values.len() as f64;
+                        let found = bytes[((y * to[0] + x) * 4 + channel) as usize];
+                        assert!((f64::from(found) - mean).abs() <= 0.5, "{from:?} {to:?} {x} {y} {channel}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Mutants: files that were damaged at random give a scene or an error in bounded time, and what a scene lacks is said.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+
+use drawloom::scene::obj::{self, ObjError};
+use libtest_mimic::Trial;
+
+use crate::folder::Folder;
+use crate::fuzz;
+use crate::shared::scenes;
+use crate::trial;
+
+/// A test that has not ended by then hangs.
+const DEADLINE: Duration = Duration::from_secs(60);
+const MUTANTS: usize = 300;
+/// A folder where the mutants of the malformed files are kept, for other programs to read.
+const KEEP: &str = "DRAWLOOM_KEEP_MUTANTS";
+
+pub fn trials() -> Vec<Trial> {
+    vec![
+        trial("mutants::of_an_own_file", of_an_own_file),
+        trial("mutants::of_malformed_files", of_malformed_files).with_ignored_flag(!scenes().is_dir()),
+    ]
+}
+
+fn of_an_own_file() {
+    let folder = Folder::new().with("a.obj", fuzz::FILE).with("a.mtl", fuzz::LIBRARY);
+    check_mutants(&folder.0, &[folder.0.join("a.obj"), folder.0.join("a.mtl")], &folder.0);
+}
+
+fn of_malformed_files() {
+    let folder = Folder::new();
+    let to = std::env::var_os(KEEP).map_or(folder.0.clone(), PathBuf::from);
+    let mut seeds = Vec::new();
+    for group in ["tobj", "trimesh"] {
+        for entry in fs::read_dir(scenes().join("malformed").join(group)).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
+            seeds.push(path);
+        }
+    }
+    seeds.sort();
+    check_mutants(&to, &seeds, &to);
+}
+
+/// Writes mutants of the seeds, among the files that they name, and loads each. A mutant of a library is loaded by an OBJ file.
+fn check_mutants(folder: &Path, seeds: &[PathBuf], to: &Path) {
+    let mut random = fastrand::Rng::with_seed(22);
+    let seeds: Vec<_> = seeds.iter().map(|path| (path, fs::read(path).unwrap())).collect();
+    for number in 0..MUTANTS {
+        let (path, seed) = &seeds[number % seeds.len()];
+        let mutant = mutate(seed, &mut random);
+        let is_library = path.extension().is_some_and(|extension| extension == "mtl");
+        let scene = to.join(format!("mutant-{number}.obj"));
+        if is_library {
+            fs::write(to.join(format!("mutant-{number}.mtl")), &mutant).unwrap();
+            fs::write(&scene, format!("mtllib mutant-{number}.mtl\n{}", crate::folder::TRIANGLE)).unwrap();
+        } else {
+            fs::write(&scene, &mutant).unwrap();
+        }
+        check(&scene, folder);
+    }
+}
+
+fn mutate(seed: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
+    let mut bytes = seed.to_vec();
+    for _ in 0..random.usize(1..8) {
+        let position = random.usize(0..=bytes.len());
+        let end = (position + random.usize(1..40)).min(bytes.len());
+        match random.usize(0..8) {
+            0 => bytes.truncate(position),
+            1 => drop(bytes.drain(position..end)),
+            2 => bytes.extend_from_within(position..end),
+            3 => bytes.insert(position, random.u8(..)),
+            4 => bytes
+                .splice(position..position, [b"\0", b"\r", b"\\", b"/"][random.usize(0..4)].iter().copied())
+                .for_each(drop),
+            5 => bytes.splice(position..position, b" 99999999999 nan -1e39 ".iter().copied()).for_each(drop),
+            6 => bytes[position..end].iter_mut().for_each(|byte| *byte ^= 0x80),
+            _ => bytes[position..end].reverse(),
+        }
+    }
+    bytes
+}
+
+fn check(scene: &Path, folder: &Path) {
+    let (sender, receiver) = mpsc::channel();
+    let path = scene.to_owned();
+    thread::spawn(move || {
+        // Nobody receives what comes after the deadline, nor anything from a panic.
+        let _ = sender.send(obj::load(path));
+    });
+    let loaded = receiver.recv_timeout(DEADLINE).unwrap_or_else(|_| panic!("{} hangs or panics", scene.display()));
+    match loaded {
+        Ok(imported) => {
+            let (found, expected) =
+                (imported.triangles + imported.degenerate_triangles, triangles(&fs::read(scene).unwrap()));
+            let is_said = !imported.warnings.is_empty();
+            assert!(found >= expected || is_said, "{}: {found} of {expected} triangles", scene.display());
+        }
+        Err(ObjError::Refused { reason, .. }) => panic!("{}: {reason}", scene.display()),
+        Err(error) => assert!(error.to_string().contains(&folder.display().to_string()), "{error}"),
+    }
+}
+
+/// The triangles of all lines that are faces as they stand there.
+fn triangles(bytes: &[u8]) -> usize {
+    let lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let of_line = |line: &[u8]| {
+        let words: Vec<_> = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
+        let corners = words.iter().skip(1).take_while(|word| !word.contains(&b'#')).count();
+        if words.first() == Some(&b"f".as_slice()) { corners.saturating_sub(2) } else { 0 }
+    };
+    lines.map(of_line).sum()
+}
