@@ -42,3 +42,15 @@ pub enum OutputError {
         extension: Option<String>,
     },
 }
+
+impl From<OutputError> for io::Error {
+    fn from(error: OutputError) -> Self {
+        let kind = match &error {
+            OutputError::NoFolder { .. } => io::ErrorKind::NotADirectory,
+            OutputError::IsFolder { .. } => io::ErrorKind::IsADirectory,
+            OutputError::Failed { source, .. } => source.kind(),
+            OutputError::PictureFormat { .. } => io::ErrorKind::Unsupported,
+        };
+        Self::new(kind, error)
+    }
+}

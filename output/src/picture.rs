@@ -41,13 +41,23 @@ impl PictureFile {
     /// # Errors
     /// If `rgba` is no such picture, the format has none of this size, or the file cannot be written.
     pub fn write(&self, size: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
-        let encoded = match self.format {
-            ImageFormat::Jpeg => {
-                let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]).copied().collect();
-                encode(&rgb, size, ColorType::Rgb8, self.format)
-            }
-            _ => encode(rgba, size, ColorType::Rgba8, self.format),
-        };
+        match self.format {
+            ImageFormat::Jpeg => self.write_opaque(size, rgba),
+            _ => self.write_as(ColorType::Rgba8, size, rgba),
+        }
+    }
+
+    /// As [`write`](Self::write), without alpha in any format.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_opaque(&self, size: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
+        let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]).copied().collect();
+        self.write_as(ColorType::Rgb8, size, &rgb)
+    }
+
+    fn write_as(&self, color: ColorType, size: [u32; 2], bytes: &[u8]) -> Result<(), OutputError> {
+        let encoded = encode(bytes, size, color, self.format);
         let failed = |error| OutputError::Failed { path: self.path().to_owned(), source: io::Error::other(error) };
         self.file.write_all(encoded.map_err(failed)?)
     }

@@ -109,6 +109,9 @@ fn a_picture_has_the_format_of_its_extension() -> Outcome {
     for name in ["a.png", "a.PNG", "a.jpg", "a.jpeg", "a.tga", "a.bmp"] {
         let picture = PictureFile::new(folder.path().join(name))?;
         picture.write([width, height], &rgba)?;
+        assert_eq!(image::open(picture.path())?.color().has_alpha(), !name.contains(".jp"), "{name}");
+        picture.write_opaque([width, height], &rgba)?;
+        assert!(!image::open(picture.path())?.color().has_alpha(), "{name}");
         let read = image::open(picture.path()).map_err(|error| format!("{name}: {error}"))?.to_rgb8();
         assert_eq!(read.dimensions(), (width, height), "{name}");
         let (read, expected) = (read.get_pixel(1, 1).0, &colors[1][..3]);
