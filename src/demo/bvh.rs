@@ -51,6 +51,11 @@ const MAX_LEAF_TRIANGLES: usize = 6;
 /// from an object.
 const MAX_TRIANGLES: usize = 2_000_000;
 
+/// The most nodes that a ray tests. A ray through a scene tests some hundred. Where triangles lie in each other, as those of a file that has
+/// them all many times, no hierarchy separates them, and a ray would test all. Nearer nodes are tested first, so what is found by then is
+/// close to what is nearest.
+const MAX_NODES_OF_RAY: usize = 2_000;
+
 impl Bvh {
     /// `None` if no triangle can be drawn.
     pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
@@ -78,17 +83,36 @@ impl Bvh {
 
     /// The nearest intersection of a ray. `direction` has unit length.
     pub(super) fn cast(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
+        self.cast_counting(origin, direction).0
+    }
+
+    /// The nearest intersection, and how many nodes were tested for it.
+    fn cast_counting(&self, origin: Vec3, direction: Vec3) -> (Option<Hit>, usize) {
         let inverse = direction.recip();
         let mut nearest = None;
         let mut limit = f32::INFINITY;
-        let mut pending = vec![0];
-        while let Some(index) = pending.pop() {
-            let node = &self.nodes[index];
-            if !node.may_be_hit(origin, inverse, limit) {
+        let mut tested = 1;
+        // Each with the distance at which the ray enters it.
+        let mut pending: Vec<_> = self.nodes[0].enter(origin, inverse).map(|enter| (0, enter)).into_iter().collect();
+        while let Some((index, enter)) = pending.pop() {
+            if enter > limit {
                 continue;
             }
+            let node = &self.nodes[index];
             if let Some(second) = node.second {
-                pending.extend([second, index + 1]);
+                if tested >= MAX_NODES_OF_RAY {
+                    break;
+                }
+                tested += 2;
+                let children = [index + 1, second].map(|child| (child, self.nodes[child].enter(origin, inverse)));
+                let mut children = children.map(|(child, enter)| enter.map(|enter| (child, enter)));
+                // The nearer one is taken first.
+                if let [Some((_, first)), Some((_, second))] = children
+                    && first < second
+                {
+                    children.swap(0, 1);
+                }
+                pending.extend(children.into_iter().flatten());
                 continue;
             }
             for triangle in &self.triangles[node.first..node.first + node.count] {
@@ -98,7 +122,7 @@ impl Bvh {
                 }
             }
         }
-        nearest
+        (nearest, tested)
     }
 
     /// Adds the node over `count` triangles from `first` on and its descendants: a median split along the longest axis.
@@ -122,12 +146,13 @@ impl Bvh {
 }
 
 impl Node {
-    fn may_be_hit(&self, origin: Vec3, inverse: Vec3, limit: f32) -> bool {
+    /// The distance at which the ray enters the box, if it does.
+    fn enter(&self, origin: Vec3, inverse: Vec3) -> Option<f32> {
         let (one, other) = ((self.low - origin) * inverse, (self.high - origin) * inverse);
         let enter = one.min(other).max_element().max(0.0);
         let leave = one.max(other).min_element();
         // A ray in the plane of a side gives NaN, which counts as a hit: a false positive only costs time.
-        !(enter > leave * 1.00001 || enter > limit)
+        (!(enter > leave * 1.00001)).then_some(enter)
     }
 }
 
@@ -197,5 +222,34 @@ mod tests {
             hits += usize::from(expected.is_some());
         }
         assert!((50..200).contains(&hits), "{hits}");
+    }
+
+    /// `count` triangles that all reach through the whole scene.
+    fn nested(count: usize, corners: impl Fn(f32) -> [Vec3; 3]) -> Bvh {
+        let triangles = (0..count).map(|number| {
+            let [a, b, c] = corners(number as f32 / count as f32);
+            Triangle { corner: a, edges: [b - a, c - a], normal: (b - a).cross(c - a) }
+        });
+        let triangles = triangles.collect();
+        let mut bvh =
+            Bvh { center: DVec3::ZERO, radius: 1.0, half_size: Vec3::splat(0.5), triangles, nodes: Vec::new() };
+        bvh.build(0, count);
+        bvh
+    }
+
+    #[test]
+    fn a_ray_tests_few_nodes_however_many_triangles_lie_in_each_other() {
+        let coincident = |_: f32| [Vec3::new(-0.5, -0.5, 0.1), Vec3::new(0.5, -0.5, 0.0), Vec3::new(0.0, 0.5, -0.1)];
+        // Each is nearer to the ray's origin than the one before, by less than they are tilted.
+        let stacked = |share: f32| coincident(share).map(|corner| corner + Vec3::Z * (0.01 * share));
+        let origin = Vec3::new(0.01, -0.02, 2.0);
+        for (bvh, tolerance) in [(nested(50_000, coincident), 0.0), (nested(50_000, stacked), 0.01)] {
+            let (hit, tested) = bvh.cast_counting(origin, Vec3::NEG_Z);
+            assert!(tested <= MAX_NODES_OF_RAY + 1, "{tested} of {}", bvh.nodes.len());
+            let distances = bvh.triangles.iter().filter_map(|triangle| triangle.distance(origin, Vec3::NEG_Z));
+            let nearest = distances.fold(f32::INFINITY, f32::min);
+            let hit = hit.expect("all are hit");
+            assert!(hit.front_facing && (0.0..=tolerance).contains(&(hit.distance - nearest)), "{hit:?} {nearest}");
+        }
     }
 }

@@ -36,9 +36,10 @@ fn written_directly(sources: &[Source]) -> Vec<String> {
 #[test]
 fn a_file_that_is_written_directly_is_found() {
     let problems_of = |text: &str| written_directly(&[Source::new("report.rs", text)]);
-    assert_eq!(problems_of("fn f() {\n    std::fs::write(path, text)?;\n}\n"), [
-        "src/report.rs:2: std::fs::write(path, text)?;"
-    ]);
+    assert_eq!(
+        problems_of("fn f() {\n    std::fs::write(path, text)?;\n}\n"),
+        ["src/report.rs:2: std::fs::write(path, text)?;"]
+    );
     assert!(problems_of("image::save_buffer(path)?;")[0].starts_with("src/report.rs:1: "));
     assert_eq!(problems_of("mod tests;\nfn f() {}\nmod tests {\n    fn g() { std::fs::write(a, b) }\n}\n"), [""; 0]);
 }
