@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::{fs, io};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::error::{ObjError, ObjWarning};
-use super::geometry::ModelGeometry;
+use super::geometry::{GeometryPart, ModelGeometry};
 use super::preprocessing::Preprocessed;
 use super::{emission, material};
 use crate::handle::Handle;
@@ -15,7 +15,7 @@ use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology};
 /// A scene from an OBJ file, without cameras.
 #[derive(Debug)]
 pub struct Imported {
-    /// One object, with a mesh of its own, for every material of every model, and a light for every emissive mesh.
+    /// One object, or several, each with a mesh of its own, for every material of every model, and a light for every emissive mesh.
     pub scene: Scene,
     /// What was left out or replaced.
     pub warnings: Vec<ObjWarning>,
@@ -27,7 +27,8 @@ pub struct Imported {
 
 /// Loads a scene from an OBJ file, with the `.mtl` files and textures that it names.
 ///
-/// - The origin of an object is the centre of its bounding box.
+/// - The origin of an object is the centre of its bounding box. A model whose extent is a million times its smallest triangle
+///   becomes several objects, so that 32-bit coordinates suffice for each.
 /// - Polygons are triangulated, including concave ones. Points, lines, free-form surfaces and vertex colours are left out.
 /// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke` and `d` or `Tr`
 ///   are read; PNG, JPEG, TGA and BMP textures are decoded.
@@ -135,16 +136,15 @@ impl Imported {
         let materials = material::add_materials(&mut self.scene, file, fetch, &mut self.warnings)?;
         let mut emissive = Vec::new();
         for model in models {
-            let geometry = ModelGeometry::new(&model.mesh);
+            let geometry = ModelGeometry::new(&model.mesh, &file.positions);
             self.report(&model.name, &geometry);
-            if geometry.indices.is_empty() {
-                continue;
-            }
             let material = materials[model.mesh.material_id.unwrap_or(materials.len() - 1)];
-            let position = self.add_object(&model.name, &geometry, file.origin, material)?;
             let emission = self.scene.assets().get(material)?.emission;
-            if emission != Vec3::ZERO {
-                emissive.push((geometry, position, emission));
+            for part in geometry.parts {
+                self.add_object(&model.name, &part, material)?;
+                if emission != Vec3::ZERO {
+                    emissive.push((part, emission));
+                }
             }
         }
         self.add_lights(&emissive);
@@ -154,24 +154,21 @@ impl Imported {
     fn add_object(
         &mut self,
         name: &str,
-        geometry: &ModelGeometry,
-        origin: DVec3,
+        geometry: &GeometryPart,
         material: Handle<Material>,
-    ) -> Result<DVec3, SceneError> {
+    ) -> Result<(), SceneError> {
         let mesh = Mesh::new(name, Topology::TriangleList, geometry.vertices.clone(), geometry.indices.clone())?;
         self.triangles += mesh.triangle_count();
         let mesh = self.scene.add(mesh)?;
-        let position = origin + geometry.center;
-        self.scene.add_object(RenderObject::new(mesh, material, position))?;
-        Ok(position)
+        self.scene.add_object(RenderObject::new(mesh, material, geometry.center))?;
+        Ok(())
     }
 
     /// Adds the lights of emissive surfaces.
-    fn add_lights(&mut self, emissive: &[(ModelGeometry, DVec3, Vec3)]) {
+    fn add_lights(&mut self, emissive: &[(GeometryPart, Vec3)]) {
         let diameter = 2.0 * self.scene.as_scene_ref().bounding_sphere().1;
         let lights = emissive.iter();
-        let lights = lights
-            .filter_map(|(geometry, position, radiance)| emission::light(geometry, *position, *radiance, diameter));
+        let lights = lights.filter_map(|(geometry, radiance)| emission::light(geometry, *radiance, diameter));
         self.scene.lights.extend(lights);
     }
 
@@ -179,7 +176,7 @@ impl Imported {
         let model = model.to_owned();
         let degenerate_triangles = geometry.degenerate_triangles;
         self.degenerate_triangles += degenerate_triangles;
-        if geometry.indices.is_empty() {
+        if geometry.parts.is_empty() {
             self.warnings.push(ObjWarning::EmptyModel { model: model.clone(), degenerate_triangles });
         }
         if geometry.fanned_polygons > 0 {
