@@ -8,6 +8,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use arguments::Arguments;
+use drawloom::demo::UpAxis;
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::scene::Camera;
 
 /// An empty folder of this process, which is removed on drop.
 struct Folder(PathBuf);
@@ -58,6 +61,30 @@ fn every_other_file_needs_a_folder() {
         assert!(error.contains("missing/a") && error.contains("is no folder"), "{error}");
         parse(&[name, &folder.file("a")]).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
+}
+
+#[test]
+fn a_camera_near_a_small_part_of_a_large_scene_sees_it() {
+    let placed = parse(&["--camera", "4,3,6,0,1.2,0"]).unwrap().camera.unwrap();
+    let mut camera = Camera { near: 50.0, ..Camera::looking_at("main", DVec3::Z * 1e5, DVec3::ZERO) };
+    placed.apply(&mut camera, UpAxis::Y);
+    assert!(camera.position == DVec3::new(4.0, 3.0, 6.0) && camera.near < 0.01, "{camera:?}");
+    // And a near plane that is nearer stays.
+    let mut camera = Camera { near: 1e-4, ..camera };
+    placed.apply(&mut camera, UpAxis::Y);
+    assert_eq!(camera.near, 1e-4);
+}
+
+#[test]
+fn the_axis_that_points_up_is_named() {
+    let arguments = parse(&["a.obj", "--up", "z", "--camera", "0,-5,1,0,0,1"]).unwrap();
+    let mut camera = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+    arguments.camera.unwrap().apply(&mut camera, arguments.up.axis());
+    let directions = [Vec3::X, Vec3::Y, Vec3::NEG_Z].map(|direction| camera.orientation * direction);
+    let expected = [Vec3::X, Vec3::Z, Vec3::Y];
+    assert!(directions.iter().zip(expected).all(|(one, other)| one.abs_diff_eq(other, 1e-6)), "{directions:?}");
+    let error = parse(&["--up", "z"]).err().expect("there is no file");
+    assert!(error.contains("--up is for an OBJ file"), "{error}");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use drawloom::Granularity;
 use drawloom::backend::RecordingStrategy;
+use drawloom::demo::UpAxis;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
 use drawloom_output::{OutputFile, PictureFile};
@@ -25,6 +26,10 @@ pub struct Arguments {
     /// The camera's position and target, in metres.
     #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
     pub camera: Option<CameraPosition>,
+
+    /// The axis that points up in the OBJ file.
+    #[arg(long, value_enum, value_name = "AXIS", default_value = "y")]
+    pub up: UpName,
 
     /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
     /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter.
@@ -101,6 +106,9 @@ impl Arguments {
         }
         if arguments.record.is_some() && !arguments.backend.is_none_or(BackendName::is_wgpu) {
             return Err(conflict("--record is for wgpu, and this backend records nothing"));
+        }
+        if arguments.up != UpName::Y && arguments.scene.is_none() {
+            return Err(conflict("--up is for an OBJ file, and there is none"));
         }
         if arguments.out.is_none() && draws {
             let default = PictureFile::new("frame.png");
@@ -181,6 +189,23 @@ impl BackendName {
     }
 }
 
+/// An axis that points up.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpName {
+    Y,
+    Z,
+}
+
+impl UpName {
+    /// The axis with this name.
+    pub fn axis(self) -> UpAxis {
+        match self {
+            Self::Y => UpAxis::Y,
+            Self::Z => UpAxis::Z,
+        }
+    }
+}
+
 /// `x,y,z,tx,ty,tz`.
 #[derive(Clone)]
 pub struct CameraPosition {
@@ -189,11 +214,13 @@ pub struct CameraPosition {
 }
 
 impl CameraPosition {
-    /// Moves a camera to this position.
-    pub fn apply(&self, camera: &mut Camera) {
-        let placed = Camera::looking_at(camera.name.clone(), self.position, self.target);
+    /// Moves a camera to this position. Its near plane does not cut off what it looks at, however large the scene is.
+    pub fn apply(&self, camera: &mut Camera, up: UpAxis) {
+        let placed = up.looking_at(camera.name.clone(), self.position, self.target);
         camera.position = placed.position;
         camera.orientation = placed.orientation;
+        let near = (self.position.distance(self.target) * 1e-3) as f32;
+        camera.near = camera.near.min(near).max(f32::MIN_POSITIVE);
     }
 }
 

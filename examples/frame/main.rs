@@ -129,13 +129,13 @@ fn load_scene(arguments: &Arguments) -> Result<Scene, Box<dyn Error>> {
                 imported.triangles,
                 imported.degenerate_triangles
             );
-            demo::add_camera_and_lights(&mut imported.scene);
+            demo::add_camera_and_lights_upright(&mut imported.scene, arguments.up.axis());
             imported.scene
         }
     };
     for camera in &mut scene.cameras {
         if let Some(placed) = &arguments.camera {
-            placed.apply(camera);
+            placed.apply(camera, arguments.up.axis());
         }
         camera.size = arguments.size.0;
     }

@@ -2,12 +2,15 @@
 
 use glam::{DVec3, Vec3};
 
+use super::bounds::bounds;
+use super::strays;
+use super::up_axis::UpAxis;
 use crate::scene::{Mesh, SceneRef, Topology};
 
-/// The triangles in normalised coordinates: the centre of their bounding box is the origin, and its corners are at
+/// The triangles in normalised coordinates, with +Y up: the centre of their bounding box is the origin, and its corners are at
 /// distance 1. So f32 is precise enough for scenes of any size, anywhere.
 pub(super) struct Bvh {
-    /// The centre of the box in the world, in metres.
+    /// The centre of the box in the world with +Y up, in metres.
     pub center: DVec3,
     /// Half the box's diagonal, in metres.
     pub radius: f64,
@@ -57,16 +60,20 @@ const MAX_TRIANGLES: usize = 2_000_000;
 const MAX_NODES_OF_RAY: usize = 2_000;
 
 impl Bvh {
-    /// `None` if no triangle can be drawn.
-    pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
+    /// Leaves out what is far from the rest. `None` if no triangle can be drawn.
+    pub(super) fn new(scene: SceneRef<'_>, up: UpAxis) -> Option<Self> {
         let with_mesh = |object: usize| scene.assets.get(scene.meshes[object]).ok().map(|mesh| (object, mesh));
         let objects = || scene.drawable_objects().filter_map(with_mesh);
         let total: usize = objects().map(|(_, mesh)| mesh.triangle_count()).sum();
         let step = total.div_ceil(MAX_TRIANGLES).max(1);
-        let world: Vec<_> = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step).collect();
-        let points = world.iter().flat_map(|(corners, _)| corners);
-        let (low, high) = points
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)));
+        let drawn = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step);
+        let mut world: Vec<_> = drawn
+            .map(|(corners, normal)| {
+                (corners.map(|corner| up.to_y_up(corner)), up.to_y_up(normal.as_dvec3()).as_vec3())
+            })
+            .collect();
+        strays::remove(&mut world);
+        let (low, high) = bounds(world.iter().flat_map(|(corners, _)| *corners));
         let (center, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
         if !(radius > 0.0 && radius.is_finite()) {
             return None;
@@ -84,6 +91,24 @@ impl Bvh {
     /// The nearest intersection of a ray. `direction` has unit length.
     pub(super) fn cast(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
         self.cast_counting(origin, direction).0
+    }
+
+    /// Points on the triangles, each with the normal there: `count` that are spread over the area, and as many over the triangles, of which
+    /// there are most where there is most detail.
+    pub(super) fn surface_points(&self, count: usize) -> Vec<(Vec3, Vec3)> {
+        let of_triangles = (0..count).map(|number| &self.triangles[number * self.triangles.len() / count]);
+        let total: f64 = self.triangles.iter().map(|triangle| f64::from(triangle.area())).sum();
+        let (mut passed, mut number) = (0.0, 0);
+        let mut of_area = Vec::new();
+        for triangle in &self.triangles {
+            passed += f64::from(triangle.area());
+            while number < count && (number as f64 + 0.5) / count as f64 * total <= passed {
+                of_area.push(triangle);
+                number += 1;
+            }
+        }
+        let point = |(number, triangle): (usize, &Triangle)| (triangle.point(number), triangle.normal);
+        of_triangles.chain(of_area).enumerate().map(point).collect()
     }
 
     /// The nearest intersection, and how many nodes were tested for it.
@@ -161,6 +186,20 @@ impl Triangle {
         [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
     }
 
+    fn area(&self) -> f32 {
+        self.edges[0].cross(self.edges[1]).length() / 2.0
+    }
+
+    /// A point on the triangle. Successive numbers give points that are spread over it.
+    fn point(&self, number: usize) -> Vec3 {
+        // The fractions of multiples of two numbers that are independent of each other: the plastic number's powers.
+        let [mut u, mut v] = [0.754_877_7, 0.569_840_3].map(|step: f32| (number as f32 * step).fract());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        self.corner + self.edges[0] * u + self.edges[1] * v
+    }
+
     fn centroid(&self) -> Vec3 {
         self.corner + (self.edges[0] + self.edges[1]) / 3.0
     }
@@ -210,7 +249,7 @@ mod tests {
     #[test]
     fn a_ray_cast_equals_a_brute_force_search() {
         let scene = colonnade().unwrap();
-        let bvh = Bvh::new(scene.as_scene_ref()).unwrap();
+        let bvh = Bvh::new(scene.as_scene_ref(), UpAxis::Y).unwrap();
         let mut hits = 0;
         for number in 0..200 {
             let turn = number as f32;

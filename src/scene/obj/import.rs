@@ -1,7 +1,8 @@
 //! Loading an OBJ file into a scene.
 
+use std::io::Read;
 use std::path::Path;
-use std::{fs, io};
+use std::{fs, io, mem};
 
 use glam::Vec3;
 
@@ -76,17 +77,15 @@ pub fn load(path: impl AsRef<Path>) -> Result<Imported, ObjError> {
 pub fn read(file: &str, bytes: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>) -> Result<Imported, ObjError> {
     let text = str::from_utf8(bytes)
         .map_err(|error| ObjError::NotText { file: file.to_owned(), offset: error.valid_up_to() })?;
-    let preprocessed = Preprocessed::new(text).map_err(|bad| ObjError::Malformed {
+    let mut preprocessed = Preprocessed::new(text).map_err(|bad| ObjError::Malformed {
         file: file.to_owned(),
         line: bad.line,
         reason: bad.reason,
     })?;
-    let models =
-        parse(&preprocessed).map_err(|error| ObjError::Refused { file: file.to_owned(), reason: error.to_string() })?;
+    let models = parse(&mut preprocessed)
+        .map_err(|error| ObjError::Refused { file: file.to_owned(), reason: error.to_string() })?;
     let mut imported = Imported { scene: Scene::new(), warnings: Vec::new(), triangles: 0, degenerate_triangles: 0 };
-    imported
-        .fill(&models, &preprocessed, &fetch)
-        .map_err(|source| ObjError::Scene { file: file.to_owned(), source })?;
+    imported.fill(models, &preprocessed, &fetch).map_err(|source| ObjError::Scene { file: file.to_owned(), source })?;
     if imported.triangles == 0 {
         return Err(ObjError::NoTriangles {
             file: file.to_owned(),
@@ -98,17 +97,18 @@ pub fn read(file: &str, bytes: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>
     Ok(imported)
 }
 
-/// Parses the text with tobj: a model for every run of faces with one name and one material. Polygons are not triangulated.
-fn parse(file: &Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+/// Parses the text with tobj, and drops it: a model for every run of faces with one name and one material. Polygons are not triangulated.
+fn parse(file: &mut Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
     let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
     // Defines every material that is used, so that each model has a material, even one that no library defines.
-    let text = format!("mtllib all\n{}", file.text);
+    let text = mem::take(&mut file.text);
+    let mut text = "mtllib all\n".as_bytes().chain(text.as_bytes());
     let materials = |_: &Path| {
         let names = (0..file.materials.len()).map(|index| index.to_string());
         let materials = names.clone().map(|name| tobj::Material { name, ..tobj::Material::default() }).collect();
         Ok((materials, names.zip(0..).collect()))
     };
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, materials)?;
+    let (models, _) = tobj::load_obj_buf(&mut text, &options, materials)?;
     Ok(models)
 }
 
@@ -128,7 +128,7 @@ fn warnings_of(file: &Preprocessed) -> impl Iterator<Item = ObjWarning> {
 impl Imported {
     fn fill(
         &mut self,
-        models: &[tobj::Model],
+        models: Vec<tobj::Model>,
         file: &Preprocessed,
         fetch: &dyn Fn(&str) -> io::Result<Vec<u8>>,
     ) -> Result<(), SceneError> {
