@@ -177,7 +177,8 @@ impl Node {
         let enter = one.min(other).max_element().max(0.0);
         let leave = one.max(other).min_element();
         // A ray in the plane of a side gives NaN, which counts as a hit: a false positive only costs time.
-        (!(enter > leave * 1.00001)).then_some(enter)
+        let misses = enter > leave * 1.00001;
+        (!misses).then_some(enter)
     }
 }
 

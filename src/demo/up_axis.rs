@@ -23,7 +23,7 @@ impl UpAxis {
         Camera { position, orientation: self.rotation() * camera.orientation, ..camera }
     }
 
-    /// The vector with +Y up. Its right stays to the right.
+    /// A vector of the scene in coordinates with +Y up and the same x axis.
     pub(super) fn to_y_up(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
         match self {
             Self::Y => DVec3::new(x, y, z),
@@ -32,14 +32,14 @@ impl UpAxis {
     }
 
     /// The inverse of [`Self::to_y_up`].
-    pub(super) fn from_y_up(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
+    pub(super) fn to_scene(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
         match self {
             Self::Y => DVec3::new(x, y, z),
             Self::Z => DVec3::new(x, -z, y),
         }
     }
 
-    /// The rotation of [`Self::from_y_up`].
+    /// The rotation of [`Self::to_scene`].
     fn rotation(self) -> Quat {
         match self {
             Self::Y => Quat::IDENTITY,
