@@ -21,12 +21,14 @@ use drawloom::process::{
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
+use drawloom_output::PictureFile;
 use parking_lot::Mutex;
 
 const FRAMES: usize = 120;
 const STEP: Duration = Duration::from_millis(16);
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let file = PictureFile::new("engine_loop.png")?;
     // The engine's own device. WgpuBackend's constants list the features and limits that Drawloom needs.
     let (device, queue) = open_device()?;
     let surface = Arc::new(Surface::new(&device, [960, 540]));
@@ -72,9 +74,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut picture = submission.read(0, "picture")?;
     // Files have red first.
     picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
-    let path = "engine_loop.png";
-    image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
-    println!("{path} written, {}x{} after the resize", picture.width, picture.height);
+    file.write([picture.width, picture.height], &picture.bytes)?;
+    println!("{} written, {}x{} after the resize", file.path().display(), picture.width, picture.height);
     Ok(())
 }
 

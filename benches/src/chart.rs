@@ -4,6 +4,7 @@ use std::error::Error;
 use std::ops::Range;
 use std::path::Path;
 
+use drawloom_output::OutputFile;
 use plotters::coord::Shift;
 use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
@@ -81,20 +82,40 @@ const BLACK_INDEX: usize = COLORS.len() - 1;
 /// Returns an error if the file cannot be written.
 pub fn draw(path: &Path, panels: &[Panel]) -> Result<(), Failure> {
     let heights: Vec<_> = panels.iter().map(Panel::height).collect();
-    let root = SVGBackend::new(path, (WIDTH, heights.iter().sum())).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut rest = root.clone();
-    for (panel, &height) in panels.iter().zip(&heights) {
-        let (area, below) = rest.split_vertically(height);
-        panel.draw(&area)?;
-        rest = below;
-    }
-    root.present()?;
+    write_svg(path, (WIDTH, heights.iter().sum()), |root| {
+        let mut rest = root.clone();
+        for (panel, &height) in panels.iter().zip(&heights) {
+            let (area, below) = rest.split_vertically(height);
+            panel.draw(&area)?;
+            rest = below;
+        }
+        Ok(())
+    })?;
     println!("{} written", path.display());
     Ok(())
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Writes what `draw` draws on white, of `size` pixels.
+///
+/// # Errors
+/// Returns the error of `draw`, or an error if the file cannot be written.
+pub fn write_svg(
+    path: &Path,
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let file = OutputFile::new(path)?;
+    let mut svg = String::new();
+    let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+    root.fill(&WHITE)?;
+    draw(&root)?;
+    root.present()?;
+    drop(root);
+    Ok(file.write_all(svg)?)
+}
+
+/// A part of a chart, or all of it.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Panel {
     fn height(&self) -> u32 {

@@ -5,6 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use drawloom_output::OutputFile;
 use serde::Serialize;
 
 /// Writes `value` as the file `name`.
@@ -12,9 +13,9 @@ use serde::Serialize;
 /// # Errors
 /// Returns an error if the file cannot be written.
 pub fn write_json(name: &str, value: &impl Serialize) -> io::Result<()> {
-    let path = file(name)?;
-    fs::write(&path, serde_json::to_string_pretty(value)? + "\n")?;
-    println!("{} written", path.display());
+    let file = OutputFile::new(file(name)?)?;
+    file.write_all(serde_json::to_string_pretty(value)? + "\n")?;
+    println!("{} written", file.path().display());
     Ok(())
 }
 

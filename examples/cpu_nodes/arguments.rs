@@ -3,7 +3,9 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
+use drawloom_output::OutputFile;
 
 /// Draws a world that the jobs of each frame make.
 #[derive(Parser)]
@@ -30,8 +32,8 @@ pub struct Arguments {
     pub explain: bool,
 
     /// Writes the timeline of the last frames as a Chrome trace, which Perfetto reads.
-    #[arg(long, value_name = "FILE")]
-    pub timeline: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub timeline: Option<OutputFile>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -27,9 +27,7 @@ mod walkers;
 mod world;
 
 use std::error::Error;
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -41,6 +39,7 @@ use drawloom::process::{Deferred, ToneMapping};
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
+use drawloom_output::{OutputError, PictureFile, create_folder};
 use drawloom_testing::adapter;
 
 use arguments::{Arguments, BackendName};
@@ -66,6 +65,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    arguments.out.as_deref().map_or(Ok(()), create_folder)?;
     let builder = Scheduler::builder().timeline_capacity(1 << 18);
     let scheduler = Arc::new(match arguments.workers {
         Some(workers) => builder.workers(workers.get()).build()?,
@@ -94,8 +94,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         submission.wait()?;
         let is_shown = [0, arguments.frames / 2, arguments.frames - 1].contains(&frame);
         if let Some(folder) = arguments.out.as_ref().filter(|_| is_shown && arguments.backend == BackendName::Wgpu) {
-            std::fs::create_dir_all(folder)?;
-            save(&folder.join(format!("frame_{frame}.png")), &submission.read(0, "picture")?)?;
+            save(folder.join(format!("frame_{frame}.png")), &submission.read(0, "picture")?)?;
         }
     }
     times.sort_unstable();
@@ -115,9 +114,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
 /// Writes the trace, and explains the last frame, if that is asked for.
 fn explain(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
-    if let Some(path) = &arguments.timeline {
-        write_chrome_trace(log, BufWriter::new(File::create(path)?))?;
-        println!("{} written", path.display());
+    if let Some(file) = &arguments.timeline {
+        file.write(|writer| write_chrome_trace(log, writer))?;
+        println!("{} written", file.path().display());
     }
     if let Some(frame) = log.frames.last().filter(|_| arguments.explain) {
         println!("\n{}", FrameReport::new(log, frame.number, &SchedulerCosts::measure()?)?);
@@ -129,8 +128,9 @@ fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1000.0
 }
 
-fn save(path: &Path, picture: &Picture) -> Result<(), Box<dyn Error>> {
-    image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
-    println!("{} written", path.display());
+fn save(path: PathBuf, picture: &Picture) -> Result<(), OutputError> {
+    let file = PictureFile::new(path)?;
+    file.write([picture.width, picture.height], &picture.bytes)?;
+    println!("{} written", file.path().display());
     Ok(())
 }

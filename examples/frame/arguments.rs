@@ -1,15 +1,19 @@
 //! The command line.
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::error::ErrorKind;
-use clap::{Parser, ValueEnum};
+use clap::{CommandFactory, Parser, ValueEnum};
 use drawloom::Granularity;
 use drawloom::backend::RecordingStrategy;
+use drawloom::demo::UpAxis;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
+use drawloom_output::{OutputFile, PictureFile};
 
 /// Renders a scene through the whole frame: graph, jobs, views, commands, sorting and instancing, bundles, queues and
 /// submission.
@@ -22,6 +26,10 @@ pub struct Arguments {
     /// The camera's position and target, in metres.
     #[arg(long, value_name = "x,y,z,tx,ty,tz", allow_hyphen_values = true)]
     pub camera: Option<CameraPosition>,
+
+    /// The axis that points up in the OBJ file.
+    #[arg(long, value_enum, value_name = "AXIS", default_value = "y")]
+    pub up: UpName,
 
     /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
     /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter.
@@ -52,9 +60,9 @@ pub struct Arguments {
     #[arg(long, value_name = "WxH", default_value = "960x540")]
     pub size: PictureSize,
 
-    /// The file of the last picture. Default: frame.png.
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
+    /// The file of the last picture, a .png, .jpg, .tga or .bmp. Default: frame.png.
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    pub out: Option<PictureFile>,
 
     /// Adds a depth pre-pass before the geometry buffer.
     #[arg(long)]
@@ -65,42 +73,53 @@ pub struct Arguments {
     pub cull_triangles: bool,
 
     /// Writes the graph of the frame's processes and targets in the DOT language.
-    #[arg(long, value_name = "FILE")]
-    pub graph: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub graph: Option<OutputFile>,
 
     /// Explains in words why the median of the last 60 frames took as long as it did.
     #[arg(long)]
     pub explain: bool,
 
     /// Writes the timeline of the last 60 frames as an HTML page.
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub html: Option<OutputFile>,
 
     /// Writes the timeline of the last 60 frames as a Chrome trace, which Perfetto reads.
-    #[arg(long, value_name = "FILE")]
-    pub timeline: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub timeline: Option<OutputFile>,
 
     /// Writes the figures as JSON.
-    #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub report: Option<OutputFile>,
 }
 
 impl Arguments {
-    /// Parses the command line, or exits with an error.
-    pub fn checked() -> Self {
-        let arguments = Self::parse();
-        if arguments.out.is_some() && matches!(arguments.backend, Some(BackendName::Noop | BackendName::Null)) {
-            conflict("--out needs a picture, and this backend draws none");
+    /// Parses the command line, and checks that each file that it names can be written.
+    ///
+    /// # Errors
+    /// If an argument is wrong, or a file cannot be written.
+    pub fn checked(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<Self, clap::Error> {
+        let mut arguments = Self::try_parse_from(arguments)?;
+        let draws = !matches!(arguments.backend, Some(BackendName::Noop | BackendName::Null));
+        if arguments.out.is_some() && !draws {
+            return Err(conflict("--out needs a picture, and this backend draws none"));
         }
         if arguments.record.is_some() && !arguments.backend.is_none_or(BackendName::is_wgpu) {
-            conflict("--record is for wgpu, and this backend records nothing");
+            return Err(conflict("--record is for wgpu, and this backend records nothing"));
         }
-        arguments
+        if arguments.up != UpName::Y && arguments.scene.is_none() {
+            return Err(conflict("--up is for an OBJ file, and there is none"));
+        }
+        if arguments.out.is_none() && draws {
+            let default = PictureFile::new("frame.png");
+            arguments.out = Some(default.map_err(|error| Self::command().error(ErrorKind::Io, error))?);
+        }
+        Ok(arguments)
     }
 }
 
-fn conflict(message: &str) -> ! {
-    <Arguments as clap::CommandFactory>::command().error(ErrorKind::ArgumentConflict, message).exit()
+fn conflict(message: &str) -> clap::Error {
+    Arguments::command().error(ErrorKind::ArgumentConflict, message)
 }
 
 /// A recording strategy.
@@ -170,6 +189,23 @@ impl BackendName {
     }
 }
 
+/// An axis that points up.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpName {
+    Y,
+    Z,
+}
+
+impl UpName {
+    /// The axis with this name.
+    pub fn axis(self) -> UpAxis {
+        match self {
+            Self::Y => UpAxis::Y,
+            Self::Z => UpAxis::Z,
+        }
+    }
+}
+
 /// `x,y,z,tx,ty,tz`.
 #[derive(Clone)]
 pub struct CameraPosition {
@@ -178,11 +214,13 @@ pub struct CameraPosition {
 }
 
 impl CameraPosition {
-    /// Moves a camera to this position.
-    pub fn apply(&self, camera: &mut Camera) {
-        let placed = Camera::looking_at(camera.name.clone(), self.position, self.target);
+    /// Moves a camera to this position. Its near plane does not cut off what it looks at, however large the scene is.
+    pub fn apply(&self, camera: &mut Camera, up: UpAxis) {
+        let placed = up.looking_at(camera.name.clone(), self.position, self.target);
         camera.position = placed.position;
         camera.orientation = placed.orientation;
+        let near = (self.position.distance(self.target) * 1e-3) as f32;
+        camera.near = camera.near.min(near).max(f32::MIN_POSITIVE);
     }
 }
 

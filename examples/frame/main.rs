@@ -33,7 +33,7 @@ use report::Report;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::checked()) {
+    match run(&Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit())) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", with_causes(error.as_ref()));
@@ -69,7 +69,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     report.print();
     timeline::write_outputs(arguments, &log)?;
     match &arguments.report {
-        Some(path) => report.write(path),
+        Some(file) => report.write(file),
         None => Ok(()),
     }
 }
@@ -131,13 +131,13 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>>
                 imported.triangles,
                 imported.degenerate_triangles
             );
-            demo::add_camera_and_lights(&mut imported.scene);
+            demo::add_camera_and_lights_upright(&mut imported.scene, arguments.up.axis());
             imported.scene
         }
     };
     for camera in &mut scene.cameras {
         if let Some(placed) = &arguments.camera {
-            placed.apply(camera);
+            placed.apply(camera, arguments.up.axis());
         }
         camera.size = arguments.size.0;
     }
@@ -209,9 +209,8 @@ fn draw<B: Backend>(
         progress.inc(1);
     }
     progress.finish_and_clear();
-    if let Some(path) = &arguments.graph {
-        std::fs::write(path, renderer.plan().to_dot())
-            .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
+    if let Some(file) = &arguments.graph {
+        file.write_all(renderer.plan().to_dot())?;
     }
 
     timeline.stop();
@@ -221,10 +220,10 @@ fn draw<B: Backend>(
 }
 
 fn save(arguments: &Arguments, picture: &Picture) -> Result<(), Box<dyn Error>> {
-    let path = arguments.out.clone().unwrap_or_else(|| "frame.png".into());
-    image::save_buffer(&path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
-        .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
-    println!("{} written", path.display());
+    if let Some(file) = &arguments.out {
+        file.write([picture.width, picture.height], &picture.bytes)?;
+        println!("{} written", file.path().display());
+    }
     Ok(())
 }
 

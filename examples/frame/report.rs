@@ -1,10 +1,10 @@
 //! The times of the frames, as a table and as JSON.
 
 use std::error::Error;
-use std::path::Path;
 use std::time::Duration;
 
 use drawloom::FrameStatistics;
+use drawloom_output::OutputFile;
 use serde::Serialize;
 
 use crate::arguments::{Arguments, BackendName, StrategyName};
@@ -181,11 +181,8 @@ impl Report {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Box<dyn Error>> {
-        let text = serde_json::to_string_pretty(self)?;
-        std::fs::write(path, text + "\n")
-            .map_err(|error| format!("{} could not be written: {error}", path.display()))?;
-        Ok(())
+    pub fn write(&self, file: &OutputFile) -> Result<(), Box<dyn Error>> {
+        Ok(file.write_all(serde_json::to_string_pretty(self)? + "\n")?)
     }
 }
 

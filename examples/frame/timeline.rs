@@ -2,11 +2,11 @@
 
 use std::error::Error;
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufWriter};
 
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace, write_page};
 use drawloom::timeline::{Frame, Log};
+use drawloom_output::OutputFile;
 
 use crate::arguments::Arguments;
 
@@ -27,15 +27,15 @@ pub fn first_recorded_frame(arguments: &Arguments) -> Option<u32> {
 /// # Errors
 /// If a file cannot be written, or if the frame to explain was not recorded completely.
 pub fn write_outputs(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
-    if let Some(path) = &arguments.timeline {
-        write(path, |file| write_chrome_trace(log, file))?;
+    if let Some(file) = &arguments.timeline {
+        write(file, |file| write_chrome_trace(log, file))?;
     }
     if arguments.html.is_none() && !arguments.explain {
         return Ok(());
     }
     let costs = SchedulerCosts::measure()?;
-    if let Some(path) = &arguments.html {
-        write(path, |file| write_page(log, &costs, file))?;
+    if let Some(file) = &arguments.html {
+        write(file, |file| write_page(log, &costs, file))?;
     }
     if let Some(frame) = median_frame(log).filter(|_| arguments.explain) {
         println!("\n{}", FrameReport::new(log, frame, &costs)?);
@@ -50,13 +50,8 @@ fn median_frame(log: &Log) -> Option<u64> {
     Some(frames.get(frames.len() / 2)?.number)
 }
 
-fn write(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>) -> Result<(), Box<dyn Error>> {
-    let written = File::create(path).and_then(|file| {
-        let mut file = BufWriter::new(file);
-        write(&mut file)?;
-        file.flush()
-    });
-    written.map_err(|error| format!("{} could not be written: {error}", path.display()))?;
-    println!("{} written", path.display());
+fn write(file: &OutputFile, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Box<dyn Error>> {
+    file.write(write)?;
+    println!("{} written", file.path().display());
     Ok(())
 }

@@ -27,10 +27,11 @@ mod tints;
 mod world;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Parser;
 use drawloom::backend::Picture;
+use drawloom_output::{OutputError, PictureFile, create_folder};
 use indicatif::ProgressBar;
 
 use crate::engine::Engine;
@@ -54,13 +55,13 @@ struct Arguments {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    std::fs::create_dir_all(&arguments.out)?;
+    create_folder(&arguments.out)?;
     let engine = Engine::new(device::open()?)?;
     let progress = ProgressBar::new((2 * arguments.frames + 3) as u64);
     let step = || progress.inc(1);
     let save = |name: &str, picture: &Picture| {
         step();
-        save(&arguments.out.join(name), picture)
+        save(arguments.out.join(name), picture)
     };
 
     let mut world = World::new(arguments.objects, SIZE)?;
@@ -76,7 +77,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn save(path: &Path, picture: &Picture) -> Result<(), Box<dyn Error>> {
-    image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
-    Ok(())
+fn save(path: PathBuf, picture: &Picture) -> Result<(), OutputError> {
+    PictureFile::new(path)?.write([picture.width, picture.height], &picture.bytes)
 }

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
+use drawloom_output::OutputFile;
 
 /// Flies through a world that is many times larger than the device's memory for it.
 #[derive(Parser)]
@@ -40,8 +42,8 @@ pub struct Arguments {
     pub size: PictureSize,
 
     /// Writes the report as JSON.
-    #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    pub report: Option<OutputFile>,
 
     /// Writes the chart and three pictures into this folder.
     #[arg(long, value_name = "DIR")]

@@ -2,7 +2,8 @@
 
 use std::error::Error;
 use std::fmt::Write;
-use std::path::Path;
+
+use drawloom_output::OutputFile;
 
 use crate::report::Recorder;
 
@@ -17,8 +18,8 @@ const COLUMNS: usize = 430;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(recorder: &Recorder, path: &Path) -> Result<(), Box<dyn Error>> {
-    Ok(std::fs::write(path, svg(recorder)?)?)
+pub fn write(recorder: &Recorder, file: &OutputFile) -> Result<(), Box<dyn Error>> {
+    Ok(file.write_all(svg(recorder)?)?)
 }
 
 fn svg(recorder: &Recorder) -> Result<String, std::fmt::Error> {

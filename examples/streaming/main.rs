@@ -29,6 +29,7 @@ use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::task::Scheduler;
+use drawloom_output::{OutputFile, create_folder};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    arguments.out.as_deref().map_or(Ok(()), create_folder)?;
     let scheduler = Arc::new(match arguments.workers {
         Some(workers) => Scheduler::new(workers.get())?,
         None => Scheduler::with_available_parallelism()?,
@@ -106,12 +108,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let report = recorder.report();
     report.print();
     if let Some(folder) = &arguments.out {
-        std::fs::create_dir_all(folder)?;
-        chart::write(&recorder, &folder.join("streaming.svg"))?;
+        chart::write(&recorder, &OutputFile::new(folder.join("streaming.svg"))?)?;
         pictures.write(folder)?;
     }
     match &arguments.report {
-        Some(path) => report.write(path),
+        Some(file) => report.write(file),
         None => Ok(()),
     }
 }

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use drawloom::backend::WgpuReadBack;
-use image::{ExtendedColorType, save_buffer};
+use drawloom_output::PictureFile;
 
 /// The pictures, each read back by the frame that drew it, without waiting for it.
 #[derive(Default)]
@@ -32,8 +32,8 @@ impl Pictures {
     pub fn write(&self, folder: &Path) -> Result<(), Box<dyn Error>> {
         for (number, picture) in self.pictures.iter().enumerate() {
             let picture = picture.read()?;
-            let path = folder.join(format!("picture-{}.png", number + 1));
-            save_buffer(path, &picture.bytes, picture.width, picture.height, ExtendedColorType::Rgba8)?;
+            let file = PictureFile::new(folder.join(format!("picture-{}.png", number + 1)))?;
+            file.write([picture.width, picture.height], &picture.bytes)?;
         }
         Ok(())
     }

@@ -1,10 +1,10 @@
 //! What the flight took.
 
 use std::error::Error;
-use std::path::Path;
 use std::time::Duration;
 
 use drawloom::backend::{StreamingBudget, StreamingStatistics};
+use drawloom_output::OutputFile;
 use serde::Serialize;
 
 /// A frame of the flight.
@@ -107,7 +107,7 @@ impl Report {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Box<dyn Error>> {
-        Ok(std::fs::write(path, serde_json::to_string_pretty(self)? + "\n")?)
+    pub fn write(&self, file: &OutputFile) -> Result<(), Box<dyn Error>> {
+        Ok(file.write_all(serde_json::to_string_pretty(self)? + "\n")?)
     }
 }

@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::error::Error;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -10,6 +9,7 @@ use drawloom::backend::{Backend, TargetMemory};
 use drawloom::scene::{Camera, SceneRef};
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitter};
+use drawloom_output::OutputFile;
 use serde::Serialize;
 
 use crate::gallery::Gallery;
@@ -164,7 +164,6 @@ pub fn print(views: &[ViewCost], targets: TargetMemory) {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(views: &[ViewCost], path: &Path) -> Result<(), Box<dyn Error>> {
-    let text = serde_json::to_string_pretty(&serde_json::json!({ "views": views }))?;
-    std::fs::write(path, text).map_err(|error| format!("{} could not be written: {error}", path.display()).into())
+pub fn write(views: &[ViewCost], file: &OutputFile) -> Result<(), Box<dyn Error>> {
+    Ok(file.write_all(serde_json::to_string_pretty(&serde_json::json!({ "views": views }))?)?)
 }

@@ -17,14 +17,15 @@ mod smoke;
 mod surface;
 
 use std::error::Error;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, ViewBudget};
+use drawloom_output::{OutputFile, PictureFile};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -34,13 +35,13 @@ use gallery::Gallery;
 #[derive(Parser)]
 #[command(name = "views")]
 struct Arguments {
-    /// Where the contact sheet goes, a .png.
-    #[arg(long, value_name = "PNG", default_value = "sheet.png")]
-    out: PathBuf,
+    /// Where the contact sheet goes, a .png, .jpg, .tga or .bmp.
+    #[arg(long, value_name = "FILE", default_value = "sheet.png", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    out: PictureFile,
 
     /// Also writes the table of views, as JSON.
-    #[arg(long, value_name = "JSON")]
-    report: Option<PathBuf>,
+    #[arg(long, value_name = "JSON", value_parser = PathBufValueParser::new().try_map(OutputFile::new))]
+    report: Option<OutputFile>,
 
     /// The frames that are measured of the whole gallery, and without each view.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -67,26 +68,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Checks what can be checked before anything is drawn.
-///
-/// # Errors
-/// If a file could not be written where it is to go, or the budget is no time.
-fn check(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let out = &arguments.out;
-    if image::ImageFormat::from_path(out).ok() != Some(image::ImageFormat::Png) {
-        return Err(format!("{} is no .png, which is what the sheet is written as", out.display()).into());
-    }
-    for path in [out].into_iter().chain(&arguments.report) {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            return Err(format!("{} cannot be written: {} is no folder", path.display(), folder.display()).into());
-        }
-    }
-    arguments.budget_ms.map_or(Ok(()), |milliseconds| Ok(ViewBudget::new(milliseconds).map(drop)?))
-}
-
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    check(arguments)?;
+    // Nothing is drawn for a budget that is no time.
+    arguments.budget_ms.map(ViewBudget::new).transpose()?;
     let mut gallery = Gallery::new()?;
     let (mut renderer, submitter) = measured_renderer()?;
     let (mut views, targets) = {
@@ -102,8 +86,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         gallery.scene.cameras = chosen.cameras;
     }
     costs::print(&views, targets);
-    if let Some(path) = &arguments.report {
-        costs::write(&views, path)?;
+    if let Some(file) = &arguments.report {
+        costs::write(&views, file)?;
     }
     draw(arguments, &gallery)
 }
@@ -137,8 +121,7 @@ fn draw(arguments: &Arguments, gallery: &Gallery) -> Result<(), Box<dyn Error>> 
         }
     };
     contact_sheet::draw_labels(&mut sheet);
-    image::save_buffer(&arguments.out, &sheet.bytes, sheet.width, sheet.height, image::ColorType::Rgba8)
-        .map_err(|error| format!("{} could not be written: {error}", arguments.out.display()))?;
-    println!("{} written", arguments.out.display());
+    arguments.out.write([sheet.width, sheet.height], &sheet.bytes)?;
+    println!("{} written", arguments.out.path().display());
     Ok(())
 }

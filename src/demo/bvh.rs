@@ -2,12 +2,15 @@
 
 use glam::{DVec3, Vec3};
 
+use super::bounds::bounds;
+use super::strays;
+use super::up_axis::UpAxis;
 use crate::scene::{Mesh, SceneRef, Topology};
 
-/// The triangles in normalised coordinates: the centre of their bounding box is the origin, and its corners are at
+/// The triangles in normalised coordinates, with +Y up: the centre of their bounding box is the origin, and its corners are at
 /// distance 1. So f32 is precise enough for scenes of any size, anywhere.
 pub(super) struct Bvh {
-    /// The centre of the box in the world, in metres.
+    /// The centre of the box in the world with +Y up, in metres.
     pub center: DVec3,
     /// Half the box's diagonal, in metres.
     pub radius: f64,
@@ -51,17 +54,26 @@ const MAX_LEAF_TRIANGLES: usize = 6;
 /// from an object.
 const MAX_TRIANGLES: usize = 2_000_000;
 
+/// The most nodes that a ray tests. A ray through a scene tests some hundred. Where triangles lie in each other, as those of a file that has
+/// them all many times, no hierarchy separates them, and a ray would test all. Nearer nodes are tested first, so what is found by then is
+/// close to what is nearest.
+const MAX_NODES_OF_RAY: usize = 2_000;
+
 impl Bvh {
-    /// `None` if no triangle can be drawn.
-    pub(super) fn new(scene: SceneRef<'_>) -> Option<Self> {
+    /// Leaves out what is far from the rest. `None` if no triangle can be drawn.
+    pub(super) fn new(scene: SceneRef<'_>, up: UpAxis) -> Option<Self> {
         let with_mesh = |object: usize| scene.assets.get(scene.meshes[object]).ok().map(|mesh| (object, mesh));
         let objects = || scene.drawable_objects().filter_map(with_mesh);
         let total: usize = objects().map(|(_, mesh)| mesh.triangle_count()).sum();
         let step = total.div_ceil(MAX_TRIANGLES).max(1);
-        let world: Vec<_> = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step).collect();
-        let points = world.iter().flat_map(|(corners, _)| corners);
-        let (low, high) = points
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)));
+        let drawn = objects().flat_map(|(object, mesh)| in_world(scene, object, mesh)).step_by(step);
+        let mut world: Vec<_> = drawn
+            .map(|(corners, normal)| {
+                (corners.map(|corner| up.to_y_up(corner)), up.to_y_up(normal.as_dvec3()).as_vec3())
+            })
+            .collect();
+        strays::remove(&mut world);
+        let (low, high) = bounds(world.iter().flat_map(|(corners, _)| *corners));
         let (center, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
         if !(radius > 0.0 && radius.is_finite()) {
             return None;
@@ -78,17 +90,54 @@ impl Bvh {
 
     /// The nearest intersection of a ray. `direction` has unit length.
     pub(super) fn cast(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
+        self.cast_counting(origin, direction).0
+    }
+
+    /// Points on the triangles, each with the normal there: `count` that are spread over the area, and as many over the triangles, of which
+    /// there are most where there is most detail.
+    pub(super) fn surface_points(&self, count: usize) -> Vec<(Vec3, Vec3)> {
+        let of_triangles = (0..count).map(|number| &self.triangles[number * self.triangles.len() / count]);
+        let total: f64 = self.triangles.iter().map(|triangle| f64::from(triangle.area())).sum();
+        let (mut passed, mut number) = (0.0, 0);
+        let mut of_area = Vec::new();
+        for triangle in &self.triangles {
+            passed += f64::from(triangle.area());
+            while number < count && (number as f64 + 0.5) / count as f64 * total <= passed {
+                of_area.push(triangle);
+                number += 1;
+            }
+        }
+        let point = |(number, triangle): (usize, &Triangle)| (triangle.point(number), triangle.normal);
+        of_triangles.chain(of_area).enumerate().map(point).collect()
+    }
+
+    /// The nearest intersection, and how many nodes were tested for it.
+    fn cast_counting(&self, origin: Vec3, direction: Vec3) -> (Option<Hit>, usize) {
         let inverse = direction.recip();
         let mut nearest = None;
         let mut limit = f32::INFINITY;
-        let mut pending = vec![0];
-        while let Some(index) = pending.pop() {
-            let node = &self.nodes[index];
-            if !node.may_be_hit(origin, inverse, limit) {
+        let mut tested = 1;
+        // Each with the distance at which the ray enters it.
+        let mut pending: Vec<_> = self.nodes[0].enter(origin, inverse).map(|enter| (0, enter)).into_iter().collect();
+        while let Some((index, enter)) = pending.pop() {
+            if enter > limit {
                 continue;
             }
+            let node = &self.nodes[index];
             if let Some(second) = node.second {
-                pending.extend([second, index + 1]);
+                if tested >= MAX_NODES_OF_RAY {
+                    break;
+                }
+                tested += 2;
+                let children = [index + 1, second].map(|child| (child, self.nodes[child].enter(origin, inverse)));
+                let mut children = children.map(|(child, enter)| enter.map(|enter| (child, enter)));
+                // The nearer one is taken first.
+                if let [Some((_, first)), Some((_, second))] = children
+                    && first < second
+                {
+                    children.swap(0, 1);
+                }
+                pending.extend(children.into_iter().flatten());
                 continue;
             }
             for triangle in &self.triangles[node.first..node.first + node.count] {
@@ -98,7 +147,7 @@ impl Bvh {
                 }
             }
         }
-        nearest
+        (nearest, tested)
     }
 
     /// Adds the node over `count` triangles from `first` on and its descendants: a median split along the longest axis.
@@ -122,18 +171,34 @@ impl Bvh {
 }
 
 impl Node {
-    fn may_be_hit(&self, origin: Vec3, inverse: Vec3, limit: f32) -> bool {
+    /// The distance at which the ray enters the box, if it does.
+    fn enter(&self, origin: Vec3, inverse: Vec3) -> Option<f32> {
         let (one, other) = ((self.low - origin) * inverse, (self.high - origin) * inverse);
         let enter = one.min(other).max_element().max(0.0);
         let leave = one.max(other).min_element();
         // A ray in the plane of a side gives NaN, which counts as a hit: a false positive only costs time.
-        !(enter > leave * 1.00001 || enter > limit)
+        let misses = enter > leave * 1.00001;
+        (!misses).then_some(enter)
     }
 }
 
 impl Triangle {
     fn corners(&self) -> [Vec3; 3] {
         [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
+    }
+
+    fn area(&self) -> f32 {
+        self.edges[0].cross(self.edges[1]).length() / 2.0
+    }
+
+    /// A point on the triangle. Successive numbers give points that are spread over it.
+    fn point(&self, number: usize) -> Vec3 {
+        // The fractions of multiples of two numbers that are independent of each other: the plastic number's powers.
+        let [mut u, mut v] = [0.754_877_7, 0.569_840_3].map(|step: f32| (number as f32 * step).fract());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        self.corner + self.edges[0] * u + self.edges[1] * v
     }
 
     fn centroid(&self) -> Vec3 {
@@ -185,7 +250,7 @@ mod tests {
     #[test]
     fn a_ray_cast_equals_a_brute_force_search() {
         let scene = colonnade().unwrap();
-        let bvh = Bvh::new(scene.as_scene_ref()).unwrap();
+        let bvh = Bvh::new(scene.as_scene_ref(), UpAxis::Y).unwrap();
         let mut hits = 0;
         for number in 0..200 {
             let turn = number as f32;
@@ -197,5 +262,34 @@ mod tests {
             hits += usize::from(expected.is_some());
         }
         assert!((50..200).contains(&hits), "{hits}");
+    }
+
+    /// `count` triangles that all reach through the whole scene.
+    fn nested(count: usize, corners: impl Fn(f32) -> [Vec3; 3]) -> Bvh {
+        let triangles = (0..count).map(|number| {
+            let [a, b, c] = corners(number as f32 / count as f32);
+            Triangle { corner: a, edges: [b - a, c - a], normal: (b - a).cross(c - a) }
+        });
+        let triangles = triangles.collect();
+        let mut bvh =
+            Bvh { center: DVec3::ZERO, radius: 1.0, half_size: Vec3::splat(0.5), triangles, nodes: Vec::new() };
+        bvh.build(0, count);
+        bvh
+    }
+
+    #[test]
+    fn a_ray_tests_few_nodes_however_many_triangles_lie_in_each_other() {
+        let coincident = |_: f32| [Vec3::new(-0.5, -0.5, 0.1), Vec3::new(0.5, -0.5, 0.0), Vec3::new(0.0, 0.5, -0.1)];
+        // Each is nearer to the ray's origin than the one before, by less than they are tilted.
+        let stacked = |share: f32| coincident(share).map(|corner| corner + Vec3::Z * (0.01 * share));
+        let origin = Vec3::new(0.01, -0.02, 2.0);
+        for (bvh, tolerance) in [(nested(50_000, coincident), 0.0), (nested(50_000, stacked), 0.01)] {
+            let (hit, tested) = bvh.cast_counting(origin, Vec3::NEG_Z);
+            assert!(tested <= MAX_NODES_OF_RAY + 1, "{tested} of {}", bvh.nodes.len());
+            let distances = bvh.triangles.iter().filter_map(|triangle| triangle.distance(origin, Vec3::NEG_Z));
+            let nearest = distances.fold(f32::INFINITY, f32::min);
+            let hit = hit.expect("all are hit");
+            assert!(hit.front_facing && (0.0..=tolerance).contains(&(hit.distance - nearest)), "{hit:?} {nearest}");
+        }
     }
 }

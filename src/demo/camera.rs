@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::bvh::Bvh;
+use super::up_axis::UpAxis;
 use super::viewpoint;
 use crate::scene::{Camera, Projection, SceneRef};
 
@@ -10,8 +11,9 @@ use crate::scene::{Camera, Projection, SceneRef};
 ///
 /// Rays classify the scene. If its triangles face points inside and not points outside, it is an interior: the camera stands
 /// in it at eye height, looking along the longest free line of sight, or looks in through a missing wall. Otherwise it is an
-/// object, shown from outside and slightly above. The scene is upright along +Y. The near plane is at a thousandth of the
-/// scene's radius.
+/// object, shown from outside and above, from the side that shows most of its surface and of its detail; of sides that show about as much, from
+/// its front (+Z). The scene is upright along +Y. The near plane is at a thousandth of the scene's radius. What is a thousand times as far away
+/// as the rest is large does not count.
 ///
 /// If nothing in the scene can be drawn, or its slices differ in length, the camera looks at the world's origin.
 ///
@@ -23,15 +25,20 @@ use crate::scene::{Camera, Projection, SceneRef};
 /// # Ok::<(), drawloom::scene::SceneError>(())
 /// ```
 pub fn camera(scene: SceneRef<'_>) -> Camera {
-    let Some(bvh) = Bvh::new(scene) else {
-        return Camera::looking_at("main", DVec3::new(2.0, 1.5, 3.0), DVec3::ZERO);
+    camera_upright(scene, UpAxis::Y)
+}
+
+/// As [`camera`], for a scene that is upright along another axis.
+pub fn camera_upright(scene: SceneRef<'_>, up: UpAxis) -> Camera {
+    let Some(bvh) = Bvh::new(scene, up) else {
+        return up.looking_at("main", up.to_scene(DVec3::new(2.0, 1.5, 3.0)), DVec3::ZERO);
     };
     let view = viewpoint::choose(&bvh);
-    let in_world = |point: Vec3| bvh.center + point.as_dvec3() * bvh.radius;
+    let in_world = |point: Vec3| up.to_scene(bvh.center + point.as_dvec3() * bvh.radius);
     Camera {
         projection: Projection::Perspective { field_of_view: view.field_of_view },
         near: ((bvh.radius * 1e-3) as f32).max(f32::MIN_POSITIVE),
-        ..Camera::looking_at("main", in_world(view.eye), in_world(view.target))
+        ..up.looking_at("main", in_world(view.eye), in_world(view.target))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::camera::camera;
+use super::camera::camera_upright;
+use super::up_axis::UpAxis;
 use crate::scene::{Camera, Light, Scene, SceneRef};
 
 /// Weak, cool ambient light.
@@ -11,10 +12,15 @@ pub const AMBIENT: Vec3 = Vec3::new(0.10, 0.11, 0.13);
 /// A dark bluish background.
 pub const BACKGROUND: Vec3 = Vec3::new(0.015, 0.02, 0.035);
 
-/// Prepares a scene of objects, such as one from an OBJ file, for drawing: adds [`camera`], adds [`lights`] if the scene has
+/// Prepares a scene of objects, such as one from an OBJ file, for drawing: adds [`camera`](super::camera()), adds [`lights`] if the scene has
 /// none, and sets [`AMBIENT`] and [`BACKGROUND`].
 pub fn add_camera_and_lights(scene: &mut Scene) {
-    let camera = camera(scene.as_scene_ref());
+    add_camera_and_lights_upright(scene, UpAxis::Y);
+}
+
+/// As [`add_camera_and_lights`], for a scene that is upright along another axis.
+pub fn add_camera_and_lights_upright(scene: &mut Scene, up: UpAxis) {
+    let camera = camera_upright(scene.as_scene_ref(), up);
     if scene.lights.is_empty() {
         let lights = lights(scene.as_scene_ref(), &camera);
         scene.lights.extend(lights);

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 use super::bvh::{Bvh, Hit};
 
@@ -107,19 +107,39 @@ fn looking_in(bvh: &Bvh, side: Vec3) -> Viewpoint {
     }
 }
 
-/// From outside, slightly above and from the side that shows the most front faces.
+/// Another side than the usual one is chosen only if it shows this many times as much.
+const CLEARLY_MORE: f32 = 1.15;
+
+/// From outside and above, from the side that shows most.
 fn object(bvh: &Bvh) -> Viewpoint {
-    let eyes = [[0.55, 0.4, 1.0], [-0.55, 0.4, 1.0], [0.55, 0.4, -1.0], [-0.55, 0.4, -1.0]].map(|side| {
-        let side = Vec3::from(side).normalize();
-        side * fitting_distance(bvh, side)
-    });
-    let shown = |eye: Vec3| {
-        let targets = (0..64).map(|ray| fibonacci_sphere(ray, 64) * bvh.half_size * 0.7);
-        targets.filter(|&target| bvh.cast(eye, (target - eye).normalize()).is_some_and(|hit| hit.front_facing)).count()
+    let points = bvh.surface_points(256);
+    let seen_from = |side: Vec3| {
+        let eye = side * fitting_distance(bvh, side);
+        (eye, seen_share(bvh, eye, &points))
     };
-    // Another side is chosen only if it shows clearly more.
-    let eye = eyes[1..].iter().fold(eyes[0], |best, &eye| if shown(eye) > shown(best) * 5 / 4 { eye } else { best });
-    Viewpoint { eye, target: Vec3::ZERO, field_of_view: OUTSIDE_FIELD_OF_VIEW.to_radians() }
+    // All around, from as high as usual and from higher.
+    let usual = Vec3::new(0.55, 0.4, 1.0).normalize();
+    let mirrored = |side: Vec3| [side, Vec3::new(-side.x, side.y, side.z)];
+    let sides = [usual, Vec3::new(0.55, 0.8, 1.0).normalize()].into_iter().flat_map(mirrored);
+    let turned = |side: Vec3| (0..8).map(move |turn| Quat::from_rotation_y(turn as f32 / 8.0 * TAU) * side);
+    let (usual, share) = seen_from(usual);
+    let best = sides.flat_map(turned).map(seen_from).fold((usual, CLEARLY_MORE * share), |best, eye| {
+        // Of sides that differ by rounding alone the first is taken.
+        if eye.1 > 1.01 * best.1 { eye } else { best }
+    });
+    Viewpoint { eye: best.0, target: Vec3::ZERO, field_of_view: OUTSIDE_FIELD_OF_VIEW.to_radians() }
+}
+
+/// The share of points on the surface, with their normals, that are seen from their front. What is seen at more than 60° from its normal
+/// counts less.
+fn seen_share(bvh: &Bvh, eye: Vec3, points: &[(Vec3, Vec3)]) -> f32 {
+    let seen = points.iter().map(|&(point, normal)| {
+        let (direction, distance) = (point - eye).normalize_and_length();
+        let facing = (-2.0 * direction.dot(normal.normalize_or_zero())).clamp(0.0, 1.0);
+        let is_seen = facing > 0.0 && bvh.cast(eye, direction).is_none_or(|hit| hit.distance > distance * 0.999);
+        if is_seen { facing } else { 0.0 }
+    });
+    seen.sum::<f32>() / points.len().max(1) as f32
 }
 
 /// The distance in direction `side` at which the whole bounding box is in the picture.

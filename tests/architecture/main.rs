@@ -3,12 +3,14 @@
 //! - `layers`: the modules that `src/lib.rs` lists are layers, and each uses only those above it.
 //! - `circles`: the files of one module do not import each other in circles.
 //! - `files`: files are short, and their names say what is inside.
+//! - `outputs`: examples and benchmarks write files through `drawloom-output`.
 //! - `atomics`: the tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
 
 mod atomics;
 mod circles;
 mod files;
 mod layers;
+mod outputs;
 mod paths;
 mod sources;
 mod tokens;

@@ -18,6 +18,9 @@ pub fn trials() -> Vec<Trial> {
         trial("geometry::faces_with_and_without_normals_mix", faces_with_and_without_normals_mix),
         trial("geometry::a_face_without_normals_has_a_face_normal", a_face_without_normals_has_a_face_normal),
         trial("geometry::the_origin_of_an_object_is_its_centre", the_origin_of_an_object_is_its_centre),
+        trial("geometry::a_far_face_does_not_flatten_a_small_one", a_far_face_does_not_flatten_a_small_one),
+        trial("geometry::details_of_any_size_are_kept", details_of_any_size_are_kept),
+        trial("geometry::a_large_convex_polygon_is_covered", a_large_convex_polygon_is_covered),
         trial(
             "geometry::malformed_lines_are_reported_with_their_number",
             malformed_lines_are_reported_with_their_number,
@@ -127,6 +130,66 @@ fn the_origin_of_an_object_is_its_centre() {
     assert_eq!(mesh(&imported, 0).vertices()[0].position, [-0.125, -0.25, 0.0]);
     let bounds = mesh(&imported, 0).bounds();
     assert!(bounds.center.length() < 1e-6 && bounds.radius < 0.3);
+}
+
+/// The areas of all triangles in the world, the smallest first.
+fn areas(imported: &Imported) -> Vec<f64> {
+    let scene = imported.scene.as_scene_ref();
+    let mut areas = Vec::new();
+    for mesh in scene.meshes.iter().map(|mesh| scene.assets.get(*mesh).unwrap()) {
+        let position = |index: u32| Vec3::from(mesh.vertices()[index as usize].position).as_dvec3();
+        for corners in mesh.indices().as_chunks::<3>().0 {
+            let [a, b, c] = corners.map(position);
+            areas.push((b - a).cross(c - a).length() / 2.0);
+        }
+    }
+    areas.sort_by(f64::total_cmp);
+    areas
+}
+
+fn a_far_face_does_not_flatten_a_small_one() {
+    let far = "v 1000000 0 0\nv 1000001 0 0\nv 1000000 1 0\n";
+    let small = "v 0 0 0\nv 0.01 0 0\nv 0.01 0.01 0\nv 0 0.01 0\n";
+    // One model, and two.
+    for name in ["", "o small\n"] {
+        let imported = load(&format!("{far}{small}f 1 2 3\n{name}f 4 5 6 7\n"));
+        assert_eq!((imported.triangles, imported.degenerate_triangles), (3, 0));
+        let areas = areas(&imported);
+        let expected = [5e-5, 5e-5, 0.5];
+        assert!(areas.iter().zip(expected).all(|(area, expected)| (area / expected - 1.0).abs() < 1e-5), "{areas:?}");
+        let mut positions = imported.scene.as_scene_ref().positions.to_vec();
+        positions.sort_by(|one, other| one.x.total_cmp(&other.x));
+        assert_eq!(positions, [DVec3::new(0.005, 0.005, 0.0), DVec3::new(1_000_000.5, 0.5, 0.0)]);
+    }
+}
+
+fn details_of_any_size_are_kept() {
+    // A plain of 20 km with a screw on it, and triangles that are each a ten-thousandth of the one before.
+    let screw = "v 3000 4000 0\nv 3000.001 4000 0\nv 3000 4000.001 0\n";
+    let plain = "v -1e4 -1e4 0\nv 1e4 -1e4 0\nv 1e4 1e4 0\nv -1e4 1e4 0\n";
+    let imported = load(&format!("{plain}{screw}f 1 2 3 4\nf 5 6 7\n"));
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (3, 0));
+    assert!((areas(&imported)[0] / 5e-7 - 1.0).abs() < 1e-3, "{:?}", areas(&imported));
+    let triangle =
+        |exponent| format!("v 1e{exponent} 0 0\nv 2e{exponent} 0 0\nv 1e{exponent} 1e{exponent} 0\nf -3 -2 -1\n");
+    let imported = load(&(-30..=30).step_by(4).map(triangle).collect::<String>());
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (16, 0));
+    for (area, exponent) in areas(&imported).into_iter().zip((-30..=30).step_by(4)) {
+        assert!((area / (0.5 * 10_f64.powi(2 * exponent)) - 1.0).abs() < 0.5, "{area} of 1e{exponent}");
+    }
+}
+
+fn a_large_convex_polygon_is_covered() {
+    const CORNERS: usize = 5_000;
+    let corner = |index: usize| (index as f64 / CORNERS as f64 * std::f64::consts::TAU).sin_cos();
+    // Six decimals, so that some corners are concave by rounding.
+    let vertices: String =
+        (0..CORNERS).map(corner).map(|(sine, cosine)| format!("v {cosine:.6} {sine:.6} 0\n")).collect();
+    let indices: String = (1..=CORNERS).map(|index| format!(" {index}")).collect();
+    let imported = load(&format!("{vertices}f{indices}\n"));
+    assert_eq!(imported.warnings, []);
+    assert_eq!(imported.triangles + imported.degenerate_triangles, CORNERS - 2);
+    assert!((f64::from(area(&imported)) - std::f64::consts::PI).abs() < 1e-5, "{}", area(&imported));
 }
 
 fn malformed_lines_are_reported_with_their_number() {

@@ -15,7 +15,7 @@ use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, demo};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::results;
-use image::{ImageFormat, RgbImage};
+use drawloom_output::PictureFile;
 use serde::Serialize;
 
 use crate::steps::AmbientOcclusion;
@@ -198,12 +198,11 @@ impl Engine {
 fn save(name: &str, picture: &Picture, other: Option<&Picture>) -> Result<(), Box<dyn Error>> {
     let pixels = picture.bytes.chunks_exact(4).enumerate();
     let bytes = pixels.flat_map(|(index, pixel)| {
-        [0, 1, 2].map(|channel| match other {
+        [0, 1, 2, 3].map(|channel| match other {
             Some(other) => pixel[channel].abs_diff(other.bytes[index * 4 + channel]).saturating_mul(8),
             None => pixel[channel],
         })
     });
-    let image = RgbImage::from_raw(picture.width, picture.height, bytes.collect()).ok_or("it has all pixels")?;
-    image.save_with_format(results::file(name)?, ImageFormat::Png)?;
-    Ok(())
+    let bytes: Vec<u8> = bytes.collect();
+    Ok(PictureFile::new(results::file(name)?)?.write_opaque([picture.width, picture.height], &bytes)?)
 }

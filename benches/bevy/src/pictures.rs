@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::mpsc;
 
 use drawloom::wgpu;
+use drawloom_output::PictureFile;
 
 use crate::contender::{Contender, Failure};
 use crate::layout::{Layout, PICTURE};
@@ -55,7 +56,7 @@ pub fn compare(contenders: &mut [Box<dyn Contender>], layout: &Layout, folder: O
             let picture = contender.picture(camera)?;
             if let Some(folder) = folder {
                 let file = format!("{}-{}-{camera}-{name}.png", layout.name, layout.objects);
-                image::save_buffer(folder.join(file), &picture, PICTURE, PICTURE, image::ColorType::Rgba8)?;
+                PictureFile::new(folder.join(file))?.write([PICTURE; 2], &picture)?;
             }
             let colors: Vec<_> = picture.chunks_exact(4).map(Color::of).collect();
             if first.is_empty() {

@@ -6,6 +6,7 @@ use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::chart::{self, HorizontalBars, Lines, Panel};
 use drawloom_benches::statistics::{median, percentile};
 use drawloom_benches::table::Table;
+use drawloom_output::OutputFile;
 
 use crate::contender::{Contender, Failure, FrameTime, PARTS};
 use crate::layout::Layout;
@@ -141,7 +142,7 @@ impl Report {
     /// Returns an error if the file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<(), Failure> {
         let Extent { backend, threads, is_quick, .. } = self.extent;
-        let mut writer = csv::WriterBuilder::new().has_headers(false).from_path(path)?;
+        let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         writer.write_record(COLUMNS)?;
         for row in &self.rows {
             let run = (backend.name(), self.backend_name(), threads, is_quick);
@@ -150,7 +151,7 @@ impl Report {
             let submitted = (row.submitted_us, row.quartiles_us, parts, row.submitted_ratio);
             writer.serialize((run, what, submitted, row.drawn_us, row.drawn_ratio))?;
         }
-        writer.flush()?;
+        OutputFile::new(path)?.write_all(writer.into_inner()?)?;
         println!("{} written", path.display());
         Ok(())
     }

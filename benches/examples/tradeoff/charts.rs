@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use plotters::coord::Shift;
+use drawloom_benches::chart::{Area, write_svg};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -91,46 +91,40 @@ fn draw_one(
     of_knobs: Column<'_>,
 ) -> Result<(), Failure> {
     let size = (NAMES + 3 * (COLUMN + FIGURE), HEAD + ROW * entries.len() as i32 + 12);
-    let root = SVGBackend::new(path, (size.0 as u32, size.1 as u32)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let title = format!("{}, {}: {name}", results.scene(), results.backend());
-    root.draw(&Text::new(title, (12, 10), text(17)))?;
-    for (row, entry) in (0..).zip(entries) {
-        let middle = HEAD + ROW * row + ROW / 2;
-        let style = text(14).pos(Pos::new(HPos::Right, VPos::Center));
-        root.draw(&Text::new(label(entry, name), (NAMES - 10, middle), style))?;
-    }
-    let columns = [
-        Column {
-            title: String::from("a frame, ms"),
-            value: &|entry| Some(entry.frame_ms()),
-            bound: &none,
-            longest: None,
-            color: RGBColor(0, 114, 178),
-        },
-        Column {
-            title: String::from("picture: RMSE from f64, of 255"),
-            value: &|entry| Some(entry.rmse_from_reference * 255.0),
-            bound: &none,
-            longest: None,
-            color: RGBColor(230, 159, 0),
-        },
-        of_knobs,
-    ];
-    for (index, column) in (0..).zip(&columns) {
-        draw_column(&root, NAMES + index * (COLUMN + FIGURE), column, entries)?;
-    }
-    root.present()?;
-    Ok(())
+    write_svg(path, (size.0 as u32, size.1 as u32), |root| {
+        let title = format!("{}, {}: {name}", results.scene(), results.backend());
+        root.draw(&Text::new(title, (12, 10), text(17)))?;
+        for (row, entry) in (0..).zip(entries) {
+            let middle = HEAD + ROW * row + ROW / 2;
+            let style = text(14).pos(Pos::new(HPos::Right, VPos::Center));
+            root.draw(&Text::new(label(entry, name), (NAMES - 10, middle), style))?;
+        }
+        let columns = [
+            Column {
+                title: String::from("a frame, ms"),
+                value: &|entry| Some(entry.frame_ms()),
+                bound: &none,
+                longest: None,
+                color: RGBColor(0, 114, 178),
+            },
+            Column {
+                title: String::from("picture: RMSE from f64, of 255"),
+                value: &|entry| Some(entry.rmse_from_reference * 255.0),
+                bound: &none,
+                longest: None,
+                color: RGBColor(230, 159, 0),
+            },
+            of_knobs,
+        ];
+        for (index, column) in (0..).zip(&columns) {
+            draw_column(root, NAMES + index * (COLUMN + FIGURE), column, entries)?;
+        }
+        Ok(())
+    })
 }
 
 /// Draws bars with their values, and a mark at the bound. Values of cut bars begin with dots.
-fn draw_column(
-    root: &DrawingArea<SVGBackend<'_>, Shift>,
-    left: i32,
-    column: &Column<'_>,
-    entries: &[&Entry],
-) -> Result<(), Failure> {
+fn draw_column(root: &Area<'_>, left: i32, column: &Column<'_>, entries: &[&Entry]) -> Result<(), Failure> {
     root.draw(&Text::new(column.title.clone(), (left, HEAD - 22), text(14)))?;
     let longest = column.longest.unwrap_or_else(|| longest(entries.iter().filter_map(|entry| (column.value)(entry))));
     for (row, entry) in (0..).zip(entries) {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use drawloom_benches::chart::{Area, write_svg};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -15,14 +16,15 @@ use crate::settings::Knob;
 /// # Errors
 /// Returns an error if the file cannot be written.
 pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
-    let path = folder.join("front.svg");
-    let root = SVGBackend::new(&path, (WIDTH, 420)).into_drawing_area();
-    root.fill(&WHITE)?;
+    write_svg(&folder.join("front.svg"), (WIDTH, 420), |root| draw_front(root, results))
+}
+
+fn draw_front(root: &Area<'_>, results: &Results) -> Result<(), Failure> {
     let points = || results.entries.iter().map(point);
     let slowest = points().map(|(time, _)| time).fold(f64::MIN_POSITIVE, f64::max);
     let nearest = points().map(|(_, distance)| distance).fold(f64::MAX, f64::min);
     let farthest = points().map(|(_, distance)| distance).fold(nearest, f64::max);
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(root)
         .caption(format!("{}, {}", results.scene(), results.backend()), text(17))
         .margin(12)
         .margin_right(NAMES + 12)
@@ -53,7 +55,6 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         let row = (WIDTH as i32 - NAMES, 40 + 20 * number as i32);
         root.draw(&Text::new(name, row, text(13).color(&FRONT)))?;
     }
-    root.present()?;
     Ok(())
 }
 

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::path::Path;
 
 use drawloom::backend::Picture;
+use drawloom_output::{OutputError, OutputFile, PictureFile};
 
 use crate::Failure;
 use crate::charts::file_name;
-use crate::comparison::without_alpha;
 use crate::measure::Measurements;
 use crate::results::{Entry, Results, short};
 use crate::settings::Knob;
@@ -24,7 +24,7 @@ pub fn write(folder: &Path, results: &Results, measurements: &Measurements) -> R
         save(&folder.join(difference_name(number)), &difference(&measured.picture, reference))?;
     }
     let path = folder.join("index.html");
-    std::fs::write(&path, html(results)).map_err(|error| format!("{}: {error}", path.display()))?;
+    OutputFile::new(&path)?.write_all(html(results))?;
     println!("{} written", path.display());
     Ok(())
 }
@@ -37,8 +37,8 @@ fn difference_name(number: usize) -> String {
     format!("{number}-difference.png")
 }
 
-fn save(path: &Path, picture: &Picture) -> Result<(), Failure> {
-    without_alpha(picture)?.save(path).map_err(|error| format!("{}: {error}", path.display()).into())
+fn save(path: &Path, picture: &Picture) -> Result<(), OutputError> {
+    PictureFile::new(path)?.write_opaque([picture.width, picture.height], &picture.bytes)
 }
 
 /// The difference of two pictures, magnified 16 times, around grey.

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use drawloom::scene::{Camera, Scene};
+use drawloom_output::OutputFile;
 use serde::{Deserialize, Serialize};
 
 use crate::Failure;
@@ -167,7 +168,7 @@ impl Results {
         };
         all.retain(|entry| entry.scene != self.scene || entry.backend != self.backend);
         all.extend(self.entries.iter().cloned());
-        std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n").map_err(|error| with_path(path, &error))?;
+        OutputFile::new(path)?.write_all(serde_json::to_string_pretty(&all)? + "\n")?;
         println!("{} written", path.display());
         Ok(())
     }

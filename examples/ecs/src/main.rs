@@ -18,10 +18,11 @@ mod scene_columns;
 mod tests;
 
 use std::error::Error;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
+use drawloom_output::PictureFile;
 use drawloom_testing::adapter;
 
 use bevy_world::BevyWorld;
@@ -50,8 +51,8 @@ struct Options {
     backend: BackendName,
 
     /// Writes the last picture, of the adapter.
-    #[arg(long, value_name = "FILE.png")]
-    picture: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.png", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    picture: Option<PictureFile>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -89,11 +90,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             println!("  bevy_ecs  {bevy}");
         }
     }
-    if let Some(path) = &options.picture {
+    if let Some(file) = &options.picture {
         let picture = graphics.picture()?;
-        image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
-            .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-        println!("{} written", path.display());
+        file.write([picture.width, picture.height], &picture.bytes)?;
+        println!("{} written", file.path().display());
     }
     Ok(())
 }

@@ -9,7 +9,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::task::Scheduler;
+use drawloom_output::PictureFile;
 use gltf_scene::{LoadOptions, draw, load, open_device};
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::filter::LevelFilter;
@@ -20,8 +22,8 @@ struct Arguments {
     /// A .gltf or a .glb.
     file: PathBuf,
     /// Where the picture goes.
-    #[arg(long, value_name = "FILE.png")]
-    picture: PathBuf,
+    #[arg(long, value_name = "FILE.png", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    picture: PictureFile,
     /// The time in seconds at which the animation is.
     #[arg(long, value_name = "SECONDS", value_parser = parse_time)]
     time: Option<f64>,
@@ -66,7 +68,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         eprintln!("warning: {warning}");
     }
     let picture = draw(open_device()?, scheduler, &world, arguments.exposure)?;
-    image::save_buffer(&arguments.picture, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)?;
+    arguments.picture.write([picture.width, picture.height], &picture.bytes)?;
     println!("{}", describe(&world, arguments));
     Ok(())
 }
@@ -78,7 +80,7 @@ fn describe(world: &gltf_scene::World, arguments: &Arguments) -> String {
         _ if world.animations.is_empty() => String::new(),
         _ => format!(", animations {:?} at rest", world.animations),
     };
-    format!("{objects} objects, {} cameras{animations}; {}", world.cameras, arguments.picture.display())
+    format!("{objects} objects, {} cameras{animations}; {}", world.cameras, arguments.picture.path().display())
 }
 
 fn parse_time(text: &str) -> Result<f64, String> {

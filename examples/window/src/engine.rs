@@ -92,14 +92,13 @@ impl Engine {
         }
         let [textures, buffers] = self.resources;
         println!("{} frames; {}; {textures} textures and {buffers} buffers", self.frames, pacing_text(&self.pacing));
-        let Some(path) = &self.options.screenshot else { return Ok(()) };
+        let Some(file) = &self.options.screenshot else { return Ok(()) };
         let mut picture = self.screenshot.ok_or("the windows were closed before the screenshot")?;
         if picture.format == Format::Bgra8Srgb {
             picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
         }
-        image::save_buffer(path, &picture.bytes, picture.width, picture.height, image::ColorType::Rgba8)
-            .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-        println!("{} written", path.display());
+        file.write([picture.width, picture.height], &picture.bytes)?;
+        println!("{} written", file.path().display());
         Ok(())
     }
 

@@ -1,8 +1,8 @@
 //! What the command line says.
 
-use std::path::PathBuf;
-
 use clap::Parser;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use drawloom_output::PictureFile;
 
 /// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F1 shows the inspector, F11 is full
 /// screen, V switches vertical synchronisation, N opens another window, Escape closes one.
@@ -24,8 +24,8 @@ pub struct Options {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
     /// Writes the first window's last picture.
-    #[arg(long, value_name = "FILE.png", requires = "frames", conflicts_with = "inspector")]
-    pub screenshot: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.png", requires = "frames", conflicts_with = "inspector", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
+    pub screenshot: Option<PictureFile>,
     /// Shows the inspector over the first window: where the time of frames goes, and what each setting costs.
     #[arg(long)]
     pub inspector: bool,

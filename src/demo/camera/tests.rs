@@ -1,7 +1,7 @@
 use glam::{DVec3, Quat, Vec3};
 
-use super::camera;
-use crate::demo::lights;
+use super::{camera, camera_upright};
+use crate::demo::{UpAxis, lights};
 use crate::scene::{Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, Vertex};
 
 /// The sides of a cube: the normal, and two directions along the side.
@@ -134,6 +134,105 @@ fn a_single_face_is_seen_from_its_front() {
     let mesh = Mesh::new("face", Topology::TriangleList, vertices, (0..6).collect()).unwrap();
     let camera = camera_of(&[(mesh, Vec3::ONE)], 1.0, DVec3::ZERO);
     assert!(camera.position.z < -1.0, "{camera:?}");
+}
+
+/// A square of `divisions`² pairs of triangles, of size 2 around the origin, whose front is towards +Z.
+fn square(divisions: usize) -> Mesh {
+    let step = 2.0 / divisions as f32;
+    let vertices = (0..divisions * divisions).flat_map(|cell| {
+        let corner =
+            Vec3::new((cell % divisions) as f32, (cell / divisions) as f32, 0.0) * step - Vec3::new(1.0, 1.0, 0.0);
+        let positions = [[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]]
+            .map(|[x, y]| corner + Vec3::new(x as f32, y as f32, 0.0) * step);
+        positions.map(|position| Vertex { position: position.into(), normal: Vec3::Z.into(), uv: [0.0; 2] })
+    });
+    let vertices: Vec<_> = vertices.collect();
+    let indices = (0..vertices.len() as u32).collect();
+    Mesh::new("square", Topology::TriangleList, vertices, indices).unwrap()
+}
+
+fn scaled(mesh: Mesh, factor: f32) -> Mesh {
+    let scale = |vertex: &Vertex| Vertex { position: vertex.position.map(|value| value * factor), ..*vertex };
+    let vertices = mesh.vertices().iter().map(scale).collect();
+    Mesh::new("scaled", mesh.topology(), vertices, mesh.indices().to_vec()).unwrap()
+}
+
+/// Adds an object that is turned around the vertical.
+fn add(scene: &mut Scene, mesh: Mesh, position: DVec3, turn: f32) {
+    let mesh = scene.add(mesh).unwrap();
+    let material = scene.add(Material::default()).unwrap();
+    let orientation = Quat::from_rotation_y(turn);
+    scene.add_object(RenderObject { orientation, ..RenderObject::new(mesh, material, position) }).unwrap();
+}
+
+#[test]
+fn an_object_is_shown_from_before_its_backdrop() {
+    for number in 0..8 {
+        let turn = number as f32 / 8.0 * std::f32::consts::TAU;
+        let front = Quat::from_rotation_y(turn) * Vec3::Z;
+        let mut scene = Scene::new();
+        let small = scaled(cube(Vec3::ZERO, false), 0.3);
+        add(&mut scene, small, (front * 0.5).as_dvec3(), turn);
+        add(&mut scene, square(1), DVec3::ZERO, turn);
+        let camera = camera(scene.as_scene_ref());
+        let before = camera.position.normalize().dot(front.as_dvec3());
+        assert!(before > 0.3, "{turn}: {camera:?}");
+    }
+}
+
+#[test]
+fn a_model_is_shown_from_the_side_with_the_detail() {
+    for number in 0..4 {
+        let turn = number as f32 / 4.0 * std::f32::consts::TAU;
+        let front = Quat::from_rotation_y(turn) * Vec3::Z;
+        let mut scene = Scene::new();
+        add(&mut scene, cube(Vec3::Z, false), DVec3::ZERO, turn);
+        add(&mut scene, square(20), front.as_dvec3(), turn);
+        let camera = camera(scene.as_scene_ref());
+        assert!(camera.position.normalize().dot(front.as_dvec3()) > 0.5, "{turn}: {camera:?}");
+    }
+}
+
+#[test]
+fn a_scene_with_z_up_is_shown_as_the_same_scene_with_y_up() {
+    let to_z_up = |vector: DVec3| DVec3::new(vector.x, -vector.z, vector.y);
+    let rotation = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    let bodies = [(DVec3::new(0.0, 0.5, 0.0), Vec3::new(2.0, 0.5, 1.0)), (DVec3::new(1.5, 2.0, 3.0), Vec3::splat(0.6))];
+    let scene = |is_z_up: bool| {
+        let mut scene = Scene::new();
+        let (mesh, material) = (scene.add(cube(Vec3::ZERO, false)).unwrap(), scene.add(Material::default()).unwrap());
+        for (position, scale) in bodies {
+            let object = RenderObject { scale, ..RenderObject::new(mesh, material, position) };
+            let turned = RenderObject { position: to_z_up(position), orientation: rotation, ..object };
+            scene.add_object(if is_z_up { turned } else { object }).unwrap();
+        }
+        scene
+    };
+    let upright = camera(scene(false).as_scene_ref());
+    let turned = camera_upright(scene(true).as_scene_ref(), UpAxis::Z);
+    assert!(to_z_up(upright.position).abs_diff_eq(turned.position, 1e-4), "{upright:?} {turned:?}");
+    let up = turned.orientation * Vec3::Y;
+    assert!(up.abs_diff_eq(rotation * (upright.orientation * Vec3::Y), 1e-4) && up.z > 0.8, "{turned:?}");
+    // And it is not what the scene gets if nobody says so.
+    assert!(!camera(scene(true).as_scene_ref()).position.abs_diff_eq(turned.position, 0.1));
+    let nothing = camera_upright(Scene::new().as_scene_ref(), UpAxis::Z);
+    assert!((nothing.orientation * Vec3::Y).z > 0.8 && nothing.position.z > 0.0, "{nothing:?}");
+}
+
+#[test]
+fn a_stray_does_not_change_the_view() {
+    let box_size = Vec3::new(1.0, 2.0, 1.0);
+    let alone = camera_of(&[(cube(Vec3::ZERO, false), box_size)], 1.0, DVec3::ZERO);
+    for distance in [1e5, -1e9, 1e30] {
+        let mut scene = scene_of(&[(cube(Vec3::ZERO, false), box_size)], DVec3::ZERO);
+        add(&mut scene, square(1), DVec3::new(distance, 0.0, 0.0), 0.0);
+        let camera = camera(scene.as_scene_ref());
+        assert_eq!((camera.position, camera.near), (alone.position, alone.near), "{distance}");
+    }
+    // What is as large as it is far is no stray.
+    let mut scene = scene_of(&[(cube(Vec3::ZERO, false), Vec3::ONE)], DVec3::ZERO);
+    add(&mut scene, scaled(square(1), 1e4), DVec3::new(0.0, 0.0, -1.0), 0.0);
+    assert!(camera(scene.as_scene_ref()).position.length() > 1e4);
 }
 
 /// Fails unless every corner of the box is in the picture, and the box fills at least half of its width or height.

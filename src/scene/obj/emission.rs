@@ -2,18 +2,18 @@
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::ModelGeometry;
+use super::geometry::GeometryPart;
 use crate::scene::Light;
 
 /// A mesh counts as planar if the length of its mean normal is at least this.
 const MIN_PLANAR_NORMAL: f64 = 0.9;
 
-/// The light for a mesh at `position` that emits `radiance`, in a scene of diameter `scene_diameter`. `None` if the mesh has
+/// The light for a mesh that emits `radiance`, in a scene of diameter `scene_diameter`. `None` if the mesh has
 /// no area, or emits nothing.
 ///
 /// A planar mesh becomes a hemispherical light with the intensity radiance × area on its axis. Any other mesh becomes a point
 /// light with a quarter of that: the mean projected area of a convex body is a quarter of its surface.
-pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, scene_diameter: f64) -> Option<Light> {
+pub(super) fn light(geometry: &GeometryPart, radiance: Vec3, scene_diameter: f64) -> Option<Light> {
     let (mut area, mut facing, mut centroid) = (0.0, DVec3::ZERO, DVec3::ZERO);
     for corners in geometry.indices.as_chunks::<3>().0 {
         let corners = corners.map(|index| geometry.vertices[index as usize]);
@@ -28,7 +28,7 @@ pub(super) fn light(geometry: &ModelGeometry, position: DVec3, radiance: Vec3, s
     if !(area > 0.0 && radiance.max_element() > 0.0) {
         return None;
     }
-    let center = position + centroid / area;
+    let center = geometry.center + centroid / area;
     let direction = facing / area;
     // Finite for any surface that 32-bit coordinates can represent.
     let intensity = |area: f64| (radiance.as_dvec3() * area).min(DVec3::splat(1e30)).as_vec3();

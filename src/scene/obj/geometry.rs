@@ -5,47 +5,45 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::polygon::triangulate;
+use super::preprocessing::position_index;
 use crate::scene::Vertex;
 
-/// The triangles of a model that have an area. Every vertex has a normal.
+/// The triangles of a model that have an area.
 #[derive(Debug, Default)]
 pub(super) struct ModelGeometry {
+    /// One part, unless the model has details that are too small for 32-bit coordinates of the whole.
+    pub parts: Vec<GeometryPart>,
+    pub degenerate_triangles: usize,
+    pub fanned_polygons: usize,
+}
+
+/// Triangles of a model. Every vertex has a normal.
+#[derive(Debug, Default)]
+pub(super) struct GeometryPart {
     /// The centre of the bounding box. Vertices are relative to it.
     pub center: DVec3,
     pub vertices: Vec<Vertex>,
     pub indices: Vec<u32>,
-    pub degenerate_triangles: usize,
-    pub fanned_polygons: usize,
 }
 
 /// A triangle whose height is less than this share of its longest edge counts as degenerate: it is thinner than the rounding
 /// of 32-bit coordinates.
 const MIN_RELATIVE_HEIGHT: f64 = 1e-7;
 
+/// A part is divided if the longest edge of a triangle is less than this share of half the part's size: its 32-bit coordinates, which are
+/// relative to the middle, are rounded by up to a sixteenth of that.
+const MIN_RELATIVE_EDGE: f64 = 1e-6;
+
+/// The most times that a part is divided.
+const MAX_DIVISIONS: u32 = 64;
+
 impl ModelGeometry {
-    pub(super) fn new(mesh: &tobj::Mesh) -> Self {
+    /// `positions` are those of the file, whose indices the mesh has as positions.
+    pub(super) fn new(mesh: &tobj::Mesh, positions: &[DVec3]) -> Self {
         let mut geometry = Self::default();
-        let attributes = VertexAttributes::new(mesh);
+        let attributes = VertexAttributes::new(mesh, positions);
         let triangles = geometry.triangles(mesh, &attributes.positions);
-        let points = triangles.iter().flat_map(|triangle| triangle.corners.map(|corner| attributes.positions[corner]));
-        let (low, high) =
-            points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
-        if !triangles.is_empty() {
-            geometry.center = (low + high) / 2.0;
-        }
-        // Triangles share vertices that have a normal in the file. Others get the normal of their face, and are not shared.
-        let mut shared = HashMap::new();
-        for Triangle { corners, normal } in triangles {
-            for corner in corners {
-                let index = match attributes.normals[corner].try_normalize() {
-                    Some(given) => {
-                        *shared.entry(corner).or_insert_with(|| geometry.add_vertex(&attributes, corner, given))
-                    }
-                    None => geometry.add_vertex(&attributes, corner, normal),
-                };
-                geometry.indices.push(index);
-            }
-        }
+        divide(triangles, &attributes, MAX_DIVISIONS, &mut geometry.parts);
         geometry
     }
 
@@ -63,16 +61,33 @@ impl ModelGeometry {
             let points: Vec<_> = polygon.iter().map(|&corner| positions[corner as usize]).collect();
             cut.clear();
             self.fanned_polygons += usize::from(!triangulate(&points, &mut cut));
-            for triangle in &cut {
-                match normal(triangle.map(|corner| points[corner])) {
-                    Some(normal) => {
-                        kept.push(Triangle { corners: triangle.map(|corner| polygon[corner] as usize), normal });
-                    }
+            for cut in &cut {
+                let corners = cut.map(|corner| polygon[corner] as usize);
+                match triangle(corners, cut.map(|corner| points[corner])) {
+                    Some(triangle) => kept.push(triangle),
                     None => self.degenerate_triangles += 1,
                 }
             }
         }
         kept
+    }
+}
+
+impl GeometryPart {
+    /// Triangles share vertices that have a normal in the file. Others get the normal of their face, and are not shared.
+    fn new(triangles: &[Triangle], attributes: &VertexAttributes, center: DVec3) -> Self {
+        let mut part = Self { center, ..Self::default() };
+        let mut shared = HashMap::new();
+        for Triangle { corners, normal, .. } in triangles {
+            for &corner in corners {
+                let index = match attributes.normals[corner].try_normalize() {
+                    Some(given) => *shared.entry(corner).or_insert_with(|| part.add_vertex(attributes, corner, given)),
+                    None => part.add_vertex(attributes, corner, *normal),
+                };
+                part.indices.push(index);
+            }
+        }
+        part
     }
 
     fn add_vertex(&mut self, attributes: &VertexAttributes, corner: usize, normal: DVec3) -> u32 {
@@ -87,9 +102,37 @@ impl ModelGeometry {
     }
 }
 
+/// Adds the triangles as one part, or divides them at the middle of the longest axis until each part has room for its smallest triangle.
+fn divide(triangles: Vec<Triangle>, attributes: &VertexAttributes, divisions: u32, parts: &mut Vec<GeometryPart>) {
+    if triangles.is_empty() {
+        return;
+    }
+    let corners = |triangle: &Triangle| triangle.corners.map(|corner| attributes.positions[corner]);
+    let (low, high) = bounds(triangles.iter().flat_map(corners));
+    let smallest = triangles.iter().map(|triangle| triangle.longest_edge).fold(f64::INFINITY, f64::min);
+    let centroid = |triangle: &Triangle| corners(triangle).into_iter().map(|corner| corner / 3.0).sum::<DVec3>();
+    let (first, last) = bounds(triangles.iter().map(centroid));
+    let axis = (last - first).max_position();
+    let middle = first[axis] / 2.0 + last[axis] / 2.0;
+    let has_room = smallest >= MIN_RELATIVE_EDGE * ((high - low).max_element() / 2.0);
+    if has_room || divisions == 0 || middle >= last[axis] {
+        parts.push(GeometryPart::new(&triangles, attributes, low / 2.0 + high / 2.0));
+        return;
+    }
+    let (before, behind) = triangles.into_iter().partition(|triangle| centroid(triangle)[axis] <= middle);
+    divide(before, attributes, divisions - 1, parts);
+    divide(behind, attributes, divisions - 1, parts);
+}
+
+/// The corners of the box around points.
+fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
+}
+
 struct Triangle {
     corners: [usize; 3],
     normal: DVec3,
+    longest_edge: f64,
 }
 
 /// The vertex attributes of a tobj mesh, one entry per vertex. A missing normal is zero.
@@ -100,22 +143,26 @@ struct VertexAttributes {
 }
 
 impl VertexAttributes {
-    fn new(mesh: &tobj::Mesh) -> Self {
-        // f64 works with either float type that tobj can be built with, and products do not overflow.
-        let to_vec3 = |values: &[_; 3]| DVec3::from(values.map(f64::from));
+    fn new(mesh: &tobj::Mesh, positions: &[DVec3]) -> Self {
+        // f64 works with either float type that tobj can be built with.
+        let to_f64 = |values: &[_; 3]| values.map(f64::from);
         let to_f32 = |values: &[_; 2]| values.map(|value| f64::from(value) as f32);
+        let indices = mesh.positions.as_chunks().0.iter().map(|position| position_index(to_f64(position)));
         Self {
-            positions: mesh.positions.as_chunks().0.iter().map(to_vec3).collect(),
-            normals: mesh.normals.as_chunks().0.iter().map(to_vec3).collect(),
+            positions: indices.map(|index| positions[index]).collect(),
+            normals: mesh.normals.as_chunks().0.iter().map(|normal| DVec3::from(to_f64(normal))).collect(),
             texture_coordinates: mesh.texcoords.as_chunks().0.iter().map(to_f32).collect(),
         }
     }
 }
 
-/// The normal of a triangle, if it has an area.
-fn normal([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+/// A triangle with its normal, if it has an area and 32-bit coordinates can represent it.
+fn triangle(corners: [usize; 3], [a, b, c]: [DVec3; 3]) -> Option<Triangle> {
     let product = (b - a).cross(c - a);
     let longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
     // A comparison with NaN is false.
-    if product.length() > MIN_RELATIVE_HEIGHT * longest { product.try_normalize() } else { None }
+    let has_area = product.length() > MIN_RELATIVE_HEIGHT * longest;
+    let is_small = [a, b, c].iter().all(|point| point.abs().cmple(DVec3::splat(f32::MAX.into())).all());
+    let normal = if has_area && is_small { product.try_normalize() } else { None };
+    normal.map(|normal| Triangle { corners, normal, longest_edge: longest.sqrt() })
 }

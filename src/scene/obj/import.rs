@@ -1,14 +1,15 @@
 //! Loading an OBJ file into a scene.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
+use std::mem;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::error::{ObjError, ObjWarning};
 use super::files::{self, Fetch};
-use super::geometry::ModelGeometry;
+use super::geometry::{GeometryPart, ModelGeometry};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::{MalformedLine, Preprocessed};
 use super::statements::{Statements, escaped};
@@ -20,7 +21,7 @@ use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology};
 /// A scene from an OBJ file, without cameras.
 #[derive(Debug, Default)]
 pub struct Imported {
-    /// One object, with a mesh of its own, for every material of every model, and a light for every emissive mesh.
+    /// One object, or several, each with a mesh of its own, for every material of every model, and a light for every emissive mesh.
     pub scene: Scene,
     /// What was left out or replaced: of each kind, the first [`ObjLimits::warnings`]. Control characters of the files are
     /// escaped in them.
@@ -35,7 +36,8 @@ pub struct Imported {
 
 /// Loads a scene from an OBJ file, with the `.mtl` files and textures that it names.
 ///
-/// - The origin of an object is the centre of its bounding box.
+/// - The origin of an object is the centre of its bounding box. A model whose extent is a million times its smallest triangle
+///   becomes several objects, so that 32-bit coordinates suffice for each.
 /// - Polygons are triangulated, including concave ones. Points, lines, free-form surfaces and vertex colours are left out.
 /// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
 ///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1
@@ -126,14 +128,14 @@ pub fn read_within(
 fn import(file: &str, reader: impl BufRead, fetch: Fetch<'_>, limits: &ObjLimits) -> Result<Imported, ObjError> {
     let file = escaped(file);
     let mut warnings = Warnings::new(limits.warnings);
-    let preprocessed = Statements::new(reader, limits.line_bytes)
+    let mut preprocessed = Statements::new(reader, limits.line_bytes)
         .and_then(|statements| Preprocessed::new(statements, &file, &mut warnings))
         .map_err(|source| ObjError::Unreadable { file: file.clone(), source })?;
-    let models =
-        parse(&preprocessed).map_err(|error| ObjError::Refused { file: file.clone(), reason: error.to_string() })?;
+    let models = parse(&mut preprocessed)
+        .map_err(|error| ObjError::Refused { file: file.clone(), reason: error.to_string() })?;
     let mut imported = Imported::default();
     imported
-        .fill(&models, &preprocessed, fetch, limits, &mut warnings)
+        .fill(models, &preprocessed, fetch, limits, &mut warnings)
         .map_err(|source| ObjError::Scene { file: file.clone(), source })?;
     if imported.triangles == 0 {
         return Err(nothing_to_draw(file, preprocessed, imported.degenerate_triangles));
@@ -152,17 +154,18 @@ fn nothing_to_draw(file: String, preprocessed: Preprocessed, degenerate_triangle
     }
 }
 
-/// Parses the text with tobj: a model for every run of faces with one name and one material. Polygons are not triangulated.
-fn parse(file: &Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+/// Parses the text with tobj, and drops it: a model for every run of faces with one name and one material. Polygons are not triangulated.
+fn parse(file: &mut Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
     let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
     // Defines every material that is used, so that each model has a material, even one that no library defines.
-    let text = format!("mtllib all\n{}", file.text);
+    let text = mem::take(&mut file.text);
+    let mut text = "mtllib all\n".as_bytes().chain(text.as_bytes());
     let materials = |_: &Path| {
         let names = (0..file.materials.len()).map(|index| index.to_string());
         let materials = names.clone().map(|name| tobj::Material { name, ..tobj::Material::default() }).collect();
         Ok((materials, names.zip(0..).collect()))
     };
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, materials)?;
+    let (models, _) = tobj::load_obj_buf(&mut text, &options, materials)?;
     Ok(models)
 }
 
@@ -185,7 +188,7 @@ fn warnings_of(file: &Preprocessed) -> impl Iterator<Item = ObjWarning> {
 impl Imported {
     fn fill(
         &mut self,
-        models: &[tobj::Model],
+        models: Vec<tobj::Model>,
         file: &Preprocessed,
         fetch: Fetch<'_>,
         limits: &ObjLimits,
@@ -195,16 +198,15 @@ impl Imported {
         let materials = material::add_materials(&mut self.scene, file, fetch, limits, warnings)?;
         let mut emissive = Vec::new();
         for model in models {
-            let geometry = ModelGeometry::new(&model.mesh);
+            let geometry = ModelGeometry::new(&model.mesh, &file.positions);
             self.report(&model.name, &geometry, warnings);
-            if geometry.indices.is_empty() {
-                continue;
-            }
             let material = materials[model.mesh.material_id.unwrap_or(materials.len() - 1)];
-            let position = self.add_object(&model.name, &geometry, file.origin, material)?;
             let emission = self.scene.assets().get(material)?.emission;
-            if emission != Vec3::ZERO {
-                emissive.push((geometry, position, emission));
+            for part in geometry.parts {
+                self.add_object(&model.name, &part, material)?;
+                if emission != Vec3::ZERO {
+                    emissive.push((part, emission));
+                }
             }
         }
         self.add_lights(&emissive);
@@ -214,24 +216,21 @@ impl Imported {
     fn add_object(
         &mut self,
         name: &str,
-        geometry: &ModelGeometry,
-        origin: DVec3,
+        geometry: &GeometryPart,
         material: Handle<Material>,
-    ) -> Result<DVec3, SceneError> {
+    ) -> Result<(), SceneError> {
         let mesh = Mesh::new(name, Topology::TriangleList, geometry.vertices.clone(), geometry.indices.clone())?;
         self.triangles += mesh.triangle_count();
         let mesh = self.scene.add(mesh)?;
-        let position = origin + geometry.center;
-        self.scene.add_object(RenderObject::new(mesh, material, position))?;
-        Ok(position)
+        self.scene.add_object(RenderObject::new(mesh, material, geometry.center))?;
+        Ok(())
     }
 
     /// Adds the lights of emissive surfaces.
-    fn add_lights(&mut self, emissive: &[(ModelGeometry, DVec3, Vec3)]) {
+    fn add_lights(&mut self, emissive: &[(GeometryPart, Vec3)]) {
         let diameter = 2.0 * self.scene.as_scene_ref().bounding_sphere().1;
         let lights = emissive.iter();
-        let lights = lights
-            .filter_map(|(geometry, position, radiance)| emission::light(geometry, *position, *radiance, diameter));
+        let lights = lights.filter_map(|(geometry, radiance)| emission::light(geometry, *radiance, diameter));
         self.scene.lights.extend(lights);
     }
 
@@ -239,7 +238,7 @@ impl Imported {
         let model = model.to_owned();
         let degenerate_triangles = geometry.degenerate_triangles;
         self.degenerate_triangles += degenerate_triangles;
-        if geometry.indices.is_empty() {
+        if geometry.parts.is_empty() {
             warnings.push(ObjWarning::EmptyModel { model: model.clone(), degenerate_triangles });
         }
         if geometry.fanned_polygons > 0 {

@@ -9,15 +9,22 @@ const MAX_EAR_CLIPPING_CORNERS: usize = 256;
 
 /// A polygon with less area than this share of that of its largest part is one whose parts cancel each other.
 const MIN_RELATIVE_AREA: f64 = 1e-9;
+/// A corner of a large polygon may be this share of the polygon's size off its convex hull: less than 32-bit coordinates resolve.
+const MAX_RELATIVE_DENT: f64 = 1e-7;
 
 /// Triangulates a polygon into `corners.len() - 2` triangles of corner indices, with the winding of the polygon. Returns
-/// false if the triangles may not cover the polygon exactly: it intersects itself, or is concave and too large.
+/// false if the triangles may not cover the polygon exactly: it intersects itself, or is concave and too large. Takes n log n
+/// time for n corners, if they are more than 256.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) -> bool {
     if corners.len() == 3 {
         triangles.push([0, 1, 2]);
         return true;
     }
     let flat = project(corners);
+    if corners.len() > MAX_EAR_CLIPPING_CORNERS && is_convex(&flat) {
+        halve(0, corners.len() - 1, triangles);
+        return true;
+    }
     let mut ring: Vec<usize> = (0..corners.len()).collect();
     let smallest = (1..flat.len() - 1)
         .map(|corner| signed_area(flat[0], flat[corner], flat[corner + 1]))
@@ -34,6 +41,67 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) ->
     // The rest, which is the whole polygon if it is convex, becomes a fan around its first corner.
     triangles.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));
     exact
+}
+
+/// Triangulates a convex polygon: the triangle of the first, the last and the middle corner, and so on beside it. In a fan of as many corners
+/// all triangles but a few would be thin, and all would meet in one corner.
+fn halve(first: usize, last: usize, triangles: &mut Vec<[usize; 3]>) {
+    if last - first < 2 {
+        return;
+    }
+    let middle = first.midpoint(last);
+    triangles.push([first, middle, last]);
+    halve(first, middle, triangles);
+    halve(middle, last, triangles);
+}
+
+/// Whether the polygon is its convex hull, but for the rounding of its corners. The hull is as large as the polygon only if its corners are
+/// corners of the polygon in the same order, and the others are close to the line between their neighbours on the hull.
+fn is_convex(flat: &[DVec2]) -> bool {
+    let hull = convex_hull(flat);
+    let next = |at: usize| hull[(at + 1) % hull.len()];
+    let descents = (0..hull.len()).filter(|&at| hull[at] >= next(at)).count();
+    if hull.len() < 3 || descents != 1 {
+        return false;
+    }
+    let (low, high) = flat.iter().fold((flat[0], flat[0]), |(low, high), &point| (low.min(point), high.max(point)));
+    let tolerance = MAX_RELATIVE_DENT * (high - low).max_element();
+    (0..hull.len()).all(|at| {
+        let (from, to) = (hull[at], next(at));
+        let (start, along) = (flat[from], (flat[to] - flat[from]).normalize_or_zero());
+        let steps = (to + flat.len() - from) % flat.len();
+        (1..steps).all(|step| along.perp_dot(flat[(from + step) % flat.len()] - start).abs() <= tolerance)
+    })
+}
+
+/// The corners of the convex hull, counter-clockwise (Andrew's monotone chain). Empty if a coordinate is not finite.
+fn convex_hull(points: &[DVec2]) -> Vec<usize> {
+    if !points.iter().all(|point| point.is_finite()) {
+        return Vec::new();
+    }
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_unstable_by(|&one, &other| {
+        let (one, other) = (points[one], points[other]);
+        one.x.total_cmp(&other.x).then(one.y.total_cmp(&other.y))
+    });
+    let mut hull: Vec<usize> = Vec::new();
+    let chain = |order: &mut dyn Iterator<Item = usize>, hull: &mut Vec<usize>| {
+        let start = hull.len();
+        for point in order {
+            while let [.., before, last] = hull[start..] {
+                if signed_area(points[before], points[last], points[point]) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(point);
+        }
+        // The last point begins the other chain.
+        hull.pop();
+    };
+    chain(&mut order.iter().copied(), &mut hull);
+    chain(&mut order.iter().rev().copied(), &mut hull);
+    hull
 }
 
 /// The angle at `from` between two other points, from −π to π.
@@ -167,10 +235,58 @@ mod tests {
         assert_eq!(triangles.len(), 2);
     }
 
+    /// A polygon around a circle of radius 1,000 around a distant point, its coordinates rounded to multiples of `step`.
+    fn circle(count: usize, step: f64, mut radius: impl FnMut(usize) -> f64) -> Vec<DVec3> {
+        let corner = |index: usize| {
+            let (sine, cosine) = (index as f64 / count as f64 * TAU).sin_cos();
+            let (x, y) = (3000.0 + radius(index) * cosine, 500.0 + radius(index) * sine);
+            DVec3::new((x / step).round() * step, 7.0, (y / step).round() * step)
+        };
+        (0..count).map(corner).collect()
+    }
+
+    #[test]
+    fn a_large_convex_polygon_has_no_corner_in_most_triangles() {
+        for step in [1e-12, 1e-5] {
+            for reversed in [false, true] {
+                let mut corners = circle(100_000, step, |_| 1000.0);
+                corners.rotate_left(12_345);
+                if reversed {
+                    corners.reverse();
+                }
+                let mut triangles = Vec::new();
+                assert!(triangulate(&corners, &mut triangles), "{step}");
+                assert_eq!(triangles.len(), corners.len() - 2);
+                let expected = 1e6 * TAU / 2.0;
+                assert!((area(&corners, &triangles) / expected - 1.0).abs() < 1e-6, "{step}");
+                let mut uses = vec![0; corners.len()];
+                triangles.iter().flatten().for_each(|&corner| uses[corner] += 1);
+                assert!(*uses.iter().max().unwrap() < 64);
+                let normal = |&[a, b, c]: &[usize; 3]| (corners[b] - corners[a]).cross(corners[c] - corners[a]).y;
+                let winding = if reversed { 1.0 } else { -1.0 };
+                assert!(triangles.iter().all(|triangle| normal(triangle) * winding > -step.max(1e-9)), "{step}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_large_polygon_that_is_not_convex_is_no_hull() {
+        // A dent that is shallow at each of its corners.
+        let dented = circle(100_000, 1e-12, |index| 1000.0 - 200.0 * (index as f64 / 100_000.0 * TAU * 3.0).sin());
+        // Twice around, on the same corners, and on others.
+        let twice = [circle(1_000, 1e-12, |_| 1000.0), circle(1_000, 1e-12, |_| 1000.0)].concat();
+        let spiral = [circle(1_000, 1e-12, |_| 1000.0), circle(1_000, 1e-12, |_| 900.0)].concat();
+        for corners in [dented, twice, spiral] {
+            assert!(!is_convex(&project(&corners)));
+        }
+    }
+
     #[test]
     fn nan_does_not_hang() {
         let mut triangles = Vec::new();
         triangulate(&[DVec3::NAN; 9], &mut triangles);
         assert_eq!(triangles.len(), 7);
+        triangulate(&[DVec3::NAN; 1000], &mut triangles);
+        assert_eq!(triangles.len(), 7 + 998);
     }
 }

@@ -8,6 +8,7 @@
 //! - It confuses vertices if only some have a colour, a normal or texture coordinates.
 //! - It overflows on some indices.
 
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 use std::io::{self, BufRead};
 
@@ -28,8 +29,8 @@ pub(super) struct Preprocessed {
     pub libraries: Vec<String>,
     /// The names of `usemtl` statements, each once, in order.
     pub materials: Vec<String>,
-    /// The origin of the positions in `text`.
-    pub origin: DVec3,
+    /// The positions of the file. `text` has their indices instead, as [`position_index`] reads them.
+    pub positions: Vec<DVec3>,
     /// The number of points, which are left out.
     pub points: usize,
     /// The number of lines, which are left out.
@@ -54,9 +55,10 @@ pub(super) struct Preprocessed {
     /// Whether faces belong to a smoothing group.
     is_smoothed: bool,
     counts: Counts,
-    positions: Vec<DVec3>,
-    /// The index of the position of the first corner of the first face.
-    first_corner: Option<usize>,
+    /// The index of each name in `materials`.
+    material_indices: HashMap<String, usize>,
+    /// The names in `libraries`.
+    library_names: HashSet<String>,
 }
 
 /// A malformed line: its number, counted from 1, and the reason.
@@ -78,16 +80,16 @@ struct Counts {
 /// up, and a zero normal.
 const PLACEHOLDERS: &str = "vt 0 1\nvn 0 0 0\n";
 
-/// The origin of the positions in the text is a multiple of this, in metres. tobj reads f32, whose precision is 0.5 m in the
-/// coordinates of a land survey.
-const ORIGIN_STEP: f64 = 4096.0;
+/// The index of a position has two digits of this base in the text.
+const INDEX_BASE: usize = 1 << 16;
 
 /// The most bytes of a word that is not a number in which one is looked for.
 const MAX_NUMBER_BYTES: usize = 64;
 
-/// The largest coordinate of an origin. Frames draw nothing as far away, so a vertex farther out is a mistake in the file,
-/// and others are not relative to it.
-const MAX_ORIGIN: f64 = 1e10;
+/// The index that a position in the text for tobj stands for.
+pub(super) fn position_index([low, high, _]: [f64; 3]) -> usize {
+    low as usize + high as usize * INDEX_BASE
+}
 
 impl Preprocessed {
     /// Reads the statements of a file. What is malformed is left out, with a warning.
@@ -114,7 +116,6 @@ impl Preprocessed {
         }
         std::mem::take(&mut preprocessed.ignored).warn(file, warnings);
         statements.warn(file, warnings);
-        preprocessed.write_positions();
         Ok(preprocessed)
     }
 
@@ -145,16 +146,12 @@ impl Preprocessed {
                 Ok(())
             }
             "usemtl" => {
-                let known = self.materials.iter().position(|name| name == rest);
-                let index = known.unwrap_or_else(|| {
-                    self.materials.push(rest.to_owned());
-                    self.materials.len() - 1
-                });
+                let index = self.material_index(rest);
                 self.emit(format_args!("usemtl {index}"));
                 Ok(())
             }
             "mtllib" => {
-                if !self.libraries.iter().any(|name| name == rest) {
+                if self.library_names.insert(rest.to_owned()) {
                     self.libraries.push(rest.to_owned());
                 }
                 Ok(())
@@ -197,25 +194,23 @@ impl Preprocessed {
             [x, y, z, ..] => Ok(DVec3::new(x, y, z)),
             _ => Err(format!("a vertex needs 3 coordinates and has {}", numbers.len())),
         });
+        let index = self.positions.len();
         // Faces count a malformed vertex as well. Triangles that have it as a corner are left out.
         self.positions.push(*position.as_ref().unwrap_or(&DVec3::NAN));
         self.counts.positions += 1;
+        // tobj reads f32, which has every whole number below 2²⁴, and whose precision is 0.5 m in the coordinates of a land survey.
+        self.emit(format_args!("v {} {} 0", index % INDEX_BASE, index / INDEX_BASE));
         position.map(drop)
     }
 
-    /// Writes the positions at the start of the text, relative to an origin near the first corner of a face. Vertices that no
-    /// face refers to may be anywhere, so they do not determine the origin.
-    fn write_positions(&mut self) {
-        let within = |position: &&DVec3| position.abs().cmple(DVec3::splat(MAX_ORIGIN)).all();
-        let first = self.first_corner.and_then(|corner| self.positions.get(corner)).filter(within);
-        self.origin = first.map_or(DVec3::ZERO, |first| (*first / ORIGIN_STEP).trunc() * ORIGIN_STEP);
-        let mut text = String::new();
-        for position in &self.positions {
-            let DVec3 { x, y, z } = *position - self.origin;
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "v {x:e} {y:e} {z:e}");
+    fn material_index(&mut self, name: &str) -> usize {
+        if let Some(index) = self.material_indices.get(name) {
+            return *index;
         }
-        self.text.insert_str(0, &text);
+        let index = self.materials.len();
+        self.materials.push(name.to_owned());
+        self.material_indices.insert(name.to_owned(), index);
+        index
     }
 
     fn texture_coordinates(&mut self, values: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
@@ -285,7 +280,6 @@ impl Preprocessed {
         let Counts { positions, texture_coordinates, normals } = self.counts;
         let position = absolute_index(position, positions)
             .ok_or_else(|| format!("a face refers to vertex {position}, but there are {positions} so far"))?;
-        self.first_corner.get_or_insert(position as usize - 1);
         let resolved = [(texture, texture_coordinates), (normal, normals)]
             .map(|(index, count)| index.map(|index| absolute_index(index, count)));
         self.dangling_corners += usize::from(resolved.contains(&Some(None)));
@@ -322,15 +316,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_distant_scene_keeps_millimetre_precision() {
-        let stray_vertex = "v 999999999 0 0\n";
-        let face = "v 500000.125 4500000.001 30\nv 500000.126 4500000.002 30\nf 2 3 2\n";
-        let text = format!("{stray_vertex}{face}");
-        let statements = Statements::new(text.as_bytes(), 1 << 20).unwrap();
+    fn the_text_has_the_index_of_each_position() {
+        let vertices = "v 500000.125 4500000.001 30\n".repeat(70_000);
+        let statements = Statements::new(vertices.as_bytes(), 1 << 20).unwrap();
         let preprocessed = Preprocessed::new(statements, "a.obj", &mut Warnings::default()).unwrap();
-        assert_eq!(preprocessed.origin, DVec3::new(499_712.0, 4_497_408.0, 0.0));
-        let second: Vec<f32> =
-            preprocessed.text.lines().nth(2).unwrap().split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
-        assert!((f64::from(second[1]) + preprocessed.origin.y - 4_500_000.002).abs() < 5e-4);
+        assert_eq!(preprocessed.positions[69_999], DVec3::new(500_000.125, 4_500_000.001, 30.0));
+        let positions = preprocessed.text.lines().filter_map(|line| line.strip_prefix("v "));
+        let numbers = positions.map(|line| line.split(' ').map(|word| f64::from(word.parse::<f32>().unwrap())));
+        let indices = numbers.map(|numbers| position_index(numbers.collect::<Vec<_>>().try_into().unwrap()));
+        assert!(indices.eq(0..70_000));
     }
 }

@@ -1,0 +1,96 @@
+//! A file that is written whole or not at all.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::destination::{Destination, folder_of};
+use crate::error::OutputError;
+
+/// A file that can be written. It is written whole or not at all.
+///
+/// ```
+/// use std::io::Write;
+///
+/// use drawloom_output::OutputFile;
+///
+/// let folder = tempfile::tempdir()?;
+/// let report = OutputFile::new(folder.path().join("report.json"))?;
+/// // Here the program does what takes long.
+/// report.write(|file| writeln!(file, "{{}}"))?;
+/// assert_eq!(std::fs::read_to_string(report.path())?, "{}\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct OutputFile {
+    path: PathBuf,
+}
+
+impl OutputFile {
+    /// Checks that the file can be written: its folder is there and takes new files, and an old file of that name may be written. Creates
+    /// nothing that stays.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn new(path: impl Into<PathBuf>) -> Result<Self, OutputError> {
+        let path = path.into();
+        if path.is_dir() || path.file_name().is_none() {
+            return Err(OutputError::IsFolder { path });
+        }
+        match Destination::of(&path) {
+            Ok(Destination::Direct(_)) => {}
+            Ok(Destination::File(file)) => check_file(&path, &file)?,
+            Err(source) => return Err(OutputError::Failed { path, source }),
+        }
+        Ok(Self { path })
+    }
+
+    /// Its path, as it was named.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Replaces the file by what `write` writes.
+    ///
+    /// # Errors
+    /// If `write` or the operating system fails. The file is then as it was, unless it is no regular file.
+    pub fn write(&self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), OutputError> {
+        let written = Destination::of(&self.path).and_then(|destination| destination.write(write));
+        written.map_err(|source| OutputError::Failed { path: self.path.clone(), source })
+    }
+
+    /// Replaces the file by `content`.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_all(&self, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
+        self.write(|file| file.write_all(content.as_ref()))
+    }
+}
+
+/// Creates a folder for files, with those above it, if it is not there, and checks that it takes new files.
+///
+/// # Errors
+/// If it cannot be created, or takes no files.
+pub fn create_folder(folder: &Path) -> Result<(), OutputError> {
+    let created = fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
+    created.map(drop).map_err(|source| OutputError::Failed { path: folder.to_owned(), source })
+}
+
+/// `path` leads to `file`.
+fn check_file(path: &Path, file: &Path) -> Result<(), OutputError> {
+    let folder = folder_of(file);
+    if !folder.is_dir() {
+        return Err(OutputError::NoFolder { path: path.to_owned(), folder: folder.to_owned() });
+    }
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| OutputError::Failed { path, source }
+    };
+    if file.exists() {
+        // Whoever protects a file from being written does not want it to be replaced.
+        OpenOptions::new().write(true).open(file).map_err(failed(path))?;
+    }
+    // Has no name where the operating system has such files, so an interrupt leaves nothing.
+    tempfile::tempfile_in(folder).map(drop).map_err(failed(folder))
+}
