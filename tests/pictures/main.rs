@@ -1,8 +1,8 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
 //! Without an adapter, or without the scenes beside the repository, the cases that need them are reported as ignored. With
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check
-//! each of them before you commit it.
+//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Cases that take long are ignored without `DRAWLOOM_SLOW_CASES=1`.
+//! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
 
 mod attributes;
 mod buffers;
@@ -29,6 +29,7 @@ mod history;
 mod image_distance;
 mod imported_targets;
 mod kept_processes;
+mod large_lists;
 mod late_latch;
 mod levels_of_detail;
 mod light_cut_off;
@@ -80,7 +81,8 @@ type Case = (&'static str, fn() -> Result<(), Failed>);
 fn main() {
     let arguments = Arguments::from_args();
     let no_adapter = fixture::device().is_none();
-    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
+    let (required, has_patience) = (is_set("DRAWLOOM_REQUIRE_ADAPTER"), is_set("DRAWLOOM_SLOW_CASES"));
     let mut trials = Vec::new();
     let cases = [
         (attributes::CASES, Needs::Adapter),
@@ -96,6 +98,8 @@ fn main() {
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
+        (large_lists::CASES, Needs::Adapter),
+        (large_lists::SLOW_CASES, Needs::AdapterAndPatience),
         (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
@@ -152,10 +156,12 @@ fn main() {
     ];
     for (cases, needs) in cases {
         let no_scenes = needs == Needs::AdapterAndSharedScenes && !shared_scenes().is_dir();
+        let is_too_slow = needs == Needs::AdapterAndPatience && !has_patience;
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
             let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
-            trials.push(Trial::test(name, case).with_ignored_flag(no_scenes || (lacks_adapter && !required)));
+            let is_ignored = no_scenes || is_too_slow || (lacks_adapter && !required);
+            trials.push(Trial::test(name, case).with_ignored_flag(is_ignored));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();
@@ -166,6 +172,8 @@ enum Needs {
     Nothing,
     Adapter,
     AdapterAndSharedScenes,
+    /// An adapter, and `DRAWLOOM_SLOW_CASES=1`.
+    AdapterAndPatience,
 }
 
 /// The folder of scenes beside the repository, which may be missing.
