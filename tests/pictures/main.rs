@@ -43,6 +43,7 @@ mod pieces;
 mod pipeline_state;
 mod placement;
 mod post;
+mod precision;
 mod prepared_pipelines;
 mod processes;
 mod rays;
@@ -119,6 +120,7 @@ fn main() {
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
+        (precision::CASES, Needs::Adapter),
         (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
