@@ -1,8 +1,8 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
-//! Without an adapter, or without the scenes beside the repository, the cases that need them are reported as ignored. With
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Cases that take long are ignored without `DRAWLOOM_SLOW_CASES=1`.
-//! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
+//! Without an adapter, without its timestamps, or without the scenes beside the repository, the cases that need them are reported as
+//! ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. Cases
+//! that take long are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
 
 mod attributes;
 mod buffers;
@@ -73,8 +73,7 @@ mod transparency;
 mod triangles;
 mod warm_up;
 
-use std::path::PathBuf;
-
+use drawloom_testing::shared_scenes;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
@@ -83,7 +82,10 @@ fn main() {
     let arguments = Arguments::from_args();
     let no_adapter = fixture::device().is_none();
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
-    let (required, has_patience) = (is_set("DRAWLOOM_REQUIRE_ADAPTER"), is_set("DRAWLOOM_SLOW_CASES"));
+    let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
+    let has_patience = is_set("DRAWLOOM_SLOW_CASES");
+    let no_scenes = shared_scenes::are_optional_and_missing();
+    let no_timestamps = !is_set("DRAWLOOM_REQUIRE_TIMESTAMPS") && !device_times::has_timestamps();
     let mut trials = Vec::new();
     let cases = [
         (attributes::CASES, Needs::Adapter),
@@ -153,17 +155,20 @@ fn main() {
         (triangles::CASES, Needs::Adapter),
         (warm_up::CASES, Needs::Adapter),
         (imported_meshes::CASES, Needs::Adapter),
-        (device_times::CASES, Needs::Adapter),
+        (device_times::CASES, Needs::AdapterAndTimestamps),
         (devices::CASES, Needs::Nothing),
     ];
     for (cases, needs) in cases {
-        let no_scenes = needs == Needs::AdapterAndSharedScenes && !shared_scenes().is_dir();
-        let is_too_slow = needs == Needs::AdapterAndPatience && !has_patience;
+        let is_left_out = match needs {
+            Needs::Nothing | Needs::Adapter => false,
+            Needs::AdapterAndTimestamps => no_timestamps,
+            Needs::AdapterAndSharedScenes => no_scenes,
+            Needs::AdapterAndPatience => !has_patience,
+        };
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
             let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
-            let is_ignored = no_scenes || is_too_slow || (lacks_adapter && !required);
-            trials.push(Trial::test(name, case).with_ignored_flag(is_ignored));
+            trials.push(Trial::test(name, case).with_ignored_flag(is_left_out || (lacks_adapter && !required)));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();
@@ -173,12 +178,8 @@ fn main() {
 enum Needs {
     Nothing,
     Adapter,
+    AdapterAndTimestamps,
     AdapterAndSharedScenes,
     /// An adapter, and `DRAWLOOM_SLOW_CASES=1`.
     AdapterAndPatience,
-}
-
-/// The folder of scenes beside the repository, which may be missing.
-fn shared_scenes() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
 }
