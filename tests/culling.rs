@@ -8,12 +8,15 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
+use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, Topology, Vertex, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::{Frustum, ObjectTable};
+use drawloom::view::{Frustum, LightTable, ObjectTable, RenderView};
 use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
+use drawloom_testing::culling::cameras::{any_camera, magnitude};
+use drawloom_testing::culling::oracle::{Classification, Oracle};
 use drawloom_testing::culling::tally::Tallies;
 use drawloom_testing::culling::{boxes, spheres};
+use drawloom_testing::random::Random;
 
 /// The maximum share of invisible volumes at random positions that tests may find visible.
 const MAX_FALSE_VISIBLE_SHARE: f64 = 1e-3;
@@ -45,6 +48,63 @@ fn no_visible_object_is_culled_by_its_volume() -> Result<(), Box<dyn Error>> {
         check(&format!("{volume:?}"), tallies);
     }
     Ok(())
+}
+
+/// Lights whose reach ends 3% of it inside the picture, and lights whose reach ends 3% outside.
+#[test]
+fn no_light_that_reaches_the_picture_is_left_out() {
+    let (mut reaching, mut outside, mut kept_outside) = (0, 0, 0);
+    for batch in 0..400 {
+        let mut random = Random::stream(batch);
+        let camera = any_camera(&mut random);
+        if camera.kind == ViewKind::Shadow {
+            continue;
+        }
+        let (oracle, view) = (Oracle::new(&camera), RenderView::new(&camera));
+        let lights: Vec<_> = (0..60)
+            .map(|index| {
+                let range = magnitude(&mut random, -2.0, 6.0);
+                let share = if random.below(3) == 0 { 1.03 } else { 0.97 };
+                let (planes, along) = (spheres::any_planes(&mut random), spheres::any_along(&mut random));
+                let center = oracle.touching(planes, [range * share; 6], along, spheres::any_aside(&mut random));
+                light(index, oracle.world(center), random.direction().as_vec3().normalize(), range as f32)
+            })
+            .collect();
+        let mut table = LightTable::default();
+        table.fill(&view, &lights, std::slice::from_ref(&view), false);
+        let kept: Vec<_> = table.sources().map(|(light, _)| light).collect();
+        for (index, light) in lights.iter().enumerate() {
+            let (center, range) = light.bounding_sphere().expect("it has a range");
+            let radius = f64::from(range);
+            match oracle.classify(oracle.relative(center), [radius; 6], radius) {
+                Classification::Inside => {
+                    reaching += 1;
+                    assert!(kept.contains(&index), "{light:?} reaches what {camera:?} sees");
+                }
+                Classification::Outside => {
+                    outside += 1;
+                    kept_outside += usize::from(kept.contains(&index));
+                }
+                Classification::Touching => {}
+            }
+        }
+    }
+    assert!(reaching > 5_000 && outside > 3_000, "{reaching} lights reach a picture, and {outside} do not");
+    // Far away, 3% of a small reach is less than the error of f32.
+    assert!(kept_outside * 4 < outside, "{kept_outside} of {outside} lights that reach no picture are kept");
+}
+
+/// A light of one of the kinds that have a range.
+fn light(index: usize, position: DVec3, direction: Vec3, range: f32) -> Light {
+    let (intensity, casts_shadow) = (Vec3::ONE, false);
+    match index % 3 {
+        0 => Light::Point { position, intensity, range, casts_shadow },
+        1 => Light::Hemispherical { position, direction, intensity, range, casts_shadow },
+        _ => {
+            let (inner_angle, outer_angle) = (0.2, 0.9);
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow }
+        }
+    }
 }
 
 /// Poles 3 m outside the frustum, whose bounding spheres intersect it. One is vertical, as is its box. One is parallel

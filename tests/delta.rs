@@ -1,29 +1,27 @@
 //! Delta coding of the commands of whole frames is lossless and compact.
 //!
-//! The case that needs a shared scene is ignored if that is missing.
+//! The case that needs a shared scene is ignored if that is missing, or fails with `DRAWLOOM_REQUIRE_SCENES=1`.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use drawloom::command::DeltaCommands;
 use drawloom::demo;
 use drawloom::scene::{Scene, obj};
 use drawloom_testing::draw_lists::draw_lists;
+use drawloom_testing::shared_scenes;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
-    let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza/sponza_part.obj");
-    let is_missing = !sponza.is_file();
     let trials = vec![
         Trial::test("colonnade", || check(&demo::colonnade()?)),
-        Trial::test("shared::sponza_twenty_times", move || {
-            let mut scene = obj::load(sponza)?.scene;
+        Trial::test("shared::sponza_twenty_times", || {
+            let mut scene = obj::load(shared_scenes::folder().join("sponza/sponza_part.obj"))?.scene;
             demo::add_camera_and_lights(&mut scene);
             scene.duplicate_objects(20);
             check(&scene)
         })
-        .with_ignored_flag(is_missing),
+        .with_ignored_flag(shared_scenes::are_optional_and_missing()),
     ];
     run(&arguments, trials).exit_code()
 }

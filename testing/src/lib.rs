@@ -16,5 +16,6 @@ pub mod precision;
 pub mod random;
 pub mod samples;
 pub mod scenes;
+pub mod shared_scenes;
 pub mod simulated_device;
 pub mod tinted;

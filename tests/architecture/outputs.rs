@@ -2,12 +2,14 @@
 
 use crate::sources::{Source, read_all};
 
-/// What creates, opens or replaces a file.
-const WRITERS: [&str; 9] = [
+/// What creates or replaces a file, or opens one to write to it.
+const WRITERS: [&str; 11] = [
     "fs::write(",
     "File::create",
     "File::options",
-    "OpenOptions",
+    ".write(true)",
+    ".append(true)",
+    ".create(true)",
     "save_buffer",
     ".save(",
     ".save_with_format(",

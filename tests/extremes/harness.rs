@@ -20,7 +20,7 @@ use crate::capture::{Capture, capture};
 /// A backend that cases are run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendName {
-    /// [`NullBackend`], which draws nothing and checks everything.
+    /// [`NullBackend`], which draws no picture: cases compare counts, rejections and errors only, as its name says.
     Null,
     /// [`SoftwareBackend`] in f32.
     Software,
@@ -35,7 +35,7 @@ impl BackendName {
 
     pub fn name(self) -> &'static str {
         match self {
-            Self::Null => "null",
+            Self::Null => "counts_on_null",
             Self::Software => "software",
             Self::Reference => "reference",
             Self::Wgpu => "wgpu",

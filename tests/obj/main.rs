@@ -1,6 +1,6 @@
 //! The OBJ loader: the shared scenes, minimal files for one feature each, and fuzzing.
 //!
-//! Cases that need the shared scenes are ignored if those are missing.
+//! Cases that need the shared scenes are ignored if those are missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`.
 
 mod damaged;
 mod files;

@@ -7,11 +7,11 @@ use std::thread;
 use std::time::Duration;
 
 use drawloom::scene::obj::{self, ObjError};
+use drawloom_testing::shared_scenes;
 use libtest_mimic::Trial;
 
 use crate::folder::Folder;
 use crate::fuzz;
-use crate::shared::scenes;
 use crate::trial;
 
 /// A test that has not ended by then hangs.
@@ -23,7 +23,8 @@ const KEEP: &str = "DRAWLOOM_KEEP_MUTANTS";
 pub fn trials() -> Vec<Trial> {
     vec![
         trial("mutants::of_an_own_file", of_an_own_file),
-        trial("mutants::of_malformed_files", of_malformed_files).with_ignored_flag(!scenes().is_dir()),
+        trial("mutants::of_malformed_files", of_malformed_files)
+            .with_ignored_flag(shared_scenes::are_optional_and_missing()),
     ]
 }
 
@@ -37,7 +38,7 @@ fn of_malformed_files() {
     let to = std::env::var_os(KEEP).map_or(folder.0.clone(), PathBuf::from);
     let mut seeds = Vec::new();
     for group in ["tobj", "trimesh"] {
-        for entry in fs::read_dir(scenes().join("malformed").join(group)).unwrap() {
+        for entry in fs::read_dir(shared_scenes::folder().join("malformed").join(group)).unwrap() {
             let path = entry.unwrap().path();
             fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
             seeds.push(path);

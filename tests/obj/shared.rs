@@ -1,11 +1,10 @@
 //! The shared scenes, which are not part of this package.
 
-use std::path::PathBuf;
-
 use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::obj::{self, Imported, ObjWarning};
 use drawloom::scene::{Blend, Light, Material, Scene};
+use drawloom_testing::shared_scenes;
 use libtest_mimic::Trial;
 
 use crate::trial;
@@ -70,7 +69,7 @@ const MALFORMED: [(&str, Outcome); 31] = [
 ];
 
 pub fn trials() -> Vec<Trial> {
-    let missing = !scenes().is_dir();
+    let missing = shared_scenes::are_optional_and_missing();
     let malformed = MALFORMED.into_iter().map(|(name, outcome)| {
         trial(format!("shared::malformed/{name}"), move || check(&format!("malformed/{name}"), &outcome))
     });
@@ -82,12 +81,8 @@ pub fn trials() -> Vec<Trial> {
     malformed.chain(more).map(|trial| trial.with_ignored_flag(missing)).collect()
 }
 
-pub fn scenes() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
-}
-
 fn check(name: &str, outcome: &Outcome) {
-    match (obj::load(scenes().join(name)), outcome) {
+    match (obj::load(shared_scenes::folder().join(name)), outcome) {
         (Ok(imported), &Gives { objects, triangles, warnings }) => {
             assert_eq!((imported.triangles, imported.degenerate_triangles), (triangles, 0));
             assert_eq!(imported.scene.object_count(), objects, "objects");
@@ -106,7 +101,7 @@ fn check(name: &str, outcome: &Outcome) {
 fn every_malformed_file_has_an_outcome() {
     let listed = MALFORMED.map(|(name, _)| name);
     for folder in ["tobj", "trimesh"] {
-        for entry in std::fs::read_dir(scenes().join("malformed").join(folder)).unwrap() {
+        for entry in std::fs::read_dir(shared_scenes::folder().join("malformed").join(folder)).unwrap() {
             let name = format!("{folder}/{}", entry.unwrap().file_name().to_string_lossy());
             let is_obj = name.to_lowercase().ends_with(".obj");
             assert!(!is_obj || listed.contains(&name.as_str()), "{name}");
@@ -116,7 +111,7 @@ fn every_malformed_file_has_an_outcome() {
 
 fn cornell() {
     let Imported { mut scene, warnings, triangles, degenerate_triangles, .. } =
-        obj::load(scenes().join("cornell/CornellBox-Original.obj")).unwrap();
+        obj::load(shared_scenes::folder().join("cornell/CornellBox-Original.obj")).unwrap();
     assert_eq!((scene.object_count(), triangles, degenerate_triangles), (8, 36, 0));
     assert_eq!(warnings, []);
     assert_eq!(material(&scene, "leftWall").diffuse, Vec3::new(0.63, 0.065, 0.05));
@@ -139,7 +134,7 @@ fn cornell() {
 
 fn sponza() {
     let Imported { mut scene, warnings, triangles, degenerate_triangles, .. } =
-        obj::load(scenes().join("sponza/sponza_part.obj")).unwrap();
+        obj::load(shared_scenes::folder().join("sponza/sponza_part.obj")).unwrap();
     assert_eq!(triangles + degenerate_triangles, 33_662);
     assert_eq!(scene.object_count(), 126);
     for (_, material) in scene.assets().iter::<Material>() {

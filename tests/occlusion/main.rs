@@ -1,6 +1,7 @@
 //! Occlusion culling compared with pictures drawn in f64: no visible object is culled, and occluders are found.
 
 mod extremes;
+mod margins;
 mod properties;
 mod walls;
 

@@ -31,18 +31,15 @@ pub const CASES: &[Case] = &[
     ("reading_times_of_untimed_or_lost_frames_is_an_error", no_times),
 ];
 
-/// A timing backend on the machine's adapter; `None` if that writes no timestamps, which must be an error naming the feature.
-fn timing() -> Result<Option<WgpuBackend>, Failed> {
+/// Whether the machine's adapter writes timestamps.
+pub fn has_timestamps() -> bool {
+    device().is_ok_and(|(device, _)| device.features().contains(wgpu::Features::TIMESTAMP_QUERY))
+}
+
+/// A timing backend on the machine's adapter.
+fn timing() -> Result<WgpuBackend, Failed> {
     let (device, queue) = device()?;
-    let has_timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
-    match WgpuBackend::new(device, queue)?.time_passes() {
-        Ok(backend) if has_timestamps => Ok(Some(backend)),
-        Err(BackendError::MissingFeature { missing }) if !has_timestamps && missing.contains("TIMESTAMP_QUERY") => {
-            Ok(None)
-        }
-        Ok(_) => Err("passes are timed without timestamps".into()),
-        Err(other) => Err(other.into()),
-    }
+    Ok(WgpuBackend::new(device, queue)?.time_passes()?)
 }
 
 /// The names of process and view of every pass of a frame, in submission order.
@@ -104,7 +101,7 @@ fn all_strategies() -> Result<(), Failed> {
     let scene = many_batches();
     let expected = drawn_by_a_new_renderer(&scene)?;
     for (recording, encoding) in strategies()? {
-        let Some(backend) = timing()? else { return Ok(()) };
+        let backend = timing()?;
         let mut fixture = fixture_of(backend.recording_strategy(recording)?.encoding_strategy(encoding))?;
         for frame in 0..2 {
             let named =
@@ -123,7 +120,7 @@ fn all_strategies() -> Result<(), Failed> {
 }
 
 fn frames_in_flight() -> Result<(), Failed> {
-    let Some(backend) = timing()? else { return Ok(()) };
+    let backend = timing()?;
     let mut fixture = fixture_of(backend)?;
     // Each scene has other passes: one has another view, one no lights.
     let mut scenes = vec![everything(), everything(), everything()];
@@ -156,7 +153,7 @@ fn frames_in_flight() -> Result<(), Failed> {
 }
 
 fn many_passes() -> Result<(), Failed> {
-    let Some(backend) = timing()? else { return Ok(()) };
+    let backend = timing()?;
     let mut fixture = fixture_of(
         backend.recording_strategy(RecordingStrategy::Direct)?.encoding_strategy(EncodingStrategy::PerPass),
     )?;
@@ -227,9 +224,6 @@ impl RawPass for OwnPass {
 }
 
 fn raw_passes() -> Result<(), Failed> {
-    if timing()?.is_none() {
-        return Ok(());
-    }
     let all = device()?.0.features() & WgpuBackend::TIMING_FEATURES;
     for features in [wgpu::Features::TIMESTAMP_QUERY, all] {
         let (device, queue) = device_with(features)?;
@@ -257,9 +251,6 @@ fn no_times() -> Result<(), Failed> {
     match untimed.submit(recorded)?.pass_times() {
         Err(BackendError::NotTimed) => {}
         other => return Err(format!("{other:?}").into()),
-    }
-    if timing()?.is_none() {
-        return Ok(());
     }
     let (device, queue) = device_with(wgpu::Features::TIMESTAMP_QUERY)?;
     let backend = WgpuBackend::new(device.clone(), queue)?.time_passes()?;

@@ -56,7 +56,8 @@ impl Fixture {
         Self::on_backend(WgpuBackend::new(device, queue)?.transient_targets(), workers, build)
     }
 
-    fn on_backend(
+    /// On a backend.
+    pub fn on_backend(
         backend: WgpuBackend,
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,

@@ -15,6 +15,7 @@ pub const CASES: &[Case] = &[
     ("cones_of_every_width_light_everything_in_reach", cones),
     ("hemispheres_light_everything_in_reach", hemispheres),
     ("spheres_light_everything_in_reach", spheres),
+    ("lights_outside_of_the_picture_light_its_edge", outside_of_the_picture),
     ("lights_are_drawn_from_within", from_within),
     ("the_near_plane_may_clip_a_light_volume", near_plane),
     ("a_hundred_lights_add_up", hundred),
@@ -218,6 +219,25 @@ fn from_within() -> Result<(), Failed> {
             let counts =
                 room(light).expect(&mut fixture, &views).map_err(|failed| with_direction(failed, half_angle, eye))?;
             expect_lit(counts, 0.01)?;
+        }
+    }
+    Ok(())
+}
+
+/// Lights to the left, right, above and below of a picture, which reach its outermost pixels with the last tenth of their range.
+fn outside_of_the_picture() -> Result<(), Failed> {
+    let mut fixture = Fixture::new()?;
+    let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 20.0);
+    let view = camera(DVec3::Z * 5.0, DVec3::ZERO, 60.0);
+    let edge = 5.0 * 30_f64.to_radians().tan();
+    for outwards in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+        let position = outwards * (edge + 0.9 * RANGE) + DVec3::Z * 0.4;
+        let towards = -(outwards + DVec3::Z * 0.1).normalize();
+        for light in [point(position), spot(position, towards, 40.0), hemisphere(position, towards)] {
+            let counts = PanelScene::new(vec![wall], vec![light]).expect(&mut fixture, std::slice::from_ref(&view))?;
+            if counts.lit < 20 {
+                return Err(format!("{light:?} lights no edge: {counts:?}").into());
+            }
         }
     }
     Ok(())

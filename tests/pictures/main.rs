@@ -1,8 +1,8 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
-//! Without an adapter, or without the scenes beside the repository, the cases that need them are reported as ignored. With
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check
-//! each of them before you commit it.
+//! Without an adapter, without its timestamps, or without the scenes beside the repository, the cases that need them are reported as
+//! ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. Cases
+//! that take long are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
 
 mod attributes;
 mod buffers;
@@ -29,6 +29,7 @@ mod history;
 mod image_distance;
 mod imported_targets;
 mod kept_processes;
+mod large_lists;
 mod late_latch;
 mod levels_of_detail;
 mod light_cut_off;
@@ -42,6 +43,7 @@ mod pieces;
 mod pipeline_state;
 mod placement;
 mod post;
+mod precision;
 mod prepared_pipelines;
 mod processes;
 mod rays;
@@ -71,8 +73,7 @@ mod transparency;
 mod triangles;
 mod warm_up;
 
-use std::path::PathBuf;
-
+use drawloom_testing::shared_scenes;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
@@ -80,7 +81,11 @@ type Case = (&'static str, fn() -> Result<(), Failed>);
 fn main() {
     let arguments = Arguments::from_args();
     let no_adapter = fixture::device().is_none();
-    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
+    let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
+    let has_patience = is_set("DRAWLOOM_SLOW_CASES");
+    let no_scenes = shared_scenes::are_optional_and_missing();
+    let no_timestamps = !is_set("DRAWLOOM_REQUIRE_TIMESTAMPS") && !device_times::has_timestamps();
     let mut trials = Vec::new();
     let cases = [
         (attributes::CASES, Needs::Adapter),
@@ -96,6 +101,8 @@ fn main() {
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
+        (large_lists::CASES, Needs::Adapter),
+        (large_lists::SLOW_CASES, Needs::AdapterAndPatience),
         (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
@@ -115,6 +122,7 @@ fn main() {
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),
+        (precision::CASES, Needs::Adapter),
         (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
@@ -147,15 +155,20 @@ fn main() {
         (triangles::CASES, Needs::Adapter),
         (warm_up::CASES, Needs::Adapter),
         (imported_meshes::CASES, Needs::Adapter),
-        (device_times::CASES, Needs::Adapter),
+        (device_times::CASES, Needs::AdapterAndTimestamps),
         (devices::CASES, Needs::Nothing),
     ];
     for (cases, needs) in cases {
-        let no_scenes = needs == Needs::AdapterAndSharedScenes && !shared_scenes().is_dir();
+        let is_left_out = match needs {
+            Needs::Nothing | Needs::Adapter => false,
+            Needs::AdapterAndTimestamps => no_timestamps,
+            Needs::AdapterAndSharedScenes => no_scenes,
+            Needs::AdapterAndPatience => !has_patience,
+        };
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
             let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
-            trials.push(Trial::test(name, case).with_ignored_flag(no_scenes || (lacks_adapter && !required)));
+            trials.push(Trial::test(name, case).with_ignored_flag(is_left_out || (lacks_adapter && !required)));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();
@@ -165,10 +178,8 @@ fn main() {
 enum Needs {
     Nothing,
     Adapter,
+    AdapterAndTimestamps,
     AdapterAndSharedScenes,
-}
-
-/// The folder of scenes beside the repository, which may be missing.
-fn shared_scenes() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes")
+    /// An adapter, and `DRAWLOOM_SLOW_CASES=1`.
+    AdapterAndPatience,
 }

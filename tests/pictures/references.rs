@@ -7,11 +7,12 @@ use drawloom::demo;
 use drawloom::glam::Vec3;
 use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
 use drawloom_testing::scenes::field;
+use drawloom_testing::shared_scenes;
 use libtest_mimic::Failed;
 
+use crate::Case;
 use crate::fixture::draw;
 use crate::image_distance::{Distance, as_image, assert_different};
-use crate::{Case, shared_scenes};
 
 pub const CASES: &[Case] = &[
     ("reference_of_the_projects_own_scene", || compare("colonnade", &colonnade()?)),
@@ -41,7 +42,7 @@ pub fn sponza() -> Result<Scene, Failed> {
 
 /// A shared scene with a camera and lights.
 pub fn shared(path: &str) -> Result<Scene, Failed> {
-    let mut scene = obj::load(shared_scenes().join(path))?.scene;
+    let mut scene = obj::load(shared_scenes::folder().join(path))?.scene;
     demo::add_camera_and_lights(&mut scene);
     Ok(scene)
 }
@@ -133,7 +134,7 @@ fn flipped_normals_exceed_the_bound() -> Result<(), Failed> {
 fn malformed_files() -> Result<(), Failed> {
     let mut drawn = 0;
     for folder in ["tobj", "trimesh"] {
-        for entry in std::fs::read_dir(shared_scenes().join("malformed").join(folder))? {
+        for entry in std::fs::read_dir(shared_scenes::folder().join("malformed").join(folder))? {
             let path = entry?.path();
             let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
             let Some(mut imported) = is_obj.then(|| obj::load(&path).ok()).flatten() else { continue };

@@ -161,3 +161,61 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
         }
     }
 }
+
+/// Every light reads its own shadow maps: the radiance of all is the sum of what each adds alone, where its maps are the first.
+#[test]
+fn lights_with_shadows_add_up() {
+    let mut scene = Scene::new();
+    let mesh = scene.add(cube()).unwrap();
+    let material = scene.add(Material::default()).unwrap();
+    for (position, scale) in [(DVec3::NEG_Y, Vec3::new(8.0, 0.1, 8.0)), (DVec3::Y * 0.5, Vec3::new(1.2, 0.3, 0.8))] {
+        scene.add_object(RenderObject { scale, ..RenderObject::new(mesh, material, position) }).unwrap();
+    }
+    scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(1.0, 4.0, 5.0), DVec3::ZERO), [48, 32])];
+    let (intensity, range, casts_shadow) = (Vec3::new(20.0, 15.0, 10.0), 12.0, true);
+    let spot = |position: DVec3| {
+        let direction = -position.as_vec3().normalize();
+        Light::Spot { position, direction, intensity, range, inner_angle: 0.5, outer_angle: 0.7, casts_shadow }
+    };
+    let lights = [
+        spot(DVec3::new(-3.0, 3.0, 1.0)),
+        Light::Directional { direction: Vec3::new(0.48, -0.8, -0.36), illuminance: Vec3::ONE, casts_shadow },
+        Light::Point { position: DVec3::new(0.5, 3.0, -1.0), intensity, range, casts_shadow },
+        spot(DVec3::new(2.0, 3.5, 1.5)),
+    ];
+    for mut fixture in [Fixture::with_granularity(2, Granularity::Adaptive), Fixture::reference()] {
+        let mut radiance = |lights: &[Light]| {
+            scene.lights = lights.to_vec();
+            fixture.draw(&scene).numbers(0, "radiance").unwrap()
+        };
+        let together = radiance(&lights);
+        let alone = lights.map(|light| radiance(&[light]));
+        for (index, found) in together.iter().enumerate() {
+            for channel in 0..3 {
+                let sum: f64 = alone.iter().map(|light| light[index][channel]).sum();
+                // Half floats, rounded once for each light, alone and together.
+                let rounding = 2.0 * lights.len() as f64 * (sum * 0.5_f64.powi(11) + 0.5_f64.powi(25));
+                assert!((found[channel] - sum).abs() <= rounding, "pixel {index}: {found:?}, and the sum is {sum}");
+            }
+        }
+        // Each light has a shadow, and no two have the same.
+        let shadows = [0, 1, 2, 3].map(|light| {
+            let bare = radiance(&[without_shadow(lights[light])]);
+            (0..bare.len()).filter(|&pixel| alone[light][pixel][0] < bare[pixel][0]).collect::<HashSet<_>>()
+        });
+        assert!(shadows.iter().all(|shadow| shadow.len() > 10), "{:?}", shadows.each_ref().map(HashSet::len));
+        assert!((0..4).all(|light| !shadows[..light].contains(&shadows[light])), "{shadows:?}");
+    }
+}
+
+/// The same light, which casts no shadow.
+fn without_shadow(mut light: Light) -> Light {
+    if let Light::Directional { casts_shadow, .. }
+    | Light::Point { casts_shadow, .. }
+    | Light::Spot { casts_shadow, .. }
+    | Light::Hemispherical { casts_shadow, .. } = &mut light
+    {
+        *casts_shadow = false;
+    }
+    light
+}

@@ -14,7 +14,6 @@ mod report;
 use std::error::Error;
 use std::hint::black_box;
 use std::mem;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
@@ -27,6 +26,7 @@ use drawloom_benches::harness::progress_bar;
 use drawloom_benches::statistics::median_duration;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::random::Random;
+use drawloom_testing::shared_scenes;
 use indicatif::ProgressBar;
 
 use report::{Report, Row};
@@ -61,7 +61,7 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
         Case { scene: "colonnade", lists: draw_lists(&demo::colonnade()?)? },
         Case { scene: "scattered", lists: vec![scattered(10_000)] },
     ];
-    let sponza = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/sponza/sponza_part.obj");
+    let sponza = shared_scenes::folder().join("sponza/sponza_part.obj");
     if sponza.is_file() {
         let mut scene = obj::load(sponza)?.scene;
         demo::add_camera_and_lights(&mut scene);

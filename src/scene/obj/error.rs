@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::io;
 
-use super::statements::excerpt;
+use super::excerpt::excerpt;
 use crate::scene::SceneError;
 
 /// Why an OBJ file could not be loaded. Every message names the file.

@@ -8,9 +8,10 @@ use std::io;
 use glam::Vec3;
 
 use super::error::ObjWarning;
+use super::excerpt::excerpt;
 use super::files::{PossibleName, possible_names};
 use super::ignored::IgnoredStatements;
-use super::statements::{Statements, excerpt};
+use super::statements::Statements;
 use super::warnings::Warnings;
 
 /// A material as its library defines it.

@@ -9,6 +9,7 @@
 
 mod emission;
 mod error;
+mod excerpt;
 mod files;
 mod geometry;
 mod ignored;

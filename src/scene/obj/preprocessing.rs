@@ -15,8 +15,9 @@ use std::io::{self, BufRead};
 use glam::DVec3;
 
 use super::error::ObjWarning;
+use super::excerpt::excerpt;
 use super::ignored::IgnoredStatements;
-use super::statements::{Statements, excerpt};
+use super::statements::Statements;
 use super::warnings::Warnings;
 
 /// The text for tobj, and what preprocessing took out of it.

@@ -274,15 +274,6 @@ fn push_escaped(text: &mut String, character: char) {
     }
 }
 
-/// The first characters of a text, for messages.
-pub(super) fn excerpt(text: &str) -> String {
-    const MAX_CHARACTERS: usize = 160;
-    match text.char_indices().nth(MAX_CHARACTERS) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
-    }
-}
-
 #[cfg(all(test, not(drawloom_loom)))]
 mod tests {
     use super::*;

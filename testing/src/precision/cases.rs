@@ -141,7 +141,11 @@ impl GpuObjects {
     ///
     /// # Errors
     /// Returns an error if the scene rejects an object.
-    pub fn visit(&mut self, cases: &[Case], mut visit: impl FnMut(&Case, &GpuObject)) -> Result<(), SceneError> {
+    pub fn visit<'a>(
+        &mut self,
+        cases: &'a [Case],
+        mut visit: impl FnMut(&'a Case, &GpuObject),
+    ) -> Result<(), SceneError> {
         let handles: Vec<_> = self.scene.objects().collect();
         for (index, case) in cases.iter().enumerate() {
             let Case { position, orientation, scale, .. } = *case;

@@ -1,10 +1,11 @@
 //! The errors of many vertices.
 
-use drawloom::scene::SceneError;
+use std::error::Error;
+
 use drawloom::view::RenderView;
 
 use super::cases::{GpuObjects, Kind, log_between, vertex_of};
-use super::vertex::{gpu_view_of, is_visible, pixels_per_radian};
+use super::vertex::{ShaderInput, VertexShader, gpu_view_of, is_visible, pixels_per_radian};
 use crate::random::Random;
 
 /// A distance from the world's origin, in metres.
@@ -30,11 +31,17 @@ pub struct Errors {
     pub absolute_mean: f64,
 }
 
-/// Measures the visible ones of `cases` vertices in views of one kind.
+/// Measures the visible ones of `cases` vertices in views of one kind, as `shader` computes them.
 ///
 /// # Errors
-/// Returns an error if the scene rejects an object.
-pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) -> Result<Errors, SceneError> {
+/// Returns an error if the scene rejects an object, or the shader's device fails.
+pub fn measure(
+    kind: Kind,
+    origin: Origin,
+    cases: usize,
+    random: &mut Random,
+    shader: &mut dyn VertexShader,
+) -> Result<Errors, Box<dyn Error>> {
     let mut gpu_objects = GpuObjects::new()?;
     let mut errors = Errors::default();
     let (mut sum, mut absolute_sum) = (0.0, 0.0);
@@ -49,17 +56,20 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
             vertex_of(kind.camera(position, random), random)
         };
         let some: Vec<_> = (start..cases.min(start + BATCH)).map(|_| draw()).collect();
-        gpu_objects.visit(&some, |case, object| {
-            if !is_visible(case) {
-                return;
+        let mut inputs = Vec::new();
+        gpu_objects.visit(&some, |case, &object| {
+            if is_visible(case) {
+                inputs.push(ShaderInput { case, object, view: gpu_view_of(&RenderView::new(&case.camera)) });
             }
-            let view = RenderView::new(&case.camera);
+        })?;
+        let clip_positions = shader.clip_positions(&inputs)?;
+        for (ShaderInput { case, .. }, clip) in inputs.iter().zip(clip_positions) {
             let truth = case.truth();
-            let error = case.shaded(object, &gpu_view_of(&view)).distance(truth);
             // NaN exceeds the diagonal.
             let diagonal = f64::from(case.camera.size[0]).hypot(f64::from(case.camera.size[1]));
             let bounded = |error: f64| if error <= diagonal { error } else { diagonal };
-            let (error, absolute) = (bounded(error), bounded(case.absolute(&view).distance(truth)));
+            let absolute = bounded(case.absolute(&RenderView::new(&case.camera)).distance(truth));
+            let error = bounded(case.drawn_at(clip).distance(truth));
             errors.cases += 1;
             errors.greatest = errors.greatest.max(error);
             errors.absolute_greatest = errors.absolute_greatest.max(absolute);
@@ -67,7 +77,7 @@ pub fn measure(kind: Kind, origin: Origin, cases: usize, random: &mut Random) ->
             errors.greatest_angle = errors.greatest_angle.max(angle / UNIT_ROUNDOFF);
             sum += error;
             absolute_sum += absolute;
-        })?;
+        }
     }
     errors.mean = sum / errors.cases.max(1) as f64;
     errors.absolute_mean = absolute_sum / errors.cases.max(1) as f64;

@@ -1,5 +1,7 @@
 //! The position of a vertex in a picture: as shaders compute it, from f32 world positions, and exact.
 
+use std::error::Error;
+
 use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
 use drawloom::scene::{Camera, Projection, ViewKind};
 use drawloom::view::{GpuObject, GpuView, RenderView};
@@ -46,13 +48,6 @@ impl Case {
         self.pixels(clip)
     }
 
-    /// The position that the shaders compute: `vertex` of `surface.wgsl`, in f32 and in the same order.
-    pub fn shaded(&self, object: &GpuObject, view: &GpuView) -> DVec2 {
-        let origin = fixed_difference(object, view);
-        let turned = rotate(Quat::from_array(object.orientation), Vec3::from(object.scale) * self.vertex);
-        self.projected(times(&view.clip_from_relative, origin + turned))
-    }
-
     /// The position computed from f32 world positions: object to world, world to view and view to clip space, each with a
     /// matrix of its own, as in most engines.
     pub fn absolute(&self, view: &RenderView) -> DVec2 {
@@ -62,7 +57,7 @@ impl Case {
         let upright = RenderView::new(&Camera { orientation: Quat::IDENTITY, ..view.camera.clone() });
         let world = times(&model, self.vertex).truncate();
         let local = times(&world_from_view.inverse(), world).truncate();
-        self.projected(times(&upright.clip_from_relative(), local))
+        self.drawn_at(projected(camera, times(&upright.clip_from_relative(), local)))
     }
 
     /// The distance of the vertex from the centre of the picture, in pixels.
@@ -71,16 +66,9 @@ impl Case {
         self.truth().distance(DVec2::new(width, height) * 0.5)
     }
 
-    /// Computes what follows the matrix, as `clip_position` of `drawloom.wgsl` does. What follows the shader is the device's
-    /// work; it is computed in f64, so that only the shader's error is measured.
-    fn projected(&self, clip: Vec4) -> DVec2 {
-        if self.camera.projection == Projection::Paraboloid {
-            let position = clip.truncate();
-            let distance = position.length();
-            let forward = -position.z / distance.max(1e-30);
-            let across = distance.max(1e-30) * (1.0 + forward).max(0.1);
-            return self.pixels(DVec2::new(f64::from(position.x / across), f64::from(position.y / across)));
-        }
+    /// Where a device draws a vertex at this position in clip space, in pixels. It is computed in f64, so that only the error of the shader is
+    /// measured.
+    pub fn drawn_at(&self, clip: Vec4) -> DVec2 {
         let clip = clip.as_dvec4();
         self.pixels(DVec2::new(clip.x, clip.y) / clip.w)
     }
@@ -89,6 +77,48 @@ impl Case {
         let [width, height] = self.camera.size.map(f64::from);
         DVec2::new((clip.x * 0.5 + 0.5) * width, (0.5 - clip.y * 0.5) * height)
     }
+}
+
+/// The vertex of a case, and what a shader reads of it.
+pub struct ShaderInput<'a> {
+    pub case: &'a Case,
+    pub object: GpuObject,
+    pub view: GpuView,
+}
+
+/// Computes the positions of vertices in clip space.
+pub trait VertexShader {
+    /// One for each input, in that order.
+    ///
+    /// # Errors
+    /// If a device fails.
+    fn clip_positions(&mut self, inputs: &[ShaderInput<'_>]) -> Result<Vec<Vec4>, Box<dyn Error>>;
+}
+
+/// `relative_position` and `clip_position` of `drawloom.wgsl` in Rust, in f32 and in the same order. It needs no adapter.
+pub struct ShaderInRust;
+
+impl VertexShader for ShaderInRust {
+    fn clip_positions(&mut self, inputs: &[ShaderInput<'_>]) -> Result<Vec<Vec4>, Box<dyn Error>> {
+        let clip = |ShaderInput { case, object, view }: &ShaderInput<'_>| {
+            let origin = fixed_difference(object, view);
+            let turned = rotate(Quat::from_array(object.orientation), Vec3::from(object.scale) * case.vertex);
+            projected(&case.camera, times(&view.clip_from_relative, origin + turned))
+        };
+        Ok(inputs.iter().map(clip).collect())
+    }
+}
+
+/// What follows the matrix in `clip_position`.
+fn projected(camera: &Camera, clip: Vec4) -> Vec4 {
+    if camera.projection != Projection::Paraboloid {
+        return clip;
+    }
+    let position = clip.truncate();
+    let distance = position.length();
+    let forward = -position.z / distance.max(1e-30);
+    let across = distance.max(1e-30) * (1.0 + forward).max(0.1);
+    Vec4::new(position.x / across, position.y / across, 0.0, 1.0)
 }
 
 /// The maximum number of pixels per radian at this distance from the centre of a perspective picture, which is stretched
