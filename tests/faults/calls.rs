@@ -14,11 +14,16 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::{Fixture, Refusal, Setting, two_scenes};
 use crate::subjects::Subject;
+use crate::worlds::Worlds;
 
 pub const CASES: &[Case] = &[
     ("every_call_of_a_frame_of_the_null_backend_fails_once", null),
     ("every_call_of_a_frame_of_the_software_backend_fails_once", software),
     ("every_call_of_a_simple_frame_of_the_software_backend_fails_once", simple_software),
+    (
+        "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
+        with_nodes_and_pieces::<SoftwareBackend>,
+    ),
     ("slow_calls_change_no_picture", slow_calls),
     ("pipelines_whose_preparation_failed_are_made_by_the_next_frame", preparation),
 ];
@@ -27,6 +32,7 @@ pub const CASES: &[Case] = &[
 pub const CASES_OF_ADAPTERS: &[Case] = &[
     ("every_call_of_a_frame_of_wgpu_fails_once", wgpu),
     ("every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once", wgpu_together),
+    ("every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once", with_nodes_and_pieces::<WgpuBackend>),
 ];
 
 fn null() -> Result<(), Failed> {
@@ -60,27 +66,48 @@ fn wgpu_together() -> Result<(), Failed> {
     every_call_fails_once::<WgpuBackend>(Setting { workers: 1, joins_passes: true, ..Setting::FULL })
 }
 
+fn with_nodes_and_pieces<S: Subject>() -> Result<(), Failed> {
+    for joins_passes in [false, true] {
+        // Views that test for occlusion execute no pieces.
+        let setting = Setting { joins_passes, tests_occlusion: false, ..Setting::FULL };
+        every_call_of_worlds_fails_once::<S>(setting, &Worlds::with_nodes_and_pieces()?)?;
+    }
+    Ok(())
+}
+
 fn every_call_fails_once<S: Subject>(setting: Setting) -> Result<(), Failed> {
-    let (scenes, moved) = two_scenes()?;
+    every_call_of_worlds_fails_once::<S>(setting, &Worlds::plain()?)
+}
+
+fn every_call_of_worlds_fails_once<S: Subject>(setting: Setting, worlds: &Worlds) -> Result<(), Failed> {
     let expected = [
-        Fixture::<S>::new(setting)?.picture(&scenes[0], Changes::Unknown)?,
-        Fixture::<S>::new(setting)?.picture(&scenes[1], Changes::Unknown)?,
+        worlds.picture(&mut Fixture::<S>::new(setting)?, 0, Changes::Unknown)?,
+        worlds.picture(&mut Fixture::<S>::new(setting)?, 1, Changes::Unknown)?,
     ];
+    expect(expected[0] != expected[1], || String::from("the worlds look alike"))?;
     let mut fixture = Fixture::<S>::new(setting)?;
-    fixture.picture(&scenes[1], Changes::Unknown)?;
+    worlds.picture(&mut fixture, 1, Changes::Unknown)?;
     let mut turn = 0;
     for kind in CallKind::ALL {
         // Where many passes fail in one call, each fault is tried on each call; elsewhere the faults take turns.
         let tries = if kind == CallKind::FinishTogether { FAULTS.len() } else { 1 };
         for index in (0..).flat_map(|index| repeat_n(index, tries)) {
-            let (scene, expected) = (&scenes[turn % 2], &expected[turn % 2]);
+            let (world, expected) = (turn % 2, &expected[turn % 2]);
             let fault = FAULTS[turn % FAULTS.len()].clone();
             turn += 1;
             let name = format!("{setting:?}, {kind:?} {index}");
+            // All is uploaded with the objects, or the objects that moved apart from them, or what moved in the frame before is recorded as
+            // pieces.
+            let changes = match turn % 3 {
+                0 => Changes::Unknown,
+                1 => Changes::Objects(&worlds.moved),
+                _ => {
+                    worlds.picture(&mut fixture, world, Changes::Objects(&worlds.moved))?;
+                    Changes::NONE
+                }
+            };
             fixture.renderer.backend().inject(kind, index, fault.clone());
-            // Either all is uploaded with the objects, or the objects that moved apart from them.
-            let changes = if turn % 3 == 0 { Changes::Unknown } else { Changes::Objects(&moved) };
-            let drawn = fixture.draw(scene, changes)?;
+            let drawn = worlds.draw(&mut fixture, world, changes)?;
             let Some(call) = fixture.renderer.backend().failed_call() else {
                 let picture = drawn.map_err(|refusal| format!("{name} did not come, but {refusal:?}"))?;
                 expect(picture == *expected, || format!("{name} did not come, and the picture is another one"))?;
@@ -89,21 +116,24 @@ fn every_call_fails_once<S: Subject>(setting: Setting) -> Result<(), Failed> {
             let refusal = drawn.err().ok_or_else(|| format!("{name}: the frame is drawn nevertheless"))?;
             check_refusal(&refusal, &call, &fault).map_err(|problem| format!("{name}: {problem}: {refusal:?}"))?;
             // What the failed frame was told has changed is not told again.
-            let picture = fixture.picture(scene, Changes::NONE).map_err(|error| format!("{name}: then {error:?}"))?;
+            let picture = worlds.picture(&mut fixture, world, Changes::NONE);
+            let picture = picture.map_err(|error| format!("{name}: then {error:?}"))?;
             expect(picture == *expected, || format!("{name}: the next picture is another one"))?;
         }
+        let calls = fixture.renderer.backend().calls(kind);
+        // The fault that did not come would come in a frame that is drawn before the next fault.
+        fixture.renderer.backend().clear();
         let has_calls = match kind {
             // The software backend records no parts.
-            CallKind::Record => continue,
+            CallKind::Record => false,
             CallKind::PreparePipelines => false,
             CallKind::Finish => !setting.joins_passes,
             CallKind::FinishTogether => setting.joins_passes,
             _ => true,
         };
-        let calls = fixture.renderer.backend().calls(kind);
         expect(!has_calls || calls > 0, || format!("{setting:?} has no {kind:?}"))?;
     }
-    Ok(())
+    expect(!worlds.has_pieces() || fixture.executed_pieces > 0, || String::from("no piece is executed"))
 }
 
 const FAULTS: [Fault; 5] = [Fault::DeviceLost, Fault::OutOfMemory, Fault::Panic, Fault::Validation, Fault::Limit];

@@ -7,7 +7,7 @@ use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Changes, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::{FrameError, Granularity, Renderer, RendererBuilder, SubmitError, Submitter};
+use drawloom::{CpuNode, FrameError, Granularity, Renderer, RendererBuilder, SubmitError, Submitter};
 use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
@@ -23,20 +23,29 @@ pub struct Setting {
     pub joins_passes: bool,
     /// Whether there are shadow maps, and post-processing beyond tone mapping.
     pub is_full: bool,
+    pub tests_occlusion: bool,
     /// Shadow maps are drawn every so many frames.
     pub shadow_interval: u32,
 }
 
 impl Setting {
     /// Everything that the pipeline has, drawn in every frame.
-    pub const FULL: Self =
-        Self { workers: 2, granularity: Granularity::Adaptive, joins_passes: false, is_full: true, shadow_interval: 1 };
+    pub const FULL: Self = Self {
+        workers: 2,
+        granularity: Granularity::Adaptive,
+        joins_passes: false,
+        is_full: true,
+        tests_occlusion: true,
+        shadow_interval: 1,
+    };
 }
 
 pub struct Fixture<S: Subject> {
     pub scheduler: Arc<Scheduler>,
     pub renderer: Renderer<FaultyBackend<S>>,
     pub submitter: Submitter<FaultyBackend<S>>,
+    /// Of all frames that were drawn, and all their views.
+    pub executed_pieces: usize,
 }
 
 /// Why a frame was not drawn.
@@ -58,15 +67,25 @@ impl<S: Subject> Fixture<S> {
         let backend = if setting.joins_passes { backend.joining_passes() } else { backend };
         let builder = Renderer::builder(backend).granularity(setting.granularity);
         let (renderer, submitter) = with_deferred(builder, setting).build(Arc::clone(&scheduler))?;
-        Ok(Self { scheduler, renderer, submitter })
+        Ok(Self { scheduler, renderer, submitter, executed_pieces: 0 })
     }
 
     /// Draws a frame. `Err` within `Ok` is a refusal by the renderer or submitter.
     pub fn draw(&mut self, scene: &Scene, changes: Changes<'_>) -> Result<Result<Vec<u8>, Refusal>, Failed> {
-        let recorded = match self.renderer.record(SceneRef { changes, ..scene.as_scene_ref() }) {
+        self.draw_with_nodes(SceneRef { changes, ..scene.as_scene_ref() }, &[])
+    }
+
+    /// Draws a frame whose graph has these nodes.
+    pub fn draw_with_nodes(
+        &mut self,
+        scene: SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
+    ) -> Result<Result<Vec<u8>, Refusal>, Failed> {
+        let recorded = match self.renderer.record_with_nodes(scene, nodes) {
             Ok(recorded) => recorded,
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };
+        self.executed_pieces += recorded.statistics().views.iter().map(|view| view.pieces).sum::<usize>();
         match self.submitter.submit(recorded) {
             Ok(submitted) => S::read(&submitted.submission, 0, "picture").map(Ok),
             Err(error) => Ok(Err(Refusal::Submission(error))),
@@ -87,8 +106,10 @@ fn with_deferred<S: Subject>(
     if !setting.is_full {
         return builder.deferred(deferred.shadow_maps(None));
     }
-    let shadows = ShadowQuality { side: 24, interval: setting.shadow_interval, ..Quality::balanced().shadows };
-    builder.deferred(deferred.post(Fxaa::default())).quality(Quality { shadows, ..Quality::balanced() })
+    let balanced = Quality::balanced();
+    let shadows = ShadowQuality { side: 24, interval: setting.shadow_interval, ..balanced.shadows };
+    let occlusion = balanced.occlusion.filter(|_| setting.tests_occlusion);
+    builder.deferred(deferred.post(Fxaa::default())).quality(Quality { shadows, occlusion, ..balanced })
 }
 
 /// Two scenes with all that the pipeline draws, and the objects in which they differ.

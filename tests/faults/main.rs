@@ -9,6 +9,7 @@ mod histories;
 mod lost_devices;
 mod replaced;
 mod subjects;
+mod worlds;
 
 use std::panic;
 

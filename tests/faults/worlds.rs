@@ -1,0 +1,75 @@
+//! What frames that fail draw in turn.
+
+use drawloom::scene::{Changes, Piece, RenderObject, Scene, SceneRef};
+use drawloom_testing::hills::GeneratedHills;
+use libtest_mimic::Failed;
+
+use crate::fixture::{Fixture, Refusal, two_scenes};
+use crate::subjects::Subject;
+
+/// Two states of a world, the objects in which they differ, and what nodes make in each frame.
+pub struct Worlds {
+    scenes: [Scene; 2],
+    pub moved: Vec<u32>,
+    hills: Option<GeneratedHills>,
+}
+
+impl Worlds {
+    /// All that the pipeline draws.
+    pub fn plain() -> Result<Self, Failed> {
+        let (scenes, moved) = two_scenes()?;
+        Ok(Self { scenes, moved, hills: None })
+    }
+
+    /// Also hills that nodes make anew in each frame, and pieces of all other objects.
+    pub fn with_nodes_and_pieces() -> Result<Self, Failed> {
+        let (mut scenes, moved) = two_scenes()?;
+        let hills = GeneratedHills::new();
+        for scene in &mut scenes {
+            let objects: Vec<_> = scene.objects().collect();
+            // One piece has an object that moves, and one that does not.
+            for (number, objects) in objects.chunks(2).enumerate() {
+                let objects = scene.object_set(objects.iter().copied())?;
+                scene.pieces.push(Piece::new(format!("piece {number}"), objects));
+            }
+            let first = scene.object(objects[0])?;
+            let mesh = scene.add(hills.mesh()?)?;
+            scene.add_object(RenderObject { mesh, ..first })?;
+        }
+        Ok(Self { scenes, moved, hills: Some(hills) })
+    }
+
+    pub fn has_pieces(&self) -> bool {
+        self.scenes.iter().any(|scene| !scene.pieces.is_empty())
+    }
+
+    /// Draws one of the states. `Err` within `Ok` is a refusal by the renderer or submitter.
+    pub fn draw<S: Subject>(
+        &self,
+        fixture: &mut Fixture<S>,
+        index: usize,
+        changes: Changes<'_>,
+    ) -> Result<Result<Vec<u8>, Refusal>, Failed> {
+        let state = self.scenes[index].as_scene_ref();
+        let (positions, scales, bounds, ambient) = (state.positions, state.scales, state.bounds, state.ambient);
+        // Another scene has other meshes and materials.
+        let scene = SceneRef { positions, scales, bounds, ambient, changes, ..self.scenes[0].as_scene_ref() };
+        match &self.hills {
+            None => fixture.draw_with_nodes(scene, &[]),
+            Some(hills) => {
+                let (vertices, indices) = hills.nodes(index);
+                fixture.draw_with_nodes(scene, &[&vertices, &indices])
+            }
+        }
+    }
+
+    /// Draws one of the states in a frame that nothing fails.
+    pub fn picture<S: Subject>(
+        &self,
+        fixture: &mut Fixture<S>,
+        index: usize,
+        changes: Changes<'_>,
+    ) -> Result<Vec<u8>, Failed> {
+        self.draw(fixture, index, changes)?.map_err(|refusal| format!("{refusal:?}").into())
+    }
+}
