@@ -1,5 +1,6 @@
 //! Where the content of a file goes.
 
+use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -15,6 +16,15 @@ pub(crate) enum Destination {
     File(PathBuf),
     /// Straight to something that cannot be replaced.
     Direct(PathBuf),
+    /// To the standard output or the standard error of this process, behind what it has written there.
+    Stream(StandardStream),
+}
+
+/// A stream that every process has.
+#[derive(Clone, Copy)]
+pub(crate) enum StandardStream {
+    Output,
+    Error,
 }
 
 impl Destination {
@@ -23,16 +33,17 @@ impl Destination {
     /// # Errors
     /// If there are too many, or if they cannot be read.
     pub(crate) fn of(path: &Path) -> io::Result<Self> {
-        if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
-            return Ok(Self::Direct(path.to_owned()));
-        }
+        let is_direct = fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir());
         let mut resolved = path.to_owned();
         for _link in 0..MAX_LINKS {
-            // Its links name open files, which need not have a name of their own.
-            if resolved.starts_with("/proc") {
+            if let Some(stream) = StandardStream::of(&resolved) {
+                return Ok(Self::Stream(stream));
+            }
+            // Links in `/proc` name open files, which need not have a name of their own.
+            if is_direct && !is_link(&resolved) || resolved.starts_with("/proc") {
                 return Ok(Self::Direct(path.to_owned()));
             }
-            if !fs::symlink_metadata(&resolved).is_ok_and(|metadata| metadata.is_symlink()) {
+            if !is_link(&resolved) {
                 return Ok(Self::File(resolved));
             }
             resolved = folder_of(&resolved).join(fs::read_link(&resolved)?);
@@ -45,28 +56,74 @@ impl Destination {
     /// # Errors
     /// The error of `write`, or of the operating system. A file is then as it was.
     pub(crate) fn write(&self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
-        let path = match self {
-            Self::Direct(path) => {
-                let mut writer = BufWriter::new(OpenOptions::new().append(true).open(path)?);
-                write(&mut writer)?;
-                return writer.flush();
-            }
-            Self::File(path) => path,
+        let file = match self {
+            Self::File(path) => return replace(path, write),
+            Self::Direct(path) => OpenOptions::new().append(true).open(path)?,
+            Self::Stream(stream) => stream.open()?,
         };
-        let old_permissions = fs::metadata(path).ok().map(|metadata| metadata.permissions());
-        let temporary = temporary_files().tempfile_in(folder_of(path))?;
-        let (file, name) = temporary.into_parts();
         let mut writer = BufWriter::new(file);
         write(&mut writer)?;
-        let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
-        if let Some(permissions) = old_permissions {
-            file.set_permissions(permissions)?;
-        }
-        // The disk may turn out to be full only now. And the name must not lead to content that is lost with the power.
-        file.sync_all()?;
-        drop(file);
-        Ok(name.persist(path)?)
+        writer.flush()
     }
+}
+
+/// Replaces a file in one step.
+fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let old_permissions = fs::metadata(path).ok().map(|metadata| metadata.permissions());
+    let temporary = temporary_files().tempfile_in(folder_of(path))?;
+    let (file, name) = temporary.into_parts();
+    // Before there is content, which others may not be allowed to read.
+    if let Some(permissions) = old_permissions {
+        file.set_permissions(permissions)?;
+    }
+    let mut writer = BufWriter::new(file);
+    write(&mut writer)?;
+    let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+    // The disk may turn out to be full only now. And the name must not lead to content that is lost with the power.
+    file.sync_all()?;
+    drop(file);
+    Ok(name.persist(path)?)
+}
+
+impl StandardStream {
+    /// The stream that a path names, such as `/dev/stdout`, which leads to `/proc/self/fd/1` on Linux.
+    fn of(path: &Path) -> Option<Self> {
+        let folder = fs::canonicalize(folder_of(path)).ok()?;
+        let is_of_process = ["/proc/self/fd", "/dev/fd"]
+            .into_iter()
+            .any(|name| fs::canonicalize(name).is_ok_and(|descriptors| descriptors == folder));
+        match path.file_name().and_then(OsStr::to_str) {
+            Some("1") if is_of_process => Some(Self::Output),
+            Some("2") if is_of_process => Some(Self::Error),
+            _ => None,
+        }
+    }
+
+    /// The stream as a file with the same offset: one that is opened by its name begins elsewhere, and what the process prints then
+    /// overwrites it.
+    #[cfg(unix)]
+    fn open(self) -> io::Result<File> {
+        use std::os::fd::AsFd;
+
+        let descriptor = match self {
+            Self::Output => {
+                io::stdout().flush()?;
+                io::stdout().as_fd().try_clone_to_owned()
+            }
+            Self::Error => io::stderr().as_fd().try_clone_to_owned(),
+        };
+        descriptor.map(File::from)
+    }
+
+    /// No path names a stream there.
+    #[cfg(not(unix))]
+    fn open(self) -> io::Result<File> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+fn is_link(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
 
 /// The folder of a file.

@@ -16,7 +16,7 @@ pub enum OutputError {
         folder: PathBuf,
     },
     /// The name is that of a folder.
-    #[error("{} cannot be written: it is a folder", path.display())]
+    #[error("{} cannot be written: it names a folder", path.display())]
     IsFolder {
         /// The folder.
         path: PathBuf,

@@ -34,11 +34,16 @@ impl OutputFile {
     /// If the file cannot be written.
     pub fn new(path: impl Into<PathBuf>) -> Result<Self, OutputError> {
         let path = path.into();
-        if path.is_dir() || path.file_name().is_none() {
+        if path.is_dir() || path.file_name().is_none() || ends_in_separator(&path) {
             return Err(OutputError::IsFolder { path });
         }
         match Destination::of(&path) {
-            Ok(Destination::Direct(_)) => {}
+            Ok(Destination::Stream(_)) => {}
+            Ok(Destination::Direct(file)) => {
+                if let Err(source) = check_direct(&file) {
+                    return Err(OutputError::Failed { path, source });
+                }
+            }
             Ok(Destination::File(file)) => check_file(&path, &file)?,
             Err(source) => return Err(OutputError::Failed { path, source }),
         }
@@ -77,6 +82,22 @@ pub fn create_folder(folder: &Path) -> Result<(), OutputError> {
     created.map(drop).map_err(|source| OutputError::Failed { path: folder.to_owned(), source })
 }
 
+fn ends_in_separator(path: &Path) -> bool {
+    path.as_os_str().as_encoded_bytes().last().is_some_and(|&last| std::path::is_separator(char::from(last)))
+}
+
+/// Checks that what is no regular file may be written, without waiting for whoever reads a pipe.
+#[cfg(target_os = "linux")]
+fn check_direct(path: &Path) -> io::Result<()> {
+    rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(io::Error::from)
+}
+
+/// Says nothing: opening a pipe waits for whoever reads it.
+#[cfg(not(target_os = "linux"))]
+fn check_direct(_path: &Path) -> io::Result<()> {
+    Ok(())
+}
+
 /// `path` leads to `file`.
 fn check_file(path: &Path, file: &Path) -> Result<(), OutputError> {
     let folder = folder_of(file);
@@ -87,9 +108,12 @@ fn check_file(path: &Path, file: &Path) -> Result<(), OutputError> {
         let path = path.to_owned();
         move |source| OutputError::Failed { path, source }
     };
-    if file.exists() {
+    match fs::symlink_metadata(file) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        // The name may be too long.
+        Err(error) => return Err(failed(path)(error)),
         // Whoever protects a file from being written does not want it to be replaced.
-        OpenOptions::new().write(true).open(file).map_err(failed(path))?;
+        Ok(_) => OpenOptions::new().write(true).open(file).map(drop).map_err(failed(path))?,
     }
     // Has no name where the operating system has such files, so an interrupt leaves nothing.
     tempfile::tempfile_in(folder).map(drop).map_err(failed(folder))

@@ -93,6 +93,10 @@ fn what_cannot_be_written_is_refused_by_name() -> Outcome {
     assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
     let error = refuse(Path::new(""));
     assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
+    let error = refuse(&folder.path().join("report/"));
+    assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
+    let error = refuse(&folder.path().join("a".repeat(300)));
+    assert!(matches!(error, OutputError::Failed { .. }), "{error}");
     let error = create_folder(&folder.path().join("file/folder")).unwrap_err();
     assert!(error.to_string().contains("file/folder"), "{error}");
     create_folder(&folder.path().join("new/folder"))?;
@@ -201,7 +205,9 @@ mod unix {
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use std::os::unix::fs::symlink;
+    use std::fs::Permissions;
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+    use std::os::unix::process::CommandExt;
 
     use super::*;
 
@@ -220,6 +226,7 @@ mod linux {
     #[test]
     fn a_folder_that_takes_no_files_is_refused() {
         let error = OutputFile::new("/sys/kernel/a.json").unwrap_err();
+        assert!(matches!(error, OutputError::Failed { .. }), "{error}");
         assert!(error.to_string().contains("/sys/kernel"), "{error}");
     }
 
@@ -227,21 +234,48 @@ mod linux {
     fn standard_output_is_written_straight() -> Outcome {
         let folder = TempDir::new()?;
         let redirected = folder.path().join("log.txt");
-        let log = fs::OpenOptions::new().create(true).append(true).open(&redirected)?;
-        if std::env::var_os(INTERRUPTED).is_some_and(|value| value == "stdout") {
+        if let Some(name) = std::env::var_os(INTERRUPTED) {
             println!("before");
-            OutputFile::new("/dev/stdout")?.write_all("content\n")?;
+            OutputFile::new(Path::new(&name))?.write_all("content\n")?;
             println!("behind");
             return Ok(());
         }
-        let status = Command::new(std::env::current_exe()?)
-            .args(["--exact", "linux::standard_output_is_written_straight", "--nocapture"])
-            .env(INTERRUPTED, "stdout")
-            .stdout(log)
-            .status()?;
-        let text = fs::read_to_string(&redirected)?;
-        assert!(status.success() && text.contains("before\ncontent\nbehind\n"), "{text}");
-        assert_eq!(names(&folder)?, ["log.txt"]);
+        // As a shell does for `>` and for `>>`.
+        for appends in [false, true] {
+            for name in ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
+                let log = fs::OpenOptions::new().create(true).write(true).append(appends).open(&redirected)?;
+                log.set_len(0)?;
+                let status = Command::new(std::env::current_exe()?)
+                    .args(["--exact", "linux::standard_output_is_written_straight", "--nocapture"])
+                    .env(INTERRUPTED, name)
+                    .stdout(log)
+                    .status()?;
+                let text = fs::read_to_string(&redirected)?;
+                assert!(status.success() && text.contains("before\ncontent\nbehind\n"), "{name}, {appends}: {text}");
+                assert_eq!(names(&folder)?, ["log.txt"]);
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_pipe_that_may_not_be_written_is_refused() -> Outcome {
+        if let Some(pipe) = std::env::var_os(INTERRUPTED) {
+            assert!(matches!(OutputFile::new(Path::new(&pipe)), Err(OutputError::Failed { .. })));
+            return Ok(());
+        }
+        let folder = TempDir::new()?;
+        let (pipe, program) = (folder.path().join("pipe"), folder.path().join("files"));
+        assert!(Command::new("mkfifo").args(["--mode=444".as_ref(), pipe.as_os_str()]).status()?.success());
+        fs::copy(std::env::current_exe()?, &program)?;
+        fs::set_permissions(folder.path(), Permissions::from_mode(0o755))?;
+        let mut command = Command::new(program);
+        command.args(["--exact", "linux::a_pipe_that_may_not_be_written_is_refused"]).env(INTERRUPTED, &pipe);
+        // Root may write everything.
+        if fs::metadata(folder.path())?.uid() == 0 {
+            command.uid(65534);
+        }
+        assert!(command.status()?.success());
         Ok(())
     }
 }
