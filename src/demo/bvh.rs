@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::bounds::bounds;
-use super::strays;
+use super::outliers;
 use super::up_axis::UpAxis;
 use crate::scene::{Mesh, SceneRef, Topology};
 
@@ -72,7 +72,7 @@ impl Bvh {
                 (corners.map(|corner| up.to_y_up(corner)), up.to_y_up(normal.as_dvec3()).as_vec3())
             })
             .collect();
-        strays::remove(&mut world);
+        outliers::remove(&mut world);
         let (low, high) = bounds(world.iter().flat_map(|(corners, _)| *corners));
         let (center, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
         if !(radius > 0.0 && radius.is_finite()) {
@@ -125,8 +125,9 @@ impl Bvh {
             }
             let node = &self.nodes[index];
             if let Some(second) = node.second {
+                // Leaves that are pending already are still intersected.
                 if tested >= MAX_NODES_OF_RAY {
-                    break;
+                    continue;
                 }
                 tested += 2;
                 let children = [index + 1, second].map(|child| (child, self.nodes[child].enter(origin, inverse)));

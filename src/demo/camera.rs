@@ -30,10 +30,15 @@ pub fn camera(scene: SceneRef<'_>) -> Camera {
 
 /// As [`camera`], for a scene that is upright along another axis.
 pub fn camera_upright(scene: SceneRef<'_>, up: UpAxis) -> Camera {
-    let Some(bvh) = Bvh::new(scene, up) else {
+    camera_of(Bvh::new(scene, up).as_ref(), up)
+}
+
+/// The camera of a scene with these triangles.
+pub(super) fn camera_of(bvh: Option<&Bvh>, up: UpAxis) -> Camera {
+    let Some(bvh) = bvh else {
         return up.looking_at("main", up.to_scene(DVec3::new(2.0, 1.5, 3.0)), DVec3::ZERO);
     };
-    let view = viewpoint::choose(&bvh);
+    let view = viewpoint::choose(bvh);
     let in_world = |point: Vec3| up.to_scene(bvh.center + point.as_dvec3() * bvh.radius);
     Camera {
         projection: Projection::Perspective { field_of_view: view.field_of_view },

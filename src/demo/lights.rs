@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::camera::camera_upright;
+use super::bvh::Bvh;
+use super::camera::camera_of;
 use super::up_axis::UpAxis;
 use crate::scene::{Camera, Light, Scene, SceneRef};
 
@@ -20,10 +21,10 @@ pub fn add_camera_and_lights(scene: &mut Scene) {
 
 /// As [`add_camera_and_lights`], for a scene that is upright along another axis.
 pub fn add_camera_and_lights_upright(scene: &mut Scene, up: UpAxis) {
-    let camera = camera_upright(scene.as_scene_ref(), up);
+    let bvh = Bvh::new(scene.as_scene_ref(), up);
+    let camera = camera_of(bvh.as_ref(), up);
     if scene.lights.is_empty() {
-        let lights = lights(scene.as_scene_ref(), &camera);
-        scene.lights.extend(lights);
+        scene.lights.extend(lights_of(bvh.as_ref(), &camera));
     }
     scene.cameras.push(camera);
     scene.ambient = AMBIENT;
@@ -31,9 +32,14 @@ pub fn add_camera_and_lights_upright(scene: &mut Scene, up: UpAxis) {
 }
 
 /// A warm key light from the camera's upper left, a cool fill light from its right, and a point light above it. The
-/// intensity and range of the point light follow from the scene's size.
+/// intensity and range of the point light follow from the scene's size, of which the same counts as for [`camera`](super::camera()).
 pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
-    let (_, radius) = scene.bounding_sphere();
+    lights_of(Bvh::new(scene, UpAxis::Y).as_ref(), camera)
+}
+
+/// The lights of a scene with these triangles.
+fn lights_of(bvh: Option<&Bvh>, camera: &Camera) -> [Light; 3] {
+    let radius = bvh.map_or(0.0, |bvh| bvh.radius);
     let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| camera.orientation * axis);
     let lamp = (up * 0.25 - right * 0.2 - back * 0.3).as_dvec3() * radius;
     let intensity = (Vec3::new(1.0, 0.85, 0.65).as_dvec3() * (0.6 * radius * radius)).min(DVec3::splat(1e30)).as_vec3();

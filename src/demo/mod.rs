@@ -7,7 +7,7 @@ mod bvh;
 mod camera;
 mod colonnade;
 mod lights;
-mod strays;
+mod outliers;
 mod up_axis;
 mod viewpoint;
 

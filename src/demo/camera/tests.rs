@@ -220,7 +220,7 @@ fn a_scene_with_z_up_is_shown_as_the_same_scene_with_y_up() {
 }
 
 #[test]
-fn a_stray_does_not_change_the_view() {
+fn an_outlier_changes_neither_the_view_nor_the_lights() {
     let box_size = Vec3::new(1.0, 2.0, 1.0);
     let alone = camera_of(&[(cube(Vec3::ZERO, false), box_size)], 1.0, DVec3::ZERO);
     for distance in [1e5, -1e9, 1e30] {
@@ -228,8 +228,12 @@ fn a_stray_does_not_change_the_view() {
         add(&mut scene, square(1), DVec3::new(distance, 0.0, 0.0), 0.0);
         let camera = camera(scene.as_scene_ref());
         assert_eq!((camera.position, camera.near), (alone.position, alone.near), "{distance}");
+        let [_, _, Light::Point { position, .. }] = lights(scene.as_scene_ref(), &camera) else {
+            panic!("no point light")
+        };
+        assert!(position.length() < 10.0, "{distance}: {position}");
     }
-    // What is as large as it is far is no stray.
+    // What is as large as it is far is no outlier.
     let mut scene = scene_of(&[(cube(Vec3::ZERO, false), Vec3::ONE)], DVec3::ZERO);
     add(&mut scene, scaled(square(1), 1e4), DVec3::new(0.0, 0.0, -1.0), 0.0);
     assert!(camera(scene.as_scene_ref()).position.length() > 1e4);

@@ -1,13 +1,13 @@
-//! What is so far from the rest of a scene that a picture of both would show neither.
+//! Outliers: triangles so far from the rest of a scene that a picture of both would show neither.
 
 use glam::{DVec3, Vec3};
 
 use super::bounds::bounds;
 
-/// A triangle is a stray if it is farther from the bulk than this many times the bulk's size.
+/// A triangle is an outlier if it is farther from the bulk than this many times the bulk's size.
 const MAX_RELATIVE_DISTANCE: f64 = 1000.0;
 
-/// The share of the area at either end of an axis that may be strays.
+/// The share of the area at either end of an axis that may be outliers.
 const TAIL: f64 = 0.1;
 
 /// The most triangles from which the bulk is estimated.
