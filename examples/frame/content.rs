@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use drawloom::scene::obj::Imported;
+use drawloom::scene::obj::{Imported, ObjWarning};
 use drawloom::scene::{Mesh, Scene};
 use serde::Serialize;
 
@@ -22,9 +22,7 @@ pub struct Content {
 impl Content {
     /// Notes what an import left out, and prints its warnings.
     pub fn of_file(imported: &Imported) -> Self {
-        for warning in &imported.warnings {
-            eprintln!("warning: {warning}");
-        }
+        print_warnings(&imported.warnings);
         let mut not_listed = imported.warning_counts.clone();
         for warning in &imported.warnings {
             not_listed.entry(warning.kind()).and_modify(|count| *count -= 1);
@@ -49,5 +47,12 @@ impl Content {
                 self.vertices += mesh.vertices().len();
             }
         }
+    }
+}
+
+/// Prints what was left out of a file or replaced.
+pub fn print_warnings(warnings: &[ObjWarning]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
     }
 }

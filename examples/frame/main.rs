@@ -27,7 +27,7 @@ use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use arguments::{Arguments, BackendName};
-use content::Content;
+use content::{Content, print_warnings};
 use device::{Device, NoDevice, WgpuDevice};
 use report::Report;
 
@@ -123,7 +123,7 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>>
     let mut scene = match &arguments.scene {
         None => demo::colonnade()?,
         Some(path) => {
-            let mut imported = obj::load(path)?;
+            let mut imported = obj::load(path).inspect_err(|error| print_warnings(error.warnings()))?;
             content = Content::of_file(&imported);
             println!(
                 "{}: {} triangles, and {} degenerate ones left out",

@@ -69,6 +69,18 @@ fn triangles_without_area_are_left_out() {
         let imported = load(&format!("{vertices}f 1 2 3\n{bad}\n"));
         assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1), "{bad}");
     }
+    // So are those of a polygon, which does not intersect itself.
+    for vertex in ["nan 0 0", "0 inf 0"] {
+        let imported = load(&format!("{TRIANGLE}v {vertex}\nv -1 1 0\nf 1 2 3 4 5\n"));
+        assert_eq!(imported.triangles + imported.degenerate_triangles, 4, "{vertex}");
+        assert_eq!(imported.warning_counts.len(), 0, "{vertex}: {:?}", imported.warnings);
+    }
+    // A mesh from end to end of what 32 bits can represent has no bounding sphere.
+    let imported = load(&format!("{TRIANGLE}v -3.4e38 3.4e38 0\nv 3.4e38 0 3.4e38\nv 0 -3.4e38 -3.4e38\nf 4 5 6\n"));
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1));
+    let edge = f32::MAX / 2.0;
+    let imported = load(&format!("v -{edge} {edge} {edge}\nv {edge} -{edge} {edge}\nv 0 {edge} -{edge}\nf 1 2 3\n"));
+    assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 0));
     // Collinear, but for rounding.
     let imported = load(&format!("{TRIANGLE}v 0.1 0.3 0.7\nv 0.2 0.6 1.4\nv 0.3 0.9 2.1\nf 4 5 6\n"));
     assert_eq!((imported.triangles, imported.degenerate_triangles), (1, 1));
@@ -85,6 +97,11 @@ fn a_model_without_area_is_reported() {
     assert!(matches!(error, ObjError::NoTriangles { degenerate_triangles: 1, .. }), "{error}");
     let error = Folder::new().with("a.obj", "").load().unwrap_err();
     assert!(error.to_string().contains("a.obj` has no triangle to draw"), "{error}");
+    let curves = Folder::new().with("a.obj", "mtllib no.mtl\nv 0 0 0\ncurv2 1 1\nsurfaces 3\n").load().unwrap_err();
+    assert!(matches!(curves, ObjError::NoTriangles { surfaces: 1, .. }), "{curves}");
+    let kinds: Vec<_> = curves.warnings().iter().map(ObjWarning::kind).collect();
+    let ignored = "file with ignored statements";
+    assert_eq!(kinds, [ignored, "points, lines or surfaces", "missing material library", "model without triangles"]);
 }
 
 fn bad_normals_and_coordinates_are_replaced() {

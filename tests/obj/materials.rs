@@ -1,8 +1,11 @@
 //! Materials, textures and lights.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::scene::obj::{Imported, ObjWarning};
+use drawloom::scene::obj::{self, Imported, ObjWarning};
 use drawloom::scene::{Blend, Light, Material, Texture};
 use image::{Rgba, RgbaImage};
 use libtest_mimic::Trial;
@@ -16,6 +19,8 @@ pub fn trials() -> Vec<Trial> {
         trial("materials::a_missing_texture_is_reported", a_missing_texture_is_reported),
         trial("materials::a_large_texture_is_scaled_down", a_large_texture_is_scaled_down),
         trial("materials::a_texture_is_shared", a_texture_is_shared),
+        trial("materials::every_texture_is_read_once", every_texture_is_read_once),
+        trial("materials::long_names_are_cut_or_refused", long_names_are_cut_or_refused),
         trial("materials::a_texture_is_found_behind_options_quotes_and_comments", a_texture_is_found),
         trial("materials::a_mask_becomes_the_alpha_of_a_blended_material", a_mask_becomes_the_alpha),
         trial("materials::a_mask_that_hides_nothing_does_not_blend", a_mask_that_hides_nothing_does_not_blend),
@@ -101,6 +106,54 @@ fn a_texture_is_shared() {
     assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
     assert_eq!(named(&imported, "one").texture, named(&imported, "two").texture);
     assert_eq!(named(&imported, "two").diffuse, Vec3::splat(0.5));
+    // Other ways to name the same file, and a mask that hides nothing.
+    let library = "newmtl one\nmap_Kd a.png # red\nnewmtl two\nmap_Kd \"a.png\"\nmap_d white.png\n";
+    let folder = folder.with("a.mtl", library).with_image("white.png", &RgbaImage::from_pixel(1, 1, Rgba([255; 4])));
+    let imported = folder.load().unwrap();
+    assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
+    assert_eq!(named(&imported, "one").texture, named(&imported, "two").texture);
+}
+
+fn every_texture_is_read_once() {
+    let (mut text, mut library) = (String::from("mtllib a.mtl\n"), String::new());
+    text += "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for index in 0..50 {
+        text += &format!("usemtl {index}\nf 1 2 3\n");
+        library += &format!("newmtl {index}\nmap_Kd {} #{index}\n", ["a.png", "broken.png", "no.png"][index % 3]);
+    }
+    let mut picture = std::io::Cursor::new(Vec::new());
+    red_above_blue().write_to(&mut picture, image::ImageFormat::Png).unwrap();
+    let reads = RefCell::new(BTreeMap::new());
+    let fetch = |name: &str| {
+        *reads.borrow_mut().entry(name.to_owned()).or_insert(0) += 1;
+        match name {
+            "a.mtl" => Ok(library.clone().into_bytes()),
+            "a.png" => Ok(picture.get_ref().clone()),
+            "broken.png" => Ok(picture.get_ref()[..40].to_vec()),
+            _ => Err(std::io::ErrorKind::NotFound.into()),
+        }
+    };
+    let imported = obj::read("a.obj", text.as_bytes(), fetch).unwrap();
+    assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
+    assert_eq!(imported.warning_counts["unusable texture"], 33);
+    assert!(reads.borrow().values().all(|&count| count == 1), "{reads:?}");
+}
+
+fn long_names_are_cut_or_refused() {
+    let long = "long".repeat(50_000);
+    let faces = "usemtl one\nf 1 2 3\nusemtl two\nf 3 2 1\n".repeat(500);
+    let text = format!("mtllib a.mtl\nmtllib {long}\nv 0 0 0\nv 1 0 0\nv 0 1 0\no {long}\n{faces}");
+    let library = format!("newmtl one\nmap_Kd {long}.png\nnewmtl two\n");
+    let imported = Folder::new().with("a.obj", text).with("a.mtl", library).load().unwrap();
+    assert_eq!(imported.triangles, 1000);
+    assert_eq!(mesh(&imported, 0).name().chars().count(), 161);
+    let [ObjWarning::LibraryLine { line: 2, reason, .. }, ObjWarning::MissingLibrary { reason: library, .. }] =
+        &imported.warnings[..]
+    else {
+        panic!("{:?}", imported.warnings);
+    };
+    assert_eq!(reason, "a texture whose name has more than 4096 bytes was left out");
+    assert_eq!(library, "its name has more than 4096 bytes");
 }
 
 fn a_texture_is_found() {
@@ -149,7 +202,7 @@ fn a_mask_becomes_the_alpha() {
     let gray = RgbaImage::from_fn(1, 2, |_, y| Rgba([[40, 40, 40, 255], [255; 4]][y as usize]));
     let alpha = RgbaImage::from_fn(4, 4, |x, _| Rgba([9, 9, 9, if x < 2 { 0 } else { 200 }]));
     let both = "newmtl one\nmap_Kd a.png\nmap_d mask.png\n";
-    for (mask, expected) in [(&gray, [40, 40, 255, 255]), (&alpha, [0, 200, 0, 200])] {
+    for (mask, expected) in [(&gray, vec![40, 40, 255, 255]), (&alpha, [0, 0, 200, 200].repeat(4))] {
         let imported = load_masked(both, &red_above_blue(), mask);
         let material = named(&imported, "one");
         assert_eq!((material.blend, material.opacity, material.diffuse), (Blend::Alpha, 1.0, Vec3::ONE));
@@ -158,6 +211,11 @@ fn a_mask_becomes_the_alpha() {
         assert_eq!(texture.pixels()[..3], [255, 0, 0]);
         assert_eq!(imported.warnings, []);
     }
+    // One colour, and the leaves in the mask.
+    let leaves = load_masked(both, &RgbaImage::from_pixel(1, 1, Rgba([0, 90, 0, 255])), &alpha);
+    assert_eq!(alphas(&leaves), [0, 0, 200, 200].repeat(4));
+    let texture = leaves.scene.assets().get(named(&leaves, "one").texture.unwrap()).unwrap();
+    assert!(texture.pixels().chunks(4).all(|pixel| pixel[..3] == [0, 90, 0]));
     // Without colours, or if they cannot be used.
     let alone = load_masked("newmtl one\nKd 0 1 0\nmap_d mask.png\n", &gray, &gray);
     assert_eq!((named(&alone, "one").diffuse, alphas(&alone)), (Vec3::Y, vec![40, 255]));

@@ -31,7 +31,7 @@ const MALFORMED: [(&str, Outcome); 31] = [
     ("tobj/empty_name_triangle.obj", gives(1, 1)),
     // The only face of a model refers to vertex 7 of 6.
     ("tobj/invalid_index.obj", warns(1, 1, 2)),
-    ("tobj/lines.obj", Error("no triangle to draw (0 degenerate triangles, 0 points, 3 lines)")),
+    ("tobj/lines.obj", Error("no triangle to draw (0 degenerate triangles, 0 points, 3 lines, 0 curves or surfaces)")),
     ("tobj/quad.obj", gives(3, 5)),
     // Vertex colours.
     ("tobj/quad_colored_merge.obj", warns(1, 2, 1)),
@@ -57,7 +57,10 @@ const MALFORMED: [(&str, Outcome); 31] = [
     ("trimesh/notenoughindices.obj", warns(1, 1, 4)),
     ("trimesh/obj_empty.obj", Error("no triangle to draw")),
     ("trimesh/obj_points.obj", Error("no triangle to draw")),
-    ("trimesh/obj_wireframe.obj", Error("no triangle to draw (0 degenerate triangles, 0 points, 12 lines)")),
+    (
+        "trimesh/obj_wireframe.obj",
+        Error("no triangle to draw (0 degenerate triangles, 0 points, 12 lines, 0 curves or surfaces)"),
+    ),
     ("trimesh/obj_with_no_face_in_chunk.obj", warns(1, 1, 1)),
     ("trimesh/polygonfaces.obj", warns(1, 3, 3)),
     ("trimesh/singlevn.obj", warns(1, 2, 2)),

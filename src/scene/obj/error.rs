@@ -26,6 +26,8 @@ pub enum ObjError {
         file: String,
         /// The first line that is not Unicode, counted from 1.
         line: usize,
+        /// What was left out or replaced.
+        warnings: Vec<ObjWarning>,
     },
     /// The file has nothing to draw, and a malformed line may be why.
     #[error("`{file}` has no triangle to draw; line {line}: {reason}")]
@@ -36,6 +38,8 @@ pub enum ObjError {
         line: usize,
         /// Why it is malformed.
         reason: String,
+        /// What was left out or replaced.
+        warnings: Vec<ObjWarning>,
     },
     /// tobj could not parse the file although every line is well-formed.
     #[error("`{file}`: {reason}")]
@@ -47,7 +51,8 @@ pub enum ObjError {
     },
     /// The file has nothing to draw.
     #[error(
-        "`{file}` has no triangle to draw ({degenerate_triangles} degenerate triangles, {points} points, {lines} lines)"
+        "`{file}` has no triangle to draw ({degenerate_triangles} degenerate triangles, {points} points, {lines} lines, \
+         {surfaces} curves or surfaces)"
     )]
     NoTriangles {
         /// The file.
@@ -58,6 +63,10 @@ pub enum ObjError {
         points: usize,
         /// The number of lines, which are not drawn.
         lines: usize,
+        /// The number of free-form curves and surfaces, which are not drawn.
+        surfaces: usize,
+        /// What was left out or replaced.
+        warnings: Vec<ObjWarning>,
     },
     /// An asset or object of the file is invalid.
     #[error("`{file}`: {source}")]
@@ -67,6 +76,18 @@ pub enum ObjError {
         /// The error of the scene.
         source: SceneError,
     },
+}
+
+impl ObjError {
+    /// What was left out or replaced until loading failed, as [`Imported::warnings`](super::Imported::warnings) of a file that loads.
+    pub fn warnings(&self) -> &[ObjWarning] {
+        match self {
+            Self::NotText { warnings, .. } | Self::Malformed { warnings, .. } | Self::NoTriangles { warnings, .. } => {
+                warnings
+            }
+            Self::Unreadable { .. } | Self::Refused { .. } | Self::Scene { .. } => &[],
+        }
+    }
 }
 
 /// Something in an OBJ file that was left out or replaced.

@@ -68,6 +68,9 @@ fn without_waiting() -> OpenOptions {
     options
 }
 
+/// The most bytes of a file's name, with its folders: as many as Linux takes. Longer names are no names, but would be kept for each material.
+pub(super) const MAX_NAME_BYTES: usize = 4096;
+
 /// A name that the text behind a keyword may mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct PossibleName {
@@ -77,7 +80,8 @@ pub(super) struct PossibleName {
 }
 
 /// The names that the text behind a keyword may mean, the likeliest first. Names may contain spaces, quotes, `#` and `-`, but
-/// programs also write quotes around them, a comment or options behind them, and a backslash before a space.
+/// programs also write quotes around them, a comment or options behind them, and a backslash before a space. None is longer than
+/// [`MAX_NAME_BYTES`].
 pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
     let quoted = text.strip_prefix('"').and_then(|rest| rest.split_once('"'));
     let comment = text.match_indices('#').map(|(index, _)| &text[..index]);
@@ -94,7 +98,7 @@ pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
         // A backslash separates folders, or belongs to the space behind it.
         for name in [name.replace('\\', "/"), name.replace("\\ ", " ").replace('\\', "/")] {
             let name = format!("{folder}{name}");
-            if names.iter().all(|known| known.name != name) {
+            if name.len() <= MAX_NAME_BYTES && names.iter().all(|known| known.name != name) {
                 names.push(PossibleName { name, drops_options });
             }
         }
@@ -102,19 +106,21 @@ pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
     names
 }
 
-/// Reads the first of several possible names of a file that can be read. Returns its name as well.
+/// The first of several possible names under which `read` finds something, and what it finds.
 ///
 /// # Errors
 /// Returns an error of a name under which there is something, or else says that nothing is found.
-pub(super) fn read_one_of<'n>(
-    names: &'n [PossibleName],
-    limit: Limit,
-    fetch: Fetch<'_>,
-) -> io::Result<(&'n PossibleName, Vec<u8>)> {
-    let mut reason = io::Error::from(io::ErrorKind::NotFound);
+pub(super) fn first_readable<T>(
+    names: &[PossibleName],
+    mut read: impl FnMut(&str) -> io::Result<T>,
+) -> io::Result<(&PossibleName, T)> {
+    let mut reason = match names {
+        [] => io::Error::new(io::ErrorKind::NotFound, format!("its name has more than {MAX_NAME_BYTES} bytes")),
+        _ => io::Error::from(io::ErrorKind::NotFound),
+    };
     for name in names {
-        match fetch(&name.name, limit) {
-            Ok(bytes) => return Ok((name, bytes)),
+        match read(&name.name) {
+            Ok(found) => return Ok((name, found)),
             Err(error) if reason.kind() == io::ErrorKind::NotFound => reason = error,
             Err(_) => {}
         }

@@ -30,6 +30,9 @@ pub(super) struct GeometryPart {
 /// of 32-bit coordinates.
 const MIN_RELATIVE_HEIGHT: f64 = 1e-7;
 
+/// The largest coordinate: the bounding sphere of a mesh whose box is as large in each direction still has an `f32` as radius.
+const MAX_COORDINATE: f64 = f32::MAX as f64 / 2.0;
+
 /// A part is divided if the longest edge of a triangle is less than this share of half the part's size: its 32-bit coordinates, which are
 /// relative to the middle, are rounded by up to a sixteenth of that.
 const MIN_RELATIVE_EDGE: f64 = 1e-6;
@@ -59,6 +62,10 @@ impl ModelGeometry {
             let (polygon, rest) = corners.split_at(arity);
             corners = rest;
             let points: Vec<_> = polygon.iter().map(|&corner| positions[corner as usize]).collect();
+            if points.iter().any(|point| !point.is_finite()) {
+                self.degenerate_triangles += arity - 2;
+                continue;
+            }
             cut.clear();
             self.fanned_polygons += usize::from(!triangulate(&points, &mut cut));
             for cut in &cut {
@@ -162,7 +169,7 @@ fn triangle(corners: [usize; 3], [a, b, c]: [DVec3; 3]) -> Option<Triangle> {
     let longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
     // A comparison with NaN is false.
     let has_area = product.length() > MIN_RELATIVE_HEIGHT * longest;
-    let is_small = [a, b, c].iter().all(|point| point.abs().cmple(DVec3::splat(f32::MAX.into())).all());
-    let normal = if has_area && is_small { product.try_normalize() } else { None };
+    let is_representable = [a, b, c].iter().all(|point| point.abs().cmple(DVec3::splat(MAX_COORDINATE)).all());
+    let normal = if has_area && is_representable { product.try_normalize() } else { None };
     normal.map(|normal| Triangle { corners, normal, longest_edge: longest.sqrt() })
 }

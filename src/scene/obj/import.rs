@@ -42,7 +42,7 @@ pub struct Imported {
 /// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
 ///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1
 ///   somewhere is blended, and casts no shadow.
-/// - A model without normals is shaded flat.
+/// - A model without normals is shaded flat. Names of models are cut after 160 characters.
 /// - An emissive mesh (`Ke`) adds a light. There are no other lights, and no cameras.
 /// - What is malformed or not supported is left out, with a warning. Lines may end in LF, CR or both; text may be UTF-8 or
 ///   UTF-16, and lines in other encodings are read as Latin-1.
@@ -138,19 +138,24 @@ fn import(file: &str, reader: impl BufRead, fetch: Fetch<'_>, limits: &ObjLimits
         .fill(models, &preprocessed, fetch, limits, &mut warnings)
         .map_err(|source| ObjError::Scene { file: file.clone(), source })?;
     if imported.triangles == 0 {
-        return Err(nothing_to_draw(file, preprocessed, imported.degenerate_triangles));
+        return Err(nothing_to_draw(file, preprocessed, imported.degenerate_triangles, warnings.listed));
     }
     (imported.warnings, imported.warning_counts) = (warnings.listed, warnings.counts);
     Ok(imported)
 }
 
 /// The error of a file without a triangle, with the likeliest reason.
-fn nothing_to_draw(file: String, preprocessed: Preprocessed, degenerate_triangles: usize) -> ObjError {
-    let Preprocessed { first_malformed, first_binary_line, points, lines, .. } = preprocessed;
+fn nothing_to_draw(
+    file: String,
+    preprocessed: Preprocessed,
+    degenerate_triangles: usize,
+    warnings: Vec<ObjWarning>,
+) -> ObjError {
+    let Preprocessed { first_malformed, first_binary_line, points, lines, surfaces, .. } = preprocessed;
     match (first_binary_line, first_malformed) {
-        (Some(line), _) => ObjError::NotText { file, line },
-        (None, Some(MalformedLine { line, reason })) => ObjError::Malformed { file, line, reason },
-        (None, None) => ObjError::NoTriangles { file, degenerate_triangles, points, lines },
+        (Some(line), _) => ObjError::NotText { file, line, warnings },
+        (None, Some(MalformedLine { line, reason })) => ObjError::Malformed { file, line, reason, warnings },
+        (None, None) => ObjError::NoTriangles { file, degenerate_triangles, points, lines, surfaces, warnings },
     }
 }
 

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::error::ObjWarning;
 use super::excerpt::excerpt;
-use super::files::{PossibleName, possible_names};
+use super::files::{MAX_NAME_BYTES, PossibleName, possible_names};
 use super::ignored::IgnoredStatements;
 use super::statements::Statements;
 use super::warnings::Warnings;
@@ -91,7 +91,11 @@ pub(super) fn add_definitions(
         match keyword {
             "Kd" => definition.diffuse = color(rest, 1.0, &mut warn).or(definition.diffuse),
             "Ke" => definition.emission = color(rest, f32::MAX, &mut warn).unwrap_or(definition.emission),
-            "Ka" => definition.ambient = color(rest, 1.0, &mut |_| ()).map(|color| (color, line)),
+            "Ka" => match color(rest, 1.0, &mut |_| ()) {
+                Some(color) => definition.ambient = Some((color, line)),
+                // A spectrum, for example, which is not drawn either.
+                None => ignored.add(keyword, line),
+            },
             "d" => {
                 definition.dissolve = opacity(rest, &mut warn).or(definition.dissolve);
                 definition.resolve_opacity(&mut warn);
@@ -152,13 +156,14 @@ impl Definition {
 /// Whether a statement that is not supported would change nothing, or changes only what another one says, which is not
 /// supported either: `Ns` and `Ni` are details of `Ks` and `illum`.
 fn changes_nothing(keyword: &str, values: &str) -> bool {
-    let mut numbers = values.split_whitespace().map_while(|word| word.parse::<f32>().ok());
+    let numbers = values.split_once('#').map_or(values, |(numbers, _)| numbers).split_whitespace();
+    let all = |is_neutral: fn(f32) -> bool| numbers.clone().all(|word| word.parse().is_ok_and(is_neutral));
     match keyword {
         "Ns" | "Ni" => true,
-        "Ks" => numbers.all(|number| number == 0.0),
-        "Tf" => numbers.all(|number| number == 1.0),
+        "Ks" => all(|number| number == 0.0),
+        "Tf" => all(|number| number == 1.0),
         // Without light, with it, and with highlights, which are those of `Ks`.
-        "illum" => numbers.next().is_some_and(|number| number <= 2.0),
+        "illum" => all(|number| number <= 2.0),
         _ => false,
     }
 }
@@ -223,7 +228,12 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
         return None;
     }
     let folder = library.rfind(['/', '\\']).map_or("", |slash| &library[..=slash]);
-    Some(possible_names(&folder.replace('\\', "/"), rest))
+    let names = possible_names(&folder.replace('\\', "/"), rest);
+    if names.is_empty() {
+        warn(format!("a texture whose name has more than {MAX_NAME_BYTES} bytes was left out"));
+        return None;
+    }
+    Some(names)
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
@@ -292,8 +302,12 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_is_counted_unless_it_changes_nothing() {
-        let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0\nNs 10\nNi 1.5\nTf 1 1 1\nillum 2";
+        let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0 # black\nNs 10\nNi 1.5\nTf 1 1 1\nillum 2";
         assert_eq!(parse_one(neutral).1, 0);
+        for spectrum in ["Ka spectral a.rfl", "Ks spectral a.rfl 1", "Tf spectral a.rfl", "Ks 0 0 red", "illum full"] {
+            let warnings = parse(&format!("newmtl a\nKd 0.5\n{spectrum}")).1;
+            assert!(matches!(warnings[..], [ObjWarning::IgnoredStatements { .. }]), "{spectrum}: {warnings:?}");
+        }
         let mut text =
             format!("newmtl a\n{neutral}\nKs 0 0 1\nnewmtl b\nKa 1 0 0\nKs 1\nillum 3\nTf 0 1 1\nmap_Ke b.png");
         for index in 0..99 {

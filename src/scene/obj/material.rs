@@ -6,7 +6,7 @@ use std::io;
 use glam::Vec3;
 
 use super::error::ObjWarning;
-use super::files::{Fetch, PossibleName, possible_names, read_one_of};
+use super::files::{Fetch, PossibleName, first_readable, possible_names};
 use super::library::{self, Definition, Definitions, TextureStatement};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::Preprocessed;
@@ -39,7 +39,7 @@ pub(super) fn add_materials(
     // A later definition of the same name replaces an earlier one.
     let defined: HashMap<_, _> =
         definitions.used.iter().map(|definition| (definition.name.as_str(), definition)).collect();
-    let mut textures = TextureCache { fetch, limits, decoded_bytes: 0, by_names: HashMap::new() };
+    let mut textures = TextureCache::new(fetch, limits);
     let default = || Material { double_sided: true, ..Material::default() };
     let mut handles = Vec::new();
     for name in &file.materials {
@@ -71,7 +71,8 @@ impl Libraries<'_> {
     /// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
-        let read = read_one_of(&possible_names("", library), limit, self.fetch).and_then(|(name, bytes)| {
+        let names = possible_names("", library);
+        let read = first_readable(&names, |name| (self.fetch)(name, limit)).and_then(|(name, bytes)| {
             self.bytes += bytes.len() as u64;
             let is_used = |name: &str| self.used.contains(name);
             let max_line_bytes = self.limits.line_bytes;
@@ -79,7 +80,7 @@ impl Libraries<'_> {
         });
         match read {
             Ok(()) => {}
-            Err(error) if library.contains(char::is_whitespace) && !is_there(&error) => {
+            Err(error) if library.contains(char::is_whitespace) && !exists_but_is_unusable(&error) => {
                 for part in library.split_whitespace() {
                     self.add(part, warnings);
                 }
@@ -92,7 +93,7 @@ impl Libraries<'_> {
 }
 
 /// Whether there is a file that cannot be read, of which this is the error.
-fn is_there(error: &io::Error) -> bool {
+fn exists_but_is_unusable(error: &io::Error) -> bool {
     // What exceeds a limit, and what is no regular file.
     matches!(error.kind(), io::ErrorKind::FileTooLarge | io::ErrorKind::InvalidInput | io::ErrorKind::PermissionDenied)
 }
@@ -111,23 +112,45 @@ struct TextureCache<'a> {
     limits: &'a ObjLimits,
     /// The bytes of all textures in the scene.
     decoded_bytes: u64,
+    /// By name, the files that were tried: whether they can be decoded, or why not. None is tried twice.
+    files: HashMap<String, Result<(), (io::ErrorKind, String)>>,
+    /// By the files of colours and mask.
+    by_files: HashMap<[Option<String>; 2], CombinedTexture>,
     /// By the likeliest names of colours and mask.
-    by_names: HashMap<[Option<String>; 2], MaterialTexture>,
+    by_statements: HashMap<[Option<String>; 2], MaterialTexture>,
 }
 
-/// The texture of a material, and how it changes the material.
-#[derive(Clone, Default)]
-struct MaterialTexture {
+/// A texture of the scene, from the files of colours and mask.
+#[derive(Clone, Copy, Default)]
+struct CombinedTexture {
     handle: Option<Handle<Texture>>,
     /// Whether it has the colours of `map_Kd`.
     has_colors: bool,
     /// The greatest opacity, from 0 to 255, if a part of `map_d` is less than opaque.
-    masked: Option<u8>,
+    max_mask_opacity: Option<u8>,
+}
+
+/// The texture of a material.
+#[derive(Clone)]
+struct MaterialTexture {
+    texture: CombinedTexture,
     /// The files that cannot be used, and why.
     unusable: Vec<(String, String)>,
 }
 
-impl TextureCache<'_> {
+/// A file that can be decoded.
+struct TextureFile {
+    name: String,
+    /// `None` if it was decoded before, for another texture.
+    pixels: Option<Pixels>,
+}
+
+impl<'a> TextureCache<'a> {
+    fn new(fetch: Fetch<'a>, limits: &'a ObjLimits) -> Self {
+        let (files, by_files, by_statements) = Default::default();
+        Self { fetch, limits, decoded_bytes: 0, files, by_files, by_statements }
+    }
+
     fn material(
         &mut self,
         scene: &mut Scene,
@@ -143,10 +166,10 @@ impl TextureCache<'_> {
             None => Material::default().diffuse,
         };
         let opacity = definition.opacity.unwrap_or(1.0);
-        if opacity == 0.0 || texture.masked == Some(0) {
+        if opacity == 0.0 || texture.max_mask_opacity == Some(0) {
             warnings.push(ObjWarning::InvisibleMaterial { material: definition.name.clone() });
         }
-        let is_blended = opacity < 1.0 || texture.masked.is_some();
+        let is_blended = opacity < 1.0 || texture.max_mask_opacity.is_some();
         Ok(Material {
             name: definition.name.clone(),
             diffuse,
@@ -164,78 +187,138 @@ impl TextureCache<'_> {
         scene: &mut Scene,
         definition: &Definition,
         warnings: &mut Warnings,
-    ) -> Result<MaterialTexture, SceneError> {
+    ) -> Result<CombinedTexture, SceneError> {
         let statements = [&definition.texture, &definition.mask].map(Option::as_ref);
         let names = statements.map(|statement| statement.map(|statement| statement.names[0].name.clone()));
-        let texture = match self.by_names.get(&names) {
+        let known = match self.by_statements.get(&names) {
             Some(known) => known.clone(),
             None => {
-                let texture = self.combine(scene, statements, warnings)?;
-                self.by_names.insert(names, texture.clone());
+                let texture = self.texture_of_statements(scene, statements, warnings)?;
+                self.by_statements.insert(names, texture.clone());
                 texture
             }
         };
-        for (texture, reason) in texture.unusable.iter().cloned() {
+        for (texture, reason) in known.unusable {
             warnings.push(ObjWarning::UnusableTexture { texture, material: definition.name.clone(), reason });
         }
-        Ok(texture)
+        Ok(known.texture)
     }
 
-    /// Decodes colours and mask, and adds a texture of both.
-    fn combine(
+    fn texture_of_statements(
         &mut self,
         scene: &mut Scene,
         statements: [Option<&TextureStatement>; 2],
         warnings: &mut Warnings,
     ) -> Result<MaterialTexture, SceneError> {
-        let mut texture = MaterialTexture::default();
-        let [colors, mask] = statements.map(|statement| {
+        let mut unusable = Vec::new();
+        let files = statements.map(|statement| {
             let statement = statement?;
-            let unusable = |reason| (statement.names[0].name.clone(), reason);
-            match self.decode(statement, warnings).map_err(unusable) {
-                Ok(decoded) => return Some(decoded),
+            match self.find(statement, warnings) {
+                Ok(file) => return Some(file),
                 // Colours and opacity may be in the same file.
-                Err(known) if texture.unusable.contains(&known) => {}
-                Err(unusable) => texture.unusable.push(unusable),
+                Err(error) => {
+                    let failure = (statement.names[0].name.clone(), error.to_string());
+                    if !unusable.contains(&failure) {
+                        unusable.push(failure);
+                    }
+                }
             }
             None
         });
-        texture.has_colors = colors.is_some();
-        let mask =
-            mask.map(|(name, pixels)| (name, pixels.into_mask())).filter(|(_, pixels)| pixels.opacities().0 < 255);
-        texture.masked = mask.as_ref().map(|(_, pixels)| pixels.opacities().1);
+        let texture = self.texture_of_files(scene, files, &mut unusable)?;
+        Ok(MaterialTexture { texture, unusable })
+    }
+
+    /// The first possible file of a statement that can be decoded.
+    fn find(
+        &mut self,
+        TextureStatement { names, library, line }: &TextureStatement,
+        warnings: &mut Warnings,
+    ) -> io::Result<TextureFile> {
+        let (PossibleName { name, drops_options }, pixels) = first_readable(names, |name| {
+            if let Some(known) = self.files.get(name) {
+                return known.as_ref().map(|()| None).map_err(|(kind, reason)| io::Error::new(*kind, reason.clone()));
+            }
+            let decoded = self.decode(name);
+            let outcome = decoded.as_ref().map(drop).map_err(|error| (error.kind(), error.to_string()));
+            self.files.insert(name.to_owned(), outcome);
+            decoded.map(Some)
+        })?;
+        if *drops_options {
+            let (library, reason) = (library.clone(), format!("the options of the texture `{name}` were left out"));
+            warnings.push(ObjWarning::LibraryLine { library, line: *line, reason });
+        }
+        if let Some([width, height]) = pixels.as_ref().and_then(|pixels| pixels.scaled_from) {
+            warnings.push(ObjWarning::ScaledTexture { texture: name.clone(), width, height });
+        }
+        Ok(TextureFile { name: name.clone(), pixels })
+    }
+
+    fn decode(&self, name: &str) -> io::Result<Pixels> {
+        let ObjLimits { texture_file_bytes, texture_bytes, all_textures_bytes, .. } = *self.limits;
+        let file = (self.fetch)(name, Limit::new("texture_file_bytes", texture_file_bytes))?;
+        let all = Limit { taken: self.decoded_bytes, ..Limit::new("all_textures_bytes", all_textures_bytes) };
+        texture::decode(name, file, Limit::new("texture_bytes", texture_bytes), all)
+            .map_err(|reason| io::Error::new(io::ErrorKind::InvalidData, reason))
+    }
+
+    /// The texture of these files, which is added to the scene if there is none yet.
+    fn texture_of_files(
+        &mut self,
+        scene: &mut Scene,
+        files: [Option<TextureFile>; 2],
+        unusable: &mut Vec<(String, String)>,
+    ) -> Result<CombinedTexture, SceneError> {
+        let names = files.each_ref().map(|file| file.as_ref().map(|file| file.name.clone()));
+        if let Some(known) = self.by_files.get(&names) {
+            return Ok(*known);
+        }
+        let mut failed = |name, error: io::Error| unusable.push((name, error.to_string()));
+        let [colors, mask] = files.map(|file| {
+            let TextureFile { name, pixels } = file?;
+            match pixels.map_or_else(|| self.decode(&name), Ok) {
+                Ok(pixels) => Some((name, pixels)),
+                Err(error) => {
+                    failed(name, error);
+                    None
+                }
+            }
+        });
+        let mask = mask.map(|(name, pixels)| (name, pixels.into_mask()));
+        // One that hides nothing makes no other texture than the colours alone.
+        let mask = mask.filter(|(_, pixels)| pixels.opacities().0 < 255);
+        let used_names = [&colors, &mask].map(|used| used.as_ref().map(|(name, _)| name.clone()));
+        let texture = match self.by_files.get(&used_names) {
+            Some(known) => *known,
+            None => self.combine(scene, colors, mask)?,
+        };
+        self.by_files.insert(used_names, texture);
+        self.by_files.insert(names, texture);
+        Ok(texture)
+    }
+
+    /// Adds a texture of colours and mask, with their names.
+    fn combine(
+        &mut self,
+        scene: &mut Scene,
+        colors: Option<(String, Pixels)>,
+        mask: Option<(String, Pixels)>,
+    ) -> Result<CombinedTexture, SceneError> {
+        let mut texture = CombinedTexture {
+            handle: None,
+            has_colors: colors.is_some(),
+            max_mask_opacity: mask.as_ref().map(|(_, pixels)| pixels.opacities().1),
+        };
         let Some((name, mut pixels)) =
             colors.or_else(|| mask.as_ref().map(|(name, mask)| (name.clone(), mask.to_white())))
         else {
             return Ok(texture);
         };
         if let Some((_, mask)) = &mask {
-            pixels.set_opacity(mask);
+            pixels.set_opacity(mask, self.limits.texture_bytes);
         }
         self.decoded_bytes += pixels.bytes.len() as u64;
         texture.handle = Some(scene.add(Texture::new(name, pixels.width, pixels.height, pixels.bytes)?)?);
         Ok(texture)
-    }
-
-    /// Decodes the file that a statement names. Returns its name as well.
-    fn decode(
-        &self,
-        TextureStatement { names, library, line }: &TextureStatement,
-        warnings: &mut Warnings,
-    ) -> Result<(String, Pixels), String> {
-        let ObjLimits { texture_file_bytes, texture_bytes, all_textures_bytes, .. } = *self.limits;
-        let file_limit = Limit::new("texture_file_bytes", texture_file_bytes);
-        let (PossibleName { name, drops_options }, file) =
-            read_one_of(names, file_limit, self.fetch).map_err(|error| error.to_string())?;
-        let all = Limit { taken: self.decoded_bytes, ..Limit::new("all_textures_bytes", all_textures_bytes) };
-        let pixels = texture::decode(name, file, Limit::new("texture_bytes", texture_bytes), all)?;
-        if *drops_options {
-            let (library, reason) = (library.clone(), format!("the options of the texture `{name}` were left out"));
-            warnings.push(ObjWarning::LibraryLine { library, line: *line, reason });
-        }
-        if let Some([width, height]) = pixels.scaled_from {
-            warnings.push(ObjWarning::ScaledTexture { texture: name.clone(), width, height });
-        }
-        Ok((name.clone(), pixels))
     }
 }

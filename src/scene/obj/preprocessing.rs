@@ -143,7 +143,8 @@ impl Preprocessed {
                 Ok(())
             }
             "o" | "g" => {
-                self.emit(format_args!("{keyword} {rest}"));
+                // tobj repeats the name in each run of faces that changes the material.
+                self.emit(format_args!("{keyword} {}", excerpt(rest)));
                 Ok(())
             }
             "usemtl" => {

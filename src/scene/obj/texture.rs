@@ -154,17 +154,28 @@ impl Pixels {
         self
     }
 
-    /// Takes the opacity of a mask, which may have another size.
-    pub(super) fn set_opacity(&mut self, mask: &Self) {
-        let nearest = |index: u32, size: u32, of: u32| (u64::from(index) * u64::from(of) / u64::from(size)) as usize;
-        for row in 0..self.height {
-            let from_row = nearest(row, self.height, mask.height) * mask.width as usize;
-            for column in 0..self.width {
-                let from = from_row + nearest(column, self.width, mask.width);
-                let to = row as usize * self.width as usize + column as usize;
-                self.bytes[to * 4 + 3] = mask.bytes[from * 4 + 3];
-            }
+    /// Takes the opacity of a mask, which may have another size. The picture is as wide and as high as the larger of the two
+    /// afterwards, if that takes at most `max_bytes`: foliage may have one colour and a large mask.
+    pub(super) fn set_opacity(&mut self, mask: &Self, max_bytes: u64) {
+        let [wide, high] = [self.width.max(mask.width), self.height.max(mask.height)];
+        if u64::from(wide) * u64::from(high) * 4 <= max_bytes {
+            self.enlarge([wide, high]);
         }
+        let sources = nearest([mask.width, mask.height], [self.width, self.height]);
+        for (pixel, source) in self.bytes.as_chunks_mut::<4>().0.iter_mut().zip(sources) {
+            pixel[3] = mask.bytes[source * 4 + 3];
+        }
+    }
+
+    /// Repeats pixels until the picture has a size.
+    fn enlarge(&mut self, [width, height]: [u32; 2]) {
+        if [self.width, self.height] == [width, height] {
+            return;
+        }
+        let pixels = self.bytes.as_chunks::<4>().0;
+        let sources = nearest([self.width, self.height], [width, height]);
+        self.bytes = sources.flat_map(|source| pixels[source]).collect();
+        (self.width, self.height) = (width, height);
     }
 
     /// The least and the greatest opacity.
@@ -172,6 +183,13 @@ impl Pixels {
         let alphas = self.bytes.as_chunks::<4>().0.iter().map(|pixel| pixel[3]);
         alphas.fold((255, 0), |(low, high), alpha| (low.min(alpha), high.max(alpha)))
     }
+}
+
+/// For each pixel of a picture, row by row, the index of the pixel at the same place of a picture of another size.
+fn nearest([wide, high]: [u32; 2], [width, height]: [u32; 2]) -> impl Iterator<Item = usize> {
+    let scaled = |index: u32, from: u32, to: u32| (u64::from(index) * u64::from(from) / u64::from(to)) as usize;
+    let rows = (0..height).map(move |row| scaled(row, high, height) * wide as usize);
+    rows.flat_map(move |row| (0..width).map(move |column| row + scaled(column, wide, width)))
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
