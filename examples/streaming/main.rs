@@ -73,9 +73,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let flight = Flight::new(arguments.size.0);
     let mut world = World::new(&scheduler, SKY)?;
     world.scene.cameras = vec![flight.camera(0.0)];
-    // The driver compiles what the first frames draw; the land is not requested yet.
+    // The driver compiles what the first frames draw, and allocates for the first picture that is read; the land is not requested yet.
     for _frame in 0..WARM_UP_FRAMES {
-        submitter.submit(renderer.record(world.scene.as_scene_ref())?)?.submission.wait()?;
+        let mut recorded = renderer.record(world.scene.as_scene_ref())?;
+        let is_drawn = arguments.backend == BackendName::Wgpu;
+        let picture = is_drawn.then(|| recorded.read_back(0, "picture", [0, 0], arguments.size.0)).transpose()?;
+        submitter.submit(recorded)?.submission.wait()?;
+        drop(picture);
     }
 
     let progress = progress_bar(arguments);
