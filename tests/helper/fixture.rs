@@ -100,13 +100,18 @@ impl<B: DrawingBackend> Engine<B> {
     /// Draws a frame, and waits until its results are there in these views.
     pub fn draw_and_wait(&mut self, scene: &Scene, views: &[&str]) -> Result<Frame<B>, Failed> {
         let frame = self.draw(scene)?;
+        self.wait_for(&frame.submission, frame.statistics[0].frame, views)?;
+        Ok(frame)
+    }
+
+    /// Waits until the results of a frame are there in these views.
+    pub fn wait_for(&self, submission: &B::Submission, number: u64, views: &[&str]) -> Result<(), Failed> {
         // Waits until the frame is drawn.
-        B::read(&frame.submission, 0, self.helper.source_target())?;
-        let number = frame.statistics[0].frame;
+        B::read(submission, 0, self.helper.source_target())?;
         for view in views {
             wait_until("a result", || self.helper.latest(view).is_some_and(|(latest, _)| latest >= number))?;
         }
-        Ok(frame)
+        Ok(())
     }
 
     /// # Errors

@@ -122,7 +122,10 @@ fn replaced_camera<B: DrawingBackend>() -> Result<(), Failed> {
     let mut recorded = engine.renderer.record(scene.as_scene_ref())?;
     recorded.replace_camera(0, &newer)?;
     engine.helper.read_back(&mut recorded);
-    engine.submitter.submit(recorded)?;
+    let number = recorded.statistics().helpers[0].frame;
+    let submitted = engine.submitter.submit(recorded)?;
+    // A step that is late leaves out all frames but the newest.
+    engine.wait_for(&submitted.submission, number, &["map"])?;
     engine.draw_and_wait(&scene, &["map"])?;
     let noted: Vec<_> = step.0.lock().unwrap().iter().map(|camera| camera.orientation).collect();
     if noted != [newer.orientation, scene.cameras[0].orientation] {
