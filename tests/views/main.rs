@@ -78,17 +78,14 @@ fn contact_sheet() -> Result<(), Failed> {
     if std::env::var_os("DRAWLOOM_RENEW_REFERENCES").is_some() {
         drawn.save(stored_sheet())?;
     }
-    expect_stored_sheet(&drawn, Distance::is_within_bound, "drawloom-sheet.png")
+    expect_stored_sheet(&drawn, "drawloom-sheet.png")
 }
 
 fn contact_sheet_in_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = SoftwareBackend::new(Arc::clone(&scheduler));
     let built = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
-    // The screen and the ball show pictures that are larger than they are, one pixel of them in each of theirs. Where that pixel lies next to
-    // an edge, rounding decides on which side, and all of it differs: 0.076 in the worst tile. A tile whose content is missing differs by more.
-    let is_alike = |distance: Distance| distance.root_mean_square <= 0.01 && distance.worst_tile <= 0.1;
-    expect_stored_sheet(&drawn_sheet(built, SoftwareSubmission::read)?, is_alike, "drawloom-sheet-in-software.png")
+    expect_stored_sheet(&drawn_sheet(built, SoftwareSubmission::read)?, "drawloom-sheet-in-software.png")
 }
 
 /// Draws the contact sheet; `read` reads a target of a view, by index.
@@ -108,9 +105,13 @@ fn stored_sheet() -> PathBuf {
 }
 
 /// Compares a sheet with the one that is shown, and stores it as the temporary file `name` if they differ.
-fn expect_stored_sheet(drawn: &RgbImage, is_alike: fn(Distance) -> bool, name: &str) -> Result<(), Failed> {
+///
+/// The screen and the ball show pictures that are larger than they are, one pixel of them in each of theirs. Where that pixel lies next to an
+/// edge, rounding decides on which side, and all of it differs: 0.076 in the worst tile in software, and 0.044 on an NVIDIA H100. A tile whose
+/// content is missing differs by more.
+fn expect_stored_sheet(drawn: &RgbImage, name: &str) -> Result<(), Failed> {
     let distance = Distance::between(drawn, &image::open(stored_sheet())?.to_rgb8())?;
-    if is_alike(distance) {
+    if distance.root_mean_square <= 0.01 && distance.worst_tile <= 0.1 {
         return Ok(());
     }
     let found = std::env::temp_dir().join(name);
