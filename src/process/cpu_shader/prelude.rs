@@ -72,7 +72,7 @@ impl<R: Real> ShaderView<R> {
         if self.is_perspective() { -normalize(relative) } else { -self.forward }
     }
 
-    fn is_perspective(&self) -> bool {
+    pub(in crate::process) fn is_perspective(&self) -> bool {
         matches!(self.projection, Projection::Perspective { .. })
     }
 }

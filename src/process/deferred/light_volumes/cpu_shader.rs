@@ -42,7 +42,7 @@ impl<R: Real> LightCpuShader<R> for LightVolumesCpuShader {
         }
         if let Some(shadows) = self.shadows {
             let (maps, by_layer) = (pass.sampled[SHADOW_MAPS], pass.lights_by_layer);
-            illuminance = illuminance * shadows.light_visibility(maps, light, by_layer, position, normal);
+            illuminance = illuminance * shadows.light_visibility(pass.view, maps, light, by_layer, position, normal);
         }
         let reflected = rgb(stored(DIFFUSE)).map(|value| value / R::of(PI)) * illuminance;
         // Above 65,504 a half float would become infinite, and later NaN.

@@ -59,11 +59,23 @@ fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>) -> ShadowM
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - position);
     }
-    // The bias times an upper bound of the depth change within the filter.
-    let offset = SHADOW_BIAS * shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
+    // An upper bound of the depth change within the filter.
+    let depth_change = shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
+    let offset = SHADOW_BIAS * (depth_change + distance_to_surface(position) / max(dot(normal, towards), 1e-3));
 
     // An offset towards the light does not change where in the map the position is.
     return shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
+}
+
+// How far a position from a picture's depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256
+// of a pixel, and their depth with them, which changes a position by half of that along its ray. And the corners were rounded to the steps of
+// fixed-point positions.
+fn distance_to_surface(position: vec3<f32>) -> f32 {
+    var pixel = 2.0 * length(view.up) / view.height;
+    if view.projection == PERSPECTIVE {
+        pixel *= length(position);
+    }
+    return pixel / 256.0 + 0x1p-29;
 }
 
 // The greatest change of a surface's distance to the light over a pixel of its map along both of the map's axes, in

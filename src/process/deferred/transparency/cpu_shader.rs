@@ -43,7 +43,7 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
             if unobstructed.0.iter().any(|&value| value > R::zero()) {
                 let visibility = self.shadows.map_or(R::one(), |shadows| {
                     let maps = pass.sampled[SHADOW_MAPS];
-                    shadows.light_visibility(maps, light, pass.lights_by_layer, position, normal)
+                    shadows.light_visibility(pass.view, maps, light, pass.lights_by_layer, position, normal)
                 });
                 illuminance = illuminance + unobstructed * visibility;
             }

@@ -1,7 +1,7 @@
 //! `shadow.wgsl` in Rust: how CPU shaders read shadow maps.
 
 use crate::process::cpu_shader::built_in::{clamp, fract, normalize};
-use crate::process::{SampledTexture, ShaderLight};
+use crate::process::{SampledTexture, ShaderLight, ShaderView};
 use crate::raster::{Real, Vector, Vector2, Vector3};
 use crate::scene::LightKind;
 use crate::view::ShadowMaps;
@@ -23,6 +23,7 @@ impl ShadowFilter {
     /// The fraction of a light that reaches a position, from 0 to 1. `by_layer` are the lights by layer.
     pub(in crate::process::deferred) fn light_visibility<R: Real>(
         self,
+        view: &ShaderView<R>,
         maps: &dyn SampledTexture<R>,
         light: &ShaderLight<R>,
         by_layer: &[ShaderLight<R>],
@@ -31,17 +32,19 @@ impl ShadowFilter {
     ) -> R {
         let Some(layer) = light.shadow_layer else { return R::one() };
         let side = maps.size()[0];
+        let off_surface = distance_to_surface(view, position);
+        let biased_point = |map| self.biased_point(side, map, position, normal, off_surface);
         let (mut map, mut map_layer) = (light, layer);
         if light.kind == LightKind::Point {
             map_layer = layer + cube_face(position - light.position);
             map = &by_layer[map_layer];
-            return self.filtered_visibility(maps, map_layer, &self.biased_point(side, map, position, normal));
+            return self.filtered_visibility(maps, map_layer, &biased_point(map));
         }
         if light.kind == LightKind::Directional {
             // The finest cascade in which the filter reads no pixel outside of the map.
             let extent = R::one() - R::of(f64::from(2 * self.filter + 1)) / R::of(side as f64);
             for cascade in 1..self.cascades as usize {
-                let found = self.biased_point(side, map, position, normal);
+                let found = biased_point(map);
                 let is_inside = found.clip.0.iter().all(|value| value.abs() < extent);
                 if is_inside && found.depth > R::zero() && found.depth < R::one() {
                     return self.filtered_visibility(maps, map_layer, &found);
@@ -50,7 +53,7 @@ impl ShadowFilter {
                 map = &by_layer[map_layer];
             }
         }
-        let found = self.biased_point(side, map, position, normal);
+        let found = biased_point(map);
         if found.clip.0.iter().any(|value| value.abs() >= R::one()) || found.depth <= R::zero() {
             return R::one();
         }
@@ -65,6 +68,7 @@ impl ShadowFilter {
         light: &ShaderLight<R>,
         position: Vector3<R>,
         normal: Vector3<R>,
+        off_surface: R,
     ) -> ShadowMapPoint<R> {
         let towards = match light.kind {
             LightKind::Directional => -light.direction,
@@ -72,9 +76,10 @@ impl ShadowFilter {
         };
         // Slope times this, in pixels' widths, is an upper bound of the depth change within the filter.
         let reach = R::of(f64::from(self.filter + 1));
-        let offset = R::of(f64::from(self.bias))
-            * shadow_map_point(side, light, position).pixel
-            * (R::of(0.1) + reach * shadow_slope(light, normal, towards));
+        let pixel = shadow_map_point(side, light, position).pixel;
+        let depth_change = pixel * (R::of(0.1) + reach * shadow_slope(light, normal, towards));
+        let bias = R::of(f64::from(self.bias));
+        let offset = bias * (depth_change + off_surface / normal.dot(towards).max(R::of(1e-3)));
 
         // An offset towards the light does not change where in the map the position is.
         shadow_map_point(side, light, position + towards * offset.min((light.position - position).length()))
@@ -113,6 +118,15 @@ impl ShadowFilter {
         // Without an occluder the result is exactly 1, as without a map, although the sum of the weights is rounded.
         if is_shadowed { lit / R::of((last * last) as f64) } else { R::one() }
     }
+}
+
+/// How far a position from a picture's depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256
+/// of a pixel, and their depth with them, which changes a position by half of that along its ray. And the corners were rounded to the steps of
+/// fixed-point positions.
+fn distance_to_surface<R: Real>(view: &ShaderView<R>, position: Vector3<R>) -> R {
+    let pixel = R::of(2.0) * view.up.length() / R::of(view.size[1] as f64);
+    let distance = if view.is_perspective() { position.length() } else { R::one() };
+    pixel * distance / R::of(256.0) + R::of(0.5_f64.powi(29))
 }
 
 /// The face of a cube around the origin that a position is seen through: 0 for +X, 1 for −X, and so on.
@@ -237,7 +251,11 @@ mod tests {
         let of_maps = maps_of(light);
         let views = [&of_maps[0]; 2].into_iter().chain(&of_maps);
         let by_layer: Vec<_> = views.map(|map| light_values(light, Some(map))).collect();
-        filter.light_visibility(maps, &by_layer[2], &by_layer, position, normal)
+        filter.light_visibility(&main_view(), maps, &by_layer[2], &by_layer, position, normal)
+    }
+
+    fn main_view<R: Real>() -> ShaderView<R> {
+        view_values(&RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z)))
     }
 
     fn shadow_filter(bias: f32, filter: u32) -> ShadowFilter {
@@ -331,7 +349,27 @@ mod tests {
                 // A position that the offset moves to the light itself, or out of the map, is lit.
                 prop_assert!(moved == 0.0 || (moved - 1.0).abs() < 1e-5);
                 let without = light_values(&light, None);
-                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&plain([1.0; 4]), &without, &[], position, Vector3::of(normal)), 1.0);
+                prop_assert_eq!(shadow_filter(1.0, filter).light_visibility(&main_view(), &plain([1.0; 4]), &without, &[], position, Vector3::of(normal)), 1.0);
+            }
+        }
+
+        /// A device that moves the corners of a surface by half of 1/256 of a pixel each way gives its positions the depth of others, so that they
+        /// lie beyond the surface as the map shows it.
+        #[test]
+        fn a_surface_whose_corners_were_moved_within_a_pixel_is_lit(
+            across in prop::array::uniform2(-0.8..0.8_f64),
+            distance in 0.2..0.8_f64,
+        ) {
+            for (light, map) in shadowed().into_iter().take(2) {
+                let [.., forward] = map.picture_axes().map(Vec3::as_dvec3);
+                let position = position_in_map(&map, across, distance);
+                let view = main_view::<f64>();
+                let pixel = 2.0 * view.up.length() / view.size[1] as f64 * position.length();
+                let beyond = position + forward.normalize() * (pixel / 512.0);
+                let depth = shadow_map_point(1 << 20, &light_values(&light, Some(&map)), Vector3::<f64>::of(position)).depth;
+                let texture = FunctionTexture { size: [1 << 20; 2], color: move |_, _| Vector([depth, 0.0, 0.0, 0.0]) };
+                let share = visibility(shadow_filter(1.0, 0), &texture, &light, Vector3::of(beyond), Vector3::of(-forward.normalize()));
+                prop_assert_eq!(share, 1.0, "{:?}", light);
             }
         }
 
