@@ -83,7 +83,7 @@ fn main() {
     let no_adapter = fixture::device().is_none();
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
     let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
-    let has_patience = is_set("DRAWLOOM_SLOW_CASES");
+    let has_slow_cases = is_set("DRAWLOOM_SLOW_CASES");
     let no_scenes = shared_scenes::are_optional_and_missing();
     let no_timestamps = !is_set("DRAWLOOM_REQUIRE_TIMESTAMPS") && !device_times::has_timestamps();
     let mut trials = Vec::new();
@@ -102,7 +102,7 @@ fn main() {
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
         (large_lists::CASES, Needs::Adapter),
-        (large_lists::SLOW_CASES, Needs::AdapterAndPatience),
+        (large_lists::SLOW_CASES, Needs::AdapterAndSlowCases),
         (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
@@ -163,7 +163,7 @@ fn main() {
             Needs::Nothing | Needs::Adapter => false,
             Needs::AdapterAndTimestamps => no_timestamps,
             Needs::AdapterAndSharedScenes => no_scenes,
-            Needs::AdapterAndPatience => !has_patience,
+            Needs::AdapterAndSlowCases => !has_slow_cases,
         };
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
@@ -181,5 +181,5 @@ enum Needs {
     AdapterAndTimestamps,
     AdapterAndSharedScenes,
     /// An adapter, and `DRAWLOOM_SLOW_CASES=1`.
-    AdapterAndPatience,
+    AdapterAndSlowCases,
 }

@@ -16,7 +16,7 @@ pub(super) type Fetch<'a> = &'a dyn Fn(&str, Limit) -> io::Result<Vec<u8>>;
 /// If it cannot be opened, is no regular file, or is larger.
 pub(super) fn open(path: &Path, limit: Limit) -> io::Result<Bounded<File>> {
     check(&fs::metadata(path)?, limit)?;
-    let file = without_waiting().open(path)?;
+    let file = non_blocking().open(path)?;
     // By now, the path may be that of something else.
     check(&file.metadata()?, limit)?;
     Ok(Bounded { inner: file, read: 0, limit })
@@ -60,7 +60,7 @@ fn check(metadata: &Metadata, limit: Limit) -> io::Result<()> {
 }
 
 /// Options with which opening a FIFO does not wait, in case that a file is replaced by one between its check and its opening.
-fn without_waiting() -> OpenOptions {
+fn non_blocking() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.read(true);
     #[cfg(any(target_os = "linux", target_os = "android"))]
@@ -182,7 +182,7 @@ mod tests {
         let opened = path.clone();
         std::thread::spawn(move || {
             // Nobody receives what comes after the deadline.
-            let _ = sender.send(without_waiting().open(opened).and_then(|file| file.metadata()));
+            let _ = sender.send(non_blocking().open(opened).and_then(|file| file.metadata()));
         });
         let metadata = receiver.recv_timeout(std::time::Duration::from_secs(60));
         fs::remove_file(&path).unwrap();

@@ -151,8 +151,8 @@ fn nothing_to_draw(
     degenerate_triangles: usize,
     warnings: Vec<ObjWarning>,
 ) -> ObjError {
-    let Preprocessed { first_malformed, first_binary_line, points, lines, surfaces, .. } = preprocessed;
-    match (first_binary_line, first_malformed) {
+    let Preprocessed { first_malformed, first_non_text_line, points, lines, surfaces, .. } = preprocessed;
+    match (first_non_text_line, first_malformed) {
         (Some(line), _) => ObjError::NotText { file, line, warnings },
         (None, Some(MalformedLine { line, reason })) => ObjError::Malformed { file, line, reason, warnings },
         (None, None) => ObjError::NoTriangles { file, degenerate_triangles, points, lines, surfaces, warnings },

@@ -9,8 +9,9 @@ const MAX_EAR_CLIPPING_CORNERS: usize = 256;
 
 /// A polygon with less area than this share of that of its largest part is one whose parts cancel each other.
 const MIN_RELATIVE_AREA: f64 = 1e-9;
+
 /// A corner of a large polygon may be this share of the polygon's size off its convex hull: less than 32-bit coordinates resolve.
-const MAX_RELATIVE_DENT: f64 = 1e-7;
+const CONVEXITY_TOLERANCE: f64 = 1e-7;
 
 /// Triangulates a polygon into `corners.len() - 2` triangles of corner indices, with the winding of the polygon. Returns
 /// false if the triangles may not cover the polygon exactly: it intersects itself, or is concave and too large. Takes n log n
@@ -65,7 +66,7 @@ fn is_convex(flat: &[DVec2]) -> bool {
         return false;
     }
     let (low, high) = flat.iter().fold((flat[0], flat[0]), |(low, high), &point| (low.min(point), high.max(point)));
-    let tolerance = MAX_RELATIVE_DENT * (high - low).max_element();
+    let tolerance = CONVEXITY_TOLERANCE * (high - low).max_element();
     (0..hull.len()).all(|at| {
         let (from, to) = (hull[at], next(at));
         let (start, along) = (flat[from], (flat[to] - flat[from]).normalize_or_zero());

@@ -51,7 +51,7 @@ pub(super) struct Preprocessed {
     /// The first malformed line.
     pub first_malformed: Option<MalformedLine>,
     /// The first line that is not text.
-    pub first_binary_line: Option<usize>,
+    pub first_non_text_line: Option<usize>,
     ignored: IgnoredStatements,
     /// Whether faces belong to a smoothing group.
     is_smoothed: bool,
@@ -110,7 +110,7 @@ impl Preprocessed {
                 warn(format!("{reason}; the line was left out"));
             }
         }
-        preprocessed.first_binary_line = statements.first_binary_line();
+        preprocessed.first_non_text_line = statements.first_non_text_line();
         if let Some(line) = statements.first_long_line() {
             let reason = String::from("the line has more bytes than `ObjLimits::line_bytes`");
             preprocessed.first_malformed.get_or_insert(MalformedLine { line, reason });

@@ -110,7 +110,7 @@ impl<R: BufRead> Statements<R> {
     }
 
     /// The first line that is not text in the file's encoding.
-    pub(super) fn first_binary_line(&self) -> Option<usize> {
+    pub(super) fn first_non_text_line(&self) -> Option<usize> {
         let (lines, first) = self.not_text;
         (lines > 0).then_some(first)
     }
