@@ -7,7 +7,7 @@ mod arguments;
 use std::fs;
 use std::path::PathBuf;
 
-use arguments::Arguments;
+use arguments::{Arguments, Frames};
 use drawloom::demo::UpAxis;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::Camera;
@@ -94,4 +94,33 @@ fn without_a_name_the_picture_is_frame_png_if_there_is_one() {
     assert_eq!(picture(&["--backend", "null"]), None);
     let error = parse(&["--backend", "null", "--out", "a.png"]).err().expect("it draws none");
     assert!(error.contains("--out needs a picture"), "{error}");
+}
+
+#[test]
+fn a_range_of_frames_needs_a_path_and_numbered_files() {
+    let folder = Folder::new("range");
+    let (numbered, single) = (folder.file("a-###.png"), folder.file("a.png"));
+    let range = |arguments: &[&str]| parse(&[&["--frames", "4..9"], arguments].concat()).map(|parsed| parsed.frames);
+    let path = ["--path", "flight.txt"];
+    let [with_numbers, without] = [&numbered, &single].map(|file| ["--out", file.as_str()]);
+    assert_eq!(range(&[path, with_numbers].concat()), Ok(Frames::Range(4..9)));
+    for (arguments, problem) in [
+        (with_numbers.to_vec(), "needs the --path"),
+        (path.to_vec(), "needs an --out"),
+        ([path, without].concat(), "needs an --out"),
+        ([&path[..], &with_numbers, &["--explain"]].concat(), "are for a number of frames"),
+        ([&path[..], &["--backend", "noop"]].concat(), "needs a backend that draws"),
+    ] {
+        let error = range(&arguments).unwrap_err();
+        assert!(error.contains(problem), "{arguments:?}: {error}");
+    }
+    let error = parse(&["--path", "flight.txt"]).err().unwrap();
+    assert!(error.contains("--path needs a range of frames"), "{error}");
+    for (frames, problem) in
+        [("0", "no frame"), ("5..5", "greater"), ("5..x", "\"x\""), ("..", "\"\""), ("1..1000001", "more")]
+    {
+        let error = parse(&["--frames", frames]).err().unwrap();
+        assert!(error.contains(problem), "{frames}: {error}");
+    }
+    assert_eq!(parse(&["--frames", "1000000"]).unwrap().frames, Frames::Count(1_000_000));
 }

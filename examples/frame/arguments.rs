@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -52,15 +53,20 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub copies: u32,
 
-    /// Number of frames.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub frames: u32,
+    /// The number of frames; or the frames of a camera path, A to B - 1, each in a file of its own. Those that are there already are not drawn.
+    #[arg(long, value_name = "N|A..B", default_value = "1")]
+    pub frames: Frames,
+
+    /// The camera path: lines of a frame's number, and the camera's position and target then, `12 x y z tx ty tz`. It moves smoothly between them.
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
 
     /// The picture's size in pixels.
     #[arg(long, value_name = "WxH", default_value = "960x540")]
     pub size: PictureSize,
 
-    /// The file of the last picture, a .png, .jpg, .tga or .bmp. Default: frame.png.
+    /// The file of the last picture, a .png, .jpg, .tga or .bmp. Default: frame.png. The files of a camera path have their frame's number instead
+    /// of `#`s, as in shot-####.png.
     #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
     pub out: Option<PictureFile>,
 
@@ -110,11 +116,40 @@ impl Arguments {
         if arguments.up != UpName::Y && arguments.scene.is_none() {
             return Err(conflict("--up is for an OBJ file, and there is none"));
         }
+        if let Frames::Range(_) = arguments.frames {
+            arguments.check_sequence(draws)?;
+        } else if arguments.path.is_some() {
+            return Err(conflict("--path needs a range of frames, as in --frames 0..100"));
+        }
         if arguments.out.is_none() && draws {
             let default = PictureFile::new("frame.png");
             arguments.out = Some(default.map_err(|error| Self::command().error(ErrorKind::Io, error))?);
         }
         Ok(arguments)
+    }
+
+    /// Checks the arguments of a range of frames.
+    fn check_sequence(&self, draws: bool) -> Result<(), clap::Error> {
+        let is_numbered =
+            |file: &PictureFile| file.path().file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
+        if !draws {
+            return Err(conflict("a range of frames needs a backend that draws"));
+        }
+        if self.path.is_none() {
+            return Err(conflict("a range of frames needs the --path of the camera"));
+        }
+        if !self.out.as_ref().is_some_and(is_numbered) {
+            return Err(conflict(
+                "a range of frames needs an --out with `#`s for the frame's number, as in shot-####.png",
+            ));
+        }
+        let files = [&self.graph, &self.html, &self.timeline, &self.report];
+        if self.camera.is_some() || self.explain || files.into_iter().any(Option::is_some) {
+            return Err(conflict(
+                "--camera, --graph, --explain, --html, --timeline and --report are for a number of frames",
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -206,14 +241,68 @@ impl UpName {
     }
 }
 
+/// `N` or `A..B`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Frames {
+    /// So many frames, of which the last one is written.
+    Count(u32),
+    /// Frames of a camera path.
+    Range(Range<u32>),
+}
+
+impl Frames {
+    /// How many there are.
+    pub fn count(&self) -> u32 {
+        match self {
+            Self::Count(count) => *count,
+            Self::Range(range) => range.end - range.start,
+        }
+    }
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        const MAX: u32 = 1_000_000;
+        let number = |text: &str| text.parse::<u32>().map_err(|error| format!("{text:?}: {error}"));
+        let (frames, last) = match text.split_once("..") {
+            None => number(text).map(|count| (Self::Count(count), count))?,
+            Some((start, end)) => {
+                number(start).and_then(|start| number(end).map(|end| (Self::Range(start..end), end)))?
+            }
+        };
+        match frames {
+            _ if last > MAX => Err(format!("more than {MAX}")),
+            Self::Count(0) => Err("there is no frame".to_owned()),
+            Self::Range(range) if range.is_empty() => Err("the end must be greater than the start".to_owned()),
+            frames => Ok(frames),
+        }
+    }
+}
+
 /// `x,y,z,tx,ty,tz`.
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CameraPosition {
     position: DVec3,
     target: DVec3,
 }
 
 impl CameraPosition {
+    /// A camera that looks from a position at a target, both in metres.
+    ///
+    /// # Errors
+    /// If they are equal, or not finite.
+    pub fn new(position: DVec3, target: DVec3) -> Result<Self, String> {
+        if !position.is_finite() || !target.is_finite() {
+            return Err("the numbers must be finite".to_owned());
+        }
+        if position == target {
+            return Err("the camera's position and target must differ".to_owned());
+        }
+        Ok(Self { position, target })
+    }
+
     /// Moves a camera to this position. Its near plane does not cut off what it looks at, however large the scene is.
     pub fn apply(&self, camera: &mut Camera, up: UpAxis) {
         let placed = up.looking_at(camera.name.clone(), self.position, self.target);
@@ -234,14 +323,7 @@ impl FromStr for CameraPosition {
         let &[x, y, z, target_x, target_y, target_z] = numbers.as_slice() else {
             return Err(format!("expected six numbers, found {}", numbers.len()));
         };
-        let (position, target) = (DVec3::new(x, y, z), DVec3::new(target_x, target_y, target_z));
-        if !position.is_finite() || !target.is_finite() {
-            return Err("the numbers must be finite".to_owned());
-        }
-        if position == target {
-            return Err("the camera's position and target must differ".to_owned());
-        }
-        Ok(Self { position, target })
+        Self::new(DVec3::new(x, y, z), DVec3::new(target_x, target_y, target_z))
     }
 }
 

@@ -4,11 +4,18 @@
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record cached --frames 100
 //!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
+//!     cargo run --release --example frame -- scene.obj --frames 40..80 --path flight.txt --out shot-####.png
+//!
+//! Its exit status is 0 if all is drawn and written, 1 if drawing or writing failed, which may go well another time, and 2 if the arguments or the
+//! files that they name are wrong.
 
 mod arguments;
+mod camera_path;
 mod content;
 mod device;
+mod pipeline;
 mod report;
+mod sequence;
 mod timeline;
 
 use std::error::Error;
@@ -16,49 +23,72 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Backend, NullBackend, Picture, SoftwareBackend, WgpuBackend};
+use drawloom::backend::{Backend, NullBackend, Picture, WgpuBackend};
 use drawloom::demo;
-use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::{Mesh, Scene, obj};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
-use drawloom::{FrameStatistics, Renderer, Submitted, wgpu};
+use drawloom::{FrameStatistics, Submitted, wgpu};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use arguments::{Arguments, BackendName};
+use arguments::{Arguments, BackendName, Frames};
 use content::{Content, print_warnings};
 use device::{Device, NoDevice, WgpuDevice};
 use report::Report;
+use sequence::Sequence;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit())) {
+    let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let failed = |error: Box<dyn Error>| eprintln!("error: {}", with_causes(error.as_ref()));
+    let Ok(input) = Input::load(&arguments).map_err(failed) else {
+        return ExitCode::from(2);
+    };
+    match run(&arguments, input).map_err(failed) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {}", with_causes(error.as_ref()));
-            ExitCode::FAILURE
-        }
+        Err(()) => ExitCode::FAILURE,
     }
 }
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let (scene, content) = load_scene(arguments)?;
+/// What the files that the command line names hold.
+struct Input {
+    scene: Scene,
+    content: Content,
+    /// Where a range of frames is to be drawn.
+    sequence: Option<Sequence>,
+}
+
+impl Input {
+    fn load(arguments: &Arguments) -> Result<Self, Box<dyn Error>> {
+        let sequence = match &arguments.frames {
+            Frames::Range(range) => Some(Sequence::new(arguments, range.clone())?),
+            Frames::Count(_) => None,
+        };
+        let (scene, content) = load_scene(arguments)?;
+        Ok(Self { scene, content, sequence })
+    }
+}
+
+fn run(arguments: &Arguments, Input { scene, content, sequence }: Input) -> Result<(), Box<dyn Error>> {
+    if let Some(sequence) = sequence {
+        return sequence.draw(arguments, scene);
+    }
     let (report, log) = match arguments.backend {
         Some(BackendName::Null) => {
             let drawn = draw(arguments, BackendName::Null, &scene, |_| NullBackend, NoDevice)?;
             (drawn.report, drawn.log)
         }
         Some(BackendName::Noop) => {
-            let backend = wgpu_backend(arguments, adapter::noop_device()?)?;
+            let backend = pipeline::wgpu_backend(arguments, adapter::noop_device()?)?;
             let drawn = draw(arguments, BackendName::Noop, &scene, |_| backend, WgpuDevice::timed(false))?;
             (drawn.report, drawn.log)
         }
-        Some(BackendName::Wgpu) => draw_on_adapter(arguments, &scene, adapter_backend(arguments)?)?,
+        Some(BackendName::Wgpu) => draw_on_adapter(arguments, &scene, pipeline::adapter_backend(arguments)?)?,
         Some(software @ (BackendName::Software | BackendName::Reference)) => {
             draw_in_software(arguments, software, &scene, None)?
         }
-        None => match adapter_backend(arguments) {
+        None => match pipeline::adapter_backend(arguments) {
             Ok(backend) => draw_on_adapter(arguments, &scene, backend)?,
             // `--record` implies wgpu.
             Err(error) if arguments.record.is_some() => return Err(error),
@@ -72,10 +102,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         Some(file) => report.write(file),
         None => Ok(()),
     }
-}
-
-fn adapter_backend(arguments: &Arguments) -> Result<WgpuBackend, Box<dyn Error>> {
-    wgpu_backend(arguments, adapter::device()?)
 }
 
 fn draw_on_adapter(
@@ -98,24 +124,10 @@ fn draw_in_software(
     scene: &Scene,
     reason: Option<&dyn Error>,
 ) -> Result<(Report, Log), Box<dyn Error>> {
-    let make = |scheduler: &Arc<Scheduler>| match name {
-        BackendName::Reference => SoftwareBackend::reference(),
-        _ => SoftwareBackend::new(Arc::clone(scheduler)),
-    };
+    let make = |scheduler: &Arc<Scheduler>| pipeline::software_backend(Some(name), scheduler);
     let drawn = draw(arguments, name, scene, make, NoDevice)?;
     save(arguments, &drawn.last.submission.read(0, "picture")?)?;
     Ok((drawn.report.because(reason.map(with_causes)), drawn.log))
-}
-
-fn wgpu_backend(
-    arguments: &Arguments,
-    (device, queue): (wgpu::Device, wgpu::Queue),
-) -> Result<WgpuBackend, Box<dyn Error>> {
-    let backend = WgpuBackend::new(device, queue)?;
-    Ok(match arguments.record {
-        None => backend,
-        Some(record) => backend.recording_strategy(record.strategy())?,
-    })
 }
 
 fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>> {
@@ -168,20 +180,10 @@ fn draw<B: Backend>(
     make: impl FnOnce(&Arc<Scheduler>) -> B,
     mut device: impl Device<B>,
 ) -> Result<Drawn<B>, Box<dyn Error>> {
-    let builder = Scheduler::builder().timeline_capacity(timeline::CAPACITY);
-    let scheduler = Arc::new(match arguments.workers {
-        Some(workers) => builder.workers(workers.get()).build()?,
-        None => builder.build()?,
-    });
-    let workers = scheduler.workers();
-    let deferred =
-        Deferred::new().depth_pre_pass(arguments.depth_pre_pass).post(ToneMapping::default()).post(Fxaa::default());
-    let backend = make(&scheduler);
-    let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?;
-
+    let (mut renderer, submitter) = pipeline::renderer(arguments, make)?;
+    let workers = renderer.scheduler().workers();
     let timeline = Arc::clone(renderer.scheduler().timeline());
-    let frames = arguments.frames;
+    let frames = arguments.frames.count();
     let progress = ProgressBar::new(u64::from(frames));
     progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left")?);
     let mut measured: Vec<(Duration, FrameStatistics)> = Vec::new();

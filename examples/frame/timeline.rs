@@ -19,7 +19,7 @@ pub const CAPACITY: usize = 1 << 18;
 /// The first frame to record, if any output of the timeline is requested.
 pub fn first_recorded_frame(arguments: &Arguments) -> Option<u32> {
     let is_requested = arguments.explain || arguments.timeline.is_some() || arguments.html.is_some();
-    is_requested.then_some(arguments.frames.saturating_sub(RECORDED_FRAMES))
+    is_requested.then_some(arguments.frames.count().saturating_sub(RECORDED_FRAMES))
 }
 
 /// Writes and prints the requested outputs.

@@ -1,0 +1,164 @@
+//! Ranges of frames of the example `frame`: each is what it is in the whole sequence, and none is drawn twice.
+
+#[path = "../../examples/frame/arguments.rs"]
+#[expect(dead_code, reason = "only sequences are drawn here")]
+mod arguments;
+#[path = "../../examples/frame/camera_path.rs"]
+mod camera_path;
+#[path = "../../examples/frame/pipeline.rs"]
+mod pipeline;
+#[path = "../../examples/frame/sequence.rs"]
+mod sequence;
+/// What the pipeline needs of the example's timelines.
+mod timeline {
+    pub const CAPACITY: usize = 1 << 10;
+}
+
+use std::error::Error;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use arguments::{Arguments, Frames};
+use camera_path::CameraPath;
+use drawloom::demo::{self, UpAxis};
+use drawloom::glam::DVec3;
+use drawloom::scene::{Camera, Material, RenderObject, Scene};
+use drawloom_testing::scenes::cube;
+use proptest::prelude::*;
+use sequence::{Sequence, file_of};
+
+use tempfile::TempDir;
+
+const PATH: &str = "# A flight around the cube.\n0 4 2 0 0 0 0\n5 0 2 4 0 0 0 # behind\n\n9 -4 2 0 0 0.5 0\n";
+
+/// A cube of one colour, and a camera that a path moves.
+fn scene() -> Result<Scene, Box<dyn Error>> {
+    let mut scene = Scene::new();
+    let (mesh, material) = (scene.add(cube())?, scene.add(Material::default())?);
+    scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
+    demo::add_camera_and_lights(&mut scene);
+    scene.cameras[0].size = [48, 27];
+    Ok(scene)
+}
+
+/// Draws a range of frames into a folder, as a process would.
+fn draw(folder: &Path, range: &str) -> Result<(), Box<dyn Error>> {
+    let (path, out) = (folder.join("path.txt"), folder.join("shot-###.png"));
+    fs::write(&path, PATH)?;
+    let files = ["--path", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = ["frame", "--backend", "software", "--frames", range].into_iter().chain(files);
+    let arguments = Arguments::checked(arguments)?;
+    let Frames::Range(frames) = arguments.frames.clone() else { return Err("no range".into()) };
+    Sequence::new(&arguments, frames)?.draw(&arguments, scene()?)
+}
+
+/// The pictures in a folder, by name.
+fn pictures(folder: &Path) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let files = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    let mut pictures = Vec::new();
+    for path in files.into_iter().map(|file| file.path()).filter(|path| path.extension() == Some("png".as_ref())) {
+        pictures.push((path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read(&path)?));
+    }
+    pictures.sort();
+    Ok(pictures)
+}
+
+#[test]
+fn frames_that_are_drawn_apart_are_those_of_the_whole_sequence() -> Result<(), Box<dyn Error>> {
+    let [whole, parts] = [TempDir::new()?, TempDir::new()?];
+    draw(whole.path(), "0..10")?;
+    for range in ["7..10", "0..1", "1..3", "3..7"] {
+        draw(parts.path(), range)?;
+    }
+    let expected = pictures(whole.path())?;
+    let names: Vec<_> = expected.iter().map(|(name, _)| name.as_str()).collect();
+    let numbers: Vec<_> = (0..10).map(|frame| format!("shot-00{frame}.png")).collect();
+    assert_eq!(names, numbers);
+    assert!(expected.windows(2).all(|pair| pair[0].1 != pair[1].1), "the camera does not move");
+    assert!(pictures(parts.path())? == expected);
+    Ok(())
+}
+
+#[test]
+fn a_sequence_goes_on_where_it_was_interrupted() -> Result<(), Box<dyn Error>> {
+    let folder = TempDir::new()?;
+    draw(folder.path(), "0..4")?;
+    let before = pictures(folder.path())?;
+    // One is missing, and one is not what would be drawn.
+    fs::remove_file(folder.path().join("shot-001.png"))?;
+    fs::write(folder.path().join("shot-002.png"), "kept")?;
+    draw(folder.path(), "0..4")?;
+    let after = pictures(folder.path())?;
+    assert_eq!(after[2].1, b"kept");
+    assert!([0, 1, 3].into_iter().all(|frame| after[frame] == before[frame]));
+    Ok(())
+}
+
+#[test]
+fn wrong_paths_are_named_with_the_line_or_the_frame() {
+    for (text, problem) in [
+        ("", "no keyframe"),
+        ("0 1 2 3 4 5", "line 1: expected a frame and six numbers, found 5 numbers"),
+        ("# x\n\n0 1 2 3 4 5 x", "line 3: \"x\": "),
+        ("-1 1 2 3 4 5 6", "line 1: frame \"-1\""),
+        ("0 1 2 3 4 5 inf", "line 1: the numbers must be finite"),
+        ("0 1 2 3 1 2 3", "line 1: the camera's position and target must differ"),
+        ("3 1 2 3 4 5 6\n3 1 2 3 4 5 7", "line 2: frame 3 does not come after"),
+    ] {
+        let error = CameraPath::parse(text).unwrap_err();
+        assert!(error.contains(problem), "{text:?}: {error}");
+    }
+    // Position and target pass through each other.
+    let crossing = CameraPath::parse("0 0 0 0 4 0 0\n4 4 0 0 0 0 0").unwrap();
+    assert_eq!(crossing.at(2).unwrap_err(), "frame 2: the camera's position and target must differ");
+}
+
+#[test]
+fn the_number_of_a_frame_takes_the_place_of_its_signs() {
+    for (pattern, frame, name) in [
+        ("out/shot-####.png", 7, "out/shot-0007.png"),
+        ("a##b.png", 12345, "a12345b.png"),
+        ("#1-##.png", 3, "#1-03.png"),
+        ("é#.png", 9, "é9.png"),
+        ("#", 1, "1"),
+        ("still.png", 1, "still.png"),
+    ] {
+        assert_eq!(file_of(Path::new(pattern), frame), PathBuf::from(name), "{pattern}");
+    }
+}
+
+proptest! {
+    /// The curve goes through its keyframes, rests outside of them, and is a straight line where they are.
+    #[test]
+    fn a_camera_passes_its_keyframes(
+        gaps in prop::collection::vec(1..50_u32, 1..6),
+        points in prop::collection::vec(prop::array::uniform3(-100.0..100.0_f64), 6),
+        share in 0.0..1.0_f64,
+    ) {
+        let frames: Vec<u32> = gaps.iter().scan(3, |frame, gap| { *frame += gap; Some(*frame) }).collect();
+        let line = |frame: u32, [x, y, z]: [f64; 3]| format!("{frame} {x} {y} {z} {x} {y} {}\n", z + 1.0);
+        let text: String = frames.iter().zip(&points).map(|(&frame, &point)| line(frame, point)).collect();
+        let path = CameraPath::parse(&text).unwrap();
+        let camera = |[x, y, z]: [f64; 3]| arguments::CameraPosition::new(DVec3::new(x, y, z), DVec3::new(x, y, z + 1.0)).unwrap();
+        for (&frame, &point) in frames.iter().zip(&points) {
+            prop_assert_eq!(path.at(frame).unwrap(), camera(point));
+        }
+        prop_assert_eq!(path.at(0).unwrap(), camera(points[0]));
+        prop_assert_eq!(path.at(9999).unwrap(), camera(points[frames.len() - 1]));
+
+        let along = |frame: u32| [f64::from(frame), 2.0 * f64::from(frame), 0.0];
+        let text: String = frames.iter().map(|&frame| line(frame, along(frame))).collect();
+        let (first, last) = (frames[0], *frames.last().unwrap());
+        let between = first + (share * f64::from(last - first)) as u32;
+        let text_between = line(between, along(between));
+        let expected = CameraPath::parse(&text_between).unwrap().at(between).unwrap();
+        let found = CameraPath::parse(&text).unwrap().at(between).unwrap();
+        let position = |placed: &arguments::CameraPosition| {
+            let mut camera = Camera::looking_at("", DVec3::X, DVec3::ZERO);
+            placed.apply(&mut camera, UpAxis::Y);
+            camera.position
+        };
+        prop_assert!(position(&found).distance(position(&expected)) < 1e-9, "{found:?} {expected:?}");
+    }
+}
