@@ -317,14 +317,20 @@ impl FromStr for CameraPosition {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers =
-            text.split(',').map(|part| part.trim().parse::<f64>().map_err(|error| format!("{part:?}: {error}")));
-        let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+        let numbers = parse_numbers(text.split(','))?;
         let &[x, y, z, target_x, target_y, target_z] = numbers.as_slice() else {
             return Err(format!("expected six numbers, found {}", numbers.len()));
         };
         Self::new(DVec3::new(x, y, z), DVec3::new(target_x, target_y, target_z))
     }
+}
+
+/// Numbers in text, with space around them.
+///
+/// # Errors
+/// Names the part that is no number.
+pub fn parse_numbers<'t>(parts: impl Iterator<Item = &'t str>) -> Result<Vec<f64>, String> {
+    parts.map(|part| part.trim().parse().map_err(|error| format!("{part:?}: {error}"))).collect()
 }
 
 /// `adaptive`, `per-camera`, `per-draw` or `chunk:N`.

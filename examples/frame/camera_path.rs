@@ -2,7 +2,7 @@
 
 use drawloom::glam::DVec3;
 
-use crate::arguments::CameraPosition;
+use crate::arguments::{CameraPosition, parse_numbers};
 
 /// Where a camera is, and what it looks at, from frame to frame.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ impl CameraPath {
     /// The camera of a frame: on a cubic curve through the keyframes (Catmull–Rom), and at rest before the first and after the last.
     ///
     /// # Errors
-    /// If it is where it looks at.
+    /// If its position is its target.
     pub fn at(&self, frame: u32) -> Result<CameraPosition, String> {
         let next = self.keyframes.partition_point(|keyframe| keyframe.frame <= frame);
         let [position, target] = match (next.checked_sub(1), self.keyframes.get(next)) {
@@ -65,7 +65,7 @@ impl CameraPath {
             + self.velocity(before + 1, point) * (length * (cube - square))
     }
 
-    /// A frame's way at a keyframe: that from the keyframe before to the one behind.
+    /// The change of a point per frame at a keyframe: the difference of its neighbours, divided by the frames between them.
     fn velocity(&self, index: usize, point: usize) -> DVec3 {
         let before = self.keyframes[index.saturating_sub(1)];
         let behind = self.keyframes[(index + 1).min(self.keyframes.len() - 1)];
@@ -75,11 +75,10 @@ impl CameraPath {
 
 impl Keyframe {
     fn parse(line: &str) -> Result<Self, String> {
-        let words: Vec<_> = line.split_whitespace().collect();
-        let [frame, coordinates @ ..] = &words[..] else { unreachable!("the line has a word") };
+        let mut words = line.split_whitespace();
+        let frame = words.next().unwrap_or_default();
         let frame = frame.parse().map_err(|error| format!("frame {frame:?}: {error}"))?;
-        let numbers = coordinates.iter().map(|word| word.parse::<f64>().map_err(|error| format!("{word:?}: {error}")));
-        let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+        let numbers = parse_numbers(words)?;
         let &[x, y, z, target_x, target_y, target_z] = numbers.as_slice() else {
             return Err(format!("expected a frame and six numbers, found {} numbers", numbers.len()));
         };

@@ -10,14 +10,16 @@ use drawloom::{Renderer, Submitter, wgpu};
 use drawloom_testing::adapter;
 
 use crate::arguments::{Arguments, BackendName};
-use crate::timeline;
+
+/// The capacity of the timeline, in events of each worker.
+const TIMELINE_CAPACITY: usize = 1 << 18;
 
 /// The pipeline, on a scheduler of its own.
 pub fn renderer<B: Backend>(
     arguments: &Arguments,
     make: impl FnOnce(&Arc<Scheduler>) -> B,
 ) -> Result<(Renderer<B>, Submitter<B>), Box<dyn Error>> {
-    let builder = Scheduler::builder().timeline_capacity(timeline::CAPACITY);
+    let builder = Scheduler::builder().timeline_capacity(TIMELINE_CAPACITY);
     let scheduler = Arc::new(match arguments.workers {
         Some(workers) => builder.workers(workers.get()).build()?,
         None => builder.build()?,

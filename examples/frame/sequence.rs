@@ -14,14 +14,16 @@ use drawloom::task::Scheduler;
 use drawloom_output::PictureFile;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::arguments::{Arguments, BackendName};
+use crate::arguments::{Arguments, BackendName, CameraPosition};
 use crate::camera_path::CameraPath;
 use crate::pipeline;
 
-/// The frames that are requested, and their cameras.
+/// A frame that is not there: its camera and its file.
+type Missing<'a> = (&'a CameraPosition, PictureFile);
+
+/// The frames that are requested, by number, and their cameras.
 pub struct Sequence {
-    frames: Range<u32>,
-    path: CameraPath,
+    cameras: Vec<(u32, CameraPosition)>,
     /// The files, with a `#` for each digit of the frame's number.
     pattern: PathBuf,
     up: UpAxis,
@@ -39,14 +41,15 @@ impl Sequence {
         let wrong = |problem: String| format!("{}: {problem}", file.display());
         let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
         let path = CameraPath::parse(&text).map_err(wrong)?;
-        frames.clone().try_for_each(|frame| path.at(frame).map(drop)).map_err(wrong)?;
-        Ok(Self { frames, path, pattern: out.path().to_owned(), up: arguments.up.axis() })
+        let cameras = frames.map(|frame| path.at(frame).map(|camera| (frame, camera)));
+        let cameras = cameras.collect::<Result<_, _>>().map_err(wrong)?;
+        Ok(Self { cameras, pattern: out.path().to_owned(), up: arguments.up.axis() })
     }
 
-    /// The files of the frames that are not there.
-    fn missing(&self) -> Result<Vec<(u32, PictureFile)>, Box<dyn Error>> {
-        let files = self.frames.clone().map(|frame| (frame, file_of(&self.pattern, frame)));
-        files.filter(|(_, file)| !file.exists()).map(|(frame, file)| Ok((frame, PictureFile::new(file)?))).collect()
+    /// The cameras and files of the frames that are not there.
+    fn missing(&self) -> Result<Vec<Missing<'_>>, Box<dyn Error>> {
+        let files = self.cameras.iter().map(|(frame, camera)| (camera, file_of(&self.pattern, *frame)));
+        files.filter(|(_, file)| !file.exists()).map(|(camera, file)| Ok((camera, PictureFile::new(file)?))).collect()
     }
 
     /// Draws the frames that are not there, and writes each as soon as it is drawn.
@@ -55,7 +58,7 @@ impl Sequence {
     /// If a frame cannot be drawn or written. Those before it are there.
     pub fn draw(&self, arguments: &Arguments, scene: Scene) -> Result<(), Box<dyn Error>> {
         let missing = self.missing()?;
-        println!("{} of {} frames are there", self.frames.len() - missing.len(), self.frames.len());
+        println!("{} of {} frames are there", self.cameras.len() - missing.len(), self.cameras.len());
         if missing.is_empty() {
             return Ok(());
         }
@@ -79,7 +82,7 @@ impl Sequence {
         &self,
         arguments: &Arguments,
         mut scene: Scene,
-        missing: Vec<(u32, PictureFile)>,
+        missing: Vec<Missing<'_>>,
         make: impl FnOnce(&Arc<Scheduler>) -> B,
         read: impl Fn(&B::Submission, usize, &str) -> Result<Picture, BackendError>,
     ) -> Result<(), Box<dyn Error>> {
@@ -87,9 +90,8 @@ impl Sequence {
         let progress = ProgressBar::new(missing.len() as u64);
         progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
         let still = scene.cameras.clone();
-        for (frame, file) in missing {
+        for (placed, file) in missing {
             scene.cameras.clone_from(&still);
-            let placed = self.path.at(frame)?;
             scene.cameras.iter_mut().for_each(|camera| placed.apply(camera, self.up));
             let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
             let picture = read(&submitted.submission, 0, "picture")?;

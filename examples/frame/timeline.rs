@@ -13,9 +13,6 @@ use crate::arguments::Arguments;
 /// The number of recorded frames, from the last one backwards. The first frames create pipelines and try recording strategies.
 const RECORDED_FRAMES: u32 = 60;
 
-/// The capacity of the timeline, in events of each worker.
-pub const CAPACITY: usize = 1 << 18;
-
 /// The first frame to record, if any output of the timeline is requested.
 pub fn first_recorded_frame(arguments: &Arguments) -> Option<u32> {
     let is_requested = arguments.explain || arguments.timeline.is_some() || arguments.html.is_some();

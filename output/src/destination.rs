@@ -33,20 +33,20 @@ impl Destination {
     /// # Errors
     /// If there are too many, or if they cannot be read.
     pub(crate) fn of(path: &Path) -> io::Result<Self> {
-        let is_direct = fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir());
         let mut resolved = path.to_owned();
         for _link in 0..MAX_LINKS {
             if let Some(stream) = StandardStream::of(&resolved) {
                 return Ok(Self::Stream(stream));
             }
             // Links in `/proc` name open files, which need not have a name of their own.
-            if is_direct && !is_link(&resolved) || resolved.starts_with("/proc") {
+            if resolved.starts_with("/proc") {
                 return Ok(Self::Direct(path.to_owned()));
             }
-            if !is_link(&resolved) {
-                return Ok(Self::File(resolved));
+            match fs::symlink_metadata(&resolved) {
+                Ok(found) if found.is_symlink() => resolved = folder_of(&resolved).join(fs::read_link(&resolved)?),
+                Ok(found) if !found.is_file() && !found.is_dir() => return Ok(Self::Direct(path.to_owned())),
+                _ => return Ok(Self::File(resolved)),
             }
-            resolved = folder_of(&resolved).join(fs::read_link(&resolved)?);
         }
         Err(io::Error::other("too many symbolic links"))
     }
@@ -88,15 +88,14 @@ fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<(
 impl StandardStream {
     /// The stream that a path names, such as `/dev/stdout`, which leads to `/proc/self/fd/1` on Linux.
     fn of(path: &Path) -> Option<Self> {
+        let stream = match path.file_name().and_then(OsStr::to_str) {
+            Some("1") => Self::Output,
+            Some("2") => Self::Error,
+            _ => return None,
+        };
         let folder = fs::canonicalize(folder_of(path)).ok()?;
-        let is_of_process = ["/proc/self/fd", "/dev/fd"]
-            .into_iter()
-            .any(|name| fs::canonicalize(name).is_ok_and(|descriptors| descriptors == folder));
-        match path.file_name().and_then(OsStr::to_str) {
-            Some("1") if is_of_process => Some(Self::Output),
-            Some("2") if is_of_process => Some(Self::Error),
-            _ => None,
-        }
+        let is_folder = |name| fs::canonicalize(name).is_ok_and(|descriptors| descriptors == folder);
+        ["/proc/self/fd", "/dev/fd"].into_iter().any(is_folder).then_some(stream)
     }
 
     /// The stream as a file with the same offset: one that is opened by its name begins elsewhere, and what the process prints then
@@ -120,10 +119,6 @@ impl StandardStream {
     fn open(self) -> io::Result<File> {
         Err(io::ErrorKind::Unsupported.into())
     }
-}
-
-fn is_link(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
 
 /// The folder of a file.

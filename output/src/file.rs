@@ -86,13 +86,13 @@ fn ends_in_separator(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().last().is_some_and(|&last| std::path::is_separator(char::from(last)))
 }
 
-/// Checks that what is no regular file may be written, without waiting for whoever reads a pipe.
+/// Checks that what is no regular file may be written, without waiting for a pipe to have a reader.
 #[cfg(target_os = "linux")]
 fn check_direct(path: &Path) -> io::Result<()> {
     rustix::fs::access(path, rustix::fs::Access::WRITE_OK).map_err(io::Error::from)
 }
 
-/// Says nothing: opening a pipe waits for whoever reads it.
+/// Checks nothing: opening a pipe waits for a reader.
 #[cfg(not(target_os = "linux"))]
 fn check_direct(_path: &Path) -> io::Result<()> {
     Ok(())

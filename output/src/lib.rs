@@ -6,8 +6,8 @@
 //!
 //! - An interrupt leaves the old file or the new one. If it comes while the content is written, a file `.drawloom-….part` stays behind.
 //! - A full disk is an error, and leaves the old file.
-//! - A new file has the permissions that the process gives to new files; one that is replaced keeps its own. Both belong to whoever runs the
-//!   process.
+//! - A new file has the permissions that the process gives to new files; one that is replaced keeps its own. Both belong to the user who runs
+//!   the process.
 //! - A symbolic link stays, and the file that it leads to is replaced. A hard link to the old file keeps the old content.
 //! - What is no regular file, such as a pipe, a terminal or `/dev/full`, cannot be replaced: the content goes straight to it, and each error is
 //!   reported. So does an open file that is named through `/proc`. `/dev/stdout` and `/dev/stderr` are the streams of the process, wherever a

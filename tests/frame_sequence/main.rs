@@ -9,10 +9,6 @@ mod camera_path;
 mod pipeline;
 #[path = "../../examples/frame/sequence.rs"]
 mod sequence;
-/// What the pipeline needs of the example's timelines.
-mod timeline {
-    pub const CAPACITY: usize = 1 << 10;
-}
 
 use std::error::Error;
 use std::fs;

@@ -79,7 +79,8 @@ pub enum ObjError {
 }
 
 impl ObjError {
-    /// What was left out or replaced until loading failed, as [`Imported::warnings`](super::Imported::warnings) of a file that loads.
+    /// What was left out or replaced of a file that has nothing to draw, as [`Imported::warnings`](super::Imported::warnings). Empty for
+    /// other errors.
     pub fn warnings(&self) -> &[ObjWarning] {
         match self {
             Self::NotText { warnings, .. } | Self::Malformed { warnings, .. } | Self::NoTriangles { warnings, .. } => {

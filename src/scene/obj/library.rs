@@ -11,7 +11,7 @@ use super::error::ObjWarning;
 use super::excerpt::excerpt;
 use super::files::{MAX_NAME_BYTES, PossibleName, possible_names};
 use super::ignored::IgnoredStatements;
-use super::statements::Statements;
+use super::statements::{Statements, without_comment};
 use super::warnings::Warnings;
 
 /// A material as its library defines it.
@@ -156,7 +156,7 @@ impl Definition {
 /// Whether a statement that is not supported would change nothing, or changes only what another one says, which is not
 /// supported either: `Ns` and `Ni` are details of `Ks` and `illum`.
 fn changes_nothing(keyword: &str, values: &str) -> bool {
-    let numbers = values.split_once('#').map_or(values, |(numbers, _)| numbers).split_whitespace();
+    let numbers = without_comment(values).split_whitespace();
     let all = |is_neutral: fn(f32) -> bool| numbers.clone().all(|word| word.parse().is_ok_and(is_neutral));
     match keyword {
         "Ns" | "Ni" => true,
@@ -170,8 +170,7 @@ fn changes_nothing(keyword: &str, values: &str) -> bool {
 
 /// A colour: one number for all channels, or one for each, clamped to 0 to `max`.
 fn color(values: &str, max: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> {
-    let numbers = values.split_once('#').map_or(values, |(numbers, _)| numbers);
-    let numbers: Result<Vec<f32>, _> = numbers.split_whitespace().map(str::parse).collect();
+    let numbers: Result<Vec<f32>, _> = without_comment(values).split_whitespace().map(str::parse).collect();
     let color = match numbers.as_deref() {
         Ok([red, green, blue, ..]) => Vec3::new(*red, *green, *blue),
         Ok([gray]) => Vec3::splat(*gray),

@@ -112,7 +112,7 @@ struct TextureCache<'a> {
     limits: &'a ObjLimits,
     /// The bytes of all textures in the scene.
     decoded_bytes: u64,
-    /// By name, the files that were tried: whether they can be decoded, or why not. None is tried twice.
+    /// By name, the files that were tried: whether they can be decoded, or why not.
     files: HashMap<String, Result<(), (io::ErrorKind, String)>>,
     /// By the files of colours and mask.
     by_files: HashMap<[Option<String>; 2], CombinedTexture>,
@@ -121,7 +121,7 @@ struct TextureCache<'a> {
 }
 
 /// A texture of the scene, from the files of colours and mask.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct CombinedTexture {
     handle: Option<Handle<Texture>>,
     /// Whether it has the colours of `map_Kd`.
@@ -141,13 +141,13 @@ struct MaterialTexture {
 /// A file that can be decoded.
 struct TextureFile {
     name: String,
-    /// `None` if it was decoded before, for another texture.
+    /// `None` if it was decoded before, for another texture. It is decoded again for another pair of colours and mask.
     pixels: Option<Pixels>,
 }
 
 impl<'a> TextureCache<'a> {
     fn new(fetch: Fetch<'a>, limits: &'a ObjLimits) -> Self {
-        let (files, by_files, by_statements) = Default::default();
+        let (files, by_files, by_statements) = (HashMap::new(), HashMap::new(), HashMap::new());
         Self { fetch, limits, decoded_bytes: 0, files, by_files, by_statements }
     }
 

@@ -17,7 +17,7 @@ use glam::DVec3;
 use super::error::ObjWarning;
 use super::excerpt::excerpt;
 use super::ignored::IgnoredStatements;
-use super::statements::Statements;
+use super::statements::{Statements, without_comment};
 use super::warnings::Warnings;
 
 /// The text for tobj, and what preprocessing took out of it.
@@ -124,7 +124,7 @@ impl Preprocessed {
         let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();
         // Names may contain `#`; numbers are followed by comments.
-        let values = rest.split_once('#').map_or(rest, |(values, _)| values);
+        let values = without_comment(rest);
         match keyword {
             "v" => self.position(values, warn),
             "vt" => self.texture_coordinates(values, warn),

@@ -256,6 +256,11 @@ fn count((lines, first): &mut (usize, usize), line: usize) {
     *lines += 1;
 }
 
+/// The values of a statement, without the comment behind them. Names may contain `#`.
+pub(super) fn without_comment(values: &str) -> &str {
+    values.split_once('#').map_or(values, |(values, _)| values)
+}
+
 /// A text without control characters, which are escaped.
 pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());

@@ -12,9 +12,10 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
     if light.shadow_layer == NO_SHADOW_MAP {
         return 1.0;
     }
+    let off_surface = distance_off_surface(position);
     if light.kind == POINT {
         let face = shadow_map_of_layer(light.shadow_layer + cube_face(position - light.position));
-        return filtered_visibility(face.shadow_layer, biased_point(face, position, normal));
+        return filtered_visibility(face.shadow_layer, biased_point(face, position, normal, off_surface));
     }
     var map = light;
     if light.kind == DIRECTIONAL {
@@ -22,14 +23,14 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
         let side = f32(textureDimensions(shadow_maps).x);
         let extent = 1.0 - f32(2 * SHADOW_FILTER + 1) / side;
         for (var cascade = 1u; cascade < SHADOW_CASCADES; cascade++) {
-            let found = biased_point(map, position, normal);
+            let found = biased_point(map, position, normal, off_surface);
             if all(abs(found.clip) < vec2<f32>(extent)) && found.depth > 0.0 && found.depth < 1.0 {
                 return filtered_visibility(map.shadow_layer, found);
             }
             map = shadow_map_of_layer(light.shadow_layer + cascade);
         }
     }
-    let found = biased_point(map, position, normal);
+    let found = biased_point(map, position, normal, off_surface);
     if any(abs(found.clip) >= vec2<f32>(1.0)) || found.depth <= 0.0 {
         return 1.0;
     }
@@ -54,23 +55,23 @@ fn cube_face(position: vec3<f32>) -> u32 {
 }
 
 // The point of a light's map at which a position is looked up: that of the position, moved towards the light by the bias.
-fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>) -> ShadowMapPoint {
+fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>, off_surface: f32) -> ShadowMapPoint {
     var towards = -light.direction;
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - position);
     }
     // An upper bound of the depth change within the filter.
     let depth_change = shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
-    let offset = SHADOW_BIAS * (depth_change + distance_to_surface(position) / max(dot(normal, towards), 1e-3));
+    let offset = SHADOW_BIAS * (depth_change + off_surface / max(dot(normal, towards), 1e-3));
 
     // An offset towards the light does not change where in the map the position is.
     return shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
 }
 
-// How far a position from a picture's depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256
-// of a pixel, and their depth with them, which changes a position by half of that along its ray. And the corners were rounded to the steps of
-// fixed-point positions.
-fn distance_to_surface(position: vec3<f32>) -> f32 {
+// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256 of a
+// pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a pixel's width at its distance, for
+// which 1/256 is an upper bound. And the corners were rounded to the steps of fixed-point positions.
+fn distance_off_surface(position: vec3<f32>) -> f32 {
     var pixel = 2.0 * length(view.up) / view.height;
     if view.projection == PERSPECTIVE {
         pixel *= length(position);

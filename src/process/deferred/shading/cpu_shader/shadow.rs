@@ -32,7 +32,7 @@ impl ShadowFilter {
     ) -> R {
         let Some(layer) = light.shadow_layer else { return R::one() };
         let side = maps.size()[0];
-        let off_surface = distance_to_surface(view, position);
+        let off_surface = distance_off_surface(view, position);
         let biased_point = |map| self.biased_point(side, map, position, normal, off_surface);
         let (mut map, mut map_layer) = (light, layer);
         if light.kind == LightKind::Point {
@@ -120,10 +120,10 @@ impl ShadowFilter {
     }
 }
 
-/// How far a position from a picture's depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256
-/// of a pixel, and their depth with them, which changes a position by half of that along its ray. And the corners were rounded to the steps of
-/// fixed-point positions.
-fn distance_to_surface<R: Real>(view: &ShaderView<R>, position: Vector3<R>) -> R {
+/// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256 of a
+/// pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a pixel's width at its distance, for
+/// which 1/256 is an upper bound. And the corners were rounded to the steps of fixed-point positions.
+fn distance_off_surface<R: Real>(view: &ShaderView<R>, position: Vector3<R>) -> R {
     let pixel = R::of(2.0) * view.up.length() / R::of(view.size[1] as f64);
     let distance = if view.is_perspective() { position.length() } else { R::one() };
     pixel * distance / R::of(256.0) + R::of(0.5_f64.powi(29))
