@@ -119,7 +119,8 @@ fn every_texture_is_read_once() {
     text += "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     for index in 0..50 {
         text += &format!("usemtl {index}\nf 1 2 3\n");
-        library += &format!("newmtl {index}\nmap_Kd {} #{index}\n", ["a.png", "broken.png", "no.png"][index % 3]);
+        let (folder, name) = (["", "./", "in/../"][index / 3 % 3], ["a.png", "broken.png", "no.png"][index % 3]);
+        library += &format!("newmtl {index}\nmap_Kd {folder}{name} #{index}\n");
     }
     let mut picture = std::io::Cursor::new(Vec::new());
     red_above_blue().write_to(&mut picture, image::ImageFormat::Png).unwrap();

@@ -79,9 +79,9 @@ pub(super) struct PossibleName {
     pub drops_options: bool,
 }
 
-/// The names that the text behind a keyword may mean, the likeliest first. Names may contain spaces, quotes, `#` and `-`, but
-/// programs also write quotes around them, a comment or options behind them, and a backslash before a space. None is longer than
-/// [`MAX_NAME_BYTES`].
+/// The names that the text behind a keyword may mean, the likeliest first, as [`normalized`] paths. Names may contain spaces, quotes,
+/// `#` and `-`, but programs also write quotes around them, a comment or options behind them, and a backslash before a space. None is
+/// longer than [`MAX_NAME_BYTES`].
 pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
     let quoted = text.strip_prefix('"').and_then(|rest| rest.split_once('"'));
     let comment = text.match_indices('#').map(|(index, _)| &text[..index]);
@@ -97,13 +97,31 @@ pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
     for (name, drops_options) in readings.into_iter().flatten().filter(|(name, _)| !name.is_empty()) {
         // A backslash separates folders, or belongs to the space behind it.
         for name in [name.replace('\\', "/"), name.replace("\\ ", " ").replace('\\', "/")] {
-            let name = format!("{folder}{name}");
-            if name.len() <= MAX_NAME_BYTES && names.iter().all(|known| known.name != name) {
+            let name = normalized(&format!("{folder}{name}"));
+            if (1..=MAX_NAME_BYTES).contains(&name.len()) && names.iter().all(|known| known.name != name) {
                 names.push(PossibleName { name, drops_options });
             }
         }
     }
     names
+}
+
+/// A path without empty components, without `.`, and without each `..` and the folder before it that it leaves, so that a file has one
+/// name. Symbolic links are not followed.
+fn normalized(path: &str) -> String {
+    // Two slashes at the start are those of a share on Windows.
+    let root = ["//", "/"].into_iter().find(|&root| path.starts_with(root)).unwrap_or_default();
+    let mut components = Vec::new();
+    for component in path.split('/') {
+        match component {
+            "" | "." => {}
+            ".." if components.last().is_some_and(|&last| last != "..") => {
+                components.pop();
+            }
+            _ => components.push(component),
+        }
+    }
+    root.to_owned() + &components.join("/")
 }
 
 /// The first of several possible names under which `read` finds something, and what it finds.
@@ -152,6 +170,28 @@ mod tests {
             assert!(names.contains(&expected), "{text}: {names:?}");
             assert_eq!(names[0].name, format!("folder/{}", text.replace('\\', "/")));
         }
+    }
+
+    #[test]
+    fn a_file_has_one_name() {
+        for (text, name) in [
+            ("x.png", "x.png"),
+            ("./x.png", "x.png"),
+            (".\\.\\x.png", "x.png"),
+            ("a//x.png", "a/x.png"),
+            ("a/../x.png", "x.png"),
+            ("a/b/../../x.png", "x.png"),
+            ("../x.png", "../x.png"),
+            ("a/../../../x.png", "../../x.png"),
+            ("...x/..png", "...x/..png"),
+            ("/a/./x.png", "/a/x.png"),
+            ("\\\\server\\share\\x.png", "//server/share/x.png"),
+        ] {
+            assert_eq!(possible_names("", text)[0].name, name, "{text}");
+        }
+        assert_eq!(possible_names("in/", "../x.png")[0].name, "x.png");
+        assert_eq!(possible_names("in/", "..\\..\\x.png")[0].name, "../x.png");
+        assert_eq!(possible_names("", "a/.."), []);
     }
 
     #[test]

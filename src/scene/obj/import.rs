@@ -84,8 +84,8 @@ pub fn load_within(path: impl AsRef<Path>, limits: &ObjLimits) -> Result<Importe
 }
 
 /// As [`load`], from bytes that an engine already has. `file` names them in errors; `fetch` reads the `.mtl` files and
-/// textures, by their paths relative to the OBJ file, with `/` between folders. It is asked for several names where it is not
-/// clear which one is meant.
+/// textures, by their paths relative to the OBJ file, with `/` between folders, and `..` only in front of them. It is asked for
+/// several names where it is not clear which one is meant.
 ///
 /// ```
 /// use std::io;
