@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use drawloom::scene::obj::{Imported, ObjError, ObjLimits, ObjWarning};
-use image::RgbaImage;
+use image::{ImageFormat, Rgba, RgbaImage};
 use libtest_mimic::Trial;
 
 use crate::folder::{Folder, TRIANGLE};
@@ -32,6 +32,7 @@ pub fn trials() -> Vec<Trial> {
         ),
         trial("files::libraries_share_a_limit", libraries_share_a_limit),
         trial("files::textures_share_a_limit", textures_share_a_limit),
+        trial("files::what_is_decoded_is_bounded_whatever_comes_of_it", what_is_decoded_is_bounded),
     ]
 }
 
@@ -151,7 +152,7 @@ fn libraries_share_a_limit() {
     let warnings = folder.load_within(&ObjLimits { library_bytes: 30, ..ObjLimits::default() }).unwrap().warnings;
     let [ObjWarning::MissingLibrary { library, reason }] = &warnings[..] else { panic!("{warnings:?}") };
     assert_eq!(library, "c.mtl");
-    assert_eq!(reason, "it takes 9 bytes or more, others take 28, and `ObjLimits::library_bytes` is 30");
+    assert_eq!(reason, "it takes 9 bytes or more, 28 are taken, and `ObjLimits::library_bytes` is 30");
 }
 
 fn textures_share_a_limit() {
@@ -162,5 +163,49 @@ fn textures_share_a_limit() {
     let warnings = folder.load_within(&ObjLimits { all_textures_bytes: 647, ..ObjLimits::default() }).unwrap().warnings;
     let [ObjWarning::UnusableTexture { texture, reason, .. }] = &warnings[..] else { panic!("{warnings:?}") };
     assert_eq!(texture, "b.png");
-    assert_eq!(reason, "it takes 324 bytes or more, others take 324, and `ObjLimits::all_textures_bytes` is 647");
+    assert_eq!(reason, "it takes 324 bytes or more, 324 are taken, and `ObjLimits::all_textures_bytes` is 647");
+}
+
+/// Loads ten materials with these statements, in which `{}` is the number of the material and of a copy of `picture.png`. All that is decoded
+/// may take so many bytes. Returns the number of the first material whose texture lacks because of that.
+fn first_over_limit(statements: &str, picture: &[u8], decoded_bytes: usize) -> Option<usize> {
+    let (mut text, mut library) = (format!("mtllib a.mtl\n{TRIANGLE}"), String::new());
+    let mut folder = Folder::new().with_image("a.png", &RgbaImage::from_pixel(10, 10, Rgba([255; 4])));
+    for number in 0..10 {
+        text += &format!("usemtl {number}\nf 1 2 3\n");
+        library += &format!("newmtl {number}\n{}\n", statements.replace("{}", &number.to_string()));
+        folder = folder.with(&format!("{number}.png"), picture);
+    }
+    let limits = ObjLimits { decoded_bytes: decoded_bytes as u64, ..ObjLimits::default() };
+    let imported = load(folder.with("a.obj", text).with("a.mtl", library), limits).unwrap();
+    let unusable = imported.warnings.iter().filter_map(|warning| match warning {
+        ObjWarning::UnusableTexture { material, reason, .. } => Some((material, reason)),
+        _ => None,
+    });
+    let mut over =
+        unusable.filter(|(_, reason)| reason.contains(&format!("`ObjLimits::decoded_bytes` is {decoded_bytes}")));
+    over.next().map(|(material, _)| material.parse().unwrap())
+}
+
+fn what_is_decoded_is_bounded() {
+    let encoded = |picture: &RgbaImage| {
+        let mut file = io::Cursor::new(Vec::new());
+        picture.write_to(&mut file, ImageFormat::Png).unwrap();
+        file.into_inner()
+    };
+    let white = RgbaImage::from_pixel(10, 10, Rgba([255; 4]));
+    let (opaque, half) = (encoded(&white), encoded(&RgbaImage::from_pixel(10, 10, Rgba([255, 255, 255, 99]))));
+    // Without the end of the pixels.
+    let damaged = &opaque[..opaque.len() - 20];
+    let damaged_bytes = damaged.len() + 400;
+    assert_eq!(first_over_limit("map_Kd {}.png", damaged, 4 * damaged_bytes), Some(4));
+    assert_eq!(first_over_limit("map_Kd {}.png", damaged, 10 * damaged_bytes), None);
+    // The colours are decoded once more for each mask, even if it turns out to hide nothing.
+    for mask in [opaque.as_slice(), &half] {
+        let pair = opaque.len() + 400 + mask.len() + 400;
+        assert_eq!(first_over_limit("map_Kd a.png\nmap_d {}.png", mask, 4 * pair), Some(4));
+        assert_eq!(first_over_limit("map_Kd a.png\nmap_d {}.png", mask, 10 * pair), None);
+    }
+    // What is no picture is read, too.
+    assert_eq!(first_over_limit("map_Kd {}.png", &[7; 5000], 21_000), Some(4));
 }

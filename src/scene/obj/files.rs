@@ -206,7 +206,7 @@ mod tests {
         let error = read(&path, Limit { taken: 50, ..limit(120) }).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "it takes 100 bytes or more, others take 50, and `ObjLimits::library_bytes` is 120"
+            "it takes 100 bytes or more, 50 are taken, and `ObjLimits::library_bytes` is 120"
         );
         fs::remove_file(&path).unwrap();
         let mut endless = Bounded { inner: io::repeat(7), read: 0, limit: limit(5000) };

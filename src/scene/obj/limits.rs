@@ -2,7 +2,7 @@
 
 use std::io;
 
-/// What the files of an import may take, so that a damaged or hostile file cannot exhaust memory. A file that exceeds a
+/// What the files of an import may take, so that a damaged or hostile file cannot exhaust memory or take very long. A file that exceeds a
 /// limit is refused, and the message names the limit.
 ///
 /// ```no_run
@@ -27,8 +27,12 @@ pub struct ObjLimits {
     /// the file's own format where a channel has more than 8 bits, and the coefficients of a progressive JPEG. Scaling
     /// takes no more. Default: 256 MiB, which is enough for the largest [`Texture`](crate::scene::Texture).
     pub texture_bytes: u64,
-    /// The bytes that all textures take together when they are decoded, 4 for each pixel. Default: 4 GiB.
+    /// The bytes that all textures of the scene take together, 4 for each pixel. Default: 4 GiB.
     pub all_textures_bytes: u64,
+    /// The bytes that are read from files of textures and decoded to pixels, 4 for each, during the whole import. Those count too that
+    /// the scene does not keep: of files that turn out to be damaged, of masks, and of pictures that are decoded once more, for
+    /// another mask. This bounds how long an import takes. Default: 16 GiB, which take about a minute.
+    pub decoded_bytes: u64,
     /// The warnings of each kind that are listed. All are counted. Default: 100.
     pub warnings: usize,
 }
@@ -42,6 +46,7 @@ impl Default for ObjLimits {
             texture_file_bytes: 256 << 20,
             texture_bytes: 256 << 20,
             all_textures_bytes: 4 << 30,
+            decoded_bytes: 16 << 30,
             warnings: 100,
         }
     }
@@ -53,23 +58,23 @@ pub(super) struct Limit {
     /// Its field in [`ObjLimits`].
     pub field: &'static str,
     pub bytes: u64,
-    /// The bytes that others take, where a limit is that of several files.
+    /// The bytes that are taken already, where a limit is that of several files.
     pub taken: u64,
 }
 
 /// More bytes than a limit allows.
 #[derive(Debug, thiserror::Error)]
-#[error("it takes {at_least} bytes or more{}, and `ObjLimits::{}` is {}", self.others(), limit.field, limit.bytes)]
+#[error("it takes {at_least} bytes or more{}, and `ObjLimits::{}` is {}", self.already_taken(), limit.field, limit.bytes)]
 struct OverLimit {
     at_least: u64,
     limit: Limit,
 }
 
 impl OverLimit {
-    fn others(&self) -> String {
+    fn already_taken(&self) -> String {
         match self.limit.taken {
             0 => String::new(),
-            taken => format!(", others take {taken}"),
+            taken => format!(", {taken} are taken"),
         }
     }
 }
@@ -77,6 +82,26 @@ impl OverLimit {
 impl Limit {
     pub(super) fn new(field: &'static str, bytes: u64) -> Self {
         Self { field, bytes, taken: 0 }
+    }
+
+    /// The bytes that are left of it.
+    pub(super) fn left(self) -> u64 {
+        self.bytes.saturating_sub(self.taken)
+    }
+
+    /// The one of two limits of which less is left.
+    pub(super) fn min(self, other: Self) -> Self {
+        if self.left() <= other.left() { self } else { other }
+    }
+
+    /// Takes bytes.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(super) fn take(&mut self, bytes: u64) -> io::Result<()> {
+        self.check(bytes)?;
+        self.taken += bytes;
+        Ok(())
     }
 
     /// Checks a size in bytes, of which at least so many are known.

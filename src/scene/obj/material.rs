@@ -110,8 +110,10 @@ fn correct_opacity(definitions: &mut Definitions, warnings: &mut Warnings) {
 struct TextureCache<'a> {
     fetch: Fetch<'a>,
     limits: &'a ObjLimits,
-    /// The bytes of all textures in the scene.
-    decoded_bytes: u64,
+    /// Of the textures in the scene.
+    all_textures: Limit,
+    /// Of what is read and decoded.
+    decoded: Limit,
     /// By name, the files that were tried: whether they can be decoded, or why not.
     files: HashMap<String, Result<(), (io::ErrorKind, String)>>,
     /// By the files of colours and mask.
@@ -148,7 +150,9 @@ struct TextureFile {
 impl<'a> TextureCache<'a> {
     fn new(fetch: Fetch<'a>, limits: &'a ObjLimits) -> Self {
         let (files, by_files, by_statements) = (HashMap::new(), HashMap::new(), HashMap::new());
-        Self { fetch, limits, decoded_bytes: 0, files, by_files, by_statements }
+        let all_textures = Limit::new("all_textures_bytes", limits.all_textures_bytes);
+        let decoded = Limit::new("decoded_bytes", limits.decoded_bytes);
+        Self { fetch, limits, all_textures, decoded, files, by_files, by_statements }
     }
 
     fn material(
@@ -254,11 +258,12 @@ impl<'a> TextureCache<'a> {
         Ok(TextureFile { name: name.clone(), pixels })
     }
 
-    fn decode(&self, name: &str) -> io::Result<Pixels> {
-        let ObjLimits { texture_file_bytes, texture_bytes, all_textures_bytes, .. } = *self.limits;
-        let file = (self.fetch)(name, Limit::new("texture_file_bytes", texture_file_bytes))?;
-        let all = Limit { taken: self.decoded_bytes, ..Limit::new("all_textures_bytes", all_textures_bytes) };
-        texture::decode(name, file, Limit::new("texture_bytes", texture_bytes), all)
+    fn decode(&mut self, name: &str) -> io::Result<Pixels> {
+        let of_file = Limit::new("texture_file_bytes", self.limits.texture_file_bytes);
+        let file = (self.fetch)(name, of_file.min(self.decoded))?;
+        self.decoded.take(file.len() as u64)?;
+        let while_decoded = Limit::new("texture_bytes", self.limits.texture_bytes);
+        texture::decode(name, file, while_decoded, self.all_textures, &mut self.decoded)
             .map_err(|reason| io::Error::new(io::ErrorKind::InvalidData, reason))
     }
 
@@ -317,7 +322,7 @@ impl<'a> TextureCache<'a> {
         if let Some((_, mask)) = &mask {
             pixels.set_opacity(mask, self.limits.texture_bytes);
         }
-        self.decoded_bytes += pixels.bytes.len() as u64;
+        self.all_textures.taken += pixels.bytes.len() as u64;
         texture.handle = Some(scene.add(Texture::new(name, pixels.width, pixels.height, pixels.bytes)?)?);
         Ok(texture)
     }

@@ -18,11 +18,17 @@ pub(super) struct Pixels {
 }
 
 /// Decodes a PNG, JPEG, TGA or BMP, and scales it to [`Texture::MAX_SIZE`] if it is larger. `while_decoded` limits the bytes that
-/// this takes, and `decoded` those of the result.
+/// this takes, and `result` those of the result. Of `decoded` it takes those of the file's pixels, also if these turn out to be damaged.
 ///
 /// # Errors
 /// Says why it cannot be decoded, or which limit it exceeds.
-pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: Limit) -> Result<Pixels, String> {
+pub(super) fn decode(
+    name: &str,
+    file: Vec<u8>,
+    while_decoded: Limit,
+    result: Limit,
+    decoded: &mut Limit,
+) -> Result<Pixels, String> {
     let coefficients = progressive_components(&file) * 2;
     let mut reader = ImageReader::new(Cursor::new(file));
     // The guess from the contents comes first, but TGA has no magic number.
@@ -44,7 +50,8 @@ pub(super) fn decode(name: &str, file: Vec<u8>, while_decoded: Limit, decoded: L
         .check(rgba_bytes.saturating_add(other_bytes))
         .map_err(|error| format!("{width}x{height}: {error}"))?;
     let [wide, high] = [width, height].map(|side| side.min(Texture::MAX_SIZE));
-    decoded.check(u64::from(wide) * u64::from(high) * 4).map_err(message)?;
+    result.check(u64::from(wide) * u64::from(high) * 4).map_err(message)?;
+    decoded.take(rgba_bytes).map_err(message)?;
     let mut bytes = if has_bytes {
         decode_bytes(decoder, rgba_bytes)?
     } else {
@@ -204,7 +211,13 @@ mod tests {
     }
 
     fn decode_within(file: Vec<u8>, bytes: u64) -> Result<Pixels, String> {
-        decode("a.png", file, Limit::new("texture_bytes", bytes), Limit::new("all_textures_bytes", 1 << 20))
+        decode_named("a.png", file, bytes)
+    }
+
+    fn decode_named(name: &str, file: Vec<u8>, bytes: u64) -> Result<Pixels, String> {
+        let [texture, all] =
+            [("texture_bytes", bytes), ("all_textures_bytes", 1 << 20)].map(|(field, bytes)| Limit::new(field, bytes));
+        decode(name, file, texture, all, &mut Limit::new("decoded_bytes", 1 << 20))
     }
 
     #[test]
@@ -240,8 +253,7 @@ mod tests {
         assert!(decode_within(file.clone(), 600).is_ok() && decode_within(file, 599).is_err());
         // 18 bytes that claim 65,535 × 65,535 pixels.
         let header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 32, 0];
-        let limit = Limit::new("texture_bytes", 256 << 20);
-        let error = decode("a.tga", header.to_vec(), limit, limit).map(drop).unwrap_err();
+        let error = decode_named("a.tga", header.to_vec(), 256 << 20).map(drop).unwrap_err();
         assert!(error.contains("`ObjLimits::texture_bytes` is 268435456"), "{error}");
     }
 
@@ -254,9 +266,7 @@ mod tests {
         let header = file.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
         file[header + 1] = 0xc2;
         assert_eq!(progressive_components(&file), 3);
-        let error = decode("a.jpg", file.clone(), Limit::new("texture_bytes", 5999), Limit::new("", 9999))
-            .map(drop)
-            .unwrap_err();
+        let error = decode_named("a.jpg", file.clone(), 5999).map(drop).unwrap_err();
         assert_eq!(error, "30x20: it takes 6000 bytes or more, and `ObjLimits::texture_bytes` is 5999");
         for end in 0..file.len() {
             progressive_components(&file[..end]);
