@@ -20,6 +20,7 @@ pub fn trials() -> Vec<Trial> {
         trial("materials::a_large_texture_is_scaled_down", a_large_texture_is_scaled_down),
         trial("materials::a_texture_is_shared", a_texture_is_shared),
         trial("materials::every_texture_is_read_once", every_texture_is_read_once),
+        trial("materials::every_material_says_what_its_texture_lacks", every_material_says_what_its_texture_lacks),
         trial("materials::long_names_are_cut_or_refused", long_names_are_cut_or_refused),
         trial("materials::a_texture_is_found_behind_options_quotes_and_comments", a_texture_is_found),
         trial("materials::a_mask_becomes_the_alpha_of_a_blended_material", a_mask_becomes_the_alpha),
@@ -120,7 +121,7 @@ fn every_texture_is_read_once() {
     for index in 0..50 {
         text += &format!("usemtl {index}\nf 1 2 3\n");
         let (folder, name) = (["", "./", "in/../"][index / 3 % 3], ["a.png", "broken.png", "no.png"][index % 3]);
-        library += &format!("newmtl {index}\nmap_Kd {folder}{name} #{index}\n");
+        library += &format!("newmtl {index}\nmap_Kd {folder}{name} #{index}\nmap_d {folder}mask.png #{index}\n");
     }
     let mut picture = std::io::Cursor::new(Vec::new());
     red_above_blue().write_to(&mut picture, image::ImageFormat::Png).unwrap();
@@ -129,15 +130,44 @@ fn every_texture_is_read_once() {
         *reads.borrow_mut().entry(name.to_owned()).or_insert(0) += 1;
         match name {
             "a.mtl" => Ok(library.clone().into_bytes()),
-            "a.png" => Ok(picture.get_ref().clone()),
+            "a.png" | "mask.png" => Ok(picture.get_ref().clone()),
             "broken.png" => Ok(picture.get_ref()[..40].to_vec()),
             _ => Err(std::io::ErrorKind::NotFound.into()),
         }
     };
     let imported = obj::read("a.obj", text.as_bytes(), fetch).unwrap();
-    assert_eq!(imported.scene.assets().iter::<Texture>().count(), 1);
+    // That of colours and mask, and that of the mask alone.
+    assert_eq!(imported.scene.assets().iter::<Texture>().count(), 2);
     assert_eq!(imported.warning_counts["unusable texture"], 33);
-    assert!(reads.borrow().values().all(|&count| count == 1), "{reads:?}");
+    let expected = [("a.mtl", 1), ("a.png", 1), ("broken.png", 1), ("mask.png", 2), ("no.png", 1)];
+    // A name with its comment is the likeliest one, and there is no such file.
+    let reads = reads.borrow();
+    let named = reads.iter().filter(|(name, _)| !name.contains('#')).map(|(name, count)| (name.as_str(), *count));
+    assert_eq!(named.collect::<Vec<_>>(), expected);
+    assert!(reads.iter().all(|(name, &count)| !name.contains('#') || count == 1), "{reads:?}");
+}
+
+/// A picture that was decoded for one material may be gone when another one needs it with a mask.
+fn every_material_says_what_its_texture_lacks() {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}usemtl two\nf 1 2 3\nusemtl three\nf 1 2 3\n");
+    let mut picture = std::io::Cursor::new(Vec::new());
+    red_above_blue().write_to(&mut picture, image::ImageFormat::Png).unwrap();
+    let reads = RefCell::new(0);
+    let fetch = |name: &str| match name {
+        "a.mtl" => {
+            let masked = "map_Kd a.png\nmap_d mask.png";
+            Ok(format!("newmtl one\nmap_Kd a.png\nnewmtl two\n{masked}\nnewmtl three\n{masked} # 3\n").into_bytes())
+        }
+        "mask.png" => Ok(picture.get_ref().clone()),
+        "a.png" if reads.replace_with(|reads| *reads + 1) == 0 => Ok(picture.get_ref().clone()),
+        _ => Err(std::io::ErrorKind::NotFound.into()),
+    };
+    let imported = obj::read("a.obj", text.as_bytes(), fetch).unwrap();
+    let lacking = imported.warnings.iter().map(|warning| match warning {
+        ObjWarning::UnusableTexture { texture, material, .. } => (texture.as_str(), material.as_str()),
+        _ => panic!("{warning:?}"),
+    });
+    assert_eq!(lacking.collect::<Vec<_>>(), [("a.png", "two"), ("a.png", "three")]);
 }
 
 fn long_names_are_cut_or_refused() {

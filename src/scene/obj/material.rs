@@ -278,13 +278,14 @@ impl<'a> TextureCache<'a> {
         if let Some(known) = self.by_files.get(&names) {
             return Ok(*known);
         }
-        let mut failed = |name, error: io::Error| unusable.push((name, error.to_string()));
+        let mut is_complete = true;
         let [colors, mask] = files.map(|file| {
             let TextureFile { name, pixels } = file?;
             match pixels.map_or_else(|| self.decode(&name), Ok) {
                 Ok(pixels) => Some((name, pixels)),
                 Err(error) => {
-                    failed(name, error);
+                    is_complete = false;
+                    unusable.push((name, error.to_string()));
                     None
                 }
             }
@@ -298,7 +299,10 @@ impl<'a> TextureCache<'a> {
             None => self.combine(scene, colors, mask)?,
         };
         self.by_files.insert(used_names, texture);
-        self.by_files.insert(names, texture);
+        // Else the next material with these files would lack the reason why one of them is missing.
+        if is_complete {
+            self.by_files.insert(names, texture);
+        }
         Ok(texture)
     }
 
