@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::scene::obj::{self, Imported, ObjWarning};
+use drawloom::scene::obj::{self, Imported, ObjLimits, ObjWarning};
 use drawloom::scene::{Blend, Light, Material, Texture};
 use image::{Rgba, RgbaImage};
 use libtest_mimic::Trial;
@@ -24,6 +24,7 @@ pub fn trials() -> Vec<Trial> {
         trial("materials::long_names_are_cut_or_refused", long_names_are_cut_or_refused),
         trial("materials::a_texture_is_found_behind_options_quotes_and_comments", a_texture_is_found),
         trial("materials::a_mask_becomes_the_alpha_of_a_blended_material", a_mask_becomes_the_alpha),
+        trial("materials::colours_are_enlarged_to_their_mask_within_limits", colours_are_enlarged_within_limits),
         trial("materials::a_mask_that_hides_nothing_does_not_blend", a_mask_that_hides_nothing_does_not_blend),
         trial("materials::d_wins_over_tr", d_wins_over_tr),
         trial("materials::a_missing_library_is_reported", a_missing_library_is_reported),
@@ -253,6 +254,24 @@ fn a_mask_becomes_the_alpha() {
     let colors_missing = load_masked("newmtl one\nKd 0 1 0\nmap_Kd no.png\nmap_d mask.png\n", &gray, &gray);
     assert_eq!((named(&colors_missing, "one").diffuse, alphas(&colors_missing)), (Vec3::Y, vec![40, 255]));
     assert_eq!(colors_missing.warnings.len(), 1);
+}
+
+fn colours_are_enlarged_within_limits() {
+    let text = format!("mtllib a.mtl\nusemtl one\n{TRIANGLE}");
+    let folder = Folder::new().with("a.obj", text).with("a.mtl", "newmtl one\nmap_Kd a.png\nmap_d mask.png\n");
+    let folder = folder.with_image("a.png", &RgbaImage::from_pixel(8, 1, Rgba([0, 90, 0, 255])));
+    let folder = folder.with_image("mask.png", &RgbaImage::from_fn(1, 8, |_, y| Rgba([0, 0, 0, y as u8 * 9])));
+    let of_all = |bytes| ObjLimits { all_textures_bytes: bytes, ..ObjLimits::default() };
+    let of_each = |bytes| ObjLimits { texture_bytes: bytes, ..ObjLimits::default() };
+    for limits in [of_all(256), of_each(256)] {
+        let imported = folder.load_within(&limits).unwrap();
+        assert_eq!((alphas(&imported).len(), imported.warnings), (64, vec![]), "{limits:?}");
+    }
+    for limits in [of_all(255), of_each(255)] {
+        let imported = folder.load_within(&limits).unwrap();
+        let expected = ObjWarning::ScaledTexture { texture: String::from("mask.png"), width: 1, height: 8 };
+        assert_eq!((alphas(&imported).len(), imported.warnings), (8, vec![expected]), "{limits:?}");
+    }
 }
 
 fn a_mask_that_hides_nothing_does_not_blend() {

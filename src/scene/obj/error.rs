@@ -207,7 +207,8 @@ pub enum ObjWarning {
         /// The error of the operating system or the decoder.
         reason: String,
     },
-    /// A texture larger than [`Texture::MAX_SIZE`](crate::scene::Texture::MAX_SIZE), which was scaled down to it.
+    /// A texture larger than [`Texture::MAX_SIZE`](crate::scene::Texture::MAX_SIZE), which was scaled down to it; or a mask that was scaled
+    /// to its colours, since [`ObjLimits`](super::ObjLimits) or memory leave no room for colours of its size.
     #[error("texture `{}` of {width}x{height} pixels was scaled down", excerpt(texture))]
     ScaledTexture {
         /// Its path, relative to the OBJ file.

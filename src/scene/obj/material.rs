@@ -229,7 +229,7 @@ impl<'a> TextureCache<'a> {
             }
             None
         });
-        let texture = self.texture_of_files(scene, files, &mut unusable)?;
+        let texture = self.texture_of_files(scene, files, &mut unusable, warnings)?;
         Ok(MaterialTexture { texture, unusable })
     }
 
@@ -273,6 +273,7 @@ impl<'a> TextureCache<'a> {
         scene: &mut Scene,
         files: [Option<TextureFile>; 2],
         unusable: &mut Vec<(String, String)>,
+        warnings: &mut Warnings,
     ) -> Result<CombinedTexture, SceneError> {
         let names = files.each_ref().map(|file| file.as_ref().map(|file| file.name.clone()));
         if let Some(known) = self.by_files.get(&names) {
@@ -296,7 +297,7 @@ impl<'a> TextureCache<'a> {
         let used_names = [&colors, &mask].map(|used| used.as_ref().map(|(name, _)| name.clone()));
         let texture = match self.by_files.get(&used_names) {
             Some(known) => *known,
-            None => self.combine(scene, colors, mask)?,
+            None => self.combine(scene, colors, mask, warnings)?,
         };
         self.by_files.insert(used_names, texture);
         // Else the next material with these files would lack the reason why one of them is missing.
@@ -312,20 +313,26 @@ impl<'a> TextureCache<'a> {
         scene: &mut Scene,
         colors: Option<(String, Pixels)>,
         mask: Option<(String, Pixels)>,
+        warnings: &mut Warnings,
     ) -> Result<CombinedTexture, SceneError> {
         let mut texture = CombinedTexture {
             handle: None,
             has_colors: colors.is_some(),
             max_mask_opacity: mask.as_ref().map(|(_, pixels)| pixels.opacities().1),
         };
-        let Some((name, mut pixels)) =
-            colors.or_else(|| mask.as_ref().map(|(name, mask)| (name.clone(), mask.to_white())))
-        else {
-            return Ok(texture);
+        let (name, pixels) = match (colors, mask) {
+            (None, None) => return Ok(texture),
+            (Some(colors), None) => colors,
+            (None, Some((name, mask))) => (name, mask.into_white()),
+            (Some((name, mut pixels)), Some((mask_name, mask))) => {
+                let max_bytes = self.limits.texture_bytes.min(self.all_textures.left());
+                if !pixels.set_opacity(&mask, max_bytes) {
+                    let Pixels { width, height, .. } = mask;
+                    warnings.push(ObjWarning::ScaledTexture { texture: mask_name, width, height });
+                }
+                (name, pixels)
+            }
         };
-        if let Some((_, mask)) = &mask {
-            pixels.set_opacity(mask, self.limits.texture_bytes);
-        }
         self.all_textures.taken += pixels.bytes.len() as u64;
         texture.handle = Some(scene.add(Texture::new(name, pixels.width, pixels.height, pixels.bytes)?)?);
         Ok(texture)

@@ -146,9 +146,10 @@ fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [wide, high]: [u32
 }
 
 impl Pixels {
-    /// White pixels of this size.
-    pub(super) fn to_white(&self) -> Self {
-        Self { bytes: vec![255; self.bytes.len()], scaled_from: None, ..*self }
+    /// White pixels of the same opacity.
+    pub(super) fn into_white(mut self) -> Self {
+        self.bytes.as_chunks_mut::<4>().0.iter_mut().for_each(|[colors @ .., _]| *colors = [255; 3]);
+        self
     }
 
     /// Makes a mask of a picture of `map_d`: the alpha is its own if that is not 255 everywhere, else its luminance.
@@ -162,27 +163,34 @@ impl Pixels {
     }
 
     /// Takes the opacity of a mask, which may have another size. The picture is as wide and as high as the larger of the two
-    /// afterwards, if that takes at most `max_bytes`: foliage may have one colour and a large mask.
-    pub(super) fn set_opacity(&mut self, mask: &Self, max_bytes: u64) {
-        let [wide, high] = [self.width.max(mask.width), self.height.max(mask.height)];
-        if u64::from(wide) * u64::from(high) * 4 <= max_bytes {
-            self.enlarge([wide, high]);
-        }
+    /// afterwards, if that takes at most `max_bytes` and there is memory for it: foliage may have one colour and a large mask. Otherwise
+    /// it keeps its size, and the result is `false`.
+    pub(super) fn set_opacity(&mut self, mask: &Self, max_bytes: u64) -> bool {
+        let is_enlarged = self.enlarge([self.width.max(mask.width), self.height.max(mask.height)], max_bytes);
         let sources = nearest([mask.width, mask.height], [self.width, self.height]);
         for (pixel, source) in self.bytes.as_chunks_mut::<4>().0.iter_mut().zip(sources) {
             pixel[3] = mask.bytes[source * 4 + 3];
         }
+        is_enlarged
     }
 
-    /// Repeats pixels until the picture has a size.
-    fn enlarge(&mut self, [width, height]: [u32; 2]) {
+    /// Repeats pixels until the picture has a size, if it takes at most `max_bytes` then and there is memory for it.
+    fn enlarge(&mut self, [width, height]: [u32; 2], max_bytes: u64) -> bool {
         if [self.width, self.height] == [width, height] {
-            return;
+            return true;
+        }
+        let size = Some(u64::from(width) * u64::from(height) * 4).filter(|&size| size <= max_bytes);
+        let Some(size) = size.and_then(|size| usize::try_from(size).ok()) else { return false };
+        let mut enlarged = Vec::new();
+        if enlarged.try_reserve_exact(size).is_err() {
+            return false;
         }
         let pixels = self.bytes.as_chunks::<4>().0;
-        let sources = nearest([self.width, self.height], [width, height]);
-        self.bytes = sources.flat_map(|source| pixels[source]).collect();
-        (self.width, self.height) = (width, height);
+        for source in nearest([self.width, self.height], [width, height]) {
+            enlarged.extend_from_slice(&pixels[source]);
+        }
+        *self = Self { width, height, bytes: enlarged, scaled_from: self.scaled_from };
+        true
     }
 
     /// The least and the greatest opacity.
