@@ -184,8 +184,8 @@ fn long_names_are_cut_or_refused() {
     else {
         panic!("{:?}", imported.warnings);
     };
-    assert_eq!(reason, "a texture whose name has more than 4096 bytes was left out");
-    assert_eq!(library, "its name has more than 4096 bytes");
+    assert_eq!(reason, "a texture was left out: the name has more than 4095 bytes");
+    assert_eq!(library, "the name has more than 4095 bytes");
 }
 
 fn a_texture_is_found() {
@@ -303,6 +303,9 @@ fn a_missing_library_is_reported() {
         panic!("{:?}", imported.warnings);
     };
     assert_eq!(library, "no.mtl");
+    let unnamed = load(&format!("mtllib\n{TRIANGLE}"));
+    let [warning] = &unnamed.warnings[..] else { panic!("{:?}", unnamed.warnings) };
+    assert_eq!(warning.to_string(), "material library `` cannot be read: there is no name");
     let object = imported.scene.objects().next().unwrap();
     let material = imported.scene.object(object).unwrap().material;
     let material = imported.scene.assets().get(material).unwrap();

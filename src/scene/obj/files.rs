@@ -68,8 +68,9 @@ fn non_blocking() -> OpenOptions {
     options
 }
 
-/// The most bytes of a file's name, with its folders: as many as Linux takes. Longer names are no names, but would be kept for each material.
-pub(super) const MAX_NAME_BYTES: usize = 4096;
+/// The most bytes of a file's name, with its folders: no file has a longer one on Linux, whose limit of 4,096 includes a zero behind it. Names are
+/// kept for each material, so longer ones would take memory for nothing.
+const MAX_NAME_BYTES: usize = 4095;
 
 /// A name that the text behind a keyword may mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,7 +83,10 @@ pub(super) struct PossibleName {
 /// The names that the text behind a keyword may mean, the likeliest first, as [`normalized`] paths. Names may contain spaces, quotes,
 /// `#` and `-`, but programs also write quotes around them, a comment or options behind them, and a backslash before a space. None is
 /// longer than [`MAX_NAME_BYTES`].
-pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
+///
+/// # Errors
+/// Says why there is none.
+pub(super) fn possible_names(folder: &str, text: &str) -> io::Result<Vec<PossibleName>> {
     let quoted = text.strip_prefix('"').and_then(|rest| rest.split_once('"'));
     let comment = text.match_indices('#').map(|(index, _)| &text[..index]);
     let comment = comment.into_iter().find(|before| before.ends_with(char::is_whitespace));
@@ -94,16 +98,19 @@ pub(super) fn possible_names(folder: &str, text: &str) -> Vec<PossibleName> {
         text.rsplit_once(char::is_whitespace).filter(|_| text.starts_with('-')).map(|(_, last)| (last, true)),
     ];
     let mut names: Vec<PossibleName> = Vec::new();
+    let mut reason = "there is no name".to_owned();
     for (name, drops_options) in readings.into_iter().flatten().filter(|(name, _)| !name.is_empty()) {
         // A backslash separates folders, or belongs to the space behind it.
         for name in [name.replace('\\', "/"), name.replace("\\ ", " ").replace('\\', "/")] {
             let name = normalized(&format!("{folder}{name}"));
-            if (1..=MAX_NAME_BYTES).contains(&name.len()) && names.iter().all(|known| known.name != name) {
+            if name.len() > MAX_NAME_BYTES {
+                reason = format!("the name has more than {MAX_NAME_BYTES} bytes");
+            } else if !name.is_empty() && names.iter().all(|known| known.name != name) {
                 names.push(PossibleName { name, drops_options });
             }
         }
     }
-    names
+    if names.is_empty() { Err(io::Error::new(io::ErrorKind::InvalidFilename, reason)) } else { Ok(names) }
 }
 
 /// A path without empty components, without `.`, and without each `..` and the folder before it that it leaves, so that a file has one
@@ -132,10 +139,7 @@ pub(super) fn first_readable<T>(
     names: &[PossibleName],
     mut read: impl FnMut(&str) -> io::Result<T>,
 ) -> io::Result<(&PossibleName, T)> {
-    let mut reason = match names {
-        [] => io::Error::new(io::ErrorKind::NotFound, format!("its name has more than {MAX_NAME_BYTES} bytes")),
-        _ => io::Error::from(io::ErrorKind::NotFound),
-    };
+    let mut reason = io::Error::from(io::ErrorKind::NotFound);
     for name in names {
         match read(&name.name) {
             Ok(found) => return Ok((name, found)),
@@ -165,7 +169,7 @@ mod tests {
             ("-x.png", "-x.png", false),
             ("a #1.png", "a #1.png", false),
         ] {
-            let names = possible_names("folder/", text);
+            let names = possible_names("folder/", text).unwrap();
             let expected = PossibleName { name: format!("folder/{name}"), drops_options };
             assert!(names.contains(&expected), "{text}: {names:?}");
             assert_eq!(names[0].name, format!("folder/{}", text.replace('\\', "/")));
@@ -187,11 +191,20 @@ mod tests {
             ("/a/./x.png", "/a/x.png"),
             ("\\\\server\\share\\x.png", "//server/share/x.png"),
         ] {
-            assert_eq!(possible_names("", text)[0].name, name, "{text}");
+            assert_eq!(possible_names("", text).unwrap()[0].name, name, "{text}");
         }
-        assert_eq!(possible_names("in/", "../x.png")[0].name, "x.png");
-        assert_eq!(possible_names("in/", "..\\..\\x.png")[0].name, "../x.png");
-        assert_eq!(possible_names("", "a/.."), []);
+        assert_eq!(possible_names("in/", "../x.png").unwrap()[0].name, "x.png");
+        assert_eq!(possible_names("in/", "..\\..\\x.png").unwrap()[0].name, "../x.png");
+    }
+
+    #[test]
+    fn an_error_says_why_there_is_no_name() {
+        for text in ["", "a/.."] {
+            assert_eq!(possible_names("", text).unwrap_err().to_string(), "there is no name");
+        }
+        assert_eq!(possible_names("", &"x".repeat(4095)).unwrap()[0].name.len(), 4095);
+        let error = possible_names("", &"x".repeat(4096)).unwrap_err();
+        assert_eq!(error.to_string(), "the name has more than 4095 bytes");
     }
 
     #[test]

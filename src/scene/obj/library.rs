@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::error::ObjWarning;
 use super::excerpt::excerpt;
-use super::files::{MAX_NAME_BYTES, PossibleName, possible_names};
+use super::files::{PossibleName, possible_names};
 use super::ignored::IgnoredStatements;
 use super::statements::{Statements, without_comment};
 use super::warnings::Warnings;
@@ -222,17 +222,9 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
             rest = after.trim_start();
         }
     }
-    if rest.is_empty() {
-        warn(String::from("a texture without a name was left out"));
-        return None;
-    }
     let folder = library.rfind(['/', '\\']).map_or("", |slash| &library[..=slash]);
     let names = possible_names(&folder.replace('\\', "/"), rest);
-    if names.is_empty() {
-        warn(format!("a texture whose name has more than {MAX_NAME_BYTES} bytes was left out"));
-        return None;
-    }
-    Some(names)
+    names.inspect_err(|reason| warn(format!("a texture was left out: {reason}"))).ok()
 }
 
 #[cfg(all(test, not(drawloom_loom)))]

@@ -71,12 +71,12 @@ impl Libraries<'_> {
     /// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
-        let names = possible_names("", library);
-        let read = first_readable(&names, |name| (self.fetch)(name, limit)).and_then(|(name, bytes)| {
+        let read = possible_names("", library).and_then(|names| {
+            let (PossibleName { name, .. }, bytes) = first_readable(&names, |name| (self.fetch)(name, limit))?;
             self.bytes += bytes.len() as u64;
             let is_used = |name: &str| self.used.contains(name);
             let max_line_bytes = self.limits.line_bytes;
-            library::add_definitions(&mut self.definitions, &name.name, &bytes, is_used, max_line_bytes, warnings)
+            library::add_definitions(&mut self.definitions, name, &bytes, is_used, max_line_bytes, warnings)
         });
         match read {
             Ok(()) => {}
