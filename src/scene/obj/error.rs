@@ -57,7 +57,7 @@ pub enum ObjError {
     NoTriangles {
         /// The file.
         file: String,
-        /// The number of triangles without area.
+        /// The triangles that were left out, as [`Imported::degenerate_triangles`](super::Imported::degenerate_triangles) counts them.
         degenerate_triangles: usize,
         /// The number of points, which are not drawn.
         points: usize,
@@ -223,7 +223,7 @@ pub enum ObjWarning {
     EmptyModel {
         /// Its name.
         model: String,
-        /// The number of triangles without area.
+        /// The triangles that were left out, as [`Imported::degenerate_triangles`](super::Imported::degenerate_triangles) counts them.
         degenerate_triangles: usize,
     },
     /// Elements other than polygons, which were left out.

@@ -13,6 +13,7 @@ use crate::scene::Vertex;
 pub(super) struct ModelGeometry {
     /// One part, unless the model has details that are too small for 32-bit coordinates of the whole.
     pub parts: Vec<GeometryPart>,
+    /// Those that were left out, as [`Imported::degenerate_triangles`](super::Imported::degenerate_triangles) says.
     pub degenerate_triangles: usize,
     pub fanned_polygons: usize,
 }
@@ -30,7 +31,7 @@ pub(super) struct GeometryPart {
 /// of 32-bit coordinates.
 const MIN_RELATIVE_HEIGHT: f64 = 1e-7;
 
-/// The largest coordinate: the bounding sphere of a mesh whose box is as large in each direction still has an `f32` as radius.
+/// The largest coordinate. The radius of the bounding sphere of a mesh is at most √3 times as large, which is finite as `f32`.
 const MAX_COORDINATE: f64 = f32::MAX as f64 / 2.0;
 
 /// A part is divided if the longest edge of a triangle is less than this share of half the part's size: its 32-bit coordinates, which are

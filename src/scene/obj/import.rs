@@ -30,7 +30,8 @@ pub struct Imported {
     pub warning_counts: BTreeMap<&'static str, usize>,
     /// The triangles of the scene.
     pub triangles: usize,
-    /// Triangles of the file that were left out, because they have no area or are not finite.
+    /// Triangles of the file that were left out: they have no area, or are too thin or too large for 32-bit coordinates, or a corner of their
+    /// polygon is not finite.
     pub degenerate_triangles: usize,
 }
 

@@ -49,19 +49,20 @@ pub(super) fn decode(
     while_decoded
         .check(rgba_bytes.saturating_add(other_bytes))
         .map_err(|error| format!("{width}x{height}: {error}"))?;
-    let [wide, high] = [width, height].map(|side| side.min(Texture::MAX_SIZE));
-    result.check(u64::from(wide) * u64::from(high) * 4).map_err(message)?;
+    let [scaled_width, scaled_height] = [width, height].map(|side| side.min(Texture::MAX_SIZE));
+    result.check(u64::from(scaled_width) * u64::from(scaled_height) * 4).map_err(message)?;
     decoded.take(rgba_bytes).map_err(message)?;
     let mut bytes = if has_bytes {
         decode_bytes(decoder, rgba_bytes)?
     } else {
         DynamicImage::from_decoder(decoder).map_err(message)?.into_rgba8().into_raw()
     };
-    let is_scaled = [wide, high] != [width, height];
+    let is_scaled = [scaled_width, scaled_height] != [width, height];
     if is_scaled {
-        scale_down(&mut bytes, [width, height], [wide, high]);
+        scale_down(&mut bytes, [width, height], [scaled_width, scaled_height]);
     }
-    Ok(Pixels { width: wide, height: high, bytes, scaled_from: is_scaled.then_some([width, height]) })
+    let scaled_from = is_scaled.then_some([width, height]);
+    Ok(Pixels { width: scaled_width, height: scaled_height, bytes, scaled_from })
 }
 
 fn message(error: impl ToString) -> String {
@@ -120,15 +121,15 @@ fn to_rgba(bytes: &mut [u8], channels: usize) {
 
 /// Replaces RGBA pixels by a smaller picture, whose pixels are the means of those that they cover. A pixel is written where none is
 /// read afterwards, so this takes no memory.
-fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [wide, high]: [u32; 2]) {
+fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [scaled_width, scaled_height]: [u32; 2]) {
     let covered = |index: u32, from: u32, to: u32| {
         let start = |index: u32| (u64::from(index) * u64::from(from) / u64::from(to)) as usize;
         start(index)..start(index + 1)
     };
-    for row in 0..high {
-        let rows = covered(row, height, high);
-        for column in 0..wide {
-            let columns = covered(column, width, wide);
+    for row in 0..scaled_height {
+        let rows = covered(row, height, scaled_height);
+        for column in 0..scaled_width {
+            let columns = covered(column, width, scaled_width);
             let mut sums = [0_u64; 4];
             for line in rows.clone() {
                 let first = line * width as usize;
@@ -138,10 +139,10 @@ fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [wide, high]: [u32
             }
             let count = (rows.len() * columns.len()) as u64;
             let mean = sums.map(|sum| ((sum + count / 2) / count) as u8);
-            bytes[(row as usize * wide as usize + column as usize) * 4..][..4].copy_from_slice(&mean);
+            bytes[(row as usize * scaled_width as usize + column as usize) * 4..][..4].copy_from_slice(&mean);
         }
     }
-    bytes.truncate(wide as usize * high as usize * 4);
+    bytes.truncate(scaled_width as usize * scaled_height as usize * 4);
     bytes.shrink_to_fit();
 }
 
@@ -201,10 +202,10 @@ impl Pixels {
 }
 
 /// For each pixel of a picture, row by row, the index of the pixel at the same place of a picture of another size.
-fn nearest([wide, high]: [u32; 2], [width, height]: [u32; 2]) -> impl Iterator<Item = usize> {
+fn nearest([source_width, source_height]: [u32; 2], [width, height]: [u32; 2]) -> impl Iterator<Item = usize> {
     let scaled = |index: u32, from: u32, to: u32| (u64::from(index) * u64::from(from) / u64::from(to)) as usize;
-    let rows = (0..height).map(move |row| scaled(row, high, height) * wide as usize);
-    rows.flat_map(move |row| (0..width).map(move |column| row + scaled(column, wide, width)))
+    let rows = (0..height).map(move |row| scaled(row, source_height, height) * source_width as usize);
+    rows.flat_map(move |row| (0..width).map(move |column| row + scaled(column, source_width, width)))
 }
 
 #[cfg(all(test, not(drawloom_loom)))]
