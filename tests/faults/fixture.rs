@@ -44,7 +44,7 @@ pub struct Fixture<S: Subject> {
     pub scheduler: Arc<Scheduler>,
     pub renderer: Renderer<FaultyBackend<S>>,
     pub submitter: Submitter<FaultyBackend<S>>,
-    /// Of all frames that were drawn, and all their views.
+    /// Of all views of the latest frame that was recorded.
     pub executed_pieces: usize,
 }
 
@@ -85,7 +85,7 @@ impl<S: Subject> Fixture<S> {
             Ok(recorded) => recorded,
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };
-        self.executed_pieces += recorded.statistics().views.iter().map(|view| view.pieces).sum::<usize>();
+        self.executed_pieces = recorded.statistics().views.iter().map(|view| view.pieces).sum::<usize>();
         match self.submitter.submit(recorded) {
             Ok(submitted) => S::read(&submitted.submission, 0, "picture").map(Ok),
             Err(error) => Ok(Err(Refusal::Submission(error))),
