@@ -2,8 +2,8 @@
 //! pass (`src/view/gpu_view.rs`). Frames that are dropped leave none behind in wgpu. These cases have a binary of their own, and run one after
 //! the other, so that they can measure the process.
 //!
-//! Without an adapter, or on a system that does not tell how much memory a process has, the case is ignored. With
-//! `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails it.
+//! They take long, and are ignored without `DRAWLOOM_SLOW_CASES=1`, without an adapter, or on a system that does not tell how much memory a
+//! process has. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
 
 use std::env;
 use std::error::Error;
@@ -17,8 +17,8 @@ use drawloom::process::Deferred;
 use drawloom::scene::Camera;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, demo};
-use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
+use drawloom_testing::{adapter, slow_cases};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 const WARM_UP_FRAMES: usize = 30;
@@ -33,14 +33,15 @@ const MAX_GROWTH_KIB: usize = 2 * 1024;
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let required = env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
-    let can_measure = resident_kib().is_some() && (required || adapter::device().is_ok());
+    let can_measure = slow_cases::are_enabled() && resident_kib().is_some();
+    let can_draw = can_measure && (required || adapter::device().is_ok());
     let submitted = Trial::test("submitted_frames_leave_no_memory_behind", || {
         draw_and_measure().map_err(|error| Failed::from(error.to_string()))
     });
     let dropped = Trial::test("frames_that_are_recorded_and_dropped_leave_no_memory_behind", || {
         drop_and_measure().map_err(|error| Failed::from(error.to_string()))
     });
-    let trials = vec![submitted.with_ignored_flag(!can_measure), dropped.with_ignored_flag(resident_kib().is_none())];
+    let trials = vec![submitted.with_ignored_flag(!can_draw), dropped.with_ignored_flag(!can_measure)];
     // Each measures the whole process.
     libtest_mimic::run(&Arguments { test_threads: Some(1), ..arguments }, trials).exit_code()
 }

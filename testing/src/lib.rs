@@ -18,4 +18,5 @@ pub mod samples;
 pub mod scenes;
 pub mod shared_scenes;
 pub mod simulated_device;
+pub mod slow_cases;
 pub mod tinted;

@@ -1,6 +1,7 @@
 //! Devices that fail: every call of a frame fails once, devices are lost, and others take their place.
 //!
-//! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then.
+//! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then. Slow cases are ignored
+//! without `DRAWLOOM_SLOW_CASES=1`.
 
 mod calls;
 mod fixture;
@@ -13,6 +14,7 @@ mod worlds;
 
 use std::panic;
 
+use drawloom_testing::slow_cases;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
@@ -34,10 +36,14 @@ fn main() {
     #[cfg(not(feature = "wgpu"))]
     let (more, of_adapters): (&[Case], Vec<Case>) = Default::default();
     let cases = [calls::CASES, histories::CASES, replaced::CASES, more].concat().into_iter();
+    let slow = calls::SLOW_CASES
+        .iter()
+        .map(|&(name, case)| Trial::test(name, case).with_ignored_flag(!slow_cases::are_enabled()));
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let is_ignored = !has_adapter() && !required;
     let with_adapter = |(name, case): Case| Trial::test(name, case).with_ignored_flag(is_ignored);
-    let trials = cases.map(|(name, case)| Trial::test(name, case)).chain(of_adapters.into_iter().map(with_adapter));
+    let trials =
+        cases.map(|(name, case)| Trial::test(name, case)).chain(of_adapters.into_iter().map(with_adapter)).chain(slow);
     libtest_mimic::run(&arguments, trials.collect()).exit();
 }
 

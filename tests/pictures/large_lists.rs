@@ -20,10 +20,8 @@ use crate::strategies::expect;
 pub const CASES: &[Case] = &[
     ("every_object_of_a_list_is_drawn_once", || check_counts(&[1, 255, 256, 257, 2_047, 2_048, 2_049])),
     ("every_object_of_a_list_around_65536_is_drawn_once", || check_counts(&[65_535, 65_536, 65_537])),
+    ("every_object_of_a_list_of_a_million_is_drawn_once", || check_counts(&[1_000_000])),
 ];
-
-/// It takes half a minute without optimisations.
-pub const SLOW_CASES: &[Case] = &[("every_object_of_a_list_of_a_million_is_drawn_once", || check_counts(&[1_000_000]))];
 
 /// Stores the number of each object, from 1, and counts the draws of each pixel.
 struct Numbers(DrawOrder);

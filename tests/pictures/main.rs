@@ -1,8 +1,8 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
 //! Without an adapter, without its timestamps, or without the scenes beside the repository, the cases that need them are reported as
-//! ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. Cases
-//! that take long are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
+//! ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. The
+//! [`slow_cases`] are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
 
 mod attributes;
 mod buffers;
@@ -62,6 +62,7 @@ mod shadow_interval;
 mod shadow_scenes;
 mod shadows;
 mod shared_encoders;
+mod slow_cases;
 mod software;
 mod stencil;
 mod strategies;
@@ -83,7 +84,6 @@ fn main() {
     let no_adapter = fixture::device().is_none();
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
     let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
-    let has_slow_cases = is_set("DRAWLOOM_SLOW_CASES");
     let no_scenes = shared_scenes::are_optional_and_missing();
     let no_timestamps = !is_set("DRAWLOOM_REQUIRE_TIMESTAMPS") && !device_times::has_timestamps();
     let mut trials = Vec::new();
@@ -102,7 +102,6 @@ fn main() {
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
         (large_lists::CASES, Needs::Adapter),
-        (large_lists::SLOW_CASES, Needs::AdapterAndSlowCases),
         (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
@@ -163,14 +162,16 @@ fn main() {
             Needs::Nothing | Needs::Adapter => false,
             Needs::AdapterAndTimestamps => no_timestamps,
             Needs::AdapterAndSharedScenes => no_scenes,
-            Needs::AdapterAndSlowCases => !has_slow_cases,
         };
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
             let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
-            trials.push(Trial::test(name, case).with_ignored_flag(is_left_out || (lacks_adapter && !required)));
+            let is_too_slow = slow_cases::contain(name) && !drawloom_testing::slow_cases::are_enabled();
+            let is_ignored = is_left_out || is_too_slow || (lacks_adapter && !required);
+            trials.push(Trial::test(name, case).with_ignored_flag(is_ignored));
         }
     }
+    slow_cases::check(&trials);
     libtest_mimic::run(&arguments, trials).exit();
 }
 
@@ -180,6 +181,4 @@ enum Needs {
     Adapter,
     AdapterAndTimestamps,
     AdapterAndSharedScenes,
-    /// An adapter, and `DRAWLOOM_SLOW_CASES=1`.
-    AdapterAndSlowCases,
 }

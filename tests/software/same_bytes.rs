@@ -83,6 +83,7 @@ fn a_recorded_frame_draws_the_scene_as_it_was() {
 }
 
 #[test]
+#[ignore = "slow: `.ci/run` runs it"]
 fn occlusion_culling_changes_nothing() {
     for scene in [odd_field(), everything()] {
         let quality = Quality { culling: CullingVolume::OrientedBox, ..Quality::balanced() };
@@ -114,6 +115,7 @@ fn triangle_culling_changes_nothing() {
 }
 
 #[test]
+#[ignore = "slow: `.ci/run` runs it"]
 fn levels_of_detail_draw_the_bytes_of_their_triangles() {
     let quality = |level_of_detail| {
         let shadows = ShadowQuality { side: 64, ..ShadowQuality::default() };
