@@ -1,0 +1,113 @@
+//! What holds of every OBJ import, whatever is in its files.
+
+use std::io;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::NullBackend;
+use drawloom::demo;
+use drawloom::process::Deferred;
+use drawloom::scene::obj::{self, Imported, ObjError, ObjLimits};
+use drawloom::scene::{Material, Mesh, SceneRef};
+use drawloom::task::Scheduler;
+
+/// The name of the OBJ file, which errors have to contain.
+const NAME: &str = "a.obj";
+
+/// What an import may take: little, so that a file of a few kilobytes reaches every limit.
+pub const LIMITS: ObjLimits = ObjLimits {
+    scene_bytes: 64 << 10,
+    line_bytes: 512,
+    library_bytes: 64 << 10,
+    texture_file_bytes: 64 << 10,
+    texture_bytes: 1 << 20,
+    all_textures_bytes: 1 << 20,
+    warnings: 3,
+};
+
+/// Imports a file, and checks the scene, or the error.
+pub fn import(file: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>) -> Option<Imported> {
+    match obj::read_within(NAME, file, fetch, &LIMITS) {
+        Ok(imported) => {
+            check_meshes(&imported);
+            check_materials(imported.scene.as_scene_ref());
+            check_warnings(&imported);
+            check_frame(&imported);
+            Some(imported)
+        }
+        Err(ObjError::Refused { reason, .. }) => panic!("tobj refuses what preprocessing wrote: {reason}"),
+        Err(error) => {
+            assert!(error.to_string().contains(NAME), "{error}");
+            assert_is_escaped(&error);
+            None
+        }
+    }
+}
+
+fn check_meshes(imported: &Imported) {
+    let scene = imported.scene.as_scene_ref();
+    let mut triangles = 0;
+    for (&mesh, position) in scene.meshes.iter().zip(scene.positions) {
+        let mesh: &Mesh = scene.assets.get(mesh).unwrap();
+        assert!(position.is_finite());
+        for vertex in mesh.vertices() {
+            let numbers = vertex.position.iter().chain(&vertex.normal).chain(&vertex.uv);
+            assert!(numbers.into_iter().all(|number| number.is_finite()), "{vertex:?}");
+            let length = vertex.normal.iter().map(|number| number * number).sum::<f32>().sqrt();
+            assert!((length - 1.0).abs() < 1e-5, "{vertex:?}");
+        }
+        assert!(mesh.indices().iter().all(|&index| (index as usize) < mesh.vertices().len()));
+        assert!(mesh.bounds().is_valid());
+        triangles += mesh.triangle_count();
+    }
+    assert_eq!(triangles, imported.triangles);
+    assert!(triangles > 0);
+}
+
+fn check_materials(scene: SceneRef<'_>) {
+    for &material in scene.materials {
+        let material: &Material = scene.assets.get(material).unwrap();
+        for color in [material.diffuse, material.emission] {
+            assert!(color.is_finite() && color.min_element() >= 0.0, "{material:?}");
+        }
+        assert!((0.0..=1.0).contains(&material.opacity), "{material:?}");
+        if let Some(texture) = material.texture {
+            let texture = scene.assets.get(texture).unwrap();
+            let bytes = u64::from(texture.width()) * u64::from(texture.height()) * 4;
+            assert!(bytes == texture.pixels().len() as u64 && bytes <= LIMITS.all_textures_bytes);
+        }
+    }
+}
+
+/// All warnings are counted, and the first of each kind are listed.
+fn check_warnings(imported: &Imported) {
+    for warning in &imported.warnings {
+        assert!(imported.warning_counts.contains_key(warning.kind()), "{warning}");
+        assert_is_escaped(warning);
+    }
+    for (kind, &count) in &imported.warning_counts {
+        let listed = imported.warnings.iter().filter(|warning| warning.kind() == *kind).count();
+        assert_eq!(listed, count.min(LIMITS.warnings), "{kind}");
+    }
+}
+
+/// No control character of a file reaches a terminal.
+fn assert_is_escaped(message: &impl ToString) {
+    let message = message.to_string();
+    assert!(message.chars().all(|character| character == '\t' || !character.is_control()), "{message:?}");
+}
+
+/// A renderer takes the scene as it is.
+fn check_frame(imported: &Imported) {
+    thread_local! {
+        static SCHEDULER: Arc<Scheduler> = Arc::new(Scheduler::new(1).unwrap());
+    }
+    let (mut renderer, submitter) = Renderer::builder(NullBackend)
+        .deferred(Deferred::to_picture())
+        .build(SCHEDULER.with(Arc::clone))
+        .unwrap();
+    let scene = imported.scene.as_scene_ref();
+    let cameras = [demo::camera(scene)];
+    let recorded = renderer.record(SceneRef { cameras: &cameras, ..scene }).unwrap();
+    submitter.submit(recorded).unwrap();
+}
