@@ -5,6 +5,7 @@ use std::io::{self, Cursor};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::limits::Limit;
+use super::statements::escaped;
 use crate::scene::Texture;
 
 /// RGBA bytes, rows from top to bottom.
@@ -65,8 +66,9 @@ pub(super) fn decode(
     Ok(Pixels { width: scaled_width, height: scaled_height, bytes, scaled_from })
 }
 
+/// The message of an error on one line, without control characters: some of decoders end with a line feed, or quote the file.
 fn message(error: impl ToString) -> String {
-    error.to_string()
+    escaped(error.to_string().trim())
 }
 
 /// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
@@ -264,6 +266,13 @@ mod tests {
         let header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255, 32, 0];
         let error = decode_named("a.tga", header.to_vec(), 256 << 20).map(drop).unwrap_err();
         assert!(error.contains("`ObjLimits::texture_bytes` is 268435456"), "{error}");
+    }
+
+    #[test]
+    fn the_message_of_a_decoder_is_one_line() {
+        let limit = Limit::new("texture_bytes", 1 << 20);
+        let error = decode("a.jpg", vec![0xf8, 0xed], limit, limit).map(drop).unwrap_err();
+        assert!(!error.contains(char::is_control) && error.starts_with("Format error decoding Jpeg"), "{error:?}");
     }
 
     #[test]
