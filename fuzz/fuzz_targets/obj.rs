@@ -4,7 +4,9 @@
 
 use std::io;
 
-use drawloom_fuzz::imports::import;
+use drawloom::demo;
+use drawloom::scene::obj::Imported;
+use drawloom_fuzz::imports::{check_frame, import};
 use libfuzzer_sys::fuzz_target;
 
 const LIBRARY: &[u8] = b"newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd a.png\nnewmtl glow\nKe 1 1 1\n";
@@ -14,9 +16,16 @@ fuzz_target!(|file: &[u8]| {
         "a.mtl" => Ok(LIBRARY.to_vec()),
         _ => Err(io::ErrorKind::NotFound.into()),
     };
-    let Some(imported) = import(file, fetch) else {
-        return;
-    };
+    import(file, fetch, |imported| {
+        check_triangles(file, imported);
+        let scene = imported.scene.as_scene_ref();
+        let camera = demo::camera(scene);
+        let lights = demo::lights(scene, &camera);
+        check_frame(imported, camera, &lights);
+    });
+});
+
+fn check_triangles(file: &[u8], imported: &Imported) {
     let found = imported.triangles + imported.degenerate_triangles;
     // A corner takes a digit and a space in any encoding.
     assert!(found <= file.len() / 2, "{found} triangles in {} bytes", file.len());
@@ -27,7 +36,7 @@ fuzz_target!(|file: &[u8]| {
         let is_said = !imported.warnings.is_empty();
         assert!(found == expected || found < expected && is_said, "{found} of {expected} triangles");
     }
-});
+}
 
 /// The triangles of all faces: one for each corner but two.
 fn triangles(file: &[u8]) -> usize {

@@ -1,15 +1,16 @@
 //! What holds of every OBJ import, whatever is in its files.
 
+use std::cell::RefCell;
 use std::io;
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::NullBackend;
-use drawloom::demo;
+use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::obj::{self, Imported, ObjError, ObjLimits};
-use drawloom::scene::{Material, Mesh, SceneRef};
+use drawloom::scene::{Camera, Light, Material, Mesh, SceneRef};
 use drawloom::task::Scheduler;
+use drawloom::{Renderer, Submitter};
 
 /// The name of the OBJ file, which errors have to contain.
 const NAME: &str = "a.obj";
@@ -25,21 +26,20 @@ pub const LIMITS: ObjLimits = ObjLimits {
     warnings: 3,
 };
 
-/// Imports a file, and checks the scene, or the error.
-pub fn import(file: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>) -> Option<Imported> {
+/// Imports a file, and checks the scene, or the error. `check` gets the import.
+pub fn import(file: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>, check: impl FnOnce(&Imported)) {
     match obj::read_within(NAME, file, fetch, &LIMITS) {
         Ok(imported) => {
             check_meshes(&imported);
             check_materials(imported.scene.as_scene_ref());
             check_warnings(&imported);
-            check_frame(&imported);
-            Some(imported)
+            check_frame(&imported, Camera::looking_at("main", DVec3::splat(3.0), DVec3::ZERO), &[]);
+            check(&imported);
         }
         Err(ObjError::Refused { reason, .. }) => panic!("tobj refuses what preprocessing wrote: {reason}"),
         Err(error) => {
             assert!(error.to_string().contains(NAME), "{error}");
             assert_is_escaped(&error);
-            None
         }
     }
 }
@@ -97,17 +97,24 @@ fn assert_is_escaped(message: &impl ToString) {
     assert!(message.chars().all(|character| character == '\t' || !character.is_control()), "{message:?}");
 }
 
-/// A renderer takes the scene as it is.
-fn check_frame(imported: &Imported) {
+/// A renderer draws the scene with this camera and further lights, or says that the camera is too far away for that.
+///
+/// # Panics
+/// If it does neither.
+pub fn check_frame(imported: &Imported, camera: Camera, lights: &[Light]) {
     thread_local! {
-        static SCHEDULER: Arc<Scheduler> = Arc::new(Scheduler::new(1).unwrap());
+        static NULL: RefCell<(Renderer<NullBackend>, Submitter<NullBackend>)> = RefCell::new(null_renderer());
     }
-    let (mut renderer, submitter) = Renderer::builder(NullBackend)
-        .deferred(Deferred::to_picture())
-        .build(SCHEDULER.with(Arc::clone))
-        .unwrap();
     let scene = imported.scene.as_scene_ref();
-    let cameras = [demo::camera(scene)];
-    let recorded = renderer.record(SceneRef { cameras: &cameras, ..scene }).unwrap();
-    submitter.submit(recorded).unwrap();
+    let lights = [scene.lights, lights].concat();
+    let scene = SceneRef { cameras: &[camera], lights: &lights, ..scene };
+    NULL.with_borrow_mut(|(renderer, submitter)| match renderer.record(scene) {
+        Ok(recorded) => _ = submitter.submit(recorded).unwrap(),
+        Err(error) => assert!(error.to_string().contains("\"main\""), "{error}"),
+    });
+}
+
+fn null_renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
 }
