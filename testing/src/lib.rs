@@ -10,6 +10,7 @@ pub mod draw_lists;
 pub mod fault_injection;
 pub mod feedback;
 mod forwarded_calls;
+pub mod graph_oracle;
 pub mod hills;
 pub mod mip_levels;
 pub mod precision;
