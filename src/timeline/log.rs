@@ -214,7 +214,7 @@ impl Log {
 
     /// How many events of any kind were dropped because there was no room, by workers and by the log itself.
     pub fn all_dropped(&self) -> u64 {
-        self.dropped + self.workers.iter().map(|worker| worker.dropped).sum::<u64>()
+        self.workers.iter().map(|worker| worker.dropped).fold(self.dropped, u64::saturating_add)
     }
 }
 

@@ -180,6 +180,13 @@ fn without_a_device_there_is_no_device_process() {
 }
 
 #[test]
+fn counts_of_dropped_events_saturate() {
+    let mut log = Log { dropped: u64::MAX - 1, ..log(vec![]) };
+    log.workers.iter_mut().for_each(|worker| worker.dropped = 1);
+    assert_eq!(Trace::of(&log).other_data["dropped"], u64::MAX);
+}
+
+#[test]
 fn a_large_trace_is_written_in_pieces() {
     let chunks =
         (0..100_000).map(|index| chunk(0, index as usize % 2, 0, index / 2 * 10, index / 2 * 10 + 10)).collect();
