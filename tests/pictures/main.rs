@@ -46,6 +46,7 @@ mod post;
 mod precision;
 mod prepared_pipelines;
 mod processes;
+mod random_scenes;
 mod rays;
 mod read_back;
 mod redraw;
@@ -124,6 +125,7 @@ fn main() {
         (precision::CASES, Needs::Adapter),
         (prepared_pipelines::CASES, Needs::Adapter),
         (processes::CASES, Needs::Adapter),
+        (random_scenes::CASES, Needs::Adapter),
         (read_back::CASES, Needs::Adapter),
         (redraw::CASES, Needs::Adapter),
         (references::CASES, Needs::Adapter),
