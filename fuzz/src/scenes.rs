@@ -19,9 +19,9 @@ use drawloom_testing::scenes::leveled::halved;
 use drawloom_testing::scenes::{as_list, cube, culled, square};
 
 /// The most objects of a world.
-pub const MAX_OBJECTS: usize = 24;
+pub const MAX_OBJECTS: usize = 16;
 const MAX_LIGHTS: usize = 4;
-const MAX_CAMERAS: usize = 3;
+const MAX_CAMERAS: usize = 2;
 const MAX_ASSETS: usize = 8;
 
 /// A number that is mostly from −4 to 4.
@@ -181,6 +181,19 @@ pub struct AnyObject {
     bounds: Option<(Vector, Number)>,
 }
 
+impl AnyObject {
+    /// A cube in the middle.
+    const CUBE: Self = Self {
+        position: Vector([Number(0.0); 3]),
+        turn: AnyTurn::Angles([Number(0.4), Number(0.3)]),
+        scale: None,
+        mesh: 0,
+        material: 0,
+        layers: None,
+        bounds: None,
+    };
+}
+
 #[derive(Arbitrary, Clone, Debug)]
 pub struct AnyLight {
     kind: u8,
@@ -244,7 +257,7 @@ impl AnyCamera {
         };
         let is_perspective = matches!(projection, Projection::Perspective { .. });
         let far = if is_perspective { f32::INFINITY } else { 100.0 };
-        let size = self.size.map(|side| u32::from(side) % 40);
+        let size = self.size.map(|side| u32::from(side) % 32);
         Camera {
             orientation: match self.turn {
                 AnyTurn::Identity => usual.orientation,
@@ -332,7 +345,10 @@ impl World {
         let mut scene = Scene::new();
         let meshes = vec![scene.add(cube()).unwrap(), scene.add(square(Topology::TriangleStrip)).unwrap()];
         let pane = Material { blend: Blend::Alpha, opacity: 0.5, double_sided: true, ..Material::default() };
-        let materials = vec![scene.add(Material::default()).unwrap(), scene.add(pane).unwrap()];
+        let checks = (0..16).map(|byte| byte * 17).collect();
+        let textures = vec![scene.add(Texture::new("checks", 2, 2, checks).unwrap()).unwrap()];
+        let checked = Material { texture: Some(textures[0]), ..Material::default() };
+        let materials = [checked, pane, Material::default()].map(|material| scene.add(material).unwrap()).into();
         let mut world = Self {
             scene,
             positions: Vec::new(),
@@ -344,11 +360,13 @@ impl World {
             layers: Vec::new(),
             pieces: Vec::new(),
             meshes,
-            textures: Vec::new(),
+            textures,
             materials,
             changed: Vec::new(),
             count_before: 0,
         };
+        // So that there is something to see and to change.
+        world.add_object(&AnyObject::CUBE);
         spec.meshes.iter().for_each(|mesh| world.add_mesh(mesh));
         spec.textures.iter().for_each(|texture| world.add_texture(texture));
         spec.materials.iter().for_each(|material| world.add_material(material));
@@ -584,10 +602,11 @@ fn pick<T>(items: &[T], index: u8) -> &T {
     &items[usize::from(index) % items.len()]
 }
 
-/// One of the presets, or another combination of settings, with small shadow maps that are drawn in each frame.
+/// One of the presets, or another combination of settings, with small shadow maps that are drawn in each frame, and edges in maps of
+/// paraboloids that are divided into few.
 pub fn quality(choice: u8) -> Quality {
     let preset = [Quality::balanced, Quality::exact, Quality::fast][usize::from(choice) % 3]();
-    let shadows = ShadowQuality { side: 16, interval: 1, ..preset.shadows };
+    let shadows = ShadowQuality { side: 16, interval: 1, widest_edge: 30.0, ..preset.shadows };
     let culling = if choice & 0x80 == 0 { preset.culling } else { CullingVolume::OrientedBox };
     let depth_pre_pass = choice & 0x40 != 0;
     Quality { shadows, culling, depth_pre_pass, occlusion: None, ..preset }
