@@ -1,6 +1,6 @@
 //! The kept nodes, their order, and the reported problems: compared with the oracle, and in single cases.
 
-use drawloom::graph::{FrameGraph, GraphProblem, NodeId, Schedule};
+use drawloom::graph::{FrameGraph, NodeId, Schedule};
 use proptest::prelude::*;
 
 use crate::oracle::{any_graph, check_compiled, valid_graph};
