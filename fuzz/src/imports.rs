@@ -23,6 +23,7 @@ pub const LIMITS: ObjLimits = ObjLimits {
     texture_file_bytes: 64 << 10,
     texture_bytes: 1 << 20,
     all_textures_bytes: 1 << 20,
+    decoded_bytes: 4 << 20,
     warnings: 3,
 };
 
