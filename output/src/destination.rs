@@ -14,7 +14,7 @@ const MAX_LINKS: usize = 40;
 pub(crate) enum Destination {
     /// To a regular file, which is there or not. No symbolic link.
     File(PathBuf),
-    /// Straight to something that cannot be replaced.
+    /// Straight to something that cannot be replaced, or to a file that is open already: behind its content.
     Direct(PathBuf),
     /// To the standard output or the standard error of this process, behind what it has written there.
     Stream(StandardStream),
@@ -38,8 +38,9 @@ impl Destination {
             if let Some(stream) = StandardStream::of(&resolved) {
                 return Ok(Self::Stream(stream));
             }
-            // Links in `/proc` name open files, which need not have a name of their own.
-            if resolved.starts_with("/proc") {
+            // Names in these folders lead to open files, which need not have a name of their own, and which others write to as well.
+            let is_open = |folder: PathBuf| folder.starts_with("/proc") || folder == Path::new("/dev/fd");
+            if fs::canonicalize(folder_of(&resolved)).is_ok_and(is_open) {
                 return Ok(Self::Direct(path.to_owned()));
             }
             match fs::symlink_metadata(&resolved) {
@@ -54,7 +55,7 @@ impl Destination {
     /// Writes the content.
     ///
     /// # Errors
-    /// The error of `write`, or of the operating system. A file is then as it was.
+    /// The error of `write`, or of the operating system. A file that would have been replaced is then as it was.
     pub(crate) fn write(&self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
         let file = match self {
             Self::File(path) => return replace(path, write),

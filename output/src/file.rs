@@ -34,7 +34,7 @@ impl OutputFile {
     /// If the file cannot be written.
     pub fn new(path: impl Into<PathBuf>) -> Result<Self, OutputError> {
         let path = path.into();
-        if path.is_dir() || path.file_name().is_none() || ends_in_separator(&path) {
+        if path.is_dir() || path.file_name().is_none() || is_spelled_as_folder(&path) {
             return Err(OutputError::IsFolder { path });
         }
         match Destination::of(&path) {
@@ -57,8 +57,13 @@ impl OutputFile {
 
     /// Replaces the file by what `write` writes.
     ///
+    /// What is no regular file is written directly, and so is a regular file that is named as an open one, such as `/dev/stdout` or `/dev/fd/3`
+    /// where a shell redirects it. That file is not replaced, because the shell and other processes hold it open: the content goes behind what
+    /// it has.
+    ///
     /// # Errors
-    /// If `write` or the operating system fails. The file is then as it was, unless it is no regular file.
+    /// If `write` or the operating system fails. A file that would have been replaced is then as it was; one that is written directly may
+    /// have a part of the content.
     pub fn write(&self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), OutputError> {
         let written = Destination::of(&self.path).and_then(|destination| destination.write(write));
         written.map_err(|source| OutputError::Failed { path: self.path.clone(), source })
@@ -82,8 +87,11 @@ pub fn create_folder(folder: &Path) -> Result<(), OutputError> {
     created.map(drop).map_err(|source| OutputError::Failed { path: folder.to_owned(), source })
 }
 
-fn ends_in_separator(path: &Path) -> bool {
-    path.as_os_str().as_encoded_bytes().last().is_some_and(|&last| std::path::is_separator(char::from(last)))
+/// Whether it ends in `/` or `/.`, which `Path` takes for the same path as one without.
+fn is_spelled_as_folder(path: &Path) -> bool {
+    let bytes = path.as_os_str().as_encoded_bytes();
+    let last = bytes.rsplit(|&byte| std::path::is_separator(char::from(byte))).next();
+    last.is_some_and(|last| matches!(last, b"" | b"."))
 }
 
 /// Checks that what is no regular file may be written, without waiting for a pipe to have a reader.

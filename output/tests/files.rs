@@ -93,8 +93,11 @@ fn what_cannot_be_written_is_refused_by_name() -> Outcome {
     assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
     let error = refuse(Path::new(""));
     assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
-    let error = refuse(&folder.path().join("report/"));
-    assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
+    for spelled_as_folder in ["report/", "report/.", "report/./", "report/.."] {
+        let error = refuse(&folder.path().join(spelled_as_folder));
+        assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
+    }
+    OutputFile::new(folder.path().join("./report."))?;
     let error = refuse(&folder.path().join("a".repeat(300)));
     assert!(matches!(error, OutputError::Failed { .. }), "{error}");
     let error = create_folder(&folder.path().join("file/folder")).unwrap_err();
@@ -208,6 +211,7 @@ mod linux {
     use std::fs::Permissions;
     use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
     use std::os::unix::process::CommandExt;
+    use std::process::Stdio;
 
     use super::*;
 
@@ -231,27 +235,62 @@ mod linux {
     }
 
     #[test]
-    fn standard_output_is_written_straight() -> Outcome {
-        let folder = TempDir::new()?;
-        let redirected = folder.path().join("log.txt");
+    fn standard_streams_are_written_straight() -> Outcome {
         if let Some(name) = std::env::var_os(INTERRUPTED) {
-            println!("before");
-            OutputFile::new(Path::new(&name))?.write_all("content\n")?;
-            println!("behind");
+            let file = OutputFile::new(Path::new(&name))?;
+            if name.to_str().is_some_and(|name| name.ends_with("err") || name.ends_with('2')) {
+                eprintln!("before");
+                file.write_all("content\n")?;
+                eprintln!("behind");
+            } else {
+                println!("before");
+                file.write_all("content\n")?;
+                println!("behind");
+            }
             return Ok(());
         }
+        let folder = TempDir::new()?;
+        let redirected = folder.path().join("log.txt");
+        let outputs = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].map(|name| (name, false));
+        let errors = ["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"].map(|name| (name, true));
         // As a shell does for `>` and for `>>`.
         for appends in [false, true] {
-            for name in ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
+            for (name, is_error) in outputs.into_iter().chain(errors) {
                 let log = fs::OpenOptions::new().create(true).write(true).append(appends).open(&redirected)?;
                 log.set_len(0)?;
-                let status = Command::new(std::env::current_exe()?)
-                    .args(["--exact", "linux::standard_output_is_written_straight", "--nocapture"])
-                    .env(INTERRUPTED, name)
-                    .stdout(log)
-                    .status()?;
+                let mut command = Command::new(std::env::current_exe()?);
+                command.args(["--exact", "linux::standard_streams_are_written_straight", "--nocapture"]);
+                let command = command.env(INTERRUPTED, name);
+                let command = if is_error { command.stderr(log).stdout(Stdio::null()) } else { command.stdout(log) };
+                let status = command.status()?;
                 let text = fs::read_to_string(&redirected)?;
                 assert!(status.success() && text.contains("before\ncontent\nbehind\n"), "{name}, {appends}: {text}");
+                assert_eq!(names(&folder)?, ["log.txt"]);
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_file_that_a_shell_opened_is_written_straight() -> Outcome {
+        if let Some(name) = std::env::var_os(INTERRUPTED) {
+            return Ok(OutputFile::new(Path::new(&name))?.write_all("content\n")?);
+        }
+        let folder = TempDir::new()?;
+        let redirected = folder.path().join("log.txt");
+        for redirection in ["3>", "3>>"] {
+            for name in ["/dev/fd/3", "/proc/self/fd/3"] {
+                fs::write(&redirected, "")?;
+                let script =
+                    format!("exec {redirection}log.txt; echo before >&3; \"$@\" >/dev/null && echo behind >>log.txt");
+                let status = Command::new("sh")
+                    .args(["-c".as_ref(), script.as_ref(), "sh".as_ref(), std::env::current_exe()?.as_os_str()])
+                    .args(["--exact", "linux::a_file_that_a_shell_opened_is_written_straight"])
+                    .env(INTERRUPTED, name)
+                    .current_dir(folder.path())
+                    .status()?;
+                assert!(status.success());
+                assert_eq!(fs::read_to_string(&redirected)?, "before\ncontent\nbehind\n", "{redirection} {name}");
                 assert_eq!(names(&folder)?, ["log.txt"]);
             }
         }
@@ -265,12 +304,11 @@ mod linux {
             return Ok(());
         }
         let folder = TempDir::new()?;
-        let (pipe, program) = (folder.path().join("pipe"), folder.path().join("files"));
+        let pipe = folder.path().join("pipe");
         assert!(Command::new("mkfifo").args(["--mode=444".as_ref(), pipe.as_os_str()]).status()?.success());
-        // By another process: a program that this one has open for writing, or a child of another test, could not be run.
-        assert!(Command::new("cp").arg(std::env::current_exe()?).arg(&program).status()?.success());
         fs::set_permissions(folder.path(), Permissions::from_mode(0o755))?;
-        let mut command = Command::new(program);
+        // The other user need not be allowed to reach the program by its name.
+        let mut command = Command::new("/proc/self/exe");
         command.args(["--exact", "linux::a_pipe_that_may_not_be_written_is_refused"]).env(INTERRUPTED, &pipe);
         // Root may write everything.
         if fs::metadata(folder.path())?.uid() == 0 {
