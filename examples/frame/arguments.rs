@@ -33,7 +33,7 @@ pub struct Arguments {
     pub up: UpName,
 
     /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
-    /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter.
+    /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter and no camera path.
     #[arg(long, value_enum)]
     pub backend: Option<BackendName>,
 
@@ -130,15 +130,17 @@ impl Arguments {
 
     /// Checks the arguments of a range of frames.
     fn check_sequence(&self, draws: bool) -> Result<(), clap::Error> {
-        let is_numbered =
-            |file: &PictureFile| file.path().file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
         if !draws {
             return Err(conflict("a range of frames needs a backend that draws"));
         }
         if self.path.is_none() {
             return Err(conflict("a range of frames needs the --path of the camera"));
         }
-        if !self.out.as_ref().is_some_and(is_numbered) {
+        let name = self.out.as_ref().and_then(|file| file.path().file_name()).unwrap_or_default();
+        let Some(name) = name.to_str() else {
+            return Err(conflict("the name of an --out with `#`s for the frame's number must be Unicode"));
+        };
+        if !name.contains('#') {
             return Err(conflict(
                 "a range of frames needs an --out with `#`s for the frame's number, as in shot-####.png",
             ));

@@ -2,12 +2,13 @@
 //! others, and one that is there already is not drawn again.
 
 use std::error::Error;
+use std::ffi::OsStr;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use drawloom::backend::{Backend, BackendError, Picture, SoftwareSubmission, WgpuSubmission};
+use drawloom::backend::{Backend, BackendError, Picture, SoftwareSubmission, WgpuBackend, WgpuSubmission};
 use drawloom::demo::UpAxis;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
@@ -18,79 +19,80 @@ use crate::arguments::{Arguments, BackendName, CameraPosition};
 use crate::camera_path::CameraPath;
 use crate::pipeline;
 
-/// A frame that is not there: its camera and its file.
-type Missing<'a> = (&'a CameraPosition, PictureFile);
-
-/// The frames that are requested, by number, and their cameras.
+/// The requested frames that are not there.
 pub struct Sequence {
-    cameras: Vec<(u32, CameraPosition)>,
-    /// The files, with a `#` for each digit of the frame's number.
-    pattern: PathBuf,
+    missing: Vec<Missing>,
+    /// How many frames are requested.
+    frame_count: usize,
     up: UpAxis,
+}
+
+/// A frame that is not there.
+struct Missing {
+    camera: CameraPosition,
+    file: PictureFile,
 }
 
 impl Sequence {
     /// The sequence that the command line names.
     ///
     /// # Errors
-    /// If the path cannot be read, or a frame has no camera.
+    /// If the path cannot be read, or a frame has no camera or a file that cannot be written.
     pub fn new(arguments: &Arguments, frames: Range<u32>) -> Result<Self, Box<dyn Error>> {
-        let (Some(file), Some(out)) = (&arguments.path, &arguments.out) else {
+        let (Some(path), Some(out)) = (&arguments.path, &arguments.out) else {
             return Err("a range of frames needs --path and --out".into());
         };
-        let wrong = |problem: String| format!("{}: {problem}", file.display());
-        let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
+        let wrong = |problem: String| format!("{}: {problem}", path.display());
+        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         let path = CameraPath::parse(&text).map_err(wrong)?;
-        let cameras = frames.map(|frame| path.at(frame).map(|camera| (frame, camera)));
-        let cameras = cameras.collect::<Result<_, _>>().map_err(wrong)?;
-        Ok(Self { cameras, pattern: out.path().to_owned(), up: arguments.up.axis() })
+        let (frame_count, mut missing) = (frames.len(), Vec::new());
+        for frame in frames {
+            let camera = path.at(frame).map_err(wrong)?;
+            let file = file_of(out.path(), frame);
+            if !file.is_file() {
+                missing.push(Missing { camera, file: PictureFile::new(file)? });
+            }
+        }
+        Ok(Self { missing, frame_count, up: arguments.up.axis() })
     }
 
-    /// The cameras and files of the frames that are not there.
-    fn missing(&self) -> Result<Vec<Missing<'_>>, Box<dyn Error>> {
-        let files = self.cameras.iter().map(|(frame, camera)| (camera, file_of(&self.pattern, *frame)));
-        files.filter(|(_, file)| !file.exists()).map(|(camera, file)| Ok((camera, PictureFile::new(file)?))).collect()
-    }
-
-    /// Draws the frames that are not there, and writes each as soon as it is drawn.
+    /// Draws the frames that are not there, and writes each as soon as it is drawn. Unless the command line names a software backend, that of
+    /// `open_adapter` draws all of them.
     ///
     /// # Errors
-    /// If a frame cannot be drawn or written. Those before it are there.
-    pub fn draw(&self, arguments: &Arguments, scene: Scene) -> Result<(), Box<dyn Error>> {
-        let missing = self.missing()?;
-        println!("{} of {} frames are there", self.cameras.len() - missing.len(), self.cameras.len());
-        if missing.is_empty() {
+    /// If there is no such backend, or a frame cannot be drawn or written. Those before it are there.
+    pub fn draw(
+        self,
+        arguments: &Arguments,
+        scene: Scene,
+        open_adapter: impl FnOnce() -> Result<WgpuBackend, Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
+        println!("{} of {} frames are there", self.frame_count - self.missing.len(), self.frame_count);
+        if self.missing.is_empty() {
             return Ok(());
         }
-        let on_adapter = match arguments.backend {
-            Some(BackendName::Software | BackendName::Reference) => None,
-            None if arguments.record.is_none() => {
-                pipeline::adapter_backend(arguments).inspect_err(|error| eprintln!("drawing in software: {error}")).ok()
-            }
-            _ => Some(pipeline::adapter_backend(arguments)?),
-        };
-        match on_adapter {
-            Some(backend) => self.draw_with(arguments, scene, missing, |_| backend, WgpuSubmission::read),
-            None => {
-                let make = |scheduler: &Arc<Scheduler>| pipeline::software_backend(arguments.backend, scheduler);
-                self.draw_with(arguments, scene, missing, make, SoftwareSubmission::read)
-            }
+        if let Some(BackendName::Software | BackendName::Reference) = arguments.backend {
+            let make = |scheduler: &Arc<Scheduler>| pipeline::software_backend(arguments.backend, scheduler);
+            return self.draw_with(arguments, scene, make, SoftwareSubmission::read);
         }
+        // The frames beside these may be drawn on an adapter, and pictures of two backends differ in details.
+        let backend = open_adapter()
+            .map_err(|error| format!("{error}; --backend software draws every frame of a sequence on the CPU"))?;
+        self.draw_with(arguments, scene, |_| backend, WgpuSubmission::read)
     }
 
     fn draw_with<B: Backend>(
-        &self,
+        self,
         arguments: &Arguments,
         mut scene: Scene,
-        missing: Vec<Missing<'_>>,
         make: impl FnOnce(&Arc<Scheduler>) -> B,
         read: impl Fn(&B::Submission, usize, &str) -> Result<Picture, BackendError>,
     ) -> Result<(), Box<dyn Error>> {
         let (mut renderer, submitter) = pipeline::renderer(arguments, make)?;
-        let progress = ProgressBar::new(missing.len() as u64);
+        let progress = ProgressBar::new(self.missing.len() as u64);
         progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
         let still = scene.cameras.clone();
-        for (placed, file) in missing {
+        for Missing { camera: placed, file } in self.missing {
             scene.cameras.clone_from(&still);
             scene.cameras.iter_mut().for_each(|camera| placed.apply(camera, self.up));
             let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
@@ -103,9 +105,10 @@ impl Sequence {
     }
 }
 
-/// The file of a frame: its number instead of the last `#`s of the name, with a zero for each of them that it does not need.
+/// The file of a frame: its number instead of the last `#`s of the name, with a zero for each of them that it does not need. A name without a
+/// `#`, or that is not Unicode, stays.
 pub fn file_of(pattern: &Path, frame: u32) -> PathBuf {
-    let name = pattern.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = pattern.file_name().and_then(OsStr::to_str).unwrap_or_default();
     let Some(end) = name.rfind('#') else { return pattern.to_owned() };
     let start = name[..end].trim_end_matches('#').len();
     let digits = end + 1 - start;

@@ -6,17 +6,20 @@ mod arguments;
 #[path = "../../examples/frame/camera_path.rs"]
 mod camera_path;
 #[path = "../../examples/frame/pipeline.rs"]
+#[expect(dead_code, reason = "the tests open no adapter")]
 mod pipeline;
 #[path = "../../examples/frame/sequence.rs"]
 mod sequence;
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use arguments::{Arguments, Frames};
 use camera_path::CameraPath;
+use drawloom::backend::WgpuBackend;
 use drawloom::demo::{self, UpAxis};
 use drawloom::glam::DVec3;
 use drawloom::scene::{Camera, Material, RenderObject, Scene};
@@ -38,15 +41,26 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
     Ok(scene)
 }
 
+/// The frames of a range, which go into a folder.
+fn sequence(folder: &Path, name: &str, more: &[&str]) -> Result<(Arguments, Sequence), Box<dyn Error>> {
+    let (path, out) = (folder.join("path.txt"), folder.join(name));
+    fs::write(&path, PATH)?;
+    let files = ["frame", "--path", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = Arguments::checked(files.iter().chain(more))?;
+    let Frames::Range(frames) = arguments.frames.clone() else { return Err("no range".into()) };
+    let sequence = Sequence::new(&arguments, frames)?;
+    Ok((arguments, sequence))
+}
+
 /// Draws a range of frames into a folder, as a process would.
 fn draw(folder: &Path, range: &str) -> Result<(), Box<dyn Error>> {
-    let (path, out) = (folder.join("path.txt"), folder.join("shot-###.png"));
-    fs::write(&path, PATH)?;
-    let files = ["--path", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
-    let arguments = ["frame", "--backend", "software", "--frames", range].into_iter().chain(files);
-    let arguments = Arguments::checked(arguments)?;
-    let Frames::Range(frames) = arguments.frames.clone() else { return Err("no range".into()) };
-    Sequence::new(&arguments, frames)?.draw(&arguments, scene()?)
+    let (arguments, sequence) = sequence(folder, "shot-###.png", &["--backend", "software", "--frames", range])?;
+    sequence.draw(&arguments, scene()?, no_adapter)
+}
+
+/// A machine without an adapter.
+fn no_adapter() -> Result<WgpuBackend, Box<dyn Error>> {
+    Err("no graphics adapter found".into())
 }
 
 /// The pictures in a folder, by name.
@@ -89,6 +103,55 @@ fn a_sequence_goes_on_where_it_was_interrupted() -> Result<(), Box<dyn Error>> {
     assert_eq!(after[2].1, b"kept");
     assert!([0, 1, 3].into_iter().all(|frame| after[frame] == before[frame]));
     Ok(())
+}
+
+#[test]
+fn without_an_adapter_only_an_explicit_backend_draws() -> Result<(), Box<dyn Error>> {
+    let folder = TempDir::new()?;
+    for more in [&["--frames", "0..2"][..], &["--frames", "0..2", "--backend", "wgpu"]] {
+        let (arguments, sequence) = sequence(folder.path(), "shot-###.png", more)?;
+        let error = sequence.draw(&arguments, scene()?, no_adapter).unwrap_err().to_string();
+        assert!(error.contains("no graphics adapter found; --backend software"), "{error}");
+        assert!(pictures(folder.path())?.is_empty());
+    }
+    draw(folder.path(), "0..2")?;
+    // Nothing is left that needs an adapter.
+    let (arguments, sequence) = sequence(folder.path(), "shot-###.png", &["--frames", "0..2"])?;
+    sequence.draw(&arguments, scene()?, no_adapter)
+}
+
+/// Names that are wrong for some frames only are found before any frame is drawn.
+#[test]
+fn each_numbered_file_is_checked_beforehand() -> Result<(), Box<dyn Error>> {
+    let folder = TempDir::new()?;
+    fs::create_dir(folder.path().join("shot-007.png"))?;
+    let error = sequence(folder.path(), "shot-###.png", &["--frames", "5..9"]).err().expect("a folder is no picture");
+    assert!(error.to_string().contains("shot-007.png cannot be written: it names a folder"), "{error}");
+    // Of 255 bytes, which is the most that file systems take, and of 256.
+    let name = format!("#{}.png", "a".repeat(250));
+    sequence(folder.path(), &name, &["--frames", "8..10"])?;
+    let error = sequence(folder.path(), &name, &["--frames", "8..11"]).err().expect("the name is too long");
+    assert!(error.to_string().contains("/10aaa"), "{error}");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_numbered_name_that_is_not_unicode_is_refused() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = TempDir::new().unwrap();
+    let parse = |name: &[u8]| {
+        let out = folder.path().join(OsStr::from_bytes(name)).into_os_string();
+        let arguments = ["frame", "--frames", "0..9", "--path", "path.txt", "--out"].map(OsString::from);
+        Arguments::checked(arguments.into_iter().chain([out]))
+    };
+    let error = parse(b"shot-\xe9-#.png").err().expect("it is not Unicode").to_string();
+    assert!(error.contains("must be Unicode"), "{error}");
+    fs::create_dir(folder.path().join(OsStr::from_bytes(b"\xe9"))).unwrap();
+    let out = parse(b"\xe9/#.png").unwrap_or_else(|error| panic!("the folder may be any: {error}")).out.unwrap();
+    assert_eq!(file_of(out.path(), 3), folder.path().join(OsStr::from_bytes(b"\xe9/3.png")));
 }
 
 #[test]
