@@ -1,13 +1,15 @@
 //! Delta coding of the commands of whole frames is lossless and compact.
 //!
-//! The case that needs a shared scene is ignored if that is missing, or fails with `DRAWLOOM_REQUIRE_SCENES=1`.
+//! The case that needs a shared scene is ignored if that is missing, or fails with `DRAWLOOM_REQUIRE_SCENES=1`. A generated hall stands in for it.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use drawloom::command::DeltaCommands;
 use drawloom::demo;
 use drawloom::scene::{Scene, obj};
 use drawloom_testing::draw_lists::draw_lists;
+use drawloom_testing::obj_files::hall;
 use drawloom_testing::shared_scenes;
 use libtest_mimic::{Arguments, Failed, Trial, run};
 
@@ -15,15 +17,23 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = vec![
         Trial::test("colonnade", || check(&demo::colonnade()?)),
+        Trial::test("hall_twenty_times", || {
+            let folder = tempfile::tempdir()?;
+            check_twenty_times(&hall().write_to(folder.path())?)
+        }),
         Trial::test("shared::sponza_twenty_times", || {
-            let mut scene = obj::load(shared_scenes::folder().join("sponza/sponza_part.obj"))?.scene;
-            demo::add_camera_and_lights(&mut scene);
-            scene.duplicate_objects(20);
-            check(&scene)
+            check_twenty_times(&shared_scenes::folder().join("sponza/sponza_part.obj"))
         })
         .with_ignored_flag(shared_scenes::are_optional_and_missing()),
     ];
     run(&arguments, trials).exit_code()
+}
+
+fn check_twenty_times(file: &Path) -> Result<(), Failed> {
+    let mut scene = obj::load(file)?.scene;
+    demo::add_camera_and_lights(&mut scene);
+    scene.duplicate_objects(20);
+    check(&scene)
 }
 
 /// The largest allowed average size of a command, in bytes: half of its uncompressed size.

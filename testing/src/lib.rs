@@ -13,6 +13,7 @@ mod forwarded_calls;
 pub mod graph_oracle;
 pub mod hills;
 pub mod mip_levels;
+pub mod obj_files;
 pub mod precision;
 pub mod random;
 pub mod samples;

@@ -1,4 +1,4 @@
-//! The OBJ loader: the shared scenes, minimal files for one feature each, and fuzzing.
+//! The OBJ loader: generated and shared scenes, minimal files for one feature each, and fuzzing.
 //!
 //! Cases that need the shared scenes are ignored if those are missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`.
 
@@ -6,6 +6,7 @@ mod damaged;
 mod files;
 mod folder;
 mod fuzz;
+mod generated;
 mod geometry;
 mod materials;
 mod mutants;
@@ -18,6 +19,7 @@ use libtest_mimic::{Arguments, Failed, Trial, run};
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = [
+        generated::trials(),
         shared::trials(),
         geometry::trials(),
         materials::trials(),

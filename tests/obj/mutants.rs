@@ -7,6 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use drawloom::scene::obj::{self, ObjError};
+use drawloom_testing::obj_files::UNUSUAL;
 use drawloom_testing::shared_scenes;
 use libtest_mimic::Trial;
 
@@ -23,6 +24,7 @@ const KEEP: &str = "DRAWLOOM_KEEP_MUTANTS";
 pub fn trials() -> Vec<Trial> {
     vec![
         trial("mutants::of_an_own_file", of_an_own_file),
+        trial("mutants::of_unusual_files", of_unusual_files),
         trial("mutants::of_malformed_files", of_malformed_files)
             .with_ignored_flag(shared_scenes::are_optional_and_missing()),
     ]
@@ -31,6 +33,12 @@ pub fn trials() -> Vec<Trial> {
 fn of_an_own_file() {
     let folder = Folder::new().with("a.obj", fuzz::FILE).with("a.mtl", fuzz::LIBRARY);
     check_mutants(&folder.0, &[folder.0.join("a.obj"), folder.0.join("a.mtl")], &folder.0);
+}
+
+fn of_unusual_files() {
+    let folder = UNUSUAL.iter().fold(Folder::new(), |folder, (name, text)| folder.with(&format!("{name}.obj"), text));
+    let seeds = UNUSUAL.map(|(name, _)| folder.0.join(format!("{name}.obj")));
+    check_mutants(&folder.0, &seeds, &folder.0);
 }
 
 fn of_malformed_files() {

@@ -2,16 +2,19 @@
 
 use drawloom::Granularity;
 use drawloom::scene::{Blend, Material, Scene};
+use drawloom_testing::obj_files::{hall, interior};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::Fixture;
-use crate::references::{colonnade, cornell, sponza};
+use crate::references::{colonnade, cornell, generated, small, sponza};
 
 pub const CASES: &[Case] = &[
     ("same_bytes_of_the_projects_own_scene", || same_for_all(&colonnade()?)),
     ("same_bytes_of_a_field_of_boxes", || same_for_all(&field(1500))),
+    ("same_bytes_of_an_interior", || same_for_all(&small(generated(&interior())?))),
+    ("same_bytes_of_a_hall", || same_for_all(&small(generated(&hall())?))),
     ("same_bytes_of_coincident_copies", || {
         let mut scene = opaque(colonnade()?)?;
         let once = Fixture::new()?.draw(&scene)?;

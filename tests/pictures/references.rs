@@ -1,11 +1,12 @@
 //! Pictures are compared with stored references. Typical mistakes exceed the bound of the comparison.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use drawloom::backend::Picture;
 use drawloom::demo;
 use drawloom::glam::Vec3;
 use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
+use drawloom_testing::obj_files::{ObjFile, UNUSUAL, hall, interior};
 use drawloom_testing::scenes::field;
 use drawloom_testing::shared_scenes;
 use libtest_mimic::Failed;
@@ -17,6 +18,9 @@ use crate::image_distance::{Distance, as_image, assert_different};
 pub const CASES: &[Case] = &[
     ("reference_of_the_projects_own_scene", || compare("colonnade", &colonnade()?)),
     ("reference_of_a_field_of_boxes", || compare("field", &field(400))),
+    ("reference_of_an_interior", || compare("interior", &small(generated(&interior())?))),
+    ("reference_of_a_hall", || compare("hall", &small(generated(&hall())?))),
+    ("every_unusual_file_that_loads_can_be_drawn", unusual_files),
     ("a_wrong_light_exceeds_the_bound", a_wrong_light_exceeds_the_bound),
     ("a_missing_object_exceeds_the_bound", a_missing_object_exceeds_the_bound),
     ("flipped_normals_exceed_the_bound", flipped_normals_exceed_the_bound),
@@ -40,14 +44,25 @@ pub fn sponza() -> Result<Scene, Failed> {
     Ok(small(shared("sponza/sponza_part.obj")?))
 }
 
+/// A generated scene with a camera and lights.
+pub fn generated(file: &ObjFile) -> Result<Scene, Failed> {
+    let folder = tempfile::tempdir()?;
+    load(&file.write_to(folder.path())?)
+}
+
 /// A shared scene with a camera and lights.
 pub fn shared(path: &str) -> Result<Scene, Failed> {
-    let mut scene = obj::load(shared_scenes::folder().join(path))?.scene;
+    load(&shared_scenes::folder().join(path))
+}
+
+fn load(path: &Path) -> Result<Scene, Failed> {
+    let mut scene = obj::load(path)?.scene;
     demo::add_camera_and_lights(&mut scene);
     Ok(scene)
 }
 
-fn small(mut scene: Scene) -> Scene {
+/// The scene with pictures of 320 × 180.
+pub fn small(mut scene: Scene) -> Scene {
     for camera in &mut scene.cameras {
         camera.size = [320, 180];
     }
@@ -131,22 +146,35 @@ fn flipped_normals_exceed_the_bound() -> Result<(), Failed> {
     assert_different(&draw(&scene)?, &right)
 }
 
+fn unusual_files() -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let mut drawn = 0;
+    for (name, text) in UNUSUAL {
+        let path = folder.path().join(format!("{name}.obj"));
+        std::fs::write(&path, text)?;
+        drawn += u32::from(draws_if_it_loads(&path)?);
+    }
+    if drawn < 10 { Err(format!("only {drawn} files loaded").into()) } else { Ok(()) }
+}
+
 fn malformed_files() -> Result<(), Failed> {
     let mut drawn = 0;
     for folder in ["tobj", "trimesh"] {
         for entry in std::fs::read_dir(shared_scenes::folder().join("malformed").join(folder))? {
             let path = entry?.path();
             let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-            let Some(mut imported) = is_obj.then(|| obj::load(&path).ok()).flatten() else { continue };
-            demo::add_camera_and_lights(&mut imported.scene);
-            let picture = draw(&small(imported.scene))?;
-            let first = &picture.bytes[..4];
-            let plain = picture.bytes.chunks_exact(4).all(|pixel| pixel == first);
-            if plain {
-                return Err(format!("{} gives an empty picture", path.display()).into());
-            }
-            drawn += 1;
+            drawn += u32::from(is_obj && draws_if_it_loads(&path)?);
         }
     }
     if drawn < 10 { Err(format!("only {drawn} files loaded").into()) } else { Ok(()) }
+}
+
+/// Whether a file loads. If it does, something of it is seen.
+fn draws_if_it_loads(path: &Path) -> Result<bool, Failed> {
+    let Ok(mut imported) = obj::load(path) else { return Ok(false) };
+    demo::add_camera_and_lights(&mut imported.scene);
+    let picture = draw(&small(imported.scene))?;
+    let first = &picture.bytes[..4];
+    let is_plain = picture.bytes.chunks_exact(4).all(|pixel| pixel == first);
+    if is_plain { Err(format!("{} gives an empty picture", path.display()).into()) } else { Ok(true) }
 }

@@ -10,12 +10,13 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
+use drawloom_testing::obj_files::{hall, interior};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::references::shared;
+use crate::references::{generated, shared};
 use crate::shadows::fixture_with;
 
 pub const CASES: &[Case] = &[
@@ -23,6 +24,8 @@ pub const CASES: &[Case] = &[
     ("software_draws_everything_as_wgpu_does", || compare(everything())),
     ("software_draws_cascades_as_wgpu_does", cascades),
     ("software_draws_a_field_of_boxes_as_wgpu_does", || compare(field(400))),
+    ("software_draws_an_interior_as_wgpu_does", || compare(generated(&interior())?)),
+    ("software_draws_a_hall_as_wgpu_does", || compare(generated(&hall())?)),
 ];
 
 pub const CASES_OF_SHARED_SCENES: &[Case] = &[
