@@ -1,4 +1,4 @@
-//! The synchronisation primitives, which a build flag replaces by those of a model checker.
+//! The synchronisation primitives, which the package `interleavings` replaces by those of a model checker.
 //!
 //! The modules `task`, `graph` and `timeline` take their atomics, locks, threads and deques from here. By default these are the
 //! standard library's, parking_lot's and crossbeam-deque's. With `--cfg drawloom_loom` they are those of loom, a model checker that

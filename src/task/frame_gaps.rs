@@ -170,6 +170,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "long, and calls no unsafe code")]
     fn it_settles_and_recovers_and_an_outlier_counts_briefly() {
         let bounds = ControllerBounds { settles_within: [1, 10, 10], max_wrong: 30, max_changes: 60 };
         check_controller(

@@ -210,10 +210,11 @@ mod tests {
     fn timestamps_of_one_thread_ascend() {
         let clock = Clock::of_this_machine();
         let reader = clock.reader();
-        let timestamps: Vec<_> = (0..10_000).map(|_| (reader.read_ordered(), reader.read_ordered())).collect();
+        let count = if cfg!(miri) { 100 } else { 10_000 };
+        let timestamps: Vec<_> = (0..count).map(|_| (reader.read_ordered(), reader.read_ordered())).collect();
         assert!(timestamps.iter().all(|(before, after)| before <= after));
         assert!(timestamps.is_sorted());
-        assert!(clock.time(timestamps[0].0) < clock.time(timestamps[9_999].1));
+        assert!(clock.time(timestamps[0].0) < clock.time(timestamps[count - 1].1));
     }
 
     #[test]
