@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use drawloom::glam::DVec3;
+use drawloom_output::{OutputError, OutputFile};
 
 /// A file and its material library.
 pub struct ObjFile {
@@ -20,10 +20,10 @@ impl ObjFile {
     ///
     /// # Errors
     /// They cannot be written.
-    pub fn write_to(&self, folder: &Path) -> io::Result<PathBuf> {
+    pub fn write_to(&self, folder: &Path) -> Result<PathBuf, OutputError> {
         let path = folder.join("generated.obj");
-        fs::write(folder.join("generated.mtl"), &self.library)?;
-        fs::write(&path, &self.text)?;
+        OutputFile::new(folder.join("generated.mtl"))?.write_all(&self.library)?;
+        OutputFile::new(&path)?.write_all(&self.text)?;
         Ok(path)
     }
 }

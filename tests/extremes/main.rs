@@ -21,6 +21,7 @@ mod markers;
 mod special;
 mod harness;
 
+use drawloom_testing::slow_cases;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 use harness::{BackendName, Harness};
@@ -46,8 +47,10 @@ fn main() {
                 timeout::with_timeout(move || case(&mut Harness::new(backend)?))
             };
             let trial = Trial::test(format!("{}::{name}", backend.name()), case);
+            let is_too_slow = name == qualities::SLOW_CASE && !slow_cases::are_enabled();
             let on_cpu = matches!(backend, BackendName::Software | BackendName::Reference);
-            trials.push(trial.with_ignored_flag((lacks_adapter && !required) || (on_cpu && !cpu_enabled)));
+            trials
+                .push(trial.with_ignored_flag((lacks_adapter && !required) || (on_cpu && !cpu_enabled) || is_too_slow));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();

@@ -18,6 +18,7 @@ use crate::worlds::Worlds;
 
 pub const CASES: &[Case] = &[
     ("every_call_of_a_frame_of_the_null_backend_fails_once", null),
+    ("every_call_of_a_frame_of_the_software_backend_fails_once", software),
     ("every_call_of_a_simple_frame_of_the_software_backend_fails_once", simple_software),
     (
         "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
@@ -26,8 +27,6 @@ pub const CASES: &[Case] = &[
     ("slow_calls_change_no_picture", slow_calls),
     ("pipelines_whose_preparation_failed_are_made_by_the_next_frame", preparation),
 ];
-
-pub const SLOW_CASES: &[Case] = &[("every_call_of_a_frame_of_the_software_backend_fails_once", software)];
 
 #[cfg(feature = "wgpu")]
 pub const CASES_OF_ADAPTERS: &[Case] = &[

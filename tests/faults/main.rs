@@ -19,6 +19,13 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
 
+/// Cases that take more than ten seconds without optimisation.
+const SLOW_CASES: [&str; 3] = [
+    "a_device_of_noop_that_is_lost_in_any_call_is_told",
+    "every_call_of_a_frame_of_the_software_backend_fails_once",
+    "every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once",
+];
+
 fn main() {
     let arguments = Arguments::from_args();
     hide_injected_panics();
@@ -36,14 +43,14 @@ fn main() {
     #[cfg(not(feature = "wgpu"))]
     let (more, of_adapters): (&[Case], Vec<Case>) = Default::default();
     let cases = [calls::CASES, histories::CASES, replaced::CASES, more].concat().into_iter();
-    let slow = calls::SLOW_CASES
-        .iter()
-        .map(|&(name, case)| Trial::test(name, case).with_ignored_flag(!slow_cases::are_enabled()));
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
-    let is_ignored = !has_adapter() && !required;
-    let with_adapter = |(name, case): Case| Trial::test(name, case).with_ignored_flag(is_ignored);
-    let trials =
-        cases.map(|(name, case)| Trial::test(name, case)).chain(of_adapters.into_iter().map(with_adapter)).chain(slow);
+    let lacks_adapter = !has_adapter() && !required;
+    let trial = |lacks_adapter: bool, (name, case): Case| {
+        let is_too_slow = SLOW_CASES.contains(&name) && !slow_cases::are_enabled();
+        Trial::test(name, case).with_ignored_flag(lacks_adapter || is_too_slow)
+    };
+    let on_adapter = of_adapters.into_iter().map(|case| trial(lacks_adapter, case));
+    let trials = cases.map(|case| trial(false, case)).chain(on_adapter);
     libtest_mimic::run(&arguments, trials.collect()).exit();
 }
 

@@ -1,11 +1,10 @@
-//! The OBJ loader: generated and shared scenes, minimal files for one feature each, and fuzzing.
+//! The OBJ loader: generated and shared scenes, minimal files for one feature each, and mutants.
 //!
 //! Cases that need the shared scenes are ignored if those are missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`.
 
 mod damaged;
 mod files;
 mod folder;
-mod fuzz;
 mod generated;
 mod geometry;
 mod materials;
@@ -26,7 +25,6 @@ fn main() -> ExitCode {
         files::trials(),
         damaged::trials(),
         mutants::trials(),
-        fuzz::trials(),
     ];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }

@@ -6,18 +6,21 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
+use drawloom::demo;
 use drawloom::scene::obj::{self, ObjError};
 use drawloom_testing::obj_files::UNUSUAL;
 use drawloom_testing::shared_scenes;
 use libtest_mimic::Trial;
 
 use crate::folder::Folder;
-use crate::fuzz;
 use crate::trial;
 
 /// A test that has not ended by then hangs.
 const DEADLINE: Duration = Duration::from_secs(60);
 const MUTANTS: usize = 300;
+const FILE: &str = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1\nv 1 1 0 1 0 0\nv 0 1 0.5\nv 2 2 -1e3\nvt 0 0\nvt 1 0.5\n\
+    vn 0 0 1\nusemtl red\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng two\nusemtl glow\nf -5//-1 -4//1 -3//1 \\\n -2 5/1\nl 1 2\np 3\n";
+const LIBRARY: &str = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 a.png\nnewmtl glow\nKe 1 1 1\nTr 0\n";
 /// A folder where the mutants of the malformed files are kept, for other programs to read.
 const KEEP: &str = "DRAWLOOM_KEEP_MUTANTS";
 
@@ -31,7 +34,7 @@ pub fn trials() -> Vec<Trial> {
 }
 
 fn of_an_own_file() {
-    let folder = Folder::new().with("a.obj", fuzz::FILE).with("a.mtl", fuzz::LIBRARY);
+    let folder = Folder::new().with("a.obj", FILE).with("a.mtl", LIBRARY);
     check_mutants(&folder.0, &[folder.0.join("a.obj"), folder.0.join("a.mtl")], &folder.0);
 }
 
@@ -105,7 +108,9 @@ fn check(scene: &Path, folder: &Path) {
     });
     let loaded = receiver.recv_timeout(DEADLINE).unwrap_or_else(|_| panic!("{} hangs or panics", scene.display()));
     match loaded {
-        Ok(imported) => {
+        Ok(mut imported) => {
+            demo::add_camera_and_lights(&mut imported.scene);
+            assert_eq!(imported.scene.cameras.len(), 1);
             let (found, expected) =
                 (imported.triangles + imported.degenerate_triangles, triangles(&fs::read(scene).unwrap()));
             let is_said = !imported.warnings.is_empty();

@@ -28,7 +28,7 @@ pub struct LoadedPage {
 }
 
 /// The maximum number of attempts to load a page until it is ready.
-const ATTEMPTS: usize = 4;
+const ATTEMPTS: u32 = 6;
 
 impl Browser {
     /// The browser in `PATH`.
@@ -50,7 +50,7 @@ impl Browser {
     }
 
     /// The browser runs on virtual time, which advances while nothing happens. On a busy machine its budget may be spent before
-    /// the compositor has drawn anything, so a page that is not ready is loaded again.
+    /// the compositor has drawn anything, so a page that is not ready is loaded again, with twice the budget.
     fn load_until(
         &self,
         name: &str,
@@ -59,8 +59,8 @@ impl Browser {
         is_ready: impl Fn(&LoadedPage) -> bool,
     ) -> Result<LoadedPage, Failed> {
         let mut body = String::new();
-        for _ in 0..ATTEMPTS {
-            let page = self.load(name, log, script)?;
+        for attempt in 0..ATTEMPTS {
+            let page = self.load(name, log, script, Duration::from_secs(5) * 2_u32.pow(attempt))?;
             if is_ready(&page) {
                 return Ok(page);
             }
@@ -69,7 +69,7 @@ impl Browser {
         Err(format!("{name} did not become ready: {body}").into())
     }
 
-    fn load(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
+    fn load(&self, name: &str, log: &Log, script: &str, virtual_time: Duration) -> Result<LoadedPage, Failed> {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("page_{name}"));
         fs::create_dir_all(&folder)?;
         let [page, dom, console] = ["page.html", "dom.html", "console"].map(|file| folder.join(file));
@@ -81,7 +81,8 @@ impl Browser {
 
         let mut child = Command::new(&self.program)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--enable-logging=stderr", "--v=0"])
-            .args(["--virtual-time-budget=5000", "--window-size=1280,800", "--dump-dom"])
+            .args(["--window-size=1280,800", "--dump-dom"])
+            .arg(format!("--virtual-time-budget={}", virtual_time.as_millis()))
             .arg(format!("--user-data-dir={}", folder.join("profile").display()))
             .arg(format!("file://{}", page.display()))
             .stdin(Stdio::null())

@@ -36,7 +36,7 @@ use drawloom::process::{Deferred, ToneMapping};
 use drawloom::scene::{Camera, LayerMask, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder, Submitter};
-use drawloom_testing::adapter;
+use drawloom_testing::{adapter, slow_cases};
 use image::RgbImage;
 use libtest_mimic::{Arguments, Failed, Trial};
 
@@ -46,9 +46,12 @@ use crate::smoke::{Smoke, UpsampledSmoke};
 
 type Case = fn() -> Result<(), Failed>;
 
+/// It takes twenty seconds without optimisation.
+const SLOW_CASE: &str = "an_impostor_looks_like_what_it_stands_for";
+
 const CASES_ON_ADAPTER: [(&str, Case); 4] = [
     ("the_contact_sheet_is_the_one_that_is_shown", contact_sheet),
-    ("an_impostor_looks_like_what_it_stands_for", impostor),
+    (SLOW_CASE, impostor),
     ("an_impostor_is_drawn_again_when_it_has_turned", impostor_turns),
     ("smoke_with_a_quarter_of_the_pixels_looks_like_smoke_with_all", smoke),
 ];
@@ -59,7 +62,11 @@ fn main() {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
     let ignores_adapter = !has_adapter && !is_set("DRAWLOOM_REQUIRE_ADAPTER");
     let ignores_software = cfg!(debug_assertions) && !is_set("DRAWLOOM_DRAW_ON_PROCESSOR");
-    let trial = |(name, case)| Trial::test(name, case).with_ignored_flag(ignores_adapter);
+    let ignores_slow = !slow_cases::are_enabled();
+    let trial = |(name, case)| {
+        let is_ignored = ignores_adapter || (name == SLOW_CASE && ignores_slow);
+        Trial::test(name, case).with_ignored_flag(is_ignored)
+    };
     let mut trials = Vec::from(CASES_ON_ADAPTER.map(trial));
     let software = Trial::test("in_software_the_contact_sheet_is_the_same", contact_sheet_in_software);
     trials.push(software.with_ignored_flag(ignores_software));
