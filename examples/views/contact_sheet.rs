@@ -20,8 +20,11 @@ const LABEL: u32 = 22;
 const COLUMNS: u32 = 3;
 const ROWS: u32 = 5;
 
+/// The height of a cell: its content, and its label.
+pub const CELL_HEIGHT: u32 = gallery::SIZE[1] + LABEL;
+
 /// The pixels of the sheet.
-pub const SIZE: [u32; 2] = [COLUMNS * gallery::SIZE[0], ROWS * (gallery::SIZE[1] + LABEL)];
+pub const SIZE: [u32; 2] = [COLUMNS * gallery::SIZE[0], ROWS * CELL_HEIGHT];
 
 /// What is in a cell of the sheet.
 #[derive(Clone, Copy, PartialEq)]
@@ -295,7 +298,7 @@ fn color_of(column: i32, at: vec2<i32>) -> vec3<f32> {{
 pub fn draw_labels(sheet: &mut Picture) {
     for (cell, (_, label)) in (0..).zip(CELLS) {
         let left = cell % COLUMNS * gallery::SIZE[0] + 6;
-        let top = cell / COLUMNS * (gallery::SIZE[1] + LABEL) + 7;
+        let top = cell / COLUMNS * CELL_HEIGHT + 7;
         for (letter, character) in (0..).zip(label.chars()) {
             let rows = font8x8::BASIC_FONTS.get(character).unwrap_or_default();
             for (y, row) in (0..).zip(rows) {
