@@ -21,6 +21,10 @@ pub struct ShadowMaps {
     /// The distance from the main cameras, in metres, up to which a directional light's maps cover their views; at most
     /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. The maps are for all main cameras: the
     /// farther these are apart, the coarser they are.
+    ///
+    /// Towards the light, a map reaches sixteen times the radius of the sphere around what it covers. An object beyond that casts its shadow
+    /// all the same, but one with a triangle that reaches from within to beyond it, such as a side of a box a hundred times as large as the
+    /// sphere, casts a wrong one: depth is clamped at the triangle's corners.
     pub max_distance: f32,
     /// The number of maps of a directional light, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers a slice of what
     /// main cameras see, between two distances, and a point is looked up in the finest map that contains it. A shadow's

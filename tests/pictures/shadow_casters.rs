@@ -8,6 +8,7 @@ use drawloom_testing::scenes::{cube, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::radiance;
 use crate::rays::{Panel, PanelScene};
 use crate::shadows::{MAPS, camera, fixture_with, hemisphere, lamp, spot, sun, with_context};
 
@@ -18,6 +19,7 @@ pub const CASES: &[Case] = &[
     ("blended_objects_are_darker_in_shadow", blended_receives),
     ("objects_outside_of_the_layers_of_maps_cast_no_shadow", layers),
     ("extreme_scales_do_not_corrupt_a_shadow_map", extreme_scales),
+    ("casters_that_are_larger_than_a_map_leave_finite_light_and_later_maps_right", larger_than_maps),
     ("a_shadow_map_holds_the_nearest_depth", depths),
 ];
 
@@ -219,7 +221,7 @@ fn extreme_scales() -> Result<(), Failed> {
         let is_sun = matches!(light, Light::Directional { .. });
         // The camera is inside of the large ones, and sees no side of them. Nor does a lamp. They hide the sun, which is outside.
         let large = if is_sun {
-            // Of still larger triangles a map has a wrong slope, as they cross its near plane.
+            // Of still larger triangles a map has a wrong slope, as they cross its near plane: `larger_than_maps` draws them.
             [Vec3::new(-1e2, 1e2, 1e2), Vec3::splat(1e3)]
         } else {
             [Vec3::new(-1e6, 1e3, 1e5), Vec3::splat(1e20)]
@@ -243,6 +245,29 @@ fn extreme_scales() -> Result<(), Failed> {
                 return Err(format!("too few pixels to compare: {counts:?}").into());
             }
         }
+    }
+    Ok(())
+}
+
+/// What lies in their shadow is documented to be wrong.
+fn larger_than_maps() -> Result<(), Failed> {
+    let mut fixture = fixture_with(MAPS)?;
+    let [sun, ..] = lights();
+    for scale in [Vec3::new(-1e6, 1e3, 1e5), Vec3::splat(1e20)] {
+        let mut floor_scene = FloorScene::new(sun)?;
+        let mesh = floor_scene.scene.add(cube())?;
+        floor_scene
+            .add(mesh, white(), |object| (object.scale, object.position) = (scale, DVec3::new(-0.4, 3.0, 0.9)))?;
+        let recorded = fixture.record(&floor_scene.scene)?;
+        let submission = fixture.submit(recorded)?;
+        for view in 0..floor_scene.scene.cameras.len() {
+            let light = radiance(&submission, view)?;
+            if !light.iter().flatten().all(|channel| channel.is_finite()) {
+                return Err(format!("a box of {scale}: light that is not finite").into());
+            }
+        }
+        let floor_scene = FloorScene::new(sun)?;
+        floor_scene.with(vec![]).expect_of(&mut fixture, &floor_scene.scene)?;
     }
     Ok(())
 }
