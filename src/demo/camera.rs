@@ -12,8 +12,8 @@ use crate::scene::{Camera, Projection, SceneRef};
 /// Rays classify the scene. If its triangles face points inside and not points outside, it is an interior: the camera stands
 /// in it at eye height, looking along the longest free line of sight, or looks in through a missing wall. Otherwise it is an
 /// object, shown from outside and above, from the side that shows most of its surface and of its detail; of sides that show about as much, from
-/// its front (+Z). The scene is upright along +Y. The near plane is at a thousandth of the scene's radius. What is a thousand times as far away
-/// as the rest is large does not count.
+/// its front (+Z). The scene is upright along +Y. The near plane is at a thousandth of the scene's radius. Outliers, which are farther away than a
+/// thousand times the size of the rest, are ignored.
 ///
 /// If nothing in the scene can be drawn, or its slices differ in length, the camera looks at the world's origin.
 ///

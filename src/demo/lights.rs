@@ -32,7 +32,7 @@ pub fn add_camera_and_lights_upright(scene: &mut Scene, up: UpAxis) {
 }
 
 /// A warm key light from the camera's upper left, a cool fill light from its right, and a point light above it. The
-/// intensity and range of the point light follow from the scene's size, of which the same counts as for [`camera`](super::camera()).
+/// intensity and range of the point light follow from the scene's size, without the outliers that [`camera`](super::camera()) ignores.
 pub fn lights(scene: SceneRef<'_>, camera: &Camera) -> [Light; 3] {
     lights_of(Bvh::new(scene, UpAxis::Y).as_ref(), camera)
 }
