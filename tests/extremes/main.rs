@@ -47,7 +47,7 @@ fn main() {
                 timeout::with_timeout(move || case(&mut Harness::new(backend)?))
             };
             let trial = Trial::test(format!("{}::{name}", backend.name()), case);
-            let is_too_slow = name == qualities::SLOW_CASE && !slow_cases::are_enabled();
+            let is_too_slow = slow_cases::leave_out(&[qualities::SLOW_CASE], name);
             let on_cpu = matches!(backend, BackendName::Software | BackendName::Reference);
             trials
                 .push(trial.with_ignored_flag((lacks_adapter && !required) || (on_cpu && !cpu_enabled) || is_too_slow));

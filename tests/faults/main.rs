@@ -46,8 +46,8 @@ fn main() {
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let lacks_adapter = !has_adapter() && !required;
     let trial = |lacks_adapter: bool, (name, case): Case| {
-        let is_too_slow = SLOW_CASES.contains(&name) && !slow_cases::are_enabled();
-        Trial::test(name, case).with_ignored_flag(lacks_adapter || is_too_slow)
+        let is_ignored = lacks_adapter || slow_cases::leave_out(&SLOW_CASES, name);
+        Trial::test(name, case).with_ignored_flag(is_ignored)
     };
     let on_adapter = of_adapters.into_iter().map(|case| trial(lacks_adapter, case));
     let trials = cases.map(|case| trial(false, case)).chain(on_adapter);

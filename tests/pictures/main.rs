@@ -168,7 +168,7 @@ fn main() {
         let lacks_adapter = needs != Needs::Nothing && no_adapter;
         for &(name, case) in cases {
             let case = move || if lacks_adapter { Err("there is no graphics adapter".into()) } else { case() };
-            let is_too_slow = slow_cases::contain(name) && !drawloom_testing::slow_cases::are_enabled();
+            let is_too_slow = drawloom_testing::slow_cases::leave_out(slow_cases::NAMES, name);
             let is_ignored = is_left_out || is_too_slow || (lacks_adapter && !required);
             trials.push(Trial::test(name, case).with_ignored_flag(is_ignored));
         }

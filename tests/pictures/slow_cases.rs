@@ -3,7 +3,7 @@
 
 use libtest_mimic::Trial;
 
-const NAMES: &[&str] = &[
+pub const NAMES: &[&str] = &[
     "a_ball_does_not_shadow_its_lit_side",
     "a_broken_shader_keeps_the_one_before_it_if_asked_to",
     "a_class_without_lights_costs_nothing",
@@ -103,11 +103,6 @@ const NAMES: &[&str] = &[
     "triangle_culling_changes_no_byte_with_any_strategy",
     "views_that_share_textures_have_the_same_pictures",
 ];
-
-/// Whether a case is one of them.
-pub fn contain(name: &str) -> bool {
-    NAMES.contains(&name)
-}
 
 /// # Panics
 /// One of them is no case.

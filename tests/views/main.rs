@@ -62,9 +62,8 @@ fn main() {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
     let ignores_adapter = !has_adapter && !is_set("DRAWLOOM_REQUIRE_ADAPTER");
     let ignores_software = cfg!(debug_assertions) && !is_set("DRAWLOOM_DRAW_ON_PROCESSOR");
-    let ignores_slow = !slow_cases::are_enabled();
     let trial = |(name, case)| {
-        let is_ignored = ignores_adapter || (name == SLOW_CASE && ignores_slow);
+        let is_ignored = ignores_adapter || slow_cases::leave_out(&[SLOW_CASE], name);
         Trial::test(name, case).with_ignored_flag(is_ignored)
     };
     let mut trials = Vec::from(CASES_ON_ADAPTER.map(trial));
