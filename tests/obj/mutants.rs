@@ -27,7 +27,7 @@ const LIBRARY: &str = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 a.png\nnewmt
 /// A picture that ends too early.
 const PICTURE: [u8; 7] = [0x89, b'P', b'N', b'G', 0, 0, 0];
 
-/// A folder where the mutants of the malformed files are kept, for other programs to read.
+/// A folder where malformed and unusual files are kept with their mutants, for other programs to read.
 const KEEP: &str = "DRAWLOOM_KEEP_MUTANTS";
 
 pub fn trials() -> Vec<Trial> {
@@ -41,18 +41,23 @@ pub fn trials() -> Vec<Trial> {
 
 fn of_an_own_file() {
     let folder = Folder::new().with("a.obj", FILE).with("a.mtl", LIBRARY).with("a.png", PICTURE);
-    check_mutants(&folder.0, &[folder.0.join("a.obj"), folder.0.join("a.mtl")], &folder.0);
+    check_mutants(&folder.0, &[folder.0.join("a.obj"), folder.0.join("a.mtl")]);
 }
 
 fn of_unusual_files() {
-    let folder = UNUSUAL.iter().fold(Folder::new(), |folder, (name, text)| folder.with(&format!("{name}.obj"), text));
-    let seeds = UNUSUAL.map(|(name, _)| folder.0.join(format!("{name}.obj")));
-    check_mutants(&folder.0, &seeds, &folder.0);
+    let folder = Folder::new();
+    let to = kept_folder("unusual").unwrap_or_else(|| folder.0.clone());
+    let seeds = UNUSUAL.map(|(name, text)| {
+        let path = to.join(format!("{name}.obj"));
+        fs::write(&path, text).unwrap();
+        path
+    });
+    check_mutants(&to, &seeds);
 }
 
 fn of_malformed_files() {
     let folder = Folder::new();
-    let to = std::env::var_os(KEEP).map_or(folder.0.clone(), PathBuf::from);
+    let to = kept_folder("malformed").unwrap_or_else(|| folder.0.clone());
     let mut seeds = Vec::new();
     for group in ["tobj", "trimesh"] {
         for entry in fs::read_dir(shared_scenes::folder().join("malformed").join(group)).unwrap() {
@@ -62,20 +67,28 @@ fn of_malformed_files() {
         }
     }
     seeds.sort();
-    check_mutants(&to, &seeds, &to);
+    check_mutants(&to, &seeds);
 }
 
-/// Writes mutants of the seeds, among the files that they name, and loads each. A mutant of a library is loaded by an OBJ file.
-fn check_mutants(folder: &Path, seeds: &[PathBuf], to: &Path) {
+/// A folder in [`KEEP`], if that is set.
+fn kept_folder(name: &str) -> Option<PathBuf> {
+    let folder = PathBuf::from(std::env::var_os(KEEP)?).join(name);
+    fs::create_dir_all(&folder).unwrap();
+    Some(folder)
+}
+
+/// Writes mutants of the seeds into the folder, which has the files that they name, and loads each. A mutant of a library is loaded by an OBJ
+/// file.
+fn check_mutants(folder: &Path, seeds: &[PathBuf]) {
     let mut random = fastrand::Rng::with_seed(22);
     let seeds: Vec<_> = seeds.iter().map(|path| (path, fs::read(path).unwrap())).collect();
     for number in 0..MUTANTS {
         let (path, seed) = &seeds[number % seeds.len()];
         let mutant = mutate(seed, &mut random);
         let is_library = path.extension().is_some_and(|extension| extension == "mtl");
-        let scene = to.join(format!("mutant-{number}.obj"));
+        let scene = folder.join(format!("mutant-{number}.obj"));
         if is_library {
-            fs::write(to.join(format!("mutant-{number}.mtl")), &mutant).unwrap();
+            fs::write(folder.join(format!("mutant-{number}.mtl")), &mutant).unwrap();
             fs::write(&scene, format!("mtllib mutant-{number}.mtl\n{}", crate::folder::TRIANGLE)).unwrap();
         } else {
             fs::write(&scene, &mutant).unwrap();
