@@ -72,7 +72,7 @@ struct Engine {
 }
 
 pub fn measure(quick: bool) -> Result<Vec<Row>, Box<dyn Error>> {
-    let size = if quick { [96, 54] } else { [640, 360] };
+    let size = if quick { [48, 27] } else { [640, 360] };
     let directions = if quick { 1 } else { 4 };
     let scene = scene()?;
     let mut rows = Vec::new();

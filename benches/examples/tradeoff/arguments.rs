@@ -36,7 +36,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// Small pictures and no rounds. Errors are measured; times are those of cold frames, and inaccurate.
+    /// Small pictures from one position of the path, and no rounds. Errors are measured, except that of maps that are drawn every few
+    /// frames; times are those of cold frames, and inaccurate.
     #[arg(long)]
     pub quick: bool,
 }
@@ -65,8 +66,10 @@ impl Arguments {
         arguments
     }
 
-    /// Positions of a path: a multiple of all shadow map intervals.
-    pub const PATH_POSITIONS: usize = 4;
+    /// Positions of a path that the program makes: a multiple of all shadow map intervals, unless the run is a quick one.
+    pub fn path_positions(&self) -> usize {
+        if self.quick { 1 } else { 4 }
+    }
 
     /// Width and height in pixels.
     pub fn size(&self) -> [u32; 2] {

@@ -16,8 +16,8 @@ pub fn of(scene: &Scene, arguments: &Arguments) -> Result<Vec<Camera>, Failure> 
     let first = scene.cameras.first().ok_or("the scene has no camera")?;
     let camera = Camera { size: arguments.size(), ..first.clone() };
     match arguments.camera_path.as_str() {
-        "sway" => Ok(sway(scene, &camera, Arguments::PATH_POSITIONS)),
-        "orbit" => Ok(orbit(scene, &camera, Arguments::PATH_POSITIONS)),
+        "sway" => Ok(sway(scene, &camera, arguments.path_positions())),
+        "orbit" => Ok(orbit(scene, &camera, arguments.path_positions())),
         file => {
             let text = std::fs::read_to_string(file).map_err(|error| format!("{file} could not be read: {error}"))?;
             let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
