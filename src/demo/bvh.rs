@@ -253,7 +253,7 @@ mod tests {
         let scene = colonnade().unwrap();
         let bvh = Bvh::new(scene.as_scene_ref(), UpAxis::Y).unwrap();
         let mut hits = 0;
-        for number in 0..200 {
+        for number in 0..60 {
             let turn = number as f32;
             let origin = Vec3::new((turn * 0.7).sin() * 0.5, (turn * 0.3).cos() * 0.1, (turn * 1.3).sin() * 0.5);
             let direction = Vec3::new((turn * 2.1).sin(), (turn * 0.9).sin(), (turn * 1.7).cos()).normalize();
@@ -262,7 +262,7 @@ mod tests {
             assert_eq!(bvh.cast(origin, direction).map(|hit| hit.distance), expected, "{number}");
             hits += usize::from(expected.is_some());
         }
-        assert!((50..200).contains(&hits), "{hits}");
+        assert!((15..60).contains(&hits), "{hits}");
     }
 
     /// `count` triangles that all reach through the whole scene.
