@@ -223,7 +223,7 @@ fn check_stages(nodes: &[Declared], log: &Log) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 80, ..ProptestConfig::default() })]
 
     #[test]
     fn nodes_run_in_the_order_that_their_declarations_imply(nodes in declared(), workers in 1..4_usize) {

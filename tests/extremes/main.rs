@@ -29,6 +29,14 @@ use harness::{BackendName, Harness};
 /// The name of a case, and a function that checks it on a backend.
 type Case = (&'static str, fn(&mut Harness) -> Result<(), Failed>);
 
+/// Cases that take four seconds and more without optimisation.
+const SLOW_CASES: [&str; 4] = [
+    "a_scene_looks_the_same_anywhere_up_to_four_million_kilometres",
+    "every_setting_at_its_limits_draws_every_scene",
+    "lights_in_a_surface_and_very_close_to_it",
+    "presets_draw_every_scene",
+];
+
 fn main() {
     let arguments = Arguments::from_args();
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
@@ -47,7 +55,7 @@ fn main() {
                 timeout::with_timeout(move || case(&mut Harness::new(backend)?))
             };
             let trial = Trial::test(format!("{}::{name}", backend.name()), case);
-            let is_too_slow = slow_cases::leave_out(&[qualities::SLOW_CASE], name);
+            let is_too_slow = slow_cases::leave_out(&SLOW_CASES, name);
             let on_cpu = matches!(backend, BackendName::Software | BackendName::Reference);
             trials
                 .push(trial.with_ignored_flag((lacks_adapter && !required) || (on_cpu && !cpu_enabled) || is_too_slow));

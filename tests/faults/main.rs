@@ -1,7 +1,7 @@
 //! Devices that fail: every call of a frame fails once, devices are lost, and others take their place.
 //!
 //! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then. Slow cases are ignored
-//! without `DRAWLOOM_SLOW_CASES=1`.
+//! without `DRAWLOOM_SLOW_CASES=1` or `only`.
 
 mod calls;
 mod fixture;
@@ -19,11 +19,13 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
 
-/// Cases that take more than ten seconds without optimisation.
-const SLOW_CASES: [&str; 3] = [
+/// Cases that take eight seconds and more without optimisation.
+const SLOW_CASES: [&str; 5] = [
     "a_device_of_noop_that_is_lost_in_any_call_is_told",
     "every_call_of_a_frame_of_the_software_backend_fails_once",
+    "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
     "every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once",
+    "frames_in_flight_are_lost_with_their_device_and_no_others",
 ];
 
 fn main() {

@@ -102,7 +102,7 @@ fn any_quality() -> impl Strategy<Value = Quality> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     /// Each view is there twice, without a filter and with one, and the filtered one shows those objects of the other that pass.
     #[test]

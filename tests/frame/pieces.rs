@@ -62,7 +62,7 @@ fn some_pieces(random: &mut Random, objects: usize, most: usize) -> Vec<Piece> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn pieces_draw_what_a_frame_without_them_draws_and_what_is_out_of_sight(

@@ -67,7 +67,7 @@ fn any_quality() -> impl Strategy<Value = Quality> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn reported_changes_make_the_frames_of_a_renderer_that_is_told_nothing(

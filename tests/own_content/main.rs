@@ -1,6 +1,7 @@
 //! The pictures of the example `own_content` are compared with stored references.
 //!
 //! Without an adapter the cases are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
+//! Slow ones are ignored without `DRAWLOOM_SLOW_CASES=1` or `only`.
 //! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
 
 #[path = "../../examples/own_content/bloom.rs"]
@@ -31,7 +32,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use drawloom::backend::Picture;
-use drawloom_testing::adapter;
+use drawloom_testing::{adapter, slow_cases};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 use crate::engine::Engine;
@@ -52,13 +53,17 @@ const PICTURES: [(&str, Draw); 5] = [
     ("characters", |engine, _| engine.characters(SIZE)),
 ];
 
+/// Those that take several seconds without optimisation.
+const SLOW_PICTURES: [&str; 2] = ["smooth", "characters"];
+
 fn main() {
     let arguments = Arguments::from_args();
     let has_adapter = adapter::device().is_ok();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let trial = |(name, draw)| {
         let trial = Trial::test(format!("reference_of_{name}"), move || compare(name, draw));
-        trial.with_ignored_flag(!has_adapter && !required)
+        let is_too_slow = slow_cases::leave_out(&SLOW_PICTURES, name);
+        trial.with_ignored_flag((!has_adapter && !required) || is_too_slow)
     };
     libtest_mimic::run(&arguments, PICTURES.map(trial).into()).exit();
 }

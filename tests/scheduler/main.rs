@@ -343,7 +343,7 @@ fn a_dropped_scheduler_leaves_no_thread() {
     }
     // No other test has this many workers, so only this one starts threads of this name.
     let (workers, last) = (66, "drawloom-65");
-    for _scheduler in 0..200 {
+    for _scheduler in 0..60 {
         let scheduler = scheduler(workers);
         assert_eq!(scheduler.parallel_for(2, 1, |_range, _worker| {}), Ok(()));
     }

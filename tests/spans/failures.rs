@@ -18,7 +18,7 @@ use crate::recorder::{ChangeKind, Recorder, scheduler, subscriber};
 use crate::work::{Failure, Mode, RunContext, schedules};
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(10) })]
 
     #[test]
     fn spans_of_failed_nodes_are_exited_and_closed(mut schedule in schedules(), number in 0..12_usize, panics in any::<bool>()) {

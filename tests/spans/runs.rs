@@ -15,7 +15,7 @@ const CHUNK: Origin = Origin { target: "drawloom::graph", name: "chunk", level: 
 const TAKEN: Origin = Origin { target: "drawloom::graph", name: "taken", level: Level::TRACE };
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(12) })]
 
     #[test]
     fn each_node_and_each_chunk_has_a_span(mut schedule in schedules(), has_parent in any::<bool>()) {
