@@ -27,7 +27,7 @@ pub const ATLAS_FORMATS: [Format; 10] = [
     Format::R16Float,
 ];
 
-/// The sizes of the pictures, none larger than a [`SIDE`].
+/// The sizes of the pictures, none larger than the part of an atlas that a level has.
 pub const ATLAS_SIZES: [[u32; 2]; 10] =
     [[1, 1], [1, 9], [16, 1], [2, 2], [3, 5], [5, 3], [7, 4], [15, 16], [13, 11], [2, 15]];
 
