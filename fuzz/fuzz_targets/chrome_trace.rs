@@ -132,7 +132,9 @@ fn is_consistent(log: &Log) -> bool {
     let is_listed = |run: &Run| {
         let nodes = &run.graph.nodes;
         let mut chunks = run.chunks.iter().chain(&run.empty);
+        let items = run.chunks.iter().map(|chunk| chunk.items.len() as u128).sum::<u128>();
         chunks.all(|chunk| chunk.node < nodes.len() && chunk.worker < log.workers.len())
+            && items <= usize::MAX as u128
             && nodes.iter().enumerate().all(|(index, node)| node.dependencies.iter().all(|&other| other < index))
     };
     log.runs.iter().all(is_listed) && log.spans.iter().all(|span| span.thread < log.threads.len())

@@ -44,8 +44,9 @@ fuzz_target!(|input: Input| {
 
     let occlusion = Quality::OCCLUSION_TILE_SIZES[usize::from(input.occlusion) % Quality::OCCLUSION_TILE_SIZES.len()];
     let mut occluded = Drawer::with_quality(two, Quality { occlusion: Some(occlusion), ..quality });
+    let drawn = occluded.draw(scene);
     assert!(
-        occluded.draw(scene).as_ref().map(|frame| frame.pictures()) == pictures,
+        !world.has_true_bounds() || drawn.as_ref().map(|frame| frame.pictures()) == pictures,
         "occlusion by tiles of {occlusion}"
     );
 

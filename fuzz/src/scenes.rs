@@ -496,6 +496,15 @@ impl World {
         }
     }
 
+    /// Whether the bounds of every object contain its mesh. Culling may remove others although they are in sight.
+    pub fn has_true_bounds(&self) -> bool {
+        self.bounds.iter().zip(&self.object_meshes).all(|(bounds, mesh)| {
+            let corners = self.scene.assets().get(*mesh).map_or(&[][..], Mesh::vertices).iter();
+            let (center, radius) = (bounds.center.as_dvec3(), f64::from(bounds.radius));
+            corners.map(|vertex| Vec3::from(vertex.position).as_dvec3()).all(|corner| corner.distance(center) <= radius)
+        })
+    }
+
     /// Adds an object, and reports it only if one with its index was removed in the same frame.
     fn add_object(&mut self, object: &AnyObject) {
         let index = self.positions.len();

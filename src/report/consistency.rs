@@ -30,6 +30,10 @@ pub(super) fn check_run(run: &Run, name: impl Display, workers: usize) -> Result
             return Err(format!("{name} has a chunk of worker {} of {workers}", chunk.worker));
         }
     }
+    let items = run.chunks.iter().try_fold(0_usize, |sum, chunk| sum.checked_add(chunk.items.len()));
+    if items.is_none() {
+        return Err(format!("{name} has more items than a `usize` can count"));
+    }
     for (index, node) in run.graph.nodes.iter().enumerate() {
         match node.dependencies.iter().find(|&&other| other >= index) {
             Some(other) if *other < nodes => {

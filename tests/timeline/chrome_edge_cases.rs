@@ -237,6 +237,13 @@ fn a_log_with_invalid_indices_is_an_error() {
         (Run { chunks: vec![chunk(2, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 2 of 2"),
         (Run { empty: vec![chunk(5, 0, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of node 5 of 2"),
         (Run { chunks: vec![chunk(0, 2, 0, 0, 1)], ..fine.clone() }, "run 0 has a chunk of worker 2 of 2"),
+        (
+            Run {
+                chunks: [0, 1].map(|node| Chunk { items: 0..usize::MAX, ..chunk(node, 0, 0, 0, 1) }).into(),
+                ..fine.clone()
+            },
+            "run 0 has more items than a `usize` can count",
+        ),
         (run(vec![node("a", &[]), node("b", &[2])], 9, vec![]), "node 1 of run 0 waits for node 2 of 2"),
         (
             run(vec![node("a", &[1]), node("b", &[])], 9, vec![]),

@@ -263,6 +263,7 @@ fn an_inconsistent_log_is_an_error() {
     assert!(is_refused(|run| run.chunks[0].worker = 99));
     assert!(is_refused(|run| run.chunks[0].node = 77));
     assert!(is_refused(|run| run.empty[0].node = 77));
+    assert!(is_refused(|run| run.chunks.iter_mut().for_each(|chunk| chunk.items = 0..usize::MAX)));
     assert!(is_refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(3)));
     assert!(is_refused(|run| Arc::make_mut(&mut run.graph).nodes[0].dependencies.push(0)));
 }

@@ -105,7 +105,8 @@ impl MeasuredNode {
     fn cut_for(&self, workers: usize) -> Self {
         let Some(ChunkedByCost { width, nanoseconds_per_item }) = self.by_cost else { return self.clone() };
         let previous = (self.chunks.count() > 1).then(|| self.chunks.range(0).len());
-        let chunks = Chunks::new(width, job_size(nanoseconds_per_item, width, workers, previous));
+        let size = job_size(nanoseconds_per_item, width, workers, previous).max(width.div_ceil(MAX_CHUNKS));
+        let chunks = Chunks::new(width, size);
         let ends = (0..chunks.count()).map(|chunk| chunks.range(chunk).end);
         let sums = iter::once(0).chain(ends.map(|end| self.work_of_first(end))).collect();
         Self { group: self.group.clone(), chunks, sums, ..*self }
@@ -122,6 +123,10 @@ impl MeasuredNode {
         self.sums[whole] + (u128::from(work) * rest as u128 / length as u128) as u64
     }
 }
+
+/// No node is cut into more chunks: four seconds of work in the longest jobs. Without a bound, a log of a frame that took hours would be
+/// replayed for as long.
+const MAX_CHUNKS: usize = 1 << 16;
 
 /// Nodes of one kind have items of the same cost: see [`Node::chunked_by_cost`](crate::graph::Node::chunked_by_cost).
 type CostKind<'run> = [Option<&'run str>; 2];
@@ -188,6 +193,18 @@ mod tests {
         assert_eq!(cuts, [[1, 1], [17, 1], [17, 1], [33, 1], [67, 1], [143, 1], [167, 1]]);
         let on_sixteen = works(&run.cut_for(16).nodes[0]);
         assert!(on_sixteen[..66].iter().all(|&work| work == 15_000) && on_sixteen[66] == 10_000, "{on_sixteen:?}");
+    }
+
+    #[test]
+    fn a_node_that_took_hours_is_cut_into_a_bounded_number_of_chunks() {
+        let mut run = TestRun::new().add_by_cost("fill", 100, &[400]).run(&COSTS);
+        for items in [1 << 22, 1 << 40, usize::MAX] {
+            run.chunks[0].items = 0..items;
+            run.chunks[0].ended = run.chunks[0].started + Duration::from_secs(7_200);
+            let cut = MeasuredRun::new(&run, &COSTS).cut_for(64);
+            assert!((MAX_CHUNKS / 2..=MAX_CHUNKS).contains(&cut.nodes[0].chunks.count()), "{items} items");
+            assert_eq!(cut.work(), 3_600_000_000_000, "{items} items");
+        }
     }
 
     #[test]

@@ -22,8 +22,8 @@ use crate::timeline::{Log, Run};
 ///
 /// A renderer with [`Granularity::Adaptive`](crate::Granularity::Adaptive) cuts a frame by what its items cost and by the number
 /// of workers. Such [nodes](crate::timeline::NodeInfo::chunked_by_cost) are cut anew for the workers of the replay, by the rule
-/// of the renderer, as if its estimates were the costs of the recorded frame. The time of a recorded chunk is spread evenly
-/// over its items; what it costs whatever its size is not known apart. All other nodes keep their chunks. So do
+/// of the renderer, as if its estimates were the costs of the recorded frame, into 65,536 chunks at most. The time of a recorded chunk is
+/// spread evenly over its items; what it costs whatever its size is not known apart. All other nodes keep their chunks. So do
 /// the stages that sort, instance or bin the objects of a pass, which a renderer divides by rules of their own.
 ///
 /// Where several workers ran, chunks have waited for each other's locks and cache lines. So a record of one worker is best
