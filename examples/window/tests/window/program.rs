@@ -97,6 +97,8 @@ pub fn command(display: &Display, arguments: &[&str]) -> Command {
     command.args(arguments);
     command.env("DISPLAY", &display.name).env("WINIT_X11_SCALE_FACTOR", display.scale_factor);
     command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+    // So that messages are plain text, whichever features of `tracing-subscriber` other packages enable.
+    command.env("NO_COLOR", "1");
     command
 }
 
