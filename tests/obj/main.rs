@@ -1,12 +1,13 @@
 //! The OBJ loader: generated and shared scenes, minimal files for one feature each, and mutants.
 //!
-//! Cases that need the shared scenes are ignored if those are missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`.
+//! Large files are ignored without `DRAWLOOM_SLOW_CASES=1` or `only`. Cases that need the shared scenes are ignored if those are missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`.
 
 mod damaged;
 mod files;
 mod folder;
 mod generated;
 mod geometry;
+mod large;
 mod materials;
 mod mutants;
 mod shared;
@@ -21,6 +22,7 @@ fn main() -> ExitCode {
         generated::trials(),
         shared::trials(),
         geometry::trials(),
+        large::trials(),
         materials::trials(),
         files::trials(),
         damaged::trials(),
