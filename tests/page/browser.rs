@@ -49,8 +49,8 @@ impl Browser {
         self.load_until(name, log, script, |page| !page.value("outcome").is_empty())
     }
 
-    /// The browser runs on virtual time, which advances while nothing happens. On a busy machine its budget may be spent before
-    /// the compositor has drawn anything, so a page that is not ready is loaded again, with twice the budget.
+    /// The browser runs on virtual time, which advances while nothing happens: its budget may be spent before the compositor has drawn
+    /// anything. So the browser is told to finish each drawing first, and a page that is not ready is loaded again, with twice the budget.
     fn load_until(
         &self,
         name: &str,
@@ -81,7 +81,7 @@ impl Browser {
 
         let mut child = Command::new(&self.program)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--enable-logging=stderr", "--v=0"])
-            .args(["--window-size=1280,800", "--dump-dom"])
+            .args(["--window-size=1280,800", "--run-all-compositor-stages-before-draw", "--dump-dom"])
             .arg(format!("--virtual-time-budget={}", virtual_time.as_millis()))
             .arg(format!("--user-data-dir={}", folder.join("profile").display()))
             .arg(format!("file://{}", page.display()))
