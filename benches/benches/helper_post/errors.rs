@@ -74,12 +74,13 @@ struct Engine {
 pub fn measure(quick: bool) -> Result<Vec<Row>, Box<dyn Error>> {
     let size = if quick { [48, 27] } else { [640, 360] };
     let directions = if quick { 1 } else { 4 };
+    let motions = if quick { &MOTIONS[..1] } else { &MOTIONS[..] };
     let scene = scene()?;
     let mut rows = Vec::new();
     for layer in [Layer::Bloom, Layer::Occlusion] {
         for (lookup, reprojection) in LOOKUPS {
             let mut engine = Engine::new(layer, reprojection)?;
-            for (motion, metres, degrees) in MOTIONS {
+            for &(motion, metres, degrees) in motions {
                 // The number of channels with each difference.
                 let mut counts = [0_u64; 256];
                 for direction in 0..directions {
