@@ -19,10 +19,12 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
 
-/// Cases that take eight seconds and more without optimisation.
-const SLOW_CASES: [&str; 5] = [
+/// Cases that take three seconds to a minute without optimisation. Less of the same is in faster ones.
+const SLOW_CASES: [&str; 7] = [
     "a_device_of_noop_that_is_lost_in_any_call_is_told",
+    "cached_views_of_a_wgpu_backend_are_drawn_anew_by_the_next",
     "every_call_of_a_frame_of_the_software_backend_fails_once",
+    "every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once",
     "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
     "every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once",
     "frames_in_flight_are_lost_with_their_device_and_no_others",

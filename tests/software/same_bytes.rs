@@ -40,6 +40,7 @@ fn workers_and_granularity_change_nothing() {
 }
 
 #[test]
+#[ignore = "slow: `.ci/run` runs it"]
 fn a_frame_does_not_depend_on_those_before_it() {
     let (small, mut large) = (odd_field(), everything());
     large.cameras[0].size = [140, 90];
@@ -51,6 +52,7 @@ fn a_frame_does_not_depend_on_those_before_it() {
 }
 
 #[test]
+#[ignore = "slow: `.ci/run` runs it"]
 fn a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it() {
     let scene = everything();
     let expected = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
@@ -139,6 +141,7 @@ fn levels_of_detail_draw_the_bytes_of_their_triangles() {
 }
 
 #[test]
+#[ignore = "slow: `.ci/run` runs it"]
 fn levels_of_detail_move_silhouettes_by_no_more_than_the_error() {
     let scene = plates();
     let width = scene.cameras[0].size[0] as usize;

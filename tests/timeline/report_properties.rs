@@ -240,7 +240,7 @@ fn check(report: &FrameReport, log: &Log) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
     #[test]
     fn a_report_agrees_with_naive_oracles(specs in any_graph(), always_parallel in any::<bool>(), wake in 0..20_u64) {
