@@ -3,7 +3,7 @@
 //!
 //! Without an adapter the cases on one are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. The case that
 //! the CPU draws is ignored without optimisations. With `--config profile.dev.package.drawloom.opt-level=1` and
-//! `DRAWLOOM_DRAW_ON_PROCESSOR=1` it runs. Slow cases are ignored without `DRAWLOOM_SLOW_CASES=1` or `only`.
+//! `DRAWLOOM_DRAW_ON_PROCESSOR=1` it runs. Slow cases are ignored without `DRAWLOOM_SLOW_CASES=1`.
 //! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the sheet: look at it before you commit it.
 
 #[path = "../../examples/views/contact_sheet.rs"]
