@@ -46,7 +46,7 @@ fn of_an_own_file() {
 
 fn of_unusual_files() {
     let folder = Folder::new();
-    let to = kept_folder("unusual").unwrap_or_else(|| folder.0.clone());
+    let to = folder_of_mutants("unusual", &folder);
     let seeds = UNUSUAL.map(|(name, text)| {
         let path = to.join(format!("{name}.obj"));
         fs::write(&path, text).unwrap();
@@ -57,7 +57,7 @@ fn of_unusual_files() {
 
 fn of_malformed_files() {
     let folder = Folder::new();
-    let to = kept_folder("malformed").unwrap_or_else(|| folder.0.clone());
+    let to = folder_of_mutants("malformed", &folder);
     let mut seeds = Vec::new();
     for group in ["tobj", "trimesh"] {
         for entry in fs::read_dir(shared_scenes::folder().join("malformed").join(group)).unwrap() {
@@ -70,11 +70,12 @@ fn of_malformed_files() {
     check_mutants(&to, &seeds);
 }
 
-/// A folder in [`KEEP`], if that is set.
-fn kept_folder(name: &str) -> Option<PathBuf> {
-    let folder = PathBuf::from(std::env::var_os(KEEP)?).join(name);
+/// A folder of this name in [`KEEP`], or the temporary one if that is not set.
+fn folder_of_mutants(name: &str, temporary: &Folder) -> PathBuf {
+    let Some(kept) = std::env::var_os(KEEP) else { return temporary.0.clone() };
+    let folder = PathBuf::from(kept).join(name);
     fs::create_dir_all(&folder).unwrap();
-    Some(folder)
+    folder
 }
 
 /// Writes mutants of the seeds into the folder, which has the files that they name, and loads each. A mutant of a library is loaded by an OBJ
