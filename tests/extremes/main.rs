@@ -1,9 +1,8 @@
 //! Scenes with extreme numbers, on every backend. Each is drawn correctly, refused with a specific error, or drawn without
 //! the parts that cannot be drawn, which are counted. No case panics, hangs, draws NaN, or leaves something out silently.
 //!
-//! Without an adapter the cases on wgpu are ignored; with `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. The cases
-//! that the CPU draws take half an hour without optimisations, and are ignored then. With
-//! `--config profile.dev.package.drawloom.opt-level=1` and `DRAWLOOM_DRAW_ON_PROCESSOR=1` they run, in two minutes.
+//! Without an adapter the cases on wgpu are ignored; with `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Slow
+//! ones are ignored without `DRAWLOOM_SLOW_CASES=1`.
 //!
 //! There are no cases for shear, which a transform cannot express: it is one scale along the object's own axes and one
 //! rotation, and objects have no parents.
@@ -29,7 +28,7 @@ use harness::{BackendName, Harness};
 /// The name of a case, and a function that checks it on a backend.
 type Case = (&'static str, fn(&mut Harness) -> Result<(), Failed>);
 
-/// Cases that take four seconds and more without optimisation.
+/// Cases that take three seconds and more.
 const SLOW_CASES: [&str; 4] = [
     "a_scene_looks_the_same_anywhere_up_to_four_million_kilometres",
     "every_setting_at_its_limits_draws_every_scene",
@@ -39,9 +38,7 @@ const SLOW_CASES: [&str; 4] = [
 
 fn main() {
     let arguments = Arguments::from_args();
-    let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
-    let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
-    let cpu_enabled = !cfg!(debug_assertions) || is_set("DRAWLOOM_DRAW_ON_PROCESSOR");
+    let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let no_adapter = harness::device().is_none();
     let mut trials = Vec::new();
     for backend in BackendName::ALL {
@@ -56,9 +53,7 @@ fn main() {
             };
             let trial = Trial::test(format!("{}::{name}", backend.name()), case);
             let is_too_slow = slow_cases::leave_out(&SLOW_CASES, name);
-            let on_cpu = matches!(backend, BackendName::Software | BackendName::Reference);
-            trials
-                .push(trial.with_ignored_flag((lacks_adapter && !required) || (on_cpu && !cpu_enabled) || is_too_slow));
+            trials.push(trial.with_ignored_flag((lacks_adapter && !required) || is_too_slow));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();

@@ -19,7 +19,7 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 type Case = (&'static str, fn() -> Result<(), Failed>);
 
-/// Cases that take three seconds to a minute without optimisation. Less of the same is in faster ones.
+/// Cases that take two seconds and more. Less of the same is in faster ones.
 const SLOW_CASES: [&str; 7] = [
     "a_device_of_noop_that_is_lost_in_any_call_is_told",
     "cached_views_of_a_wgpu_backend_are_drawn_anew_by_the_next",

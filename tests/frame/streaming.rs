@@ -348,7 +348,6 @@ fn what_no_longer_exists_is_freed_and_its_uploads_are_dropped() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn textures_of_several_sizes_share_their_budget() {
     let layer = |side: u64| side * side * 4 * 4 / 3;
     let budget = StreamingBudget { texture_bytes: 24 * layer(256), ..budget(1 << 20) };
@@ -377,7 +376,6 @@ fn textures_of_several_sizes_share_their_budget() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn textures_beyond_the_device_s_layers_are_told_as_that_and_others_make_no_room_in_vain() {
     let layers = adapter::noop_device().unwrap().0.limits().max_texture_array_layers;
     let budget = StreamingBudget {

@@ -135,7 +135,6 @@ fn levelled(distance: f64) -> Scene {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn levels_of_detail_after_a_warm_up_are_those_of_a_new_renderer() {
     let triangles = |renderer: &mut Renderer<NullBackend>, submitter: &Submitter<NullBackend>, distance: f64| {
         let scene = levelled(distance);

@@ -53,7 +53,7 @@ const PICTURES: [(&str, Draw); 5] = [
     ("characters", |engine, _| engine.characters(SIZE)),
 ];
 
-/// Those that take several seconds without optimisation.
+/// Those that take several seconds.
 const SLOW_PICTURES: [&str; 2] = ["smooth", "characters"];
 
 fn main() {

@@ -47,8 +47,7 @@ fn compare(scene: Scene) -> Result<(), Failed> {
 /// Compares wgpu's picture with those of the software backend in f32 and in f64.
 fn compare_with(mut scene: Scene, maps: ShadowMaps) -> Result<(), Failed> {
     for camera in &mut scene.cameras {
-        // Without optimisation the software backend takes about thirty times as long.
-        camera.size = if cfg!(debug_assertions) { [240, 135] } else { [960, 540] };
+        camera.size = [480, 270];
     }
     let by_wgpu = fixture_with(maps)?.draw(&scene)?;
     let scheduler = Arc::new(Scheduler::new(2)?);

@@ -40,7 +40,6 @@ fn workers_and_granularity_change_nothing() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn a_frame_does_not_depend_on_those_before_it() {
     let (small, mut large) = (odd_field(), everything());
     large.cameras[0].size = [140, 90];
@@ -52,7 +51,6 @@ fn a_frame_does_not_depend_on_those_before_it() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it() {
     let scene = everything();
     let expected = Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene);
@@ -85,7 +83,6 @@ fn a_recorded_frame_draws_the_scene_as_it_was() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn occlusion_culling_changes_nothing() {
     for scene in [odd_field(), everything()] {
         let quality = Quality { culling: CullingVolume::OrientedBox, ..Quality::balanced() };
@@ -117,7 +114,6 @@ fn triangle_culling_changes_nothing() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn levels_of_detail_draw_the_bytes_of_their_triangles() {
     let quality = |level_of_detail| {
         let shadows = ShadowQuality { side: 64, ..ShadowQuality::default() };
@@ -141,7 +137,6 @@ fn levels_of_detail_draw_the_bytes_of_their_triangles() {
 }
 
 #[test]
-#[ignore = "slow: `.ci/run` runs it"]
 fn levels_of_detail_move_silhouettes_by_no_more_than_the_error() {
     let scene = plates();
     let width = scene.cameras[0].size[0] as usize;

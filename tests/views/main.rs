@@ -1,9 +1,8 @@
 //! The gallery of the example `views`: its contact sheet is compared with the one that is shown, and what stands for something else in it
 //! with what that stands for.
 //!
-//! Without an adapter the cases on one are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. The case that
-//! the CPU draws is ignored without optimisations. With `--config profile.dev.package.drawloom.opt-level=1` and
-//! `DRAWLOOM_DRAW_ON_PROCESSOR=1` it runs. Slow cases are ignored without `DRAWLOOM_SLOW_CASES=1`.
+//! Without an adapter the cases on one are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Slow cases
+//! are ignored without `DRAWLOOM_SLOW_CASES=1`.
 //! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the sheet: look at it before you commit it.
 
 #[path = "../../examples/views/contact_sheet.rs"]
@@ -46,9 +45,10 @@ use crate::smoke::{Smoke, UpsampledSmoke};
 
 type Case = fn() -> Result<(), Failed>;
 
-/// Cases that take some twenty seconds without optimisation.
-const SLOW_CASES: [&str; 2] =
-    ["an_impostor_looks_like_what_it_stands_for", "the_contact_sheet_is_the_one_that_is_shown"];
+/// Cases that take several seconds.
+const SLOW_CASES: [&str; 3] =
+    ["an_impostor_looks_like_what_it_stands_for", IN_SOFTWARE, "the_contact_sheet_is_the_one_that_is_shown"];
+const IN_SOFTWARE: &str = "in_software_the_contact_sheet_is_the_same";
 
 const CASES_ON_ADAPTER: [(&str, Case); 4] = [
     ("the_contact_sheet_is_the_one_that_is_shown", contact_sheet),
@@ -60,16 +60,15 @@ const CASES_ON_ADAPTER: [(&str, Case); 4] = [
 fn main() {
     let arguments = Arguments::from_args();
     let has_adapter = adapter::device().is_ok();
-    let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
-    let ignores_adapter = !has_adapter && !is_set("DRAWLOOM_REQUIRE_ADAPTER");
-    let ignores_software = cfg!(debug_assertions) && !is_set("DRAWLOOM_DRAW_ON_PROCESSOR");
+    let requires_adapter = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+    let ignores_adapter = !has_adapter && !requires_adapter;
     let trial = |(name, case)| {
         let is_ignored = ignores_adapter || slow_cases::leave_out(&SLOW_CASES, name);
         Trial::test(name, case).with_ignored_flag(is_ignored)
     };
     let mut trials = Vec::from(CASES_ON_ADAPTER.map(trial));
-    let software = Trial::test("in_software_the_contact_sheet_is_the_same", contact_sheet_in_software);
-    trials.push(software.with_ignored_flag(ignores_software));
+    let software = Trial::test(IN_SOFTWARE, contact_sheet_in_software);
+    trials.push(software.with_ignored_flag(slow_cases::leave_out(&SLOW_CASES, IN_SOFTWARE)));
     trials.push(Trial::test("a_cell_without_its_content_exceeds_the_sheets_bound", a_cell_without_its_content));
     libtest_mimic::run(&arguments, trials).exit();
 }
