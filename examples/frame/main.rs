@@ -180,7 +180,7 @@ fn draw<B: Backend>(
     make: impl FnOnce(&Arc<Scheduler>) -> B,
     mut device: impl Device<B>,
 ) -> Result<Drawn<B>, Box<dyn Error>> {
-    let (mut renderer, submitter) = pipeline::renderer(arguments, make)?;
+    let (mut renderer, submitter) = pipeline::renderer(arguments, scene, make)?;
     let workers = renderer.scheduler().workers();
     let timeline = Arc::clone(renderer.scheduler().timeline());
     let frames = arguments.frames.count();

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::scene::{Mesh, Scene, VERTEX_COLOR};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
 use drawloom_testing::adapter;
@@ -14,9 +15,10 @@ use crate::arguments::{Arguments, BackendName};
 /// The capacity of the timeline, in events of each worker.
 const TIMELINE_CAPACITY: usize = 1 << 18;
 
-/// The pipeline, on a scheduler of its own.
+/// The pipeline for a scene, on a scheduler of its own.
 pub fn renderer<B: Backend>(
     arguments: &Arguments,
+    scene: &Scene,
     make: impl FnOnce(&Arc<Scheduler>) -> B,
 ) -> Result<(Renderer<B>, Submitter<B>), Box<dyn Error>> {
     let builder = Scheduler::builder().timeline_capacity(TIMELINE_CAPACITY);
@@ -24,10 +26,17 @@ pub fn renderer<B: Backend>(
         Some(workers) => builder.workers(workers.get()).build()?,
         None => builder.build()?,
     });
-    let deferred =
-        Deferred::new().depth_pre_pass(arguments.depth_pre_pass).post(ToneMapping::default()).post(Fxaa::default());
+    let deferred = Deferred::new()
+        .depth_pre_pass(arguments.depth_pre_pass)
+        .vertex_colors(has_vertex_colors(scene))
+        .post(ToneMapping::default())
+        .post(Fxaa::default());
     let backend = make(&scheduler);
     Ok(Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?)
+}
+
+fn has_vertex_colors(scene: &Scene) -> bool {
+    scene.assets().iter::<Mesh>().any(|(_, mesh)| mesh.attribute(VERTEX_COLOR.layout()).is_some())
 }
 
 /// wgpu on the machine's best adapter.

@@ -88,7 +88,7 @@ impl Sequence {
         make: impl FnOnce(&Arc<Scheduler>) -> B,
         read: impl Fn(&B::Submission, usize, &str) -> Result<Picture, BackendError>,
     ) -> Result<(), Box<dyn Error>> {
-        let (mut renderer, submitter) = pipeline::renderer(arguments, make)?;
+        let (mut renderer, submitter) = pipeline::renderer(arguments, &scene, make)?;
         let progress = ProgressBar::new(self.missing.len() as u64);
         progress.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")?);
         let still = scene.cameras.clone();

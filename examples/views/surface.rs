@@ -104,7 +104,7 @@ impl<R: Real> ObjectCpuShader<R> for Surface {
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        let [rx, ry, rz, nx, ny, nz, u, v, _] = pixel.varyings;
+        let [rx, ry, rz, nx, ny, nz, u, v, ..] = pixel.varyings;
         let (other, view) = (pass.sampled[0], pass.view.size);
         let size = other.size();
         // From the share of the picture to the nearest pixel of the other view.

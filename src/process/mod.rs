@@ -51,8 +51,8 @@ pub use cpu_shader::{
 use declaration::source_of_previous;
 pub use declaration::{Declaration, Declare, DeclaredAttribute, previous_name};
 pub use deferred::{
-    Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER, LightVolumes, Place,
-    Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
+    COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
+    LightVolumes, Place, Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
 pub use face_culling::FaceCulling;

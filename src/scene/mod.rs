@@ -81,4 +81,4 @@ pub use redraw::Redraw;
 pub use scene_ref::SceneRef;
 pub use topology::Topology;
 pub(crate) use transform::is_unit;
-pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VertexAttribute};
+pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VERTEX_COLOR, VertexAttribute};

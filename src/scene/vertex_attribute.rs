@@ -57,6 +57,10 @@ const fn is_field_name(name: &str) -> bool {
     !(bytes.is_empty() || matches!(bytes, b"position" | b"normal" | b"uv" | b"instance"))
 }
 
+/// The colours of vertices: red, green and blue, linear, from 0 to 1. A pipeline [with vertex
+/// colours](crate::process::Deferred::vertex_colors) multiplies the diffuse colour of materials by them.
+pub const VERTEX_COLOR: VertexAttribute<[f32; 3]> = VertexAttribute::new("color");
+
 // Derived implementations would require them of `T`.
 impl<T> Clone for VertexAttribute<T> {
     fn clone(&self) -> Self {

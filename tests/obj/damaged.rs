@@ -5,7 +5,7 @@ use drawloom::scene::Material;
 use drawloom::scene::obj::{Imported, ObjLimits, ObjWarning};
 use libtest_mimic::Trial;
 
-use crate::folder::{Folder, TRIANGLE, load, mesh};
+use crate::folder::{Folder, TRIANGLE, colors, load, mesh};
 use crate::trial;
 
 pub fn trials() -> Vec<Trial> {
@@ -15,6 +15,7 @@ pub fn trials() -> Vec<Trial> {
         trial("damaged::a_file_may_end_anywhere", a_file_may_end_anywhere),
         trial("damaged::unknown_statements_are_counted_and_named", unknown_statements_are_counted_and_named),
         trial("damaged::what_is_not_drawn_is_said", what_is_not_drawn_is_said),
+        trial("damaged::colors_that_are_none_are_replaced", colors_that_are_none_are_replaced),
         trial("damaged::names_in_any_encoding_match", names_in_any_encoding_match),
         trial("damaged::utf_16_and_cr_are_read", utf_16_and_cr_are_read),
         trial("damaged::warnings_are_capped_and_counted", warnings_are_capped_and_counted),
@@ -81,8 +82,6 @@ fn unknown_statements_are_counted_and_named() {
 }
 
 fn what_is_not_drawn_is_said() {
-    let colored = load("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nf 1 2 3\n");
-    assert_eq!(colored.warnings, [ObjWarning::VertexColors { vertices: 2 }]);
     let smooth = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\ns 1\nf 1 2 3\nf 1//1 2//1 3//1\ns off\nf 1 2 3\n";
     assert_eq!(load(smooth).warnings, [ObjWarning::NotSmoothed { faces: 1 }]);
     let library = "newmtl one\nKs 1 1 1\nillum 2\nmap_bump a.png\nnorm a.png\nmap_Ke a.png\nTf 0 1 0\n";
@@ -93,6 +92,13 @@ fn what_is_not_drawn_is_said() {
         assert!(message.contains(&format!("`{keyword}` in line ")), "{message}");
     }
     assert!(!message.contains("illum"), "{message}");
+}
+
+fn colors_that_are_none_are_replaced() {
+    let imported = load("v 0 0 0 2 -1 1\nv 1 0 0 0 NaN 0\nv 0 1 0 255 0 0.5\nf 1 2 3\n");
+    assert_eq!(imported.warnings, [ObjWarning::ReplacedColors { vertices: 3 }]);
+    let [red, white, pink] = colors(&imported)[..] else { panic!("three vertices have a colour") };
+    assert_eq!((red, white, [pink[0], pink[1]]), ([1.0, 0.0, 1.0], [1.0; 3], [1.0, 0.0]));
 }
 
 fn diffuse(imported: &Imported) -> Vec<Vec3> {

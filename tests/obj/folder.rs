@@ -4,8 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use drawloom::scene::Mesh;
 use drawloom::scene::obj::{self, Imported, ObjError, ObjLimits};
+use drawloom::scene::{Mesh, VERTEX_COLOR};
 use image::RgbaImage;
 
 /// A temporary folder, which is removed on drop.
@@ -56,4 +56,11 @@ pub fn load(text: &str) -> Imported {
 pub fn mesh(imported: &Imported, object: usize) -> &Mesh {
     let scene = imported.scene.as_scene_ref();
     scene.assets.get(scene.meshes[object]).unwrap()
+}
+
+/// The colours of the vertices of the first object; empty if they have none.
+pub fn colors(imported: &Imported) -> Vec<[f32; 3]> {
+    let bytes = mesh(imported, 0).attribute(VERTEX_COLOR.layout()).unwrap_or_default();
+    let numbers: Vec<f32> = bytes.as_chunks().0.iter().copied().map(f32::from_ne_bytes).collect();
+    numbers.as_chunks().0.to_vec()
 }

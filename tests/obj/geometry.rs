@@ -4,7 +4,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::obj::{self, Imported, ObjError, ObjWarning};
 use libtest_mimic::Trial;
 
-use crate::folder::{Folder, TRIANGLE, load, mesh};
+use crate::folder::{Folder, TRIANGLE, colors, load, mesh};
 use crate::trial;
 
 pub fn trials() -> Vec<Trial> {
@@ -18,6 +18,7 @@ pub fn trials() -> Vec<Trial> {
         trial("geometry::faces_with_and_without_normals_mix", faces_with_and_without_normals_mix),
         trial("geometry::a_face_without_normals_has_a_face_normal", a_face_without_normals_has_a_face_normal),
         trial("geometry::the_origin_of_an_object_is_its_centre", the_origin_of_an_object_is_its_centre),
+        trial("geometry::colors_of_vertices_are_read", colors_of_vertices_are_read),
         trial("geometry::a_far_face_does_not_flatten_a_small_one", a_far_face_does_not_flatten_a_small_one),
         trial("geometry::details_of_any_size_are_kept", details_of_any_size_are_kept),
         trial("geometry::a_large_convex_polygon_is_covered", a_large_convex_polygon_is_covered),
@@ -55,6 +56,29 @@ fn a_relative_index_counts_back() {
     let imported = load("v 9 9 9\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf -3 -2 -1\nv 7 7 7\n");
     assert_eq!(imported.triangles, 1);
     assert_eq!(imported.scene.as_scene_ref().positions, [DVec3::new(1.0, 1.0, 0.0)]);
+}
+
+fn colors_of_vertices_are_read() {
+    let imported = load("v 0 0 0\nv 1 0 0 0.5 1 0\nv 0 1 0 0.02 0 0.2 # the third\nf 1 2 3\nv 5 5 5 1 0 0\n");
+    assert!(imported.warnings.is_empty(), "{:?}", imported.warnings);
+    let expected = [[1.0; 3], [0.214_041_14, 1.0, 0.0], [0.001_547_987_6, 0.0, 0.033_104_766]];
+    let found = colors(&imported);
+    let errors =
+        found.iter().flatten().zip(expected.iter().flatten()).map(|(found, expected)| (found - expected).abs());
+    assert!(found.len() == 3 && errors.fold(0.0, f32::max) < 1e-7, "{found:?}");
+
+    // A corner has the colour of its position, wherever that is in the file, also where faces share none of their vertices.
+    let text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 1 1 0 1 1 0\nf 4 3 2\nf 3 1 2\n";
+    let found = load(text);
+    let expected =
+        [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    assert_eq!(colors(&found), expected);
+
+    // White vertices are those of a mesh without colours, and a weight is no colour.
+    for text in ["v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 2\nf 1 2 3\n", TRIANGLE] {
+        let plain = load(text);
+        assert!(colors(&plain).is_empty() && plain.warnings.is_empty(), "{text}");
+    }
 }
 
 fn lines_and_points_are_left_out() {

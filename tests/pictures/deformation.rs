@@ -12,7 +12,7 @@ use drawloom::process::{
 use drawloom::raster::{Real, Vector};
 use drawloom::scene::{
     Blend, Bounds, Camera, LayerMask, Light, Material, Mesh, ObjectColumn, RenderObject, Scene, SceneRef, Topology,
-    Vertex, VertexAttribute,
+    VERTEX_COLOR, Vertex, VertexAttribute,
 };
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::{cube, sized};
@@ -137,7 +137,8 @@ fn scene(is_in_shape: bool) -> Result<(Scene, Vec<LayerMask>), Failed> {
         layers.push(if push == 0.0 { OTHER } else { PUSHED });
     }
     let floor = scene.add(cube())?;
-    let object = RenderObject::new(floor, stone, DVec3::new(0.0, -0.6, 0.0));
+    // Below each top that is pushed down.
+    let object = RenderObject::new(floor, stone, DVec3::new(0.0, -0.7, 0.0));
     scene.add_object(RenderObject { scale: Vec3::new(9.0, 0.1, 4.0), ..object })?;
     let object = RenderObject::new(floor, glass, DVec3::new(2.0, 0.0, 3.5));
     scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..object })?;
@@ -145,7 +146,7 @@ fn scene(is_in_shape: bool) -> Result<(Scene, Vec<LayerMask>), Failed> {
     Ok((scene, layers))
 }
 
-/// The mesh with its top pushed down, its triangles culled on the CPU, and the attribute that says what the top is.
+/// The mesh with its top pushed down, its triangles culled on the CPU, colours, and the attribute that says what the top is.
 fn with_top(mesh: &Mesh, push: f32) -> Result<Mesh, Failed> {
     let top = |vertex: &Vertex| if vertex.position[1] > 0.0 { 1.0_f32 } else { 0.0 };
     let tops: Vec<_> = mesh.vertices().iter().map(top).collect();
@@ -154,7 +155,10 @@ fn with_top(mesh: &Mesh, push: f32) -> Result<Mesh, Failed> {
         Vertex { position: [x + ASIDE * down, y - down, z], ..*vertex }
     });
     let moved = Mesh::new(mesh.name(), Topology::TriangleList, moved.collect(), mesh.indices().to_vec())?;
-    Ok(moved.with_attribute(TOP, &tops)?.with_triangle_culling(push == 0.0))
+    let color = |vertex: &Vertex| vertex.uv.map(|coordinate| coordinate.clamp(0.0, 1.0));
+    let colors: Vec<_> = mesh.vertices().iter().map(color).map(|[u, v]| [u, v, 0.5]).collect();
+    let moved = moved.with_attribute(TOP, &tops)?.with_attribute(VERTEX_COLOR, &colors)?;
+    Ok(moved.with_triangle_culling(push == 0.0))
 }
 
 fn pushes() -> Vec<f32> {
@@ -179,6 +183,7 @@ fn shape() -> Result<(), Failed> {
         Deferred::to_picture(),
         Deferred::to_picture().depth_pre_pass(true),
         Deferred::to_picture().geometry_shares(2),
+        Deferred::to_picture().vertex_colors(true),
         Deferred::to_picture().shadow_maps(None),
         Deferred::to_picture().replace("geometry buffer", GeometryBuffer::new(GeometryFormats::default())),
     ] {
@@ -220,12 +225,14 @@ fn on_software() -> Result<(), Failed> {
         let scene = SceneRef { layers: &layers, columns: &columns, ..scene.as_scene_ref() };
         Ok(submitter.submit(renderer.record(scene)?)?.submission.read(0, "picture")?)
     };
-    let expected = draw(Deferred::to_picture(), &moved)?;
-    if draw(Deferred::to_picture().deformation(Push::usual()), &scene)? == expected {
-        Ok(())
-    } else {
-        Err("the software backend draws another shape".into())
+    for colors in [false, true] {
+        let pipeline = Deferred::to_picture().vertex_colors(colors);
+        let expected = draw(pipeline.clone(), &moved)?;
+        if draw(pipeline.deformation(Push::usual()), &scene)? != expected {
+            return Err("the software backend draws another shape".into());
+        }
     }
+    Ok(())
 }
 
 /// A deformation with a mistake in its third line.

@@ -73,6 +73,7 @@ mod transforms;
 mod transient_targets;
 mod transparency;
 mod triangles;
+mod vertex_colors;
 mod warm_up;
 
 use drawloom_testing::shared_scenes;
@@ -154,6 +155,7 @@ fn main() {
         (transforms::CASES, Needs::Adapter),
         (transient_targets::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),
+        (vertex_colors::CASES, Needs::Adapter),
         (warm_up::CASES, Needs::Adapter),
         (imported_meshes::CASES, Needs::Adapter),
         (device_times::CASES, Needs::AdapterAndTimestamps),

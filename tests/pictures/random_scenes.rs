@@ -12,7 +12,9 @@ use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
-use drawloom::scene::{Blend, Camera, Light, Material, Projection, RenderObject, Scene, SceneError, Texture, Topology};
+use drawloom::scene::{
+    Blend, Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology, VERTEX_COLOR,
+};
 use drawloom::task::Scheduler;
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::leveled::halved;
@@ -35,9 +37,11 @@ fn random_scenes() -> Result<(), Failed> {
     for quality in [Quality::balanced(), Quality::exact(), Quality::fast()] {
         let shadows = ShadowQuality { side: 128, interval: 1, ..quality.shadows };
         let quality = Quality { shadows, ..quality };
-        let by_wgpu = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))?;
+        // One of the presets ignores colours.
+        let deferred = Deferred::to_picture().vertex_colors(quality != Quality::fast());
+        let by_wgpu = Fixture::with(2, |builder| builder.deferred(deferred.clone()).quality(quality))?;
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+        let builder = Renderer::builder(backend).deferred(deferred).quality(quality);
         fixtures.push((by_wgpu, builder.build(Arc::clone(&scheduler))?));
     }
     let mut worst = Spread::default();
@@ -62,6 +66,12 @@ fn random_scenes() -> Result<(), Failed> {
     Ok(())
 }
 
+/// The mesh with other colours at each of its vertices.
+fn colored(mesh: Mesh) -> Result<Mesh, SceneError> {
+    let colors: Vec<_> = mesh.vertices().iter().map(|vertex| vertex.position.map(|x| 0.5 + 0.4 * x)).collect();
+    mesh.with_attribute(VERTEX_COLOR, &colors)
+}
+
 /// Boxes and squares of any size and material that intersect each other, in any lights, wherever in the world.
 fn random_scene(number: u64) -> Result<Scene, SceneError> {
     let mut random = Random::stream(number);
@@ -74,6 +84,7 @@ fn random_scene(number: u64) -> Result<Scene, SceneError> {
         scene.add(square(Topology::TriangleStrip))?,
         scene.add(culled(&as_list(&cube())))?,
         scene.add(halved(&cube()))?,
+        scene.add(colored(cube())?)?,
     ];
     let blends = [Blend::None, Blend::None, Blend::None, Blend::Alpha, Blend::Additive, Blend::Subtractive];
     let mut materials = Vec::new();

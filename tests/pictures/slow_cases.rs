@@ -42,6 +42,7 @@ pub const NAMES: &[&str] = &[
     "memory_of_meshes_and_textures_is_used_again",
     "meshes_in_the_engines_buffers_come_and_go",
     "meshes_that_come_one_by_one_are_drawn_like_meshes_that_come_at_once",
+    "meshes_without_colors_look_the_same_with_vertex_colors",
     "no_old_shadow_remains_when_lights_or_views_are_added_or_removed",
     "no_strategy_changes_the_picture_of_pieces",
     "normals_diffuse_and_radiance_can_have_other_formats",

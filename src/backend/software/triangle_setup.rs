@@ -12,7 +12,7 @@ use crate::process::{
     VertexOutput,
 };
 use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
-use crate::scene::{Blend, Mesh};
+use crate::scene::{Blend, Mesh, VERTEX_COLOR};
 
 /// A range of one object's triangles.
 pub(super) struct TriangleRange {
@@ -215,16 +215,22 @@ impl<'a, R: Precision, const V: usize> PostTransformCache<'a, R, V> {
 fn vertex_input<R: Real>(mesh: &Mesh, index: usize, attributes: &[DeclaredAttribute]) -> VertexInput<R> {
     let real = |value: f32| R::of(f64::from(value));
     let vertex = mesh.vertices()[index];
-    let mut own = [Vector::zero(); MAX_ATTRIBUTES];
-    for (own, &DeclaredAttribute { layout, ref default }) in own.iter_mut().zip(attributes) {
+    let value_of = |&DeclaredAttribute { layout, ref default }: &DeclaredAttribute| {
         let stride = layout.format.bytes();
         let value = mesh.attribute(layout).map_or(default.as_slice(), |values| &values[index * stride..][..stride]);
-        *own = Vector(layout.format.numbers(value).map(R::of));
+        Vector(layout.format.numbers(value).map(R::of))
+    };
+    let is_color = |attribute: &DeclaredAttribute| attribute.layout == VERTEX_COLOR.layout();
+    let color = attributes.iter().find(|attribute| is_color(attribute)).map(value_of);
+    let mut own = [Vector::zero(); MAX_ATTRIBUTES];
+    for (own, attribute) in own.iter_mut().zip(attributes.iter().filter(|attribute| !is_color(attribute))) {
+        *own = value_of(attribute);
     }
     VertexInput {
         position: Vector(vertex.position.map(real)),
         normal: Vector(vertex.normal.map(real)),
         uv: Vector(vertex.uv.map(real)),
+        color: color.map_or(Vector::splat(R::one()), |Vector([red, green, blue, _])| Vector([red, green, blue])),
         attributes: own,
     }
 }

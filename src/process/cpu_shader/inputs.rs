@@ -10,7 +10,7 @@ use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, ColumnLayout, LightKind, MaterialType, MaterialValues, ObjectColumn, Projection};
 
 /// How many numbers a vertex hands on to the pixels.
-pub const VARYINGS: usize = 9;
+pub const VARYINGS: usize = 11;
 
 /// How many attributes of the engine's own a CPU shader can read.
 pub const MAX_ATTRIBUTES: usize = 4;
@@ -223,8 +223,9 @@ pub struct VertexInput<R> {
     pub normal: Vector3<R>,
     /// Texture coordinates.
     pub uv: Vector2<R>,
-    /// The first attributes of the engine's own that the process reads, in the order declared, each with 0 for the numbers that it
-    /// lacks.
+    /// The value of [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), and white if the process does not read it.
+    pub color: Vector3<R>,
+    /// The first other attributes that the process reads, in the order declared, each with 0 for the numbers that it lacks.
     pub attributes: [Vector4<R>; MAX_ATTRIBUTES],
 }
 

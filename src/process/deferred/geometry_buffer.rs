@@ -4,9 +4,10 @@
 mod cpu_shader;
 
 use super::GeometryFormats;
-use super::shading::SURFACE_SHADER;
+use super::shading::{COLORED_SURFACE_SHADER, SURFACE_SHADER};
 use crate::command::{MaterialShare, Selection};
 use crate::process::{ClearColor, CommandDraws, Declare, Draws, RenderProcess};
+use crate::scene::VERTEX_COLOR;
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
 /// radiance:
@@ -27,6 +28,7 @@ pub struct GeometryBuffer {
     formats: GeometryFormats,
     share: MaterialShare,
     has_depth: bool,
+    has_colors: bool,
 }
 
 impl GeometryBuffer {
@@ -43,9 +45,12 @@ impl GeometryBuffer {
         } else {
             format!("geometry buffer {} of {}", share.index + 1, share.of)
         };
-        let shader =
-            [SURFACE_SHADER, &formats.normal_encoding_wgsl(), include_str!("geometry_buffer/geometry_buffer.wgsl")];
-        Self { name, shader: shader.concat(), formats, share, has_depth: false }
+        Self { name, shader: shader(SURFACE_SHADER, formats), formats, share, has_depth: false, has_colors: false }
+    }
+
+    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in meshes without colours.
+    pub fn with_vertex_colors(self) -> Self {
+        Self { shader: shader(COLORED_SURFACE_SHADER, self.formats), has_colors: true, ..self }
     }
 
     /// The same after a [`DepthPrePass`](super::DepthPrePass): it draws only pixels whose depth equals the stored
@@ -53,6 +58,11 @@ impl GeometryBuffer {
     pub fn after_depth_pre_pass(self) -> Self {
         Self { has_depth: true, ..self }
     }
+}
+
+/// The shader that draws such surfaces.
+fn shader(surface: &str, formats: GeometryFormats) -> String {
+    [surface, &formats.normal_encoding_wgsl(), include_str!("geometry_buffer/geometry_buffer.wgsl")].concat()
 }
 
 impl RenderProcess for GeometryBuffer {
@@ -72,6 +82,9 @@ impl RenderProcess for GeometryBuffer {
             } else {
                 declare.draws_over(target);
             }
+        }
+        if self.has_colors {
+            declare.reads_attribute(VERTEX_COLOR, [1.0; 3]);
         }
         if self.has_depth {
             declare.matches_depth("depth");
@@ -93,6 +106,7 @@ impl RenderProcess for GeometryBuffer {
 
     #[cfg(feature = "software")]
     fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
-        Some(crate::process::CpuShader::objects(cpu_shader::GeometryBufferCpuShader { formats: self.formats }))
+        let Self { formats, has_colors, .. } = *self;
+        Some(crate::process::CpuShader::objects(cpu_shader::GeometryBufferCpuShader { formats, has_colors }))
     }
 }

@@ -23,6 +23,6 @@ pub use light_volumes::LightVolumes;
 pub use pipeline::Deferred;
 pub use place::Place;
 pub use requirements::Requirements;
-pub use shading::{ILLUMINATION_SHADER, SURFACE_SHADER};
+pub use shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER};
 pub use shadow_casters::ShadowCasters;
 pub use transparency::Transparency;

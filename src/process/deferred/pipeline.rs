@@ -38,6 +38,7 @@ pub struct Deferred {
     depth_pre_pass: bool,
     geometry_shares: u32,
     formats: GeometryFormats,
+    vertex_colors: bool,
     shadow_maps: Option<ShadowMaps>,
     post: Vec<Arc<dyn PostStep>>,
     replaced: Vec<(String, Arc<dyn RenderProcess>)>,
@@ -53,6 +54,7 @@ impl Deferred {
             depth_pre_pass: false,
             geometry_shares: 1,
             formats: GeometryFormats::default(),
+            vertex_colors: false,
             shadow_maps: Some(ShadowMaps::default()),
             post: Vec::new(),
             replaced: Vec::new(),
@@ -81,6 +83,12 @@ impl Deferred {
     /// Sets the formats of the geometry buffer's targets.
     pub fn formats(self, formats: GeometryFormats) -> Self {
         Self { formats, ..self }
+    }
+
+    /// Sets whether the colours of vertices, [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), are drawn; the default is no. Diffuse colours
+    /// are multiplied by them. Meshes without colours look as before, but their vertices take part in what colours cost.
+    pub fn vertex_colors(self, vertex_colors: bool) -> Self {
+        Self { vertex_colors, ..self }
     }
 
     /// Sets how shadow maps are drawn and read; with `None`, no light casts shadows.
@@ -246,12 +254,14 @@ impl Deferred {
         }
         let of = self.geometry_shares.clamp(1, 64);
         for index in 0..of {
-            let geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
-            processes.push(Arc::new(if self.depth_pre_pass {
-                geometry_buffer.after_depth_pre_pass()
-            } else {
-                geometry_buffer
-            }) as _);
+            let mut geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
+            if self.depth_pre_pass {
+                geometry_buffer = geometry_buffer.after_depth_pre_pass();
+            }
+            if self.vertex_colors {
+                geometry_buffer = geometry_buffer.with_vertex_colors();
+            }
+            processes.push(Arc::new(geometry_buffer) as _);
         }
         [self.with_deformed(pre_pass), self.with_deformed(processes)].concat()
     }
@@ -272,7 +282,11 @@ impl Deferred {
     }
 
     fn transparency(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
-        let transparency = || Arc::new(Transparency::new(self.required_maps(requirements))) as Arc<dyn RenderProcess>;
+        let transparency = || {
+            let transparency = Transparency::new(self.required_maps(requirements));
+            let transparency = if self.vertex_colors { transparency.with_vertex_colors() } else { transparency };
+            Arc::new(transparency) as Arc<dyn RenderProcess>
+        };
         self.with_deformed(requirements.transparency().then(transparency).into_iter().collect())
     }
 

@@ -4,10 +4,10 @@
 mod cpu_shader;
 
 use super::ShadowCasters;
-use super::shading::{ILLUMINATION_SHADER, SURFACE_SHADER, shadow_shader};
+use super::shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER, shadow_shader};
 use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
-use crate::scene::ViewKind;
+use crate::scene::{VERTEX_COLOR, ViewKind};
 use crate::view::ShadowMaps;
 
 /// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with
@@ -24,6 +24,7 @@ use crate::view::ShadowMaps;
 pub struct Transparency {
     shader: String,
     maps: Option<ShadowMaps>,
+    has_colors: bool,
 }
 
 impl Transparency {
@@ -31,14 +32,19 @@ impl Transparency {
 
     /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
-        let shader = [
-            SURFACE_SHADER,
-            ILLUMINATION_SHADER,
-            &shadow_shader(maps.map(|maps| (1, maps))),
-            include_str!("transparency/transparency.wgsl"),
-        ];
-        Self { shader: shader.concat(), maps: maps.copied() }
+        Self { shader: shader(SURFACE_SHADER, maps), maps: maps.copied(), has_colors: false }
     }
+
+    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in meshes without colours.
+    pub fn with_vertex_colors(self) -> Self {
+        Self { shader: shader(COLORED_SURFACE_SHADER, self.maps.as_ref()), has_colors: true, ..self }
+    }
+}
+
+/// The shader that draws such surfaces.
+fn shader(surface: &str, maps: Option<&ShadowMaps>) -> String {
+    let shadows = shadow_shader(maps.map(|maps| (1, maps)));
+    [surface, ILLUMINATION_SHADER, &shadows, include_str!("transparency/transparency.wgsl")].concat()
 }
 
 impl RenderProcess for Transparency {
@@ -47,6 +53,9 @@ impl RenderProcess for Transparency {
     }
 
     fn declare(&self, declare: &mut Declare) {
+        if self.has_colors {
+            declare.reads_attribute(VERTEX_COLOR, [1.0; 3]);
+        }
         if self.maps.is_some() {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
@@ -65,6 +74,7 @@ impl RenderProcess for Transparency {
 
     #[cfg(feature = "software")]
     fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
-        Some(crate::process::CpuShader::objects(cpu_shader::TransparencyCpuShader::new(self.maps.as_ref())))
+        let shader = cpu_shader::TransparencyCpuShader::new(self.maps.as_ref(), self.has_colors);
+        Some(crate::process::CpuShader::objects(shader))
     }
 }

@@ -146,9 +146,9 @@ pub enum ObjWarning {
         /// The number of statements with other keywords.
         others: usize,
     },
-    /// Vertices with a colour, which is not drawn.
-    #[error("{vertices} vertices have a colour, which is not drawn")]
-    VertexColors {
+    /// Colours of vertices that are not between 0 and 1. They were clamped, and replaced by white where they are not numbers.
+    #[error("the colours of {vertices} vertices are not between 0 and 1, and were clamped or replaced by white")]
+    ReplacedColors {
         /// Their number.
         vertices: usize,
     },
@@ -276,7 +276,7 @@ impl ObjWarning {
             Self::NotUnicode { .. } => "file with lines that are not Unicode",
             Self::LongLines { .. } => "file with long lines",
             Self::IgnoredStatements { .. } => "file with ignored statements",
-            Self::VertexColors { .. } => "vertex colours",
+            Self::ReplacedColors { .. } => "replaced colours",
             Self::NotSmoothed { .. } => "smoothing groups without normals",
             Self::InvisibleMaterial { .. } => "invisible material",
             Self::MissingLibrary { .. } => "missing material library",

@@ -24,6 +24,8 @@ pub(super) struct GeometryPart {
     /// The centre of the bounding box. Vertices are relative to it.
     pub center: DVec3,
     pub vertices: Vec<Vertex>,
+    /// The colours of the vertices, linear; empty if none has one.
+    pub colors: Vec<[f32; 3]>,
     pub indices: Vec<u32>,
 }
 
@@ -42,10 +44,11 @@ const MIN_RELATIVE_EDGE: f64 = 1e-6;
 const MAX_DIVISIONS: u32 = 64;
 
 impl ModelGeometry {
-    /// `positions` are those of the file, whose indices the mesh has as positions.
-    pub(super) fn new(mesh: &tobj::Mesh, positions: &[DVec3]) -> Self {
+    /// `positions` are those of the file, whose indices the mesh has as positions. `colors`, in sRGB, are those of the positions, if
+    /// there are any.
+    pub(super) fn new(mesh: &tobj::Mesh, positions: &[DVec3], colors: &[[f64; 3]]) -> Self {
         let mut geometry = Self::default();
-        let attributes = VertexAttributes::new(mesh, positions);
+        let attributes = VertexAttributes::new(mesh, positions, colors);
         let triangles = geometry.triangles(mesh, &attributes.positions);
         divide(triangles, &attributes, MAX_DIVISIONS, &mut geometry.parts);
         geometry
@@ -106,6 +109,7 @@ impl GeometryPart {
             // The v axis of OBJ points up.
             uv: [u, 1.0 - v],
         });
+        self.colors.extend(attributes.colors.get(corner));
         (self.vertices.len() - 1) as u32
     }
 }
@@ -148,20 +152,31 @@ struct VertexAttributes {
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
     texture_coordinates: Vec<[f32; 2]>,
+    /// Linear; empty if no vertex has a colour.
+    colors: Vec<[f32; 3]>,
 }
 
 impl VertexAttributes {
-    fn new(mesh: &tobj::Mesh, positions: &[DVec3]) -> Self {
+    fn new(mesh: &tobj::Mesh, positions: &[DVec3], colors: &[[f64; 3]]) -> Self {
         // f64 works with either float type that tobj can be built with.
         let to_f64 = |values: &[_; 3]| values.map(f64::from);
         let to_f32 = |values: &[_; 2]| values.map(|value| f64::from(value) as f32);
         let indices = mesh.positions.as_chunks().0.iter().map(|position| position_index(to_f64(position)));
+        // Without colours in the file, no index has one.
+        let colors: Vec<_> = indices.clone().filter_map(|index| colors.get(index)).collect();
+        let is_colored = colors.iter().any(|color| **color != [1.0; 3]);
         Self {
             positions: indices.map(|index| positions[index]).collect(),
+            colors: colors.into_iter().filter(|_| is_colored).map(|color| color.map(linear_from_srgb)).collect(),
             normals: mesh.normals.as_chunks().0.iter().map(|normal| DVec3::from(to_f64(normal))).collect(),
             texture_coordinates: mesh.texcoords.as_chunks().0.iter().map(to_f32).collect(),
         }
     }
+}
+
+/// The linear value of a channel in sRGB (IEC 61966-2-1).
+fn linear_from_srgb(value: f64) -> f32 {
+    (if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }) as f32
 }
 
 /// A triangle with its normal, if it has an area and 32-bit coordinates can represent it.

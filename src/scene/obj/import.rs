@@ -16,7 +16,7 @@ use super::statements::{Statements, escaped};
 use super::warnings::Warnings;
 use super::{emission, material};
 use crate::handle::Handle;
-use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology};
+use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology, VERTEX_COLOR};
 
 /// A scene from an OBJ file, without cameras.
 #[derive(Debug, Default)]
@@ -39,7 +39,9 @@ pub struct Imported {
 ///
 /// - The origin of an object is the centre of its bounding box. A model whose extent is a million times its smallest triangle
 ///   becomes several objects, so that 32-bit coordinates suffice for each.
-/// - Polygons are triangulated, including concave ones. Points, lines, free-form surfaces and vertex colours are left out.
+/// - Polygons are triangulated, including concave ones. Points, lines and free-form surfaces are left out.
+/// - Colours of vertices (three numbers behind the coordinates) count as sRGB, as in other programs. They become the attribute
+///   [`VERTEX_COLOR`] of the meshes, which a pipeline [with vertex colours](crate::process::Deferred::vertex_colors) draws.
 /// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
 ///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with an opacity below 1
 ///   somewhere is blended, and casts no shadow.
@@ -178,13 +180,13 @@ fn parse(file: &mut Preprocessed) -> Result<Vec<tobj::Model>, tobj::LoadError> {
 /// Warnings about what preprocessing replaced or left out.
 fn warnings_of(file: &Preprocessed) -> impl Iterator<Item = ObjWarning> {
     let Preprocessed { points, lines, surfaces, bad_normals, bad_texture_coordinates, dangling_corners, .. } = *file;
-    let Preprocessed { colored_vertices, unsmoothed_faces, .. } = *file;
+    let Preprocessed { bad_colors, unsmoothed_faces, .. } = *file;
     [
         (points + lines + surfaces, ObjWarning::NotDrawn { points, lines, surfaces }),
         (bad_normals, ObjWarning::ReplacedNormals { normals: bad_normals }),
         (bad_texture_coordinates, ObjWarning::ReplacedTextureCoordinates { coordinates: bad_texture_coordinates }),
         (dangling_corners, ObjWarning::DanglingCorners { corners: dangling_corners }),
-        (colored_vertices, ObjWarning::VertexColors { vertices: colored_vertices }),
+        (bad_colors, ObjWarning::ReplacedColors { vertices: bad_colors }),
         (unsmoothed_faces, ObjWarning::NotSmoothed { faces: unsmoothed_faces }),
     ]
     .into_iter()
@@ -204,7 +206,7 @@ impl Imported {
         let materials = material::add_materials(&mut self.scene, file, fetch, limits, warnings)?;
         let mut emissive = Vec::new();
         for model in models {
-            let geometry = ModelGeometry::new(&model.mesh, &file.positions);
+            let geometry = ModelGeometry::new(&model.mesh, &file.positions, &file.colors);
             self.report(&model.name, &geometry, warnings);
             let material = materials[model.mesh.material_id.unwrap_or(materials.len() - 1)];
             let emission = self.scene.assets().get(material)?.emission;
@@ -225,7 +227,10 @@ impl Imported {
         geometry: &GeometryPart,
         material: Handle<Material>,
     ) -> Result<(), SceneError> {
-        let mesh = Mesh::new(name, Topology::TriangleList, geometry.vertices.clone(), geometry.indices.clone())?;
+        let mut mesh = Mesh::new(name, Topology::TriangleList, geometry.vertices.clone(), geometry.indices.clone())?;
+        if !geometry.colors.is_empty() {
+            mesh = mesh.with_attribute(VERTEX_COLOR, &geometry.colors)?;
+        }
         self.triangles += mesh.triangle_count();
         let mesh = self.scene.add(mesh)?;
         self.scene.add_object(RenderObject::new(mesh, material, geometry.center))?;

@@ -44,8 +44,10 @@ pub(super) struct Preprocessed {
     pub bad_texture_coordinates: usize,
     /// The number of corners that refer to a missing normal or missing texture coordinates.
     pub dangling_corners: usize,
-    /// The number of vertices with a colour, which is left out.
-    pub colored_vertices: usize,
+    /// The colour of each position, in sRGB; empty if there is none. Positions without a colour are white.
+    pub colors: Vec<[f64; 3]>,
+    /// The number of colours that are not between 0 and 1. They are clamped in `colors`, and white if they are not numbers.
+    pub bad_colors: usize,
     /// The number of faces of smoothing groups that have a corner without normal.
     pub unsmoothed_faces: usize,
     /// The first malformed line.
@@ -81,6 +83,8 @@ struct Counts {
 /// up, and a zero normal.
 const PLACEHOLDERS: &str = "vt 0 1\nvn 0 0 0\n";
 
+const WHITE: [f64; 3] = [1.0; 3];
+
 /// The index of a position has two digits of this base in the text.
 const INDEX_BASE: usize = 1 << 16;
 
@@ -109,6 +113,9 @@ impl Preprocessed {
                 preprocessed.first_malformed.get_or_insert_with(|| MalformedLine { line, reason: reason.clone() });
                 warn(format!("{reason}; the line was left out"));
             }
+        }
+        if !preprocessed.colors.is_empty() {
+            preprocessed.colors.resize(preprocessed.positions.len(), WHITE);
         }
         preprocessed.first_non_text_line = statements.first_non_text_line();
         if let Some(line) = statements.first_long_line() {
@@ -186,10 +193,12 @@ impl Preprocessed {
         values.split_whitespace().map(number).collect()
     }
 
-    /// Three coordinates. A fourth number is a weight, which divides them; further numbers are a colour.
+    /// Three coordinates. A fourth number is a weight, which divides them; three further numbers are a colour.
     fn position(&mut self, values: &str, warn: &mut impl FnMut(String)) -> Result<(), String> {
         let numbers = Self::numbers(values, warn);
-        self.colored_vertices += usize::from(numbers.as_ref().is_ok_and(|numbers| numbers.len() >= 6));
+        if let Ok([_, _, _, red, green, blue, ..]) = numbers.as_deref() {
+            self.color([*red, *green, *blue]);
+        }
         let position = numbers.and_then(|numbers| match numbers[..] {
             [_, _, _, 0.0] => Err(String::from("a vertex has the weight 0")),
             [x, y, z, weight] => Ok(DVec3::new(x, y, z) / weight),
@@ -203,6 +212,14 @@ impl Preprocessed {
         // tobj reads f32, which has every whole number below 2²⁴, and whose precision is 0.5 m in the coordinates of a land survey.
         self.emit(format_args!("v {} {} 0", index % INDEX_BASE, index / INDEX_BASE));
         position.map(drop)
+    }
+
+    /// The colour of the next position.
+    fn color(&mut self, color: [f64; 3]) {
+        self.bad_colors += usize::from(color.iter().any(|channel| !(0.0..=1.0).contains(channel)));
+        let is_number = color.iter().all(|channel| !channel.is_nan());
+        self.colors.resize(self.positions.len(), WHITE);
+        self.colors.push(if is_number { color.map(|channel| channel.clamp(0.0, 1.0)) } else { WHITE });
     }
 
     fn material_index(&mut self, name: &str) -> usize {

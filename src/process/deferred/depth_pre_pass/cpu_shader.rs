@@ -55,7 +55,7 @@ mod tests {
                 index: 0,
             };
             let vertex =
-                VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero(), attributes: [Vector::zero(); MAX_ATTRIBUTES] };
+                VertexInput { position: Vector3::of(position.into()), normal: Vector::zero(), uv: Vector::zero(), color: Vector::splat(1.0), attributes: [Vector::zero(); MAX_ATTRIBUTES] };
             for view in views() {
                 let view = view_values(&view);
                 let material = material(Blend::None);

@@ -13,6 +13,8 @@ use crate::raster::{Real, Vector3, Vector4};
 pub(super) struct GeometryBufferCpuShader {
     /// The formats of its targets.
     pub(super) formats: GeometryFormats,
+    /// Whether vertices have colours.
+    pub(super) has_colors: bool,
 }
 
 impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
@@ -23,7 +25,7 @@ impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let material = pass.materials.get(pixel.material);
         let normal = shading_normal(pass.view, pixel, &material);
-        let diffuse = rgb(surface_diffuse(pass, pixel, &material));
+        let diffuse = rgb(surface_diffuse(pass, pixel, &material, self.has_colors));
         let radiance = material.emission + diffuse * pass.view.ambient;
         let clamped = |color: Vector3<R>| color.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
         let outputs = [
@@ -55,8 +57,8 @@ mod tests {
         let normal = Vector([0.48, 0.6, 0.64]);
         let pixel = ObjectPixel {
             coordinates: [0, 0],
-            varyings: [0.0, 0.0, -4.0, normal[0], normal[1], normal[2], 0.5, 1.0, 0.0],
-            dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0],
+            varyings: [0.0, 0.0, -4.0, normal[0], normal[1], normal[2], 0.5, 1.0, 1.0, 1.0, 1.0],
+            dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0],
             dpdy: [0.0; VARYINGS],
             material: 0,
             object: 0,

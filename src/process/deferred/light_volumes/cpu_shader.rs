@@ -109,8 +109,8 @@ mod tests {
             let lights = [light];
             pass.lights = &lights;
             let [x, y, z] = surface.0;
-            let [dpdx, dpdy] = [[0.0; VARYINGS], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]];
-            let varyings = [x, y, z, normal.x, normal.y, normal.z, 0.5, 1.0, 0.0];
+            let [dpdx, dpdy] = [[0.0; VARYINGS], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0]];
+            let varyings = [x, y, z, normal.x, normal.y, normal.z, 0.5, 1.0, 1.0, 1.0, 1.0];
             let pixel = ObjectPixel { coordinates: [3, 5], varyings, dpdx, dpdy, material: 0, object: 0 };
             let TypedCpuShader::Objects(transparency) = Transparency::new(None).cpu_shader().unwrap().double else { panic!("objects") };
             let mut drawn = [Vector::zero()];

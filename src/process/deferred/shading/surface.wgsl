@@ -1,23 +1,3 @@
-// The interpolated vertex output of an object: what shaders that draw objects share.
-struct Surface {
-    @invariant @builtin(position) clip: vec4<f32>,
-    @location(0) relative: vec3<f32>,
-    @location(1) normal: vec3<f32>,
-    @location(2) uv: vec2<f32>,
-    @location(3) @interpolate(flat) material: u32,
-    // The object's index in the scene.
-    @location(4) @interpolate(flat) object: u32,
-}
-
-@vertex
-fn vertex(in: VertexInput) -> Surface {
-    let object = drawn_object(in.instance);
-    let deformed = deform(in, object);
-    let relative = relative_position(object, deformed.position);
-    let uv = clamp(deformed.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
-    return Surface(clip_position(relative), relative, world_normal(object, deformed.normal), uv, object.material, object.index);
-}
-
 // From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,
 // interpolation and filtering would lead to NaN.
 const MAX_UV: f32 = 0x1p23;
@@ -35,7 +15,8 @@ fn shading_normal(in: Surface, material: Material) -> vec3<f32> {
 
 // The surface's diffuse colour and opacity. Needs uniform control flow.
 fn surface_diffuse(in: Surface, material: Material) -> vec4<f32> {
-    return diffuse_at(material, in.uv, dpdx(in.uv), dpdy(in.uv));
+    let diffuse = diffuse_at(material, in.uv, dpdx(in.uv), dpdy(in.uv));
+    return vec4<f32>(diffuse.rgb * vertex_color(in), diffuse.a);
 }
 
 // A vector scaled to unit length, or another if it has no direction.

@@ -61,6 +61,7 @@ mod tests {
             position: Vector::zero(),
             normal: Vector::zero(),
             uv: Vector::zero(),
+            color: Vector::splat(1.0),
             attributes: [Vector::zero(); MAX_ATTRIBUTES],
         };
         let cpu_shader = ShadowCastersCpuShader { hemispheres: true };

@@ -18,11 +18,13 @@ use crate::view::ShadowMaps;
 pub(super) struct TransparencyCpuShader {
     /// `None` if no light has a shadow map.
     shadows: Option<ShadowFilter>,
+    /// Whether vertices have colours.
+    has_colors: bool,
 }
 
 impl TransparencyCpuShader {
-    pub(super) fn new(maps: Option<&ShadowMaps>) -> Self {
-        Self { shadows: maps.map(ShadowFilter::new) }
+    pub(super) fn new(maps: Option<&ShadowMaps>, has_colors: bool) -> Self {
+        Self { shadows: maps.map(ShadowFilter::new), has_colors }
     }
 }
 
@@ -34,7 +36,7 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let material = pass.materials.get(pixel.material);
         let normal = shading_normal(pass.view, pixel, &material);
-        let diffuse = surface_diffuse(pass, pixel, &material);
+        let diffuse = surface_diffuse(pass, pixel, &material, self.has_colors);
         let position = relative_of(pixel);
         let pi = R::of(PI);
         let mut illuminance = pass.view.ambient * pi;
@@ -87,8 +89,8 @@ mod tests {
         pass.lights = lights;
         let pixel = ObjectPixel {
             coordinates: [0, 0],
-            varyings: [0.0, 0.0, -4.0, 0.0, 0.0, 1.0, 0.5, 1.0, 0.0],
-            dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0],
+            varyings: [0.0, 0.0, -4.0, 0.0, 0.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0],
+            dpdx: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0],
             dpdy: [0.0; VARYINGS],
             material: 0,
             object: 0,

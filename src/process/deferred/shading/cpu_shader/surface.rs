@@ -1,6 +1,6 @@
 //! `surface.wgsl` in Rust: what CPU shaders that draw objects share.
 
-use crate::process::cpu_shader::built_in::{inverse_square_root, sign};
+use crate::process::cpu_shader::built_in::{inverse_square_root, rgb, sign, with_alpha};
 use crate::process::{
     ObjectPixel, PassInputs, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
@@ -19,6 +19,7 @@ pub(in crate::process::deferred) fn surface_vertex<R: Real>(
     varyings[NORMAL..NORMAL + 3].copy_from_slice(&normal.0);
     let farthest = R::of(MAX_UV);
     varyings[UV..UV + 2].copy_from_slice(&vertex.uv.map(|value| value.max(-farthest).min(farthest)).0);
+    varyings[COLOR..COLOR + 3].copy_from_slice(&vertex.color.0);
     VertexOutput { clip: view.clip_position(relative), varyings }
 }
 
@@ -45,20 +46,23 @@ pub(in crate::process::deferred) fn shading_normal<R: Real>(
     if material.double_sided && normal.dot(facing) < R::zero() { -normal } else { normal }
 }
 
-/// The surface's diffuse colour and opacity.
+/// The surface's diffuse colour and opacity. `has_colors` says whether vertices have colours.
 pub(in crate::process::deferred) fn surface_diffuse<R: Real>(
     pass: &PassInputs<'_, R>,
     pixel: &ObjectPixel<R>,
     material: &ShaderMaterial<R>,
+    has_colors: bool,
 ) -> Vector4<R> {
     let [uv, dpdx, dpdy] = [&pixel.varyings, &pixel.dpdx, &pixel.dpdy].map(uv_of);
-    pass.diffuse_at(pixel.material, material, uv, dpdx, dpdy)
+    let diffuse = pass.diffuse_at(pixel.material, material, uv, dpdx, dpdy);
+    if has_colors { with_alpha(rgb(diffuse) * three(&pixel.varyings, COLOR), diffuse[3]) } else { diffuse }
 }
 
 // The index of each varying.
 const RELATIVE: usize = 0;
 const NORMAL: usize = 3;
 const UV: usize = 6;
+const COLOR: usize = 8;
 
 fn three<R: Real>(varyings: &[R; VARYINGS], first: usize) -> Vector3<R> {
     Vector([varyings[first], varyings[first + 1], varyings[first + 2]])
@@ -88,16 +92,16 @@ mod tests {
         let [x, y, z] = normal;
         ObjectPixel {
             coordinates: [0, 0],
-            varyings: [0.5, 0.25, -4.0, x, y, z, 0.5, 0.25, 0.0],
-            dpdx: [0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0],
-            dpdy: [0.0, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, -0.03, 0.0],
+            varyings: [0.5, 0.25, -4.0, x, y, z, 0.5, 0.25, 0.5, 1.0, 0.25],
+            dpdx: [0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0],
+            dpdy: [0.0, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, -0.03, 0.0, 0.0, 0.0],
             material: 0,
             object: 0,
         }
     }
 
     #[test]
-    fn varyings_carry_position_normal_and_texture_coordinates() {
+    fn varyings_carry_position_normal_texture_coordinates_and_colors() {
         let view = view_values::<f32>(&views()[0]);
         let object = ShaderObject {
             camera: Vector3::zero(),
@@ -111,6 +115,7 @@ mod tests {
             position: Vector([1.0, 1.0, 1.0]),
             normal: Vector([0.0, 0.0, 1.0]),
             uv: Vector([0.75, 0.5]),
+            color: Vector([0.5, 0.25, 1.0]),
             attributes: [Vector::zero(); MAX_ATTRIBUTES],
         };
         let output = surface_vertex(&view, &object, &vertex);
@@ -126,8 +131,9 @@ mod tests {
         assert_eq!(relative_of(&pixel), Vector([2.0, 2.0, -4.0]));
         let material = material(Blend::None);
         assert_eq!(shading_normal(&view, &pixel, &material.0), vertex.normal);
-        let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel, &material.0);
-        assert_eq!(diffuse, Vector([0.5 * 0.75, 0.25 * 0.5, 0.0, 0.5]));
+        let diffuse = |has_colors| surface_diffuse(&pass(&view, &material, &[]), &pixel, &material.0, has_colors);
+        assert_eq!(diffuse(false), Vector([0.5 * 0.75, 0.25 * 0.5, 0.0, 0.5]));
+        assert_eq!(diffuse(true), Vector([0.5 * 0.75 * 0.5, 0.25 * 0.5 * 0.25, 0.0, 0.5]));
     }
 
     #[test]
@@ -161,7 +167,7 @@ mod tests {
     fn texture_sampling_uses_the_derivatives() {
         let view = view_values::<f64>(&views()[0]);
         let material = material(Blend::None);
-        let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel([0.0, 0.0, 1.0]), &material.0);
+        let diffuse = surface_diffuse(&pass(&view, &material, &[]), &pixel([0.0, 0.0, 1.0]), &material.0, false);
         assert_eq!(diffuse, Vector([0.5 * 0.5, 0.25 * 0.25, 0.01 - 0.03, 0.5]));
     }
 }
