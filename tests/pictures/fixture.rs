@@ -100,8 +100,12 @@ pub fn pixel(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
 
 /// Red, green and blue of every pixel of a view's `radiance`, which is in half floats.
 pub fn radiance(submission: &WgpuSubmission, view: usize) -> Result<Vec<[f64; 3]>, Failed> {
-    let picture = submission.read(view, "radiance")?;
+    Ok(half_floats(&submission.read(view, "radiance")?))
+}
+
+/// Red, green and blue of every pixel of a picture in half floats.
+pub fn half_floats(picture: &Picture) -> Vec<[f64; 3]> {
     let channel = |bytes: &[u8]| f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
     let pixels = picture.bytes.chunks_exact(8);
-    Ok(pixels.map(|pixel| [channel(&pixel[0..]), channel(&pixel[2..]), channel(&pixel[4..])]).collect())
+    pixels.map(|pixel| [channel(&pixel[0..]), channel(&pixel[2..]), channel(&pixel[4..])]).collect()
 }

@@ -14,11 +14,10 @@ use drawloom::scene::{
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{sized, square};
-use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
+use crate::fixture::{Fixture, half_floats};
 
 pub const CASES: &[Case] = &[
     ("vertex_colors_are_interpolated_and_multiply_diffuse_colors", interpolated),
@@ -86,13 +85,6 @@ fn expected([column, row]: [u32; 2]) -> [f64; 3] {
     [0, 1, 2].map(|channel| shares[channel] * f64::from(full[channel]))
 }
 
-/// The picture of the target in f64.
-fn numbers(picture: &Picture) -> Vec<[f64; 3]> {
-    let channel = |bytes: &[u8]| f16::from_le_bytes([bytes[0], bytes[1]]).to_f64();
-    let pixels = picture.bytes.chunks_exact(8);
-    pixels.map(|pixel| [channel(&pixel[0..]), channel(&pixel[2..]), channel(&pixel[4..])]).collect()
-}
-
 fn draw_in_software(reference: bool, deferred: Deferred, scene: &Scene, target: &str) -> Result<Picture, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = if reference { SoftwareBackend::reference() } else { SoftwareBackend::new(Arc::clone(&scheduler)) };
@@ -118,7 +110,7 @@ fn interpolated() -> Result<(), Failed> {
             draw_in_software(true, deferred, &scene, "radiance")?,
         ];
         for (backend, picture) in ["wgpu", "software", "reference"].into_iter().zip(pictures) {
-            for (index, found) in numbers(&picture).into_iter().enumerate() {
+            for (index, found) in half_floats(&picture).into_iter().enumerate() {
                 let coordinates = [index as u32 % SIZE[0], index as u32 / SIZE[0]];
                 let expected = expected(coordinates);
                 let error = [0, 1, 2].map(|channel| (found[channel] - expected[channel]).abs());
@@ -154,7 +146,7 @@ fn of_an_obj_file() -> Result<(), Failed> {
     let mut scene = obj::read("triangle.obj", text.as_bytes(), |_| Err(io::ErrorKind::NotFound.into()))?.scene;
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 2.0, DVec3::ZERO), SIZE)];
     scene.ambient = Vec3::ONE;
-    let found = numbers(&draw(Deferred::new().vertex_colors(true), &scene, "radiance")?);
+    let found = half_floats(&draw(Deferred::new().vertex_colors(true), &scene, "radiance")?);
     let brightest = |channel: usize| {
         let (index, _) =
             found.iter().enumerate().max_by(|(_, one), (_, other)| one[channel].total_cmp(&other[channel]))?;
