@@ -21,8 +21,7 @@ const UPDATE: Duration = Duration::from_millis(2);
 /// What the simulated device takes for the step, beside the rest of the frame, and for a frame that only draws a finished picture.
 const STEP_ON_DEVICE: Duration = Duration::from_micros(1_500);
 const COMPOSITION: Duration = Duration::from_micros(200);
-/// The frames of a turn. The first ones are not counted, as the device is idle before them, and the helper has nothing.
-const FRAMES: usize = 60;
+/// The first frames of a turn, which are not counted, as the device is idle before them, and the helper has nothing.
 const FIRST_FRAMES: usize = 10;
 
 #[derive(Serialize)]
@@ -40,11 +39,11 @@ pub struct Row {
 }
 
 pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
-    let turns = if quick { 1 } else { 9 };
+    let (turns, frames) = if quick { (1, 20) } else { (9, 60) };
     let mut rows = Vec::new();
     match backend {
         BackendName::Noop => {
-            let picture = if quick { [320, 180] } else { [1920, 1080] };
+            let (boxes, picture) = if quick { (100, [320, 180]) } else { (1_000, [1920, 1080]) };
             for milliseconds in [2, 10] {
                 let (device, queue) = adapter::noop_device()?;
                 let frame_time = Duration::from_millis(milliseconds);
@@ -59,7 +58,7 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
                     }
                 };
                 let device = format!("{milliseconds} ms");
-                rows.extend(of_device(&device, open, if quick { 100 } else { 1_000 }, picture, turns, progress)?);
+                rows.extend(of_device(&device, open, boxes, picture, [turns, frames], progress)?);
             }
         }
         BackendName::Adapter => {
@@ -67,8 +66,8 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
             let open = |_, _: Option<&WgpuBackend>| {
                 WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom")
             };
-            let picture = if quick { [64, 36] } else { [480, 270] };
-            rows.extend(of_device("adapter", open, if quick { 50 } else { 1_000 }, picture, turns, progress)?);
+            let (boxes, picture) = if quick { (50, [64, 36]) } else { (1_000, [480, 270]) };
+            rows.extend(of_device("adapter", open, boxes, picture, [turns, frames], progress)?);
         }
     }
     Ok(rows)
@@ -79,7 +78,7 @@ fn of_device<B: Backend<Submission = WgpuSubmission>>(
     open: impl Fn(Kind, Option<&B>) -> B,
     boxes: usize,
     picture: [u32; 2],
-    turns: usize,
+    [turns, frames]: [usize; 2],
     progress: &ProgressBar,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut contenders = Vec::new();
@@ -90,7 +89,7 @@ fn of_device<B: Backend<Submission = WgpuSubmission>>(
     }
     let rounds = Rounds { warm_up: 1, measured: turns };
     let measured =
-        Harness::new(rounds, progress).measure(&mut contenders, |contender, _| contender.draw(FRAMES, UPDATE))?;
+        Harness::new(rounds, progress).measure(&mut contenders, |contender, _| contender.draw(frames, UPDATE))?;
     Ok(Variant::ALL.into_iter().zip(measured).map(|(variant, turns)| row(device, variant, &turns)).collect())
 }
 

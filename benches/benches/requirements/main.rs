@@ -83,7 +83,7 @@ struct Row {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse().backend;
     let quick = arguments.is_quick();
-    let changes = if quick { 4 } else { CHANGES };
+    let counts = if quick { [2, 1] } else { [WARM_UP, CHANGES] };
     let progress = progress_bar("frames");
     let mut rows = Vec::new();
     for backend in arguments.backends() {
@@ -94,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             BackendName::Adapter => (&[1_000], [160, 90]),
         };
         for boxes in numbers {
-            rows.extend(measure(backend, changes, *boxes, size, &progress)?);
+            rows.extend(measure(backend, counts, *boxes, size, &progress)?);
         }
     }
     let mut unneeded = Vec::new();
@@ -129,7 +129,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn measure(
     backend: BackendName,
-    changes: usize,
+    [warm_up, changes]: [usize; 2],
     boxes: usize,
     size: [u32; 2],
     progress: &ProgressBar,
@@ -141,9 +141,9 @@ fn measure(
     for preparation in preparations {
         runners.push(Runner::new((backend, &scheduler), preparation, boxes, size)?);
     }
-    progress.inc_length(((WARM_UP + changes * FRAMES_PER_CHANGE) * runners.len()) as u64);
+    progress.inc_length(((warm_up + changes * FRAMES_PER_CHANGE) * runners.len()) as u64);
     let mut times = vec![Vec::new(); runners.len()];
-    for _ in 0..WARM_UP {
+    for _ in 0..warm_up {
         for runner in &mut runners {
             runner.frame()?;
             progress.inc(1);
