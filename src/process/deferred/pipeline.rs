@@ -86,7 +86,7 @@ impl Deferred {
     }
 
     /// Sets whether the colours of vertices, [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), are drawn; the default is no. Diffuse colours
-    /// are multiplied by them. Meshes without colours look as before, but their vertices take part in what colours cost.
+    /// are multiplied by them. Meshes without colours look as without this setting, and cost as much as those with colours.
     pub fn vertex_colors(self, vertex_colors: bool) -> Self {
         Self { vertex_colors, ..self }
     }
