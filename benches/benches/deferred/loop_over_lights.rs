@@ -24,7 +24,7 @@ impl RenderProcess for AllLights {
 
     fn draws(&self) -> Draws<'_> {
         let shader = concat!(
-            include_str!("../../../src/process/deferred/shading/surface_vertex.wgsl"),
+            include_str!("../../../src/process/deferred/shading/uncolored_surface.wgsl"),
             include_str!("../../../src/process/deferred/shading/surface.wgsl"),
             include_str!("../../../src/process/deferred/shading/illumination.wgsl"),
             include_str!("all_lights.wgsl")

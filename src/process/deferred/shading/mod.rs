@@ -15,12 +15,12 @@ pub(super) use shadow::shadow_shader;
 /// and the indices of the `material` and the `object`. `shading_normal(surface, material)` is the normal of the visible side;
 /// `surface_diffuse(surface, material)` is the diffuse colour with the material's texture, and the opacity. Both need uniform control
 /// flow.
-pub const SURFACE_SHADER: &str = concat!(include_str!("surface_vertex.wgsl"), "\n", include_str!("surface.wgsl"));
+pub const SURFACE_SHADER: &str = concat!(include_str!("uncolored_surface.wgsl"), "\n", include_str!("surface.wgsl"));
 
 /// [`SURFACE_SHADER`] for processes that [read](crate::process::Declare::reads_attribute)
 /// [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR): the diffuse colour is multiplied by it.
 pub const COLORED_SURFACE_SHADER: &str =
-    concat!(include_str!("colored_surface_vertex.wgsl"), "\n", include_str!("surface.wgsl"));
+    concat!(include_str!("colored_surface.wgsl"), "\n", include_str!("surface.wgsl"));
 
 /// The WGSL by which lights illuminate: `illuminance_from(light, position, normal)` is the illuminance of a surface at a position
 /// relative to the camera, without shadows.

@@ -1,3 +1,18 @@
+@vertex
+fn vertex(in: VertexInput) -> Surface {
+    let object = drawn_object(in.instance);
+    let deformed = deform(in, object);
+    var surface: Surface;
+    surface.relative = relative_position(object, deformed.position);
+    surface.clip = clip_position(surface.relative);
+    surface.normal = world_normal(object, deformed.normal);
+    surface.uv = clamp(deformed.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
+    surface.material = object.material;
+    surface.object = object.index;
+    set_color(&surface, deformed);
+    return surface;
+}
+
 // From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,
 // interpolation and filtering would lead to NaN.
 const MAX_UV: f32 = 0x1p23;
