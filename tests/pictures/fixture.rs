@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use drawloom::backend::{Picture, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
@@ -90,6 +90,17 @@ impl Fixture {
 /// The picture of a scene, drawn by the shipped processes.
 pub fn draw(scene: &Scene) -> Result<Picture, Failed> {
     Fixture::new()?.draw(scene)
+}
+
+/// The first view's target of this name, drawn by a software backend.
+pub fn draw_on_processor(
+    (backend, scheduler): (SoftwareBackend, Arc<Scheduler>),
+    deferred: Deferred,
+    scene: &Scene,
+    target: &str,
+) -> Result<Picture, Failed> {
+    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+    Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, target)?)
 }
 
 /// Red, green and blue of a pixel.

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::demo;
 use drawloom::glam::DVec3;
@@ -13,9 +12,11 @@ use drawloom::view::ShadowMaps;
 use drawloom_testing::obj_files::{hall, interior};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
+use drawloom_testing::slow_cases;
 use libtest_mimic::Failed;
 
 use crate::Case;
+use crate::fixture::draw_on_processor;
 use crate::references::{generated, shared};
 use crate::shadows::fixture_with;
 
@@ -46,13 +47,15 @@ fn compare(scene: Scene) -> Result<(), Failed> {
 
 /// Compares wgpu's picture with those of the software backend in f32 and in f64.
 fn compare_with(mut scene: Scene, maps: ShadowMaps) -> Result<(), Failed> {
-    for camera in &mut scene.cameras {
-        camera.size = [480, 270];
-    }
+    let size = if slow_cases::are_enabled() { [960, 540] } else { [240, 135] };
+    scene.cameras.iter_mut().for_each(|camera| camera.size = size);
     let by_wgpu = fixture_with(maps)?.draw(&scene)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let single = draw_on(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, &scene, maps)?;
-    let double = draw_on(SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?), &scene, maps)?;
+    let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+    let single = SoftwareBackend::new(Arc::clone(&scheduler));
+    let single = draw_on_processor((single, scheduler), deferred.clone(), &scene, "picture")?;
+    let reference = (SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?));
+    let double = draw_on_processor(reference, deferred, &scene, "picture")?;
     let differences = [("f32", &single), ("the reference", &double)]
         .map(|(name, picture)| (name, Difference::new(&by_wgpu, picture)));
     println!("{differences:?}");
@@ -60,17 +63,6 @@ fn compare_with(mut scene: Scene, maps: ShadowMaps) -> Result<(), Failed> {
         return Ok(());
     }
     Err(format!("wgpu's picture and the CPU's differ: {differences:?}").into())
-}
-
-fn draw_on(
-    backend: SoftwareBackend,
-    scheduler: Arc<Scheduler>,
-    scene: &Scene,
-    maps: ShadowMaps,
-) -> Result<Picture, Failed> {
-    let deferred = Deferred::to_picture().shadow_maps(Some(maps));
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
-    Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
 }
 
 /// The difference between two pictures.

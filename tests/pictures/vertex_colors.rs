@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 use std::io;
 use std::sync::Arc;
 
-use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -17,7 +16,7 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, half_floats};
+use crate::fixture::{Fixture, draw_on_processor, half_floats};
 
 pub const CASES: &[Case] = &[
     ("vertex_colors_are_interpolated_and_multiply_diffuse_colors", interpolated),
@@ -85,11 +84,9 @@ fn expected([column, row]: [u32; 2]) -> [f64; 3] {
     [0, 1, 2].map(|channel| shares[channel] * f64::from(full[channel]))
 }
 
-fn draw_in_software(reference: bool, deferred: Deferred, scene: &Scene, target: &str) -> Result<Picture, Failed> {
+fn draw_in_software(deferred: Deferred, scene: &Scene, target: &str) -> Result<Picture, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let backend = if reference { SoftwareBackend::reference() } else { SoftwareBackend::new(Arc::clone(&scheduler)) };
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
-    Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, target)?)
+    draw_on_processor((SoftwareBackend::new(Arc::clone(&scheduler)), scheduler), deferred, scene, target)
 }
 
 fn draw(deferred: Deferred, scene: &Scene, target: &str) -> Result<Picture, Failed> {
@@ -104,10 +101,11 @@ fn interpolated() -> Result<(), Failed> {
     let bound = 2.0 / 2_048.0;
     for pre_pass in [false, true] {
         let deferred = Deferred::to_picture().depth_pre_pass(pre_pass).vertex_colors(true);
+        let reference = (SoftwareBackend::reference(), Arc::new(Scheduler::new(2)?));
         let pictures = [
             draw(deferred.clone(), &scene, "radiance")?,
-            draw_in_software(false, deferred.clone(), &scene, "radiance")?,
-            draw_in_software(true, deferred, &scene, "radiance")?,
+            draw_in_software(deferred.clone(), &scene, "radiance")?,
+            draw_on_processor(reference, deferred, &scene, "radiance")?,
         ];
         for (backend, picture) in ["wgpu", "software", "reference"].into_iter().zip(pictures) {
             for (index, found) in half_floats(&picture).into_iter().enumerate() {
@@ -128,7 +126,7 @@ fn without_colors() -> Result<(), Failed> {
     let [with, without] = [true, false].map(|colors| Deferred::to_picture().vertex_colors(colors));
     for (found, expected) in [
         (draw(with.clone(), &scene, "picture")?, draw(without.clone(), &scene, "picture")?),
-        (draw_in_software(false, with, &scene, "picture")?, draw_in_software(false, without, &scene, "picture")?),
+        (draw_in_software(with, &scene, "picture")?, draw_in_software(without, &scene, "picture")?),
     ] {
         // A white that is interpolated may be less than 1 by a rounding, which no more than rounds a byte the other way.
         let pairs = found.bytes.iter().zip(&expected.bytes);
