@@ -23,9 +23,9 @@ mod wgpu;
 
 #[cfg(feature = "wgpu")]
 pub use self::wgpu::{
-    DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, RecordingStrategy, StreamingBudget,
-    StreamingStatistics, SurfaceError, SurfaceFrame, WgpuBackend, WgpuPassStatistics, WgpuReadBack, WgpuResources,
-    WgpuSubmission, WindowDevice, WindowSurface,
+    DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, PipelineLibrary, RecordingStrategy,
+    StreamingBudget, StreamingStatistics, SurfaceError, SurfaceFrame, WgpuBackend, WgpuPassStatistics, WgpuReadBack,
+    WgpuResources, WgpuSubmission, WindowDevice, WindowSurface,
 };
 pub use backend_trait::Backend;
 pub use error::BackendError;

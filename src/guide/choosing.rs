@@ -14,6 +14,8 @@
 //! and the draw lists of its processes. A view whose camera and objects do not change costs next to nothing. So:
 //!
 //! - Several windows or split screens are cameras of one frame, not several renderers: meshes, materials and object data are shared.
+//! - Renderers that are opened while the engine runs, for thumbnails say, have backends of one [`PipelineLibrary`]: the first frame of each
+//!   compiles only what no other has compiled, which takes tenths of a second otherwise.
 //! - A view that need not be new in every frame is left out of the cameras in the frames between, and its texture is kept.
 //! - Each view has targets of its own, some 20 bytes a pixel beside its picture. With [`WgpuBackend::transient_targets`], views of the same
 //!   size share them, and only outputs can be read back. Use it wherever there are several cameras, and always where there are hundreds:
@@ -44,6 +46,7 @@
 //! [`Quality::balanced`]: crate::quality::Quality::balanced
 //! [`Scheduler::with_available_parallelism`]: crate::task::Scheduler::with_available_parallelism
 //! [`ShadowQuality::interval`]: crate::quality::ShadowQuality::interval
+//! [`PipelineLibrary`]: crate::backend::PipelineLibrary
 //! [`WgpuBackend::transient_targets`]: crate::backend::WgpuBackend::transient_targets
 //! [levels of detail]: crate::scene::Mesh::with_levels
 //! [triangle culling]: crate::scene::Mesh::with_triangle_culling

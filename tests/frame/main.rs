@@ -22,6 +22,8 @@ mod object_table;
 mod occlusion;
 mod order;
 mod pieces;
+#[cfg(feature = "wgpu")]
+mod pipeline_library;
 mod quality;
 mod redraw;
 mod requirements;

@@ -7,7 +7,7 @@ use parking_lot::Mutex;
 
 use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
-use super::pipelines::PipelineCache;
+use super::pipelines::{PipelineCache, SharedPipelines};
 use super::resources::{
     BindGroupLayouts, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers, SubdividedMesh,
     TargetCache, UploadQueue, new_buffer, shares_memory,
@@ -36,6 +36,8 @@ pub struct WgpuBackend {
     pub(super) uploads: UploadQueue,
     pub(super) layouts: BindGroupLayouts,
     pub(super) pipelines: Mutex<PipelineCache>,
+    /// What is shared with other backends, if the backend is of a [`PipelineLibrary`](super::PipelineLibrary).
+    pub(super) library: Option<SharedPipelines>,
     /// Created when a plan draws lights for the first time.
     pub(super) light_meshes: Mutex<Option<Arc<LightMeshes>>>,
     pub(super) meshes: Mutex<MeshCache>,
@@ -119,6 +121,7 @@ impl WgpuBackend {
             uploads: UploadQueue::new(queue),
             layouts,
             pipelines: Mutex::default(),
+            library: None,
             light_meshes: Mutex::default(),
             meshes: Mutex::default(),
             materials: Mutex::default(),

@@ -59,14 +59,17 @@ impl Backend for WgpuBackend {
                 Some(pipelines) => {
                     let create = || pipelines.create_missing(&self.device, variants());
                     pipelines.insert(with_error_scope(&self.device, &label, create).flatten()?);
+                    pipelines.share();
                 }
                 None => {
                     let create = || {
-                        let made = ProcessPipelines::new(&self.device, &self.layouts, plan, planned, draws, quality)?;
+                        let (device, layouts, library) = (&self.device, &self.layouts, self.library.as_ref());
+                        let made = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
                         made.insert(made.create_missing(&self.device, variants())?);
                         Ok(made)
                     };
                     let made = with_error_scope(&self.device, &label, create).flatten()?;
+                    made.share();
                     self.pipelines.lock().add_prepared(plan, planned, draws, quality, made);
                 }
             }
@@ -153,7 +156,10 @@ impl Backend for WgpuBackend {
             self.subdivisions.clear();
             self.buffers.clear();
         })?;
-        pipelines.insert(created);
+        if !created.is_empty() {
+            pipelines.insert(created);
+            pipelines.share();
+        }
         Ok(())
     }
 

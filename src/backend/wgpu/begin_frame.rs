@@ -115,7 +115,8 @@ impl WgpuBackend {
         request: &FrameRequest<'_>,
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let FrameRequest { plan, draws, quality, .. } = *request;
-        self.pipelines.lock().update(&self.device, &self.layouts, plan, draws, quality)
+        let library = self.library.as_ref();
+        self.pipelines.lock().update(&self.device, &self.layouts, library, plan, draws, quality)
     }
 
     /// Updates the bind groups of each pass, and chooses its strategy.

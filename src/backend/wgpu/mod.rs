@@ -24,6 +24,7 @@ mod frame;
 #[cfg(all(test, not(drawloom_loom)))]
 mod noop_device;
 mod pass_bind_groups;
+mod pipeline_library;
 mod pipelines;
 mod read_back;
 mod recording;
@@ -40,6 +41,7 @@ mod window_surface;
 
 pub use backend::{WgpuBackend, WgpuResources};
 pub use frame::WgpuPassStatistics;
+pub use pipeline_library::PipelineLibrary;
 pub use read_back::WgpuReadBack;
 pub use strategy::{EncodingStrategy, RecordingStrategy};
 pub use streaming::{StreamingBudget, StreamingStatistics};

@@ -3,7 +3,9 @@
 mod attachment_formats;
 mod compile_shader;
 mod pipeline_cache;
+mod pipeline_inputs;
 mod pipeline_key;
+mod shared_pipelines;
 mod pipeline_variant;
 mod process_pipelines;
 mod unused_bindings;
@@ -13,3 +15,4 @@ pub(crate) use pipeline_cache::{PipelineCache, shader_label};
 pub(crate) use pipeline_key::fixed_state;
 pub(crate) use pipeline_variant::PipelineVariant;
 pub(crate) use process_pipelines::ProcessPipelines;
+pub(crate) use shared_pipelines::SharedPipelines;

@@ -5,6 +5,7 @@ use std::sync::{Arc, Weak};
 
 use super::pipeline_key::PipelineKey;
 use super::process_pipelines::ProcessPipelines;
+use super::shared_pipelines::SharedPipelines;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
@@ -52,6 +53,7 @@ impl PipelineCache {
         &mut self,
         device: &wgpu::Device,
         layouts: &BindGroupLayouts,
+        library: Option<&SharedPipelines>,
         plan: &FramePlan,
         draws: &[Draws<'_>],
         quality: &Quality,
@@ -79,7 +81,7 @@ impl PipelineCache {
                     let working = self.working.get(&planned.name).cloned();
                     let working = working.filter(|old| old.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
-                        let created = ProcessPipelines::new(device, layouts, plan, planned, draws, quality)?;
+                        let created = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
                         if let Some(working) = &working {
                             // Only a pipeline shows that a shader lacks an entry point, or reads what there is not.
                             created.insert(created.create_missing(device, working.variants().keys().cloned())?);
@@ -94,6 +96,7 @@ impl PipelineCache {
                         _ => match (with_error_scope(device, &label, create).flatten(), &working) {
                             (Ok(created), _) => {
                                 self.failed.remove(&planned.name);
+                                created.share();
                                 Arc::new(created)
                             }
                             (Err(error), Some(working)) => {
@@ -193,7 +196,7 @@ mod tests {
         let layouts = BindGroupLayouts::new(&device);
         let mut cache = PipelineCache::new(false);
         let prepare = |cache: &mut PipelineCache, quality: &Quality| {
-            let made = ProcessPipelines::new(&device, &layouts, &plan, planned, &draws[0], quality).unwrap();
+            let made = ProcessPipelines::new(&device, &layouts, None, &plan, planned, &draws[0], quality).unwrap();
             cache.add_prepared(&plan, planned, &draws[0], quality, made);
         };
         let [other, quality] = [Quality::exact(), Quality::fast()];
@@ -204,13 +207,13 @@ mod tests {
         }
         // A frame takes what is prepared, and what comes late is dropped.
         let prepared = Arc::clone(&cache.prepared[0].1);
-        let used = cache.update(&device, &layouts, &plan, &draws, &quality).unwrap();
+        let used = cache.update(&device, &layouts, None, &plan, &draws, &quality).unwrap();
         assert!(Arc::ptr_eq(&used[0], &prepared) && cache.prepared.is_empty());
         prepare(&mut cache, &quality);
         assert!(cache.prepared.is_empty());
         // What is prepared for another quality does not change what frames use.
         prepare(&mut cache, &other);
-        let used = cache.update(&device, &layouts, &plan, &draws, &quality).unwrap();
+        let used = cache.update(&device, &layouts, None, &plan, &draws, &quality).unwrap();
         assert!(Arc::ptr_eq(&used[0], &prepared));
     }
 }

@@ -8,12 +8,14 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
 use super::compile_shader::compile_shader;
-use super::pipeline_key::{PipelineKey, VertexSource};
+use super::pipeline_inputs::PipelineInputs;
+use super::pipeline_key::VertexSource;
 use super::pipeline_variant::PipelineVariant;
+use super::shared_pipelines::SharedPipelines;
 use super::unused_bindings::warn_of_unused_bindings;
 use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{BindGroupLayouts, binding_type, engine_layout, process_layout};
+use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout, process_layout};
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::Cull;
 use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
@@ -23,95 +25,70 @@ use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
 pub(crate) struct ProcessPipelines {
-    name: String,
-    key: PipelineKey<'static>,
-    attachments: AttachmentFormats,
+    inputs: PipelineInputs,
     /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
     pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
     pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
-    /// The attributes of vertices that it reads.
-    attributes: Vec<DeclaredAttribute>,
-    /// The [values](attribute_defaults) that they have in meshes that lack them; made for the first imported mesh.
+    /// The [values](attribute_defaults) that its attributes have in meshes that lack them; made for the first imported mesh.
     attribute_defaults: OnceLock<wgpu::Buffer>,
-    /// The number of columns and material types that it reads.
-    array_count: usize,
-    /// What it says about its resources.
-    resources: Vec<wgpu::BindingType>,
-    features: wgpu::Features,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
-    /// Of a compute shader.
-    compute: Option<wgpu::ComputePipeline>,
     variants: RwLock<HashMap<PipelineVariant, wgpu::RenderPipeline>>,
+    /// `None` if the backend shares no pipelines.
+    library: Option<SharedPipelines>,
     /// The tuner of each view's pass.
     tuners: Mutex<Vec<Option<Tuner>>>,
 }
 
-struct CompiledShader {
+/// Clones are the same on the device.
+#[derive(Clone)]
+pub(super) struct CompiledShader {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
+    /// Of a compute shader.
+    pub(super) compute: Option<wgpu::ComputePipeline>,
 }
 
 impl ProcessPipelines {
-    /// Compiles the shader of a process.
+    /// Compiles the shader of a process, or takes that of the library.
     ///
     /// # Errors
     /// If it does not compile.
     pub(crate) fn new(
         device: &wgpu::Device,
         layouts: &BindGroupLayouts,
+        library: Option<&SharedPipelines>,
         plan: &FramePlan,
         planned: &PlannedProcess,
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> Result<Self, BackendError> {
-        let name = planned.name.as_str();
-        let key = PipelineKey::new(draws, quality).into_owned();
-        let attachments = AttachmentFormats::new(plan, &planned.declaration);
-        let array_count = array_count(&planned.declaration);
-        let attributes = planned.declaration.attributes.clone();
+        let inputs = PipelineInputs::new(device.features(), plan, planned, draws, quality);
+        let PipelineInputs { key, attachments, array_count, resources, .. } = &inputs;
         let is_compute = key.vertices == VertexSource::Compute;
-        let AttachmentFormats { sampled, writes_buffers, .. } = &attachments;
+        let AttachmentFormats { sampled, writes_buffers, .. } = attachments;
         let process_layout = process_layout(device, key.parameter_bytes, sampled, writes_buffers, is_compute);
-        let features = device.features();
-        let resources: Vec<_> = draws.resources().iter().map(|resource| binding_type(features, resource)).collect();
-        let engine_layout = engine_layout(device, array_count, &resources, is_compute);
-        let shader = if key.vertices == VertexSource::None {
-            None
-        } else {
-            let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
-            let module = compile_shader(device, name, &before, &key.own_shaders())?;
-            warn_of_unused_bindings(name, &planned.declaration, &before, &key.own_shaders());
-            let own = [process_layout.as_ref(), engine_layout.as_ref()];
-            let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
-            let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(name),
-                bind_group_layouts: &groups[..used],
-                immediate_size: 0,
-            });
-            Some(CompiledShader { module, layout })
+        let engine_layout = engine_layout(device, *array_count, resources, is_compute);
+        let shader = match library.and_then(|library| library.shader(&inputs)) {
+            _ if key.vertices == VertexSource::None => None,
+            Some(compiled) => Some(compiled),
+            None => {
+                let own = [process_layout.as_ref(), engine_layout.as_ref()];
+                Some(CompiledShader::new(device, layouts, own, &planned.declaration, &inputs)?)
+            }
         };
-        let compute = shader.as_ref().filter(|_| is_compute).map(|shader| compute_pipeline(device, shader));
-        let (name, variants, tuners) = (name.to_owned(), RwLock::default(), Mutex::default());
         let pipelines = Self {
-            name,
-            key,
-            attachments,
+            inputs,
             process_layout,
             engine_layout,
-            attributes,
             attribute_defaults: OnceLock::new(),
-            array_count,
-            resources,
-            features,
             shader,
-            compute,
-            variants,
-            tuners,
+            variants: RwLock::default(),
+            library: library.cloned(),
+            tuners: Mutex::default(),
         };
-        if let Some(state) = pipelines.key.state {
+        if let Some(state) = pipelines.inputs.key.state {
             pipelines.insert(pipelines.create(device, PipelineVariant::of_pages(state))?);
         }
         Ok(pipelines)
@@ -130,16 +107,12 @@ impl ProcessPipelines {
 
     /// Whether these pipelines still fit what a process of this plan declares.
     pub(crate) fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
-        self.name == planned.name.as_str()
-            && self.array_count == array_count(&planned.declaration)
-            && self.attributes == planned.declaration.attributes
-            && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
+        self.inputs.fit_declaration(plan, planned)
     }
 
     /// Whether these pipelines still fit what their process draws.
     pub(crate) fn fits_draws(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
-        let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
-        self.key == PipelineKey::new(draws, quality) && resources.eq(self.resources.iter().copied())
+        self.inputs.fit_draws(draws, quality)
     }
 
     /// Whether the pipelines of a process of this plan for these draws would differ from these in the text of their shader only.
@@ -150,10 +123,7 @@ impl ProcessPipelines {
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> bool {
-        let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
-        PipelineKey::new(draws, quality).with_text_of(&self.key) == self.key
-            && resources.eq(self.resources.iter().copied())
-            && self.fits_declaration(plan, planned)
+        self.inputs.differ_in_text_only(plan, planned, draws, quality)
     }
 
     /// Creates the missing ones of these pipelines. [Insert](Self::insert) them only if the device reports no error.
@@ -184,6 +154,13 @@ impl ProcessPipelines {
         }
     }
 
+    /// Adds the shader and all pipelines to the library, if there is one. Call it only if the device has reported no error.
+    pub(crate) fn share(&self) {
+        if let Some((library, shader)) = self.library.as_ref().zip(self.shader.as_ref()) {
+            library.add(&self.inputs, shader, &self.variants());
+        }
+    }
+
     /// The pipelines.
     pub(crate) fn variants(&self) -> RwLockReadGuard<'_, HashMap<PipelineVariant, wgpu::RenderPipeline>> {
         self.variants.read()
@@ -191,16 +168,16 @@ impl ProcessPipelines {
 
     /// The pipeline of a compute shader; `None` for a process that draws.
     pub(crate) fn compute(&self) -> Option<&wgpu::ComputePipeline> {
-        self.compute.as_ref()
+        self.shader.as_ref()?.compute.as_ref()
     }
 
     /// Describes bundles for passes of this process.
     pub(crate) fn bundle_descriptor<'a>(&'a self, label: &'a str) -> wgpu::RenderBundleEncoderDescriptor<'a> {
         wgpu::RenderBundleEncoderDescriptor {
             label: Some(label),
-            color_formats: &self.attachments.colors,
-            depth_stencil: self.attachments.depth.map(DepthAttachmentFormat::bundle_state),
-            sample_count: self.attachments.samples,
+            color_formats: &self.inputs.attachments.colors,
+            depth_stencil: self.inputs.attachments.depth.map(DepthAttachmentFormat::bundle_state),
+            sample_count: self.inputs.attachments.samples,
             multiview: None,
         }
     }
@@ -216,7 +193,7 @@ impl ProcessPipelines {
 
     /// The attributes of vertices that it reads, in the order of their buffers.
     pub(crate) fn attributes(&self) -> &[DeclaredAttribute] {
-        &self.attributes
+        &self.inputs.attributes
     }
 
     /// The values of attributes that imported meshes lack; `None` before there is a pipeline for such a mesh.
@@ -226,7 +203,7 @@ impl ProcessPipelines {
 
     /// The process's name.
     pub(crate) fn name(&self) -> &str {
-        &self.name
+        &self.inputs.name
     }
 
     /// `None` for a raw pass, which has no pipeline.
@@ -240,8 +217,9 @@ impl ProcessPipelines {
     ) -> Result<Option<(PipelineVariant, wgpu::RenderPipeline)>, BackendError> {
         let Some(shader) = &self.shader else { return Ok(None) };
         let state = variant.state;
-        let AttachmentFormats { colors, can_be_blended, .. } = &self.attachments;
-        let equations = &self.key.blend_equations;
+        let PipelineInputs { name, key, attachments, attributes, .. } = &self.inputs;
+        let AttachmentFormats { colors, can_be_blended, .. } = attachments;
+        let equations = &key.blend_equations;
         let target = |(index, (format, can_be_blended)): (usize, (&Option<wgpu::TextureFormat>, &bool))| {
             let equation = equations.get(index).copied().unwrap_or_else(|| state.blend().into());
             let blend = blend_state(equation).filter(|_| *can_be_blended);
@@ -253,20 +231,24 @@ impl ProcessPipelines {
                 self.attribute_defaults.get_or_init(|| {
                     device.create_buffer_init(&BufferInitDescriptor {
                         label: Some("defaults of attributes"),
-                        contents: &attribute_defaults(&self.attributes),
+                        contents: &attribute_defaults(attributes),
                         usage: wgpu::BufferUsages::VERTEX,
                     })
                 });
-                VertexBuffers::of_imported_meshes(layout, &self.attributes, &self.name)?
+                VertexBuffers::of_imported_meshes(layout, attributes, name)?
             }
-            None => VertexBuffers::new(self.key.vertices, &self.attributes),
+            None => VertexBuffers::new(key.vertices, attributes),
         };
-        let entry_point = match self.key.vertices {
+        let shared = self.library.as_ref().and_then(|library| library.pipeline(&self.inputs, &variant));
+        if let Some(pipeline) = shared {
+            return Ok(Some((variant, pipeline)));
+        }
+        let entry_point = match key.vertices {
             VertexSource::Meshes(_) | VertexSource::Procedural(_) => "vertex",
             VertexSource::LightVolumes => "light_volume",
             VertexSource::FullScreen | VertexSource::Compute | VertexSource::None => "full_screen",
         };
-        let (topology, strip_index_format) = match (self.key.vertices, state.topology()) {
+        let (topology, strip_index_format) = match (key.vertices, state.topology()) {
             (VertexSource::Procedural(primitive), _) => (primitive_topology(primitive), None),
             (_, Topology::TriangleList) => (wgpu::PrimitiveTopology::TriangleList, None),
             (_, Topology::TriangleStrip) => {
@@ -288,24 +270,21 @@ impl ProcessPipelines {
                 topology,
                 strip_index_format,
                 front_face: wgpu::FrontFace::Ccw,
-                cull_mode: match self.key.face_culling.applied_to(state.cull()) {
+                cull_mode: match key.face_culling.applied_to(state.cull()) {
                     Cull::Back => Some(wgpu::Face::Back),
                     Cull::Front => Some(wgpu::Face::Front),
                     Cull::Nothing => None,
                 },
                 ..wgpu::PrimitiveState::default()
             },
-            depth_stencil: self.attachments.depth.map(|depth| {
+            depth_stencil: attachments.depth.map(|depth| {
                 // A blended surface must not hide what is drawn after it, unless the process says so.
                 let may_write_depth = !equations.is_empty() || state.blend() == Blend::None;
-                let writes_depth = self.key.writes_depth && may_write_depth;
-                depth.pipeline_state_of(writes_depth, self.depth_compare(depth), self.key.stencil)
+                let writes_depth = key.writes_depth && may_write_depth;
+                depth.pipeline_state_of(writes_depth, self.depth_compare(depth), key.stencil)
             }),
-            multisample: wgpu::MultisampleState {
-                count: self.attachments.samples,
-                ..wgpu::MultisampleState::default()
-            },
-            fragment: self.key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
+            multisample: wgpu::MultisampleState { count: attachments.samples, ..wgpu::MultisampleState::default() },
+            fragment: key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
                 module: &shader.module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
@@ -319,7 +298,7 @@ impl ProcessPipelines {
 
     /// Depth is reversed: nearer is greater.
     fn depth_compare(&self, depth: DepthAttachmentFormat) -> wgpu::CompareFunction {
-        match self.key.vertices {
+        match self.inputs.key.vertices {
             _ if depth.access == Access::MatchDepth => wgpu::CompareFunction::Equal,
             _ if depth.access == Access::TestStencil => wgpu::CompareFunction::Always,
             _ if depth.access == Access::MarkStencil => wgpu::CompareFunction::GreaterEqual,
@@ -334,19 +313,41 @@ impl ProcessPipelines {
     }
 }
 
-fn compute_pipeline(device: &wgpu::Device, shader: &CompiledShader) -> wgpu::ComputePipeline {
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: Some(&shader.layout),
-        module: &shader.module,
-        entry_point: Some("compute"),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    })
-}
-
-fn array_count(declaration: &Declaration) -> usize {
-    declaration.columns.len() + declaration.material_types.len()
+impl CompiledShader {
+    /// Compiles the shader of a process whose own bind groups, 2 and 3, have these layouts.
+    ///
+    /// # Errors
+    /// If it does not compile.
+    fn new(
+        device: &wgpu::Device,
+        layouts: &BindGroupLayouts,
+        own: [Option<&wgpu::BindGroupLayout>; 2],
+        declaration: &Declaration,
+        inputs: &PipelineInputs,
+    ) -> Result<Self, BackendError> {
+        let PipelineInputs { name, key, attributes, .. } = inputs;
+        let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
+        let module = compile_shader(device, name, &before, &key.own_shaders())?;
+        warn_of_unused_bindings(name, declaration, &before, &key.own_shaders());
+        let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
+        let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &groups[..used],
+            immediate_size: 0,
+        });
+        let compute = (key.vertices == VertexSource::Compute).then(|| {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: None,
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some("compute"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        });
+        Ok(Self { module, layout, compute })
+    }
 }
 
 fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
@@ -378,7 +379,7 @@ mod tests {
         let quality = Quality::balanced();
         let layouts = BindGroupLayouts::new(&device);
         let pipelines =
-            ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
+            ProcessPipelines::new(&device, &layouts, None, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
 
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {
@@ -402,7 +403,7 @@ mod tests {
         let layouts = BindGroupLayouts::new(&device);
         let quality = Quality::balanced();
         let pipelines =
-            ProcessPipelines::new(&device, &layouts, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
+            ProcessPipelines::new(&device, &layouts, None, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
 
         let [first, second] = [Cull::Back, Cull::Nothing]
             .map(|cull| PipelineVariant::of_pages(DrawState::new(Topology::TriangleList, cull, Blend::None)));

@@ -1,0 +1,78 @@
+//! What all pipelines of a process are made from.
+
+use super::attachment_formats::AttachmentFormats;
+use super::pipeline_key::PipelineKey;
+use crate::backend::wgpu::resources::binding_type;
+use crate::process::{Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess};
+use crate::quality::Quality;
+
+/// What all pipelines of a process are made from: what it declares, and what it draws in frames of one quality. Pipelines of equal inputs
+/// are equal on one device.
+#[derive(Clone, PartialEq)]
+pub(super) struct PipelineInputs {
+    pub(super) name: String,
+    pub(super) key: PipelineKey<'static>,
+    pub(super) attachments: AttachmentFormats,
+    /// The attributes of vertices that it reads.
+    pub(super) attributes: Vec<DeclaredAttribute>,
+    /// The number of columns and material types that it reads.
+    pub(super) array_count: usize,
+    /// What it says about its resources.
+    pub(super) resources: Vec<wgpu::BindingType>,
+    features: wgpu::Features,
+}
+
+impl PipelineInputs {
+    pub(super) fn new(
+        features: wgpu::Features,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> Self {
+        Self {
+            name: planned.name.clone(),
+            key: PipelineKey::new(draws, quality).into_owned(),
+            attachments: AttachmentFormats::new(plan, &planned.declaration),
+            attributes: planned.declaration.attributes.clone(),
+            array_count: array_count(&planned.declaration),
+            resources: draws.resources().iter().map(|resource| binding_type(features, resource)).collect(),
+            features,
+        }
+    }
+
+    /// Whether they still fit what a process of this plan declares.
+    pub(super) fn fit_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
+        self.name == planned.name.as_str()
+            && self.array_count == array_count(&planned.declaration)
+            && self.attributes == planned.declaration.attributes
+            && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
+    }
+
+    /// Whether they still fit what their process draws.
+    pub(super) fn fit_draws(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
+        self.key == PipelineKey::new(draws, quality) && self.fit_resources(draws)
+    }
+
+    /// Whether the inputs of a process of this plan for these draws would differ from these in the text of their shader only.
+    pub(super) fn differ_in_text_only(
+        &self,
+        plan: &FramePlan,
+        planned: &PlannedProcess,
+        draws: &Draws<'_>,
+        quality: &Quality,
+    ) -> bool {
+        PipelineKey::new(draws, quality).with_text_of(&self.key) == self.key
+            && self.fit_resources(draws)
+            && self.fit_declaration(plan, planned)
+    }
+
+    fn fit_resources(&self, draws: &Draws<'_>) -> bool {
+        let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
+        resources.eq(self.resources.iter().copied())
+    }
+}
+
+fn array_count(declaration: &Declaration) -> usize {
+    declaration.columns.len() + declaration.material_types.len()
+}
