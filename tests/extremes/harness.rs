@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use drawloom::backend::{
-    Backend, BackendError, NullBackend, NullSubmission, Picture, SoftwareBackend, SoftwareSubmission, WgpuBackend,
+    Backend, BackendError, NullBackend, NullSubmission, Picture, PipelineLibrary, SoftwareBackend, SoftwareSubmission,
     WgpuSubmission,
 };
 use drawloom::process::Deferred;
@@ -61,9 +61,10 @@ impl BackendName {
             Self::Software => RendererOn::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, quality),
             Self::Reference => RendererOn::open(SoftwareBackend::reference(), scheduler, quality),
             Self::Wgpu => {
+                static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
                 let (device, queue) = device().ok_or_else(|| "there is no graphics adapter".to_owned())?;
-                let backend = WgpuBackend::new(device, queue).map_err(|error| error.to_string())?;
-                RendererOn::open(backend, scheduler, quality)
+                let library = LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue));
+                RendererOn::open(library.backend().map_err(|error| error.to_string())?, scheduler, quality)
             }
         }
     }

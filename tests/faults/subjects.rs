@@ -42,7 +42,7 @@ pub use of_wgpu::shared_device;
 mod of_wgpu {
     use std::sync::{Arc, OnceLock};
 
-    use drawloom::backend::{WgpuBackend, WgpuSubmission};
+    use drawloom::backend::{PipelineLibrary, WgpuBackend, WgpuSubmission};
     use drawloom::task::Scheduler;
     use drawloom::wgpu;
     use drawloom_testing::adapter;
@@ -57,9 +57,11 @@ mod of_wgpu {
     }
 
     impl Subject for WgpuBackend {
+        /// Subjects share what they compile: dozens are opened, one for each call that fails.
         fn open(_: &Arc<Scheduler>) -> Result<Self, Failed> {
+            static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
             let (device, queue) = shared_device().ok_or("there is no graphics adapter")?;
-            Ok(Self::new(device, queue)?)
+            Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
         }
 
         fn read(submission: &WgpuSubmission, view: usize, target: &str) -> Result<Vec<u8>, Failed> {

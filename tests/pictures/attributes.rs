@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drawloom::Renderer;
-use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
+use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
@@ -19,9 +19,9 @@ use drawloom_testing::scenes::{cube, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, pixel};
+use crate::fixture::{Fixture, backend, pixel};
 use crate::image_distance::assert_color;
-use crate::strategies::{device, strategies};
+use crate::strategies::strategies;
 
 pub const CASES: &[Case] = &[
     ("attributes_are_interpolated_and_meshes_without_them_have_the_default", interpolated),
@@ -231,8 +231,7 @@ fn same_everywhere() -> Result<(), Failed> {
     let by_software = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "coloured")?;
     let mut first = None;
     for (recording, encoding) in strategies()? {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
         let builder = Renderer::builder(backend).process(Colored).output("coloured");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };

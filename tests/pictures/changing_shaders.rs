@@ -13,8 +13,8 @@ use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
-use crate::strategies::{counts, device, expect, many_batches};
+use crate::fixture::{Fixture, backend};
+use crate::strategies::{counts, expect, many_batches};
 
 pub const CASES: &[Case] = &[
     ("cached_bundles_are_recorded_again_when_a_shader_or_its_parameters_change", changing_shader),
@@ -81,12 +81,13 @@ fn changing_shader() -> Result<(), Failed> {
     let fixture = |recording| {
         // Cases that count cached bundles use a device of their own: see `fixture_alone`.
         let is_counted = recording == RecordingStrategy::CachedBundles;
-        let (device, queue) = if is_counted { adapter::device()? } else { device()? };
-        let builder = Renderer::builder(
-            WgpuBackend::new(device, queue)?
-                .recording_strategy(recording)?
-                .encoding_strategy(EncodingStrategy::PerPass),
-        );
+        let alone = || -> Result<_, Failed> {
+            let (device, queue) = adapter::device()?;
+            Ok(WgpuBackend::new(device, queue)?)
+        };
+        let backend = if is_counted { alone()? } else { backend()? };
+        let backend = backend.recording_strategy(recording)?.encoding_strategy(EncodingStrategy::PerPass);
+        let builder = Renderer::builder(backend);
         let builder = builder.process(Painted { step: Arc::clone(&step) }).output("paint");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         Ok::<_, Failed>(Fixture { renderer, submitter })
@@ -156,8 +157,7 @@ impl RenderProcess for Edited {
 fn broken_shader() -> Result<(), Failed> {
     let (mut scene, step) = (many_batches(), Arc::new(AtomicU32::new(RED)));
     let build = |keeps| -> Result<Fixture, Failed> {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?;
+        let backend = backend()?;
         let backend = if keeps { backend.keep_working_shaders() } else { backend };
         let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
         let builder = builder.process(Edited { step: Arc::clone(&step) }).output("paint");

@@ -141,7 +141,7 @@ fn as_wgpu() -> Result<(), Failed> {
 
 fn too_few_buffers() -> Result<(), Failed> {
     let (device, queue) = adapter::device_with_limits(WgpuBackend::REQUIRED_LIMITS)?;
-    let mut fixture = Fixture::on(Some((device, queue)), 1, tinted)?;
+    let mut fixture = Fixture::on((device, queue), 1, tinted)?;
     let (scene, tints) = (squares()?, [[0.0; 4]; 2]);
     let scene = SceneRef { columns: &[TINT.values(&tints)], ..scene.as_scene_ref() };
     match fixture.renderer.record(scene) {

@@ -20,8 +20,8 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
-use crate::strategies::{device, drawn_by_a_new_renderer, expect, fixture_of, many_batches, pictures, strategies};
+use crate::fixture::{Fixture, backend, device};
+use crate::strategies::{drawn_by_a_new_renderer, expect, fixture_of, many_batches, pictures, strategies};
 
 pub const CASES: &[Case] = &[
     ("every_pass_is_timed_once_with_every_strategy", all_strategies),
@@ -38,8 +38,7 @@ pub fn has_timestamps() -> bool {
 
 /// A timing backend on the machine's adapter.
 fn timing() -> Result<WgpuBackend, Failed> {
-    let (device, queue) = device()?;
-    Ok(WgpuBackend::new(device, queue)?.time_passes()?)
+    Ok(backend()?.time_passes()?)
 }
 
 /// The names of process and view of every pass of a frame, in submission order.

@@ -82,9 +82,8 @@ fn read_back_after_fence() -> Result<(), Failed> {
 
 fn lost_device() -> Result<(), Failed> {
     let (device, queue) = adapter::device().map_err(|error| error.to_string())?;
-    let mut fixture = Fixture::on(Some((device.clone(), queue)), 2, |builder| {
-        builder.deferred(drawloom::process::Deferred::to_picture())
-    })?;
+    let mut fixture =
+        Fixture::on((device.clone(), queue), 2, |builder| builder.deferred(drawloom::process::Deferred::to_picture()))?;
     let scene = scene();
     let mut submitted = fixture.record(&scene)?;
     let in_flight = submitted.fence_at(FramePlace::End)?;

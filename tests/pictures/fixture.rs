@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Picture, PipelineLibrary, SoftwareBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
@@ -11,10 +11,17 @@ use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
 
-/// A device on the machine's adapter, which all cases share; `None` without an adapter.
-pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
-    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
-    DEVICE.get_or_init(|| adapter::device().ok()).clone()
+/// A device on the machine's adapter, which all cases share.
+pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
+    static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
+    Ok(DEVICE.get_or_init(|| adapter::device().map_err(|error| error.to_string())).clone()?)
+}
+
+/// A backend on the device that all cases share. What one case has compiled no other compiles again: that takes longer than most draw.
+pub fn backend() -> Result<WgpuBackend, Failed> {
+    static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
+    let (device, queue) = device()?;
+    Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
 }
 
 /// A renderer and its submitter.
@@ -34,16 +41,15 @@ impl Fixture {
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<Self, Failed> {
-        Self::on(device(), workers, build)
+        Self::on_backend(backend()?, workers, build)
     }
 
-    /// On another device; `None` if there is no adapter.
+    /// On another device.
     pub fn on(
-        device: Option<(wgpu::Device, wgpu::Queue)>,
+        (device, queue): (wgpu::Device, wgpu::Queue),
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<Self, Failed> {
-        let (device, queue) = device.ok_or("there is no graphics adapter")?;
         Self::on_backend(WgpuBackend::new(device, queue)?, workers, build)
     }
 
@@ -52,8 +58,7 @@ impl Fixture {
         workers: usize,
         build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<Self, Failed> {
-        let (device, queue) = device().ok_or("there is no graphics adapter")?;
-        Self::on_backend(WgpuBackend::new(device, queue)?.transient_targets(), workers, build)
+        Self::on_backend(backend()?.transient_targets(), workers, build)
     }
 
     /// On a backend.

@@ -21,8 +21,8 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::attributes::{COLOR, Colored, SHADE, STRENGTH, with_colors};
-use crate::fixture::Fixture;
-use crate::strategies::{device, expect, strategies};
+use crate::fixture::{Fixture, backend, device};
+use crate::strategies::{expect, strategies};
 
 pub const CASES: &[Case] = &[
     ("a_mesh_in_the_engines_buffers_looks_like_one_in_the_pages", same_picture),
@@ -161,7 +161,7 @@ fn pictures(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed
 }
 
 fn fixture() -> Result<Fixture, Failed> {
-    fixture_of(WgpuBackend::new(device()?.0, device()?.1)?)
+    fixture_of(backend()?)
 }
 
 fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
@@ -240,8 +240,7 @@ fn every_strategy() -> Result<(), Failed> {
     let expected = pictures(&mut fixture()?, &with_copies(None)?)?;
     let scene = with_copies(Some([BufferLayout::SeparateStreams, BufferLayout::WithoutColors]))?;
     for (recording, encoding) in strategies()? {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
         let mut fixture = fixture_of(backend)?;
         for frame in 0..2 {
             if pictures(&mut fixture, &scene)? != expected {
@@ -294,7 +293,7 @@ fn without_normals() -> Result<(), Failed> {
 
 fn pipelines() -> Result<(), Failed> {
     let count = |scene: &Scene| -> Result<usize, Failed> {
-        let mut fixture = Fixture::on(Some(device()?), 2, |builder| builder.process(Colored).output("coloured"))?;
+        let mut fixture = Fixture::with(2, |builder| builder.process(Colored).output("coloured"))?;
         let recorded = fixture.record(scene)?;
         fixture.submit(recorded)?;
         Ok(fixture.renderer.backend().resources().pipelines)

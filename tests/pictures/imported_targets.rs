@@ -10,8 +10,8 @@ use libtest_mimic::Failed;
 use wgpu::{TextureFormat, TextureUsages};
 
 use crate::Case;
-use crate::fixture::Fixture;
-use crate::strategies::{counts, device, expect, fixture_of};
+use crate::fixture::{Fixture, backend, device};
+use crate::strategies::{counts, expect, fixture_of};
 
 pub const CASES: &[Case] = &[
     ("views_draw_into_imported_textures", into_textures),
@@ -48,8 +48,7 @@ pub fn texture(
 }
 
 fn fixture() -> Result<Fixture, Failed> {
-    let (device, queue) = device()?;
-    fixture_of(WgpuBackend::new(device, queue)?)
+    fixture_of(backend()?)
 }
 
 fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
@@ -118,7 +117,7 @@ fn srgb() -> Result<(), Failed> {
     let (device, _) = device()?;
     let tone_mapping = ToneMapping { format: Format::Bgra8Srgb, ..ToneMapping::default() };
     let deferred = Deferred::new().post(tone_mapping);
-    let mut fixture = Fixture::on(Some(crate::strategies::device()?), 2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
     let scene = field(60);
     let expected = draw(&mut fixture, &scene)?;
     let surface = texture(&device, scene.cameras[0].size, TextureFormat::Bgra8Unorm, USAGE);
@@ -196,7 +195,7 @@ fn depth_with_stencil() -> Result<(), Failed> {
     let (device, _) = device()?;
     let format = Format::Depth32FloatStencil8;
     let deferred = Deferred::to_picture().formats(GeometryFormats { depth: format, ..GeometryFormats::default() });
-    let mut fixture = Fixture::on(Some(crate::strategies::device()?), 2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
     let scene = field(60);
     let expected = draw(&mut fixture, &scene)?;
     let depth = texture(&device, scene.cameras[0].size, TextureFormat::Depth32FloatStencil8, USAGE);

@@ -14,7 +14,7 @@ use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, device};
+use crate::fixture::{Fixture, backend, device};
 use crate::strategies::expect;
 
 pub const CASES: &[Case] = &[
@@ -117,8 +117,11 @@ fn expected_numbers(scene: &SceneRef<'_>) -> Result<Vec<u32>, Failed> {
 }
 
 /// Draws a scene, and compares the number of each pixel.
-fn compare(fixture: &mut Fixture, scene: SceneRef<'_>, context: &str) -> Result<(), Failed> {
-    let expected = expected_numbers(&scene)?;
+fn compare(
+    fixture: &mut Fixture,
+    (scene, expected): (SceneRef<'_>, &[u32]),
+    context: impl Fn() -> String,
+) -> Result<(), Failed> {
     let recorded = fixture.renderer.record(scene)?;
     let submission = fixture.submit(recorded)?;
     let (numbers, draws) = (submission.read(0, "number")?, submission.read(0, "draws")?);
@@ -132,7 +135,8 @@ fn compare(fixture: &mut Fixture, scene: SceneRef<'_>, context: &str) -> Result<
     expect(found.len() == expected.len() && total == count && wrong.is_empty(), || {
         let first = wrong.first().map(|&pixel| (found[pixel], expected[pixel], drawn[pixel]));
         format!(
-            "{context}: {total} of {count} objects were drawn, {} pixels are wrong; the first (number, expected number, draws): {first:?}",
+            "{}: {total} of {count} objects were drawn, {} pixels are wrong; the first (number, expected number, draws): {first:?}",
+            context(),
             wrong.len()
         )
     })
@@ -147,26 +151,34 @@ const VARIANTS: [(RecordingStrategy, DrawOrder); 3] = [
 
 /// Draws lists of these lengths: at first, after the first object and the last have changed places, and without the first.
 fn check_counts(counts: &[usize]) -> Result<(), Failed> {
-    let (device, queue) = device().ok_or("there is no graphics adapter")?;
-    let has_indirect = device.features().contains(WgpuBackend::OPTIONAL_FEATURES);
-    let variants =
-        VARIANTS.into_iter().filter(|(recording, _)| has_indirect || *recording != RecordingStrategy::Indirect);
-    for ((recording, order), &count) in variants.flat_map(|variant| counts.iter().map(move |count| (variant, count))) {
-        let backend = WgpuBackend::new(device.clone(), queue.clone())?.recording_strategy(recording)?;
-        let build = |builder: RendererBuilder<_>| builder.process(Numbers(order)).output("number").output("draws");
-        let mut fixture = Fixture::on_backend(backend, 2, build)?;
-        let context = |step: &str| format!("{count} objects {step}, {recording:?}, {order:?}");
-        let mut scene = scene(count)?;
-        compare(&mut fixture, scene.as_scene_ref(), &context("at first"))?;
-        let mut positions = scene.as_scene_ref().positions.to_vec();
+    let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
+    for &count in counts {
+        let whole = scene(count)?;
+        let mut positions = whole.as_scene_ref().positions.to_vec();
         positions.swap(0, count - 1);
         let changes = Changes::Objects(&[0, count as u32 - 1]);
-        let swapped = SceneRef { positions: &positions, changes, ..scene.as_scene_ref() };
-        compare(&mut fixture, swapped, &context("of which two changed places"))?;
-        let first = scene.objects().next().ok_or("there is an object")?;
-        scene.remove_object(first)?;
-        let fewer = SceneRef { changes: Changes::Unknown, ..scene.as_scene_ref() };
-        compare(&mut fixture, fewer, &context("without the first"))?;
+        let swapped = SceneRef { positions: &positions, changes, ..whole.as_scene_ref() };
+        let mut without_first = scene(count)?;
+        let first = without_first.objects().next().ok_or("there is an object")?;
+        without_first.remove_object(first)?;
+        let fewer = SceneRef { changes: Changes::Unknown, ..without_first.as_scene_ref() };
+        let steps = [
+            ("at first", whole.as_scene_ref(), expected_numbers(&whole.as_scene_ref())?),
+            ("of which two changed places", swapped, expected_numbers(&swapped)?),
+            ("without the first", fewer, expected_numbers(&fewer)?),
+        ];
+        for (recording, order) in VARIANTS {
+            if recording == RecordingStrategy::Indirect && !has_indirect {
+                continue;
+            }
+            let build = |builder: RendererBuilder<_>| builder.process(Numbers(order)).output("number").output("draws");
+            let mut fixture = Fixture::on_backend(backend()?.recording_strategy(recording)?, 2, build)?;
+            for (step, scene, expected) in &steps {
+                compare(&mut fixture, (*scene, expected), || {
+                    format!("{count} objects {step}, {recording:?}, {order:?}")
+                })?;
+            }
+        }
     }
     Ok(())
 }

@@ -12,7 +12,7 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, radiance};
-use crate::strategies::{expect, fixture_with, pictures, strategies};
+use crate::strategies::{expect, few_strategies, fixture_with, pictures, strategies};
 
 pub const CASES: &[Case] = &[
     ("at_an_error_of_0_levels_of_detail_change_no_byte", full_detail),
@@ -80,7 +80,7 @@ fn coarsest_levels() -> Result<(), Failed> {
         let expected = draw(&with_meshes(leveled(), coarsest), PLAIN, quality(0.0))?;
         let full = draw(&with_meshes(leveled(), whole), PLAIN, quality(0.0))?;
         expect(expected != full, || "the levels look like the meshes".to_owned())?;
-        for strategies in strategies()? {
+        for strategies in few_strategies()? {
             let found = draw(&leveled(), strategies, quality(1e9))?;
             expect(found == expected, || format!("the picture differs with {strategies:?}"))?;
         }

@@ -83,7 +83,7 @@ type Case = (&'static str, fn() -> Result<(), Failed>);
 
 fn main() {
     let arguments = Arguments::from_args();
-    let no_adapter = fixture::device().is_none();
+    let no_adapter = fixture::device().is_err();
     let is_set = |name| std::env::var_os(name).is_some_and(|value| value == "1");
     let required = is_set("DRAWLOOM_REQUIRE_ADAPTER");
     let no_scenes = shared_scenes::are_optional_and_missing();

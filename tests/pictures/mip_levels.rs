@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use drawloom::backend::{BackendError, Picture, TargetMemory, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{BackendError, Picture, TargetMemory, WgpuSubmission};
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess,
     TargetSize,
@@ -19,9 +19,9 @@ use drawloom_testing::mip_levels::{
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
+use crate::fixture::{Fixture, backend};
 use crate::imported_targets::{USAGE, texture};
-use crate::strategies::{device, expect, many_batches, strategies};
+use crate::strategies::{expect, many_batches, strategies};
 
 pub const CASES: &[Case] = &[
     ("mip_levels_are_means_in_every_view_and_frame", own),
@@ -155,8 +155,7 @@ fn same_bytes() -> Result<(), Failed> {
     let mut scene = many_batches();
     let mut expected: Option<Picture> = None;
     for (recording, encoding) in strategies()? {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
         let builder = Renderer::builder(backend)
             .deferred(Deferred::to_picture().shadow_maps(None))
             .granularity(Granularity::Chunk(300));
@@ -256,7 +255,7 @@ fn import() -> Result<(), Failed> {
     let mut scene = atlas_scene();
     scene.cameras.truncate(1);
     let camera = &scene.cameras[0];
-    let (device, _) = crate::fixture::device().ok_or("there is no graphics adapter")?;
+    let (device, _) = crate::fixture::device()?;
     let imported = texture(&device, camera.size, TextureFormat::R16Float, USAGE);
     fixture.renderer.backend().import_target(camera.name.clone(), "pyramid", imported);
     let error = fixture.renderer.record(scene.as_scene_ref()).map(drop).err();

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
+use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
@@ -20,8 +20,8 @@ use drawloom_testing::scenes::{as_list, culled, field, sized, square, with_meshe
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, pixel};
-use crate::strategies::{device, expect, many_batches, strategies};
+use crate::fixture::{Fixture, backend, pixel};
+use crate::strategies::{expect, many_batches, strategies};
 
 pub const CASES: &[Case] = &[
     ("an_edge_through_the_middle_of_pixels_covers_half_of_their_samples", half_covered),
@@ -210,8 +210,7 @@ fn every_strategy() -> Result<(), Failed> {
     scene.cameras.truncate(1);
     let [expected] = read(&mut fixture(true, Quality::balanced())?, &scene, ["numbers"])?;
     for (recording, encoding) in strategies()? {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
         let builder = Renderer::builder(backend).process(Numbered { multisampled: true }).output("numbers");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };

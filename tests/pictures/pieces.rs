@@ -23,7 +23,7 @@ use drawloom_testing::scenes::{cube, field, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::device;
+use crate::fixture::backend;
 use crate::sampled_views::{MIRROR, SURFACE};
 use crate::strategies::{expect, many_batches};
 use crate::streaming::disc;
@@ -115,8 +115,7 @@ fn on_the_device_with(
     with: impl FnOnce(WgpuBackend) -> Result<WgpuBackend, BackendError>,
     build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
 ) -> Result<Painter<WgpuBackend>, Failed> {
-    let (device, queue) = device().ok_or("there is no graphics adapter")?;
-    let builder = Renderer::builder(with(WgpuBackend::new(device, queue)?)?).deferred(deferred());
+    let builder = Renderer::builder(with(backend()?)?).deferred(deferred());
     let (renderer, submitter) = build(builder).build(Arc::new(Scheduler::new(2)?))?;
     Ok(Painter { renderer, submitter, read: |submitted, view| Ok(submitted.submission.read(view, "picture")?) })
 }
@@ -297,8 +296,7 @@ fn other_renderers() -> Result<(), Failed> {
         plain.renderer.set_deferred(deferred)?;
         executed.push(("formats", steady(&mut with, &mut plain, &mut scene, "formats")?));
     }
-    let (device, queue) = device().ok_or("there is no graphics adapter")?;
-    with.submitter = with.renderer.replace_backend(WgpuBackend::new(device, queue)?);
+    with.submitter = with.renderer.replace_backend(backend()?);
     executed.push(("another backend", steady(&mut with, &mut plain, &mut scene, "another backend")?));
     with.renderer.forget_previous_frames();
     executed.push(("forgotten", steady(&mut with, &mut plain, &mut scene, "forgotten")?));

@@ -23,7 +23,7 @@ pub const CASES: &[Case] = &[
 const VERTICES: usize = 4000;
 
 fn check(kinds: &[Kind], is_within: fn(&Errors) -> bool) -> Result<(), Failed> {
-    let (device, queue) = device().ok_or("there is no graphics adapter")?;
+    let (device, queue) = device()?;
     let (mut random, mut shader) = (Random::new(), ShaderOnDevice::new(device, queue));
     for kind in kinds {
         let errors = measure(*kind, Origin::Anywhere, VERTICES, &mut random, &mut shader)?;

@@ -179,7 +179,7 @@ fn history() -> Result<(), Failed> {
 }
 
 fn imported() -> Result<(), Failed> {
-    let (device, _) = device().ok_or("there is no graphics adapter")?;
+    let (device, _) = device()?;
     let mut fixture = Fixture::with(2, with_mirror)?;
     for (frame, is_imported) in [(0, false), (1, true), (2, true), (3, false), (4, false)] {
         let scene = scene(offset(frame), 0.0, Redraw::Interval(100))?;

@@ -11,7 +11,7 @@ use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, device, pixel};
+use crate::fixture::{Fixture, backend, device, pixel};
 use crate::image_distance::assert_color;
 
 pub const CASES: &[Case] = &[
@@ -62,13 +62,13 @@ struct Own {
 
 impl Own {
     fn new() -> Result<Self, Failed> {
-        Self::on(device().ok_or("there is no graphics adapter")?)
+        Self::on(backend()?)
     }
 
-    fn on(device: (wgpu::Device, wgpu::Queue)) -> Result<Self, Failed> {
+    fn on(backend: WgpuBackend) -> Result<Self, Failed> {
         let process = Arc::new(OwnResources::default());
         let build = |builder: RendererBuilder<WgpuBackend>| builder.process(Arc::clone(&process)).output("own");
-        let fixture = Fixture::on(Some(device), 2, build)?;
+        let fixture = Fixture::on_backend(backend, 2, build)?;
         let mut scene = field(4);
         scene.cameras.truncate(1);
         scene.cameras[0].size = [16, 16];
@@ -168,7 +168,7 @@ fn sampler(device: &wgpu::Device, filter: wgpu::FilterMode) -> ShaderResource<'s
 
 fn handles() -> Result<(), Failed> {
     let mut own = Own::new()?;
-    let (device, queue) = device().ok_or("no adapter")?;
+    let (device, queue) = device()?;
     let tint = buffer(&device, &queue, 0.25, wgpu::BufferUsages::STORAGE);
     let (image, linear) = (image(&device, &queue), sampler(&device, wgpu::FilterMode::Linear));
     let resources = vec![ShaderResource::Buffer(tint.clone()), image.clone(), linear.clone()];
@@ -186,7 +186,7 @@ fn handles() -> Result<(), Failed> {
 
 fn other_kinds() -> Result<(), Failed> {
     let mut own = Own::new()?;
-    let (device, queue) = device().ok_or("no adapter")?;
+    let (device, queue) = device()?;
     let tint = ShaderResource::Buffer(buffer(&device, &queue, 0.25, wgpu::BufferUsages::STORAGE));
     for _round in 0..2 {
         let picture = own.draw(FROM_BYTES, vec![floats(&[1.0]), floats(&[0.5])])?;
@@ -256,7 +256,7 @@ fn filtered_target() -> Result<(), Failed> {
 
 fn refused() -> Result<(), Failed> {
     let [(device, queue), (other_device, other_queue)] = adapter::two_devices()?;
-    let mut own = Own::on((device.clone(), queue.clone()))?;
+    let mut own = Own::on(WgpuBackend::new(device.clone(), queue.clone())?)?;
     let storage = wgpu::BufferUsages::STORAGE;
     let (image, linear) = (image(&device, &queue), sampler(&device, wgpu::FilterMode::Linear));
     let ShaderResource::Sampler { sampler: comparison, .. } = linear.clone() else { unreachable!("it is a sampler") };
@@ -292,7 +292,7 @@ fn refused() -> Result<(), Failed> {
 /// A texture of four samples a pixel, whose content is 0.
 fn multisampled() -> Result<(), Failed> {
     let mut own = Own::new()?;
-    let (device, _) = device().ok_or("no adapter")?;
+    let (device, _) = device()?;
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("samples"),
         size: wgpu::Extent3d { width: 2, height: 2, depth_or_array_layers: 1 },
@@ -319,7 +319,7 @@ fn multisampled() -> Result<(), Failed> {
 
 fn refused_submission() -> Result<(), Failed> {
     let mut own = Own::new()?;
-    let (device, queue) = device().ok_or("no adapter")?;
+    let (device, queue) = device()?;
     let tint = buffer(&device, &queue, 0.25, wgpu::BufferUsages::STORAGE);
     let resources =
         vec![ShaderResource::Buffer(tint.clone()), image(&device, &queue), sampler(&device, wgpu::FilterMode::Linear)];

@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
-use drawloom::backend::WgpuBackend;
+use drawloom::RendererBuilder;
+use drawloom::backend::{PipelineLibrary, WgpuBackend};
 use drawloom::process::Deferred;
 use drawloom::scene::{Changes, SceneRef};
-use drawloom::{RendererBuilder, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::tinted::Tinted;
@@ -23,9 +23,13 @@ pub const CASES: &[Case] = &[
 
 /// A fixture whose device maps no memory, so objects are staged.
 fn staging_fixture() -> Result<Fixture, Failed> {
-    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
-    let open = || adapter::device_without(WgpuBackend::MAPPING_FEATURES).ok();
-    Fixture::on(DEVICE.get_or_init(open).clone(), 2, with_tints)
+    static LIBRARY: OnceLock<Result<PipelineLibrary, String>> = OnceLock::new();
+    let open = || {
+        let (device, queue) =
+            adapter::device_without(WgpuBackend::MAPPING_FEATURES).map_err(|error| error.to_string())?;
+        Ok::<_, String>(PipelineLibrary::new(device, queue))
+    };
+    Fixture::on_backend(LIBRARY.get_or_init(open).clone()?.backend()?, 2, with_tints)
 }
 
 /// The shipped processes, and one that reads a column.

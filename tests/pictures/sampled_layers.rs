@@ -275,7 +275,7 @@ fn transient() -> Result<(), Failed> {
 
 fn import() -> Result<(), Failed> {
     let (mut fixture, scene) = (fixture()?, screens()?);
-    let (device, _) = device().ok_or("there is no graphics adapter")?;
+    let (device, _) = device()?;
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: SIZE[0], height: SIZE[1], depth_or_array_layers: 1 },

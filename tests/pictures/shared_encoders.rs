@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, WgpuBackend, WgpuPassStatistics};
+use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, WgpuPassStatistics};
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
@@ -11,8 +11,8 @@ use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
-use crate::strategies::{Head, Ouroboros, device, expect, fixture_with, many_batches, pictures};
+use crate::fixture::{Fixture, backend};
+use crate::strategies::{Head, Ouroboros, expect, fixture_with, many_batches, pictures};
 
 pub const CASES: &[Case] = &[
     ("passes_that_share_an_encoder_draw_the_same_bytes", same_bytes),
@@ -127,8 +127,7 @@ impl RenderProcess for Foot {
 }
 
 fn refused() -> Result<(), Failed> {
-    let (device, queue) = device()?;
-    let backend = WgpuBackend::new(device, queue)?.encoding_strategy(EncodingStrategy::PerPass);
+    let backend = backend()?.encoding_strategy(EncodingStrategy::PerPass);
     let builder =
         Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros).process(Foot);
     let (mut renderer, _submitter) = builder.output("foot").build(Arc::new(Scheduler::new(1)?))?;

@@ -17,8 +17,8 @@ use drawloom_testing::scenes::{cube, field, sized};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::Fixture;
-use crate::strategies::{device, expect, strategies};
+use crate::fixture::{Fixture, backend};
+use crate::strategies::{expect, strategies};
 
 pub const CASES: &[Case] = &[
     ("a_stencil_alone_marks_all_pixels_of_objects", alone),
@@ -208,8 +208,7 @@ fn beside_depth() -> Result<(), Failed> {
 fn every_strategy() -> Result<(), Failed> {
     let expected = covered(Some("depth"))?;
     for (recording, encoding) in strategies()? {
-        let (device, queue) = device()?;
-        let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?.encoding_strategy(encoding);
+        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
         let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
         let builder = Renderer::builder(backend).deferred(pipeline()).process(Mark::BESIDE_DEPTH);
         let (renderer, submitter) = builder.process(white).output("white").build(Arc::new(Scheduler::new(2)?))?;

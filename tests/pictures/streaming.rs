@@ -19,7 +19,6 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::Fixture;
-use crate::strategies::device;
 
 pub const CASES: &[Case] = &[
     ("meshes_that_come_one_by_one_are_drawn_like_meshes_that_come_at_once", one_by_one),
@@ -39,8 +38,7 @@ fn fixture(backend: WgpuBackend, workers: usize) -> Result<Fixture, Failed> {
 }
 
 fn backend(recording: RecordingStrategy) -> Result<WgpuBackend, Failed> {
-    let (device, queue) = device()?;
-    let backend = WgpuBackend::new(device, queue)?.recording_strategy(recording)?;
+    let backend = crate::fixture::backend()?.recording_strategy(recording)?;
     Ok(backend.encoding_strategy(EncodingStrategy::PerPass))
 }
 

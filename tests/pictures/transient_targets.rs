@@ -249,7 +249,7 @@ fn history() -> Result<(), Failed> {
 }
 
 fn imports() -> Result<(), Failed> {
-    let (device, _) = device().ok_or("there is no graphics adapter")?;
+    let (device, _) = device()?;
     let (mut both, mut scene) = (Both::new(|builder| builder.deferred(smooth()))?, field(40));
     let size = [80, 60];
     with_cameras(&mut scene, &[size; 3]);
