@@ -5,6 +5,7 @@ fn main() {
     for checker in ["loom", "shuttle"] {
         if std::env::var_os(format!("CARGO_FEATURE_{}", checker.to_uppercase())).is_some() {
             println!("cargo::rustc-cfg=drawloom_{checker}");
+            println!("cargo::rustc-cfg=drawloom_model_check");
         }
     }
 }

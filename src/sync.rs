@@ -3,8 +3,8 @@
 //! The modules `task`, `graph` and `timeline` take their atomics, locks, threads and deques from here. By default these are the
 //! standard library's, parking_lot's and crossbeam-deque's. With `--cfg drawloom_loom` they are those of loom, a model checker that
 //! explores all interleavings of a few threads, and all values that each memory ordering allows. With `--cfg drawloom_shuttle`
-//! they are those of shuttle, which tries random interleavings in one total order, and so can check whole runs. The tests for both
-//! are beside the code that they check.
+//! they are those of shuttle, which tries random interleavings in one total order, and so can check whole runs. With either comes
+//! `--cfg drawloom_model_check`. The tests for both are beside the code that they check.
 //!
 //! All variants have the same interface: a lock returns its guard and cannot be poisoned, and a wait takes the guard and returns
 //! it.
@@ -13,12 +13,12 @@
 use loom as primitives;
 #[cfg(drawloom_shuttle)]
 use shuttle as primitives;
-#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
+#[cfg(not(drawloom_model_check))]
 use std as primitives;
 
-#[cfg(any(drawloom_loom, drawloom_shuttle))]
+#[cfg(drawloom_model_check)]
 pub(crate) use self::modelled::{Condvar, Deque, Mutex, Stealer};
-#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
+#[cfg(not(drawloom_model_check))]
 pub(crate) use self::native::{Condvar, Deque, Mutex, Stealer};
 
 #[cfg(drawloom_shuttle)]
@@ -39,7 +39,7 @@ pub(crate) use self::primitives::{
     thread, thread_local,
 };
 
-#[cfg(not(any(drawloom_loom, drawloom_shuttle)))]
+#[cfg(not(drawloom_model_check))]
 mod native {
     use parking_lot::MutexGuard;
 
@@ -66,7 +66,7 @@ mod native {
     }
 }
 
-#[cfg(any(drawloom_loom, drawloom_shuttle))]
+#[cfg(drawloom_model_check)]
 mod modelled {
     use std::collections::VecDeque;
     use std::sync::PoisonError;

@@ -88,7 +88,7 @@ impl Drop for AbortOnUnwind {
     #[cold]
     fn drop(&mut self) {
         // A model checker that has found a failure drops the threads of its model in the middle of their work.
-        if cfg!(any(drawloom_loom, drawloom_shuttle)) {
+        if cfg!(drawloom_model_check) {
             return;
         }
         eprintln!("drawloom: a panic tried to unwind through {}, which other threads rely on: aborting", self.what);
@@ -96,7 +96,7 @@ impl Drop for AbortOnUnwind {
     }
 }
 
-#[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::env;
     use std::panic::panic_any;

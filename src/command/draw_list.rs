@@ -285,7 +285,7 @@ impl PartialEq for DrawList {
 
 impl Eq for DrawList {}
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use proptest::prelude::*;
 

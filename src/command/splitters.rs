@@ -104,7 +104,7 @@ impl KeyRange {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use proptest::prelude::*;
 

@@ -138,7 +138,7 @@ impl RankedAdjacency {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use proptest::prelude::*;
 

@@ -100,7 +100,7 @@ fn nanoseconds(since: Instant) -> u32 {
     since.elapsed().as_nanos().try_into().unwrap_or(u32::MAX)
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
     use crate::tuning::signal::{ControllerBounds, check_controller};

@@ -178,7 +178,7 @@ pub(super) fn needed<P>(
     needed
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::{Roles, derive};
     use crate::graph::FrameGraph;

@@ -158,7 +158,7 @@ impl ExecutionPolicy {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::time::Duration;
 

@@ -41,7 +41,7 @@ impl Token {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use proptest::prelude::*;
 

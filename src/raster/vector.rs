@@ -164,7 +164,7 @@ impl<R: Real> Quaternion<R> {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use glam::DQuat;
     use proptest::prelude::*;

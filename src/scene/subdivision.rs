@@ -169,7 +169,7 @@ fn midpoint_of(one: Vertex, other: Vertex) -> Vertex {
     bytemuck::cast(midpoint)
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::collections::{HashMap, HashSet};
 

@@ -231,7 +231,7 @@ impl fmt::Debug for SchedulerBuilder {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::io;
     use std::sync::mpsc;

@@ -94,7 +94,7 @@ pub(crate) fn are_awake_after(gaps: &[Duration], workers: usize, wake_up_cost: D
     gaps.last().is_some_and(|&gap| gap < spin)
 }
 
-#[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
     use crate::tuning::signal::{ControllerBounds, check_controller};

@@ -25,7 +25,7 @@ const UNCOUNTED_LOOKS: u32 = 16;
 
 /// Under a model checker workers sleep at once, because each look would be one more branch. Under Miri too, because a look takes
 /// as long as a job.
-const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_loom, drawloom_shuttle, miri));
+const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_model_check, miri));
 
 /// A worker's time without jobs.
 #[derive(Default)]

@@ -47,7 +47,7 @@ impl Latch {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::Latch;
 

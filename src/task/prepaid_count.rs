@@ -11,7 +11,7 @@ use std::cell::Cell;
 use super::region::{JobContext, Region};
 
 /// How many jobs a worker counts at once.
-const BATCH: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 32 };
+const BATCH: usize = if cfg!(drawloom_model_check) { 2 } else { 32 };
 
 /// The count that a worker holds of one region's latch.
 pub(super) struct PrepaidCount<W: JobContext> {

@@ -23,7 +23,7 @@ use super::shuffle::Shuffle;
 use crate::sync::{Arc, Deque, Steal, Stealer};
 
 /// The most jobs in a deque. Crossbeam's deque starts with room for 64, and grows when that is full.
-const MAX_IN_DEQUE: usize = if cfg!(any(drawloom_loom, drawloom_shuttle)) { 2 } else { 60 };
+const MAX_IN_DEQUE: usize = if cfg!(drawloom_model_check) { 2 } else { 60 };
 
 /// How many jobs a thief takes from an overflow beside the one that it runs, at most.
 const MAX_EXTRA_STOLEN: usize = 59;

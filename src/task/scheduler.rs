@@ -259,7 +259,7 @@ impl fmt::Debug for WorkerState<'_> {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::sync::mpsc;
     use std::thread;
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(any(miri, drawloom_shuttle), ignore = "time does not pass as usual")]
+    #[cfg_attr(miri, ignore = "time does not pass as usual")]
     fn a_worker_that_was_awake_between_frames_sleeps_in_the_end() {
         let builder = Scheduler::builder().workers(2).wake_up_cost(Duration::from_millis(1));
         let scheduler = builder.build().unwrap();

@@ -36,7 +36,7 @@ pub(super) struct Shared<W: JobContext> {
 
 impl<W: JobContext> Shared<W> {
     /// Under a model checker workers never stay awake, and gaps would only be more branches.
-    const MEASURES_GAPS: bool = cfg!(not(any(drawloom_loom, drawloom_shuttle)));
+    const MEASURES_GAPS: bool = cfg!(not(drawloom_model_check));
 
     /// `stealers` has one entry for each worker, and `first` is the queues of worker 0.
     pub(super) fn new(

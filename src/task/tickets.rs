@@ -179,7 +179,7 @@ impl TicketSize {
     }
 }
 
-#[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::time::Duration;
 

@@ -27,7 +27,7 @@ const SLEEP_BEFORE: Duration = Duration::from_micros(20);
 /// processor of the spawning thread even once, workers are kept off there from then on, if they `may_move`.
 pub(super) fn measure(scheduler: &Scheduler, may_move: bool) -> Duration {
     // Under a model checker or an interpreter, time does not pass as usual.
-    if scheduler.workers() == 1 || cfg!(any(drawloom_loom, drawloom_shuttle, miri)) {
+    if scheduler.workers() == 1 || cfg!(any(drawloom_model_check, miri)) {
         return Duration::ZERO;
     }
     let mut wake_ups = measure_all(scheduler);

@@ -185,7 +185,7 @@ fn nanoseconds(time: Duration) -> u64 {
     nanoseconds.min(u64::MAX >> 3)
 }
 
-#[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};

@@ -182,7 +182,7 @@ impl Display for Nanoseconds {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
 

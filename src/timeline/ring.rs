@@ -99,7 +99,7 @@ impl Ring {
     }
 }
 
-#[cfg(all(test, not(any(drawloom_loom, drawloom_shuttle))))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::{Event, Ring, WORDS};
 

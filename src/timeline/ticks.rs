@@ -1,7 +1,7 @@
 //! The processor's time-stamp counter, where it has a reliable one. Reading it takes half as long as reading the system's
 //! clock, which is the most expensive part of recording a chunk.
 
-#[cfg(all(target_arch = "x86_64", not(any(drawloom_loom, drawloom_shuttle, miri))))]
+#[cfg(all(target_arch = "x86_64", not(any(drawloom_model_check, miri))))]
 mod counter {
     use std::arch::x86_64::{__cpuid, _mm_lfence, _rdtsc};
     use std::fs;
@@ -39,7 +39,7 @@ mod counter {
     }
 }
 
-#[cfg(not(all(target_arch = "x86_64", not(any(drawloom_loom, drawloom_shuttle, miri)))))]
+#[cfg(not(all(target_arch = "x86_64", not(any(drawloom_model_check, miri)))))]
 mod counter {
     pub(in crate::timeline) fn is_reliable() -> bool {
         false

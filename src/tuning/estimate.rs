@@ -98,7 +98,7 @@ impl Estimate {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
     use crate::tuning::signal::Signal;

@@ -54,7 +54,7 @@
 
 mod estimate;
 mod hysteresis;
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 pub(crate) mod signal;
 mod tuner;
 

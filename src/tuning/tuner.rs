@@ -205,7 +205,7 @@ impl Tuner {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
     use crate::tuning::signal::{ControllerBounds, Signal, check_controller};

@@ -167,13 +167,15 @@ fn check_counts(counts: &[usize]) -> Result<(), Failed> {
             ("of which two changed places", swapped, expected_numbers(&swapped)?),
             ("without the first", fewer, expected_numbers(&fewer)?),
         ];
-        for (recording, order) in VARIANTS {
+        for (index, (recording, order)) in VARIANTS.into_iter().enumerate() {
             if recording == RecordingStrategy::Indirect && !has_indirect {
                 continue;
             }
             let build = |builder: RendererBuilder<_>| builder.process(Numbers(order)).output("number").output("draws");
             let mut fixture = Fixture::on_backend(backend()?.recording_strategy(recording)?, 2, build)?;
-            for (step, scene, expected) in &steps {
+            // A frame of a million takes seconds.
+            let steps = if count > 100_000 && index > 0 { &steps[..1] } else { &steps[..] };
+            for (step, scene, expected) in steps {
                 compare(&mut fixture, (*scene, expected), || {
                     format!("{count} objects {step}, {recording:?}, {order:?}")
                 })?;

@@ -360,7 +360,7 @@ fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::sync::{Arc, mpsc};
     use std::time::Duration;

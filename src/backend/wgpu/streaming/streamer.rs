@@ -244,7 +244,7 @@ impl BudgetWarning {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use std::iter;
 

@@ -152,7 +152,7 @@ impl<R: Real> Source<'_, R> {
     }
 }
 
-#[cfg(all(test, not(drawloom_loom)))]
+#[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use proptest::prelude::*;
 
