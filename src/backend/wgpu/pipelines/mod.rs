@@ -2,12 +2,13 @@
 
 mod attachment_formats;
 mod compile_shader;
+mod compiled_shader;
 mod pipeline_cache;
 mod pipeline_inputs;
 mod pipeline_key;
-mod shared_pipelines;
 mod pipeline_variant;
 mod process_pipelines;
+mod shared_pipelines;
 mod unused_bindings;
 mod vertex_buffers;
 

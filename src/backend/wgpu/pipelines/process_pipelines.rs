@@ -7,18 +7,17 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
-use super::compile_shader::compile_shader;
+use super::compiled_shader::CompiledShader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_key::VertexSource;
 use super::pipeline_variant::PipelineVariant;
 use super::shared_pipelines::SharedPipelines;
-use super::unused_bindings::warn_of_unused_bindings;
 use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout, process_layout};
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::Cull;
-use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
+use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology};
 use crate::tuning::Tuner;
@@ -39,15 +38,6 @@ pub(crate) struct ProcessPipelines {
     library: Option<SharedPipelines>,
     /// The tuner of each view's pass.
     tuners: Mutex<Vec<Option<Tuner>>>,
-}
-
-/// Clones are the same on the device.
-#[derive(Clone)]
-pub(super) struct CompiledShader {
-    module: wgpu::ShaderModule,
-    layout: wgpu::PipelineLayout,
-    /// Of a compute shader.
-    pub(super) compute: Option<wgpu::ComputePipeline>,
 }
 
 impl ProcessPipelines {
@@ -310,43 +300,6 @@ impl ProcessPipelines {
                 wgpu::CompareFunction::Greater
             }
         }
-    }
-}
-
-impl CompiledShader {
-    /// Compiles the shader of a process whose own bind groups, 2 and 3, have these layouts.
-    ///
-    /// # Errors
-    /// If it does not compile.
-    fn new(
-        device: &wgpu::Device,
-        layouts: &BindGroupLayouts,
-        own: [Option<&wgpu::BindGroupLayout>; 2],
-        declaration: &Declaration,
-        inputs: &PipelineInputs,
-    ) -> Result<Self, BackendError> {
-        let PipelineInputs { name, key, attributes, .. } = inputs;
-        let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
-        let module = compile_shader(device, name, &before, &key.own_shaders())?;
-        warn_of_unused_bindings(name, declaration, &before, &key.own_shaders());
-        let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
-        let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(name),
-            bind_group_layouts: &groups[..used],
-            immediate_size: 0,
-        });
-        let compute = (key.vertices == VertexSource::Compute).then(|| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: None,
-                layout: Some(&layout),
-                module: &module,
-                entry_point: Some("compute"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                cache: None,
-            })
-        });
-        Ok(Self { module, layout, compute })
     }
 }
 

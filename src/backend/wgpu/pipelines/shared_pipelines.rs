@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
+use super::compiled_shader::CompiledShader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_variant::PipelineVariant;
-use super::process_pipelines::CompiledShader;
 
 /// The compiled shaders and pipelines of several backends, in the order in which they were compiled. Clones are the same library.
 #[derive(Clone, Default)]
