@@ -86,8 +86,8 @@ fn are_different(one: &[u8; 4], other: &[u8; 4]) -> bool {
 
 /// The most by which a channel of the picture may differ where both pictures show the same. Radiance is rounded to half floats, 2⁻¹¹ of
 /// it, once for each light and pane: a dozen times at most, 0.6% in all. The tone curve and sRGB turn a change of 1% into at most 0.3% of
-/// the range. So the two differ by half a step of 255 at most, and either is rounded to whole steps.
-const ROUNDING: u8 = 2;
+/// the range. So the two differ by half a step of 255 at most, and by 1 when both are rounded to whole steps.
+const ROUNDING: u8 = 1;
 
 /// The greatest distance in pixels by which either of two pictures may have a vertex in the wrong place: see
 /// [`GpuView`](drawloom::view::GpuView).
