@@ -48,7 +48,8 @@ pub fn strategies() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed
     Ok(recordings.flat_map(|recording| ENCODING_STRATEGIES.map(|encoding| (recording, encoding))).collect())
 }
 
-/// A few of the strategies: each way to record, and with these each way to encode, at least once. For scenes whose passes have too few draws to be split.
+/// A few of the strategies: each way to record once, and with these each way to encode at least once. For scenes whose passes have too few
+/// draws to be split.
 pub fn few_strategies() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
     let mut next_encoding = ENCODING_STRATEGIES.into_iter().cycle();
     let mut few = strategies()?;

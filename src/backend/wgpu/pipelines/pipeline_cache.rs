@@ -60,7 +60,7 @@ impl PipelineCache {
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let cached = self.plans.get(&plan.identity()).map(|cached| &cached.processes);
         let all_fit = |cached: &&Arc<[Arc<ProcessPipelines>]>| {
-            cached.iter().zip(draws).all(|(pipelines, draws)| pipelines.fits_draws(draws, quality))
+            cached.iter().zip(draws).all(|(pipelines, draws)| pipelines.inputs.fit_draws(draws, quality))
         };
         if let Some(cached) = cached.filter(all_fit) {
             let cached = Arc::clone(cached);
@@ -69,7 +69,7 @@ impl PipelineCache {
         }
         let mut processes = cached.map_or_else(Vec::new, |cached| cached.to_vec());
         for (index, (planned, draws)) in plan.processes().iter().zip(draws).enumerate() {
-            if processes.get(index).is_some_and(|pipelines| pipelines.fits_draws(draws, quality)) {
+            if processes.get(index).is_some_and(|pipelines| pipelines.inputs.fit_draws(draws, quality)) {
                 self.failed.remove(&planned.name);
                 continue;
             }
@@ -79,7 +79,7 @@ impl PipelineCache {
                 None => {
                     let label = shader_label(&planned.name);
                     let working = self.working.get(&planned.name).cloned();
-                    let working = working.filter(|old| old.differ_in_text_only(plan, planned, draws, quality));
+                    let working = working.filter(|old| old.inputs.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
                         let created = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
                         if let Some(working) = &working {
@@ -138,7 +138,7 @@ impl PipelineCache {
         draws: &Draws<'_>,
         quality: &Quality,
     ) -> Option<&Arc<ProcessPipelines>> {
-        self.all().find(|pipelines| pipelines.fits(plan, planned, draws, quality))
+        self.all().find(|pipelines| pipelines.inputs.fit(plan, planned, draws, quality))
     }
 
     /// Adds complete pipelines that were made for a process of a plan without a lock on the cache, unless a frame has made them meanwhile. They
@@ -153,7 +153,7 @@ impl PipelineCache {
     ) {
         let of_plan = plan.alive();
         let is_replaced = |before: &(Weak<()>, Arc<ProcessPipelines>)| {
-            before.0.ptr_eq(&of_plan) && before.1.fits_declaration(plan, planned)
+            before.0.ptr_eq(&of_plan) && before.1.inputs.fit_declaration(plan, planned)
         };
         if self.find(plan, planned, draws, quality).is_none() {
             self.prepared.retain(|before| !is_replaced(before));

@@ -41,6 +41,11 @@ impl PipelineInputs {
         }
     }
 
+    /// Whether a process of this plan can use their pipelines for these draws, in frames of this quality.
+    pub(super) fn fit(&self, plan: &FramePlan, planned: &PlannedProcess, draws: &Draws<'_>, quality: &Quality) -> bool {
+        self.fit_draws(draws, quality) && self.fit_declaration(plan, planned)
+    }
+
     /// Whether they still fit what a process of this plan declares.
     pub(super) fn fit_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()

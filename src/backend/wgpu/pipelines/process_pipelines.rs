@@ -24,7 +24,7 @@ use crate::tuning::Tuner;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
 pub(crate) struct ProcessPipelines {
-    inputs: PipelineInputs,
+    pub(super) inputs: PipelineInputs,
     /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
     pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
@@ -82,38 +82,6 @@ impl ProcessPipelines {
             pipelines.insert(pipelines.create(device, PipelineVariant::of_pages(state))?);
         }
         Ok(pipelines)
-    }
-
-    /// Whether a process of this plan can use these pipelines for these draws, in frames of this quality.
-    pub(crate) fn fits(
-        &self,
-        plan: &FramePlan,
-        planned: &PlannedProcess,
-        draws: &Draws<'_>,
-        quality: &Quality,
-    ) -> bool {
-        self.fits_draws(draws, quality) && self.fits_declaration(plan, planned)
-    }
-
-    /// Whether these pipelines still fit what a process of this plan declares.
-    pub(crate) fn fits_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
-        self.inputs.fit_declaration(plan, planned)
-    }
-
-    /// Whether these pipelines still fit what their process draws.
-    pub(crate) fn fits_draws(&self, draws: &Draws<'_>, quality: &Quality) -> bool {
-        self.inputs.fit_draws(draws, quality)
-    }
-
-    /// Whether the pipelines of a process of this plan for these draws would differ from these in the text of their shader only.
-    pub(crate) fn differ_in_text_only(
-        &self,
-        plan: &FramePlan,
-        planned: &PlannedProcess,
-        draws: &Draws<'_>,
-        quality: &Quality,
-    ) -> bool {
-        self.inputs.differ_in_text_only(plan, planned, draws, quality)
     }
 
     /// Creates the missing ones of these pipelines. [Insert](Self::insert) them only if the device reports no error.
