@@ -130,7 +130,7 @@ fn the_second_backend_of_a_library_compiles_nothing_and_another_quality_its_diff
     assert_eq!((compiled(&instance), second.0.backend().resources().pipelines), (all, pipelines));
     assert!(second.0.backend().pass_statistics().iter().all(|pass| pass.recording == RecordingStrategy::Bundles));
 
-    // Nobody uses them now, and the library has them all the same.
+    // No backend uses the pipelines now, and the library keeps them.
     drop((first, second));
     assert_eq!(compiled(&instance), all);
     let mut third = renderer(library.backend().unwrap(), shipped);
@@ -143,7 +143,7 @@ fn the_second_backend_of_a_library_compiles_nothing_and_another_quality_its_diff
     let [_, more, compute] = compiled(&instance);
     assert!(more > all[1] && more < 2 * all[1] && compute == all[2], "{more} and {compute}, at first {all:?}");
 
-    // Who draws goes on with what it has.
+    // A renderer keeps the pipelines that it uses.
     library.clear();
     assert_eq!(library.pipeline_count(), 0);
     draw(&mut third, &scene);

@@ -32,7 +32,7 @@ impl SharedPipelines {
         processes.iter().find(|process| process.inputs == *inputs)?.pipelines.get(variant).cloned()
     }
 
-    /// Adds what the device has accepted. What another backend has added meanwhile stays.
+    /// Adds what the device has accepted. Pipelines that another backend has added meanwhile are not replaced.
     pub(super) fn add(
         &self,
         inputs: &PipelineInputs,
