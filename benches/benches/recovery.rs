@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("There is no graphics adapter.");
         return Ok(());
     };
-    let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (2, &[[96, 54]]) } else { (9, &[[480, 270], [960, 540]]) };
+    let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (1, &[[96, 54]]) } else { (9, &[[480, 270], [960, 540]]) };
     let progress = progress_bar("rounds");
     progress.set_length((2 * rounds * sizes.len()) as u64);
     // wgpu tells of a lost device by panics, which the backend catches.

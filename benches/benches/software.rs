@@ -42,7 +42,10 @@ struct Row {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
-    let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (3, &[[96, 54]]) } else { (15, &[[480, 270], [960, 540]]) };
+    let (rounds, sizes): (_, &[[u32; 2]]) = match quick {
+        true => (Rounds { warm_up: 0, measured: 1 }, &[[96, 54]]),
+        false => (Rounds { warm_up: WARM_UP, measured: 15 }, &[[480, 270], [960, 540]]),
+    };
     let maps = ShadowMaps::default();
     let maps = if quick { ShadowMaps { side: 64, ..maps } } else { maps };
     let progress = progress_bar("frames");
@@ -89,23 +92,27 @@ fn measure(
     mut scene: Scene,
     size: [u32; 2],
     maps: ShadowMaps,
-    rounds: usize,
+    rounds: Rounds,
     progress: &ProgressBar,
 ) -> Result<Row, Box<dyn Error>> {
     scene.cameras.iter_mut().for_each(|camera| camera.size = size);
     let mut runners = [Runner::new(1, maps)?, Runner::new(2, maps)?];
     let mut expected = None;
-    let times = Harness::new(Rounds { warm_up: WARM_UP, measured: rounds }, progress).measure(
-        &mut runners,
-        |runner, _round| {
-            let (picture, time) = runner.frame(&scene)?;
-            if *expected.get_or_insert_with(|| picture.clone()) != picture {
-                return Err(Box::<dyn Error>::from("the number of workers changes the picture"));
-            }
-            Ok(time)
-        },
-    )?;
+    let times = Harness::new(rounds, progress).measure(&mut runners, |runner, _round| {
+        let (picture, time) = runner.frame(&scene)?;
+        if *expected.get_or_insert_with(|| picture.clone()) != picture {
+            return Err(Box::<dyn Error>::from("the number of workers changes the picture"));
+        }
+        Ok(time)
+    })?;
     let milliseconds = |times: &Vec<Duration>| median_duration(times.iter().copied()).as_secs_f64() * 1e3;
     let (one, two) = (milliseconds(&times[0]), milliseconds(&times[1]));
-    Ok(Row { scene: "colonnade", size, rounds, one_worker_ms: one, two_workers_ms: two, ratio: one / two })
+    Ok(Row {
+        scene: "colonnade",
+        size,
+        rounds: rounds.measured,
+        one_worker_ms: one,
+        two_workers_ms: two,
+        ratio: one / two,
+    })
 }

@@ -6,16 +6,16 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Picture, WgpuBackend};
+use drawloom::backend::{Picture, PipelineLibrary, WgpuBackend};
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::helper::{Bloom, HelperBlend, HelperLayer, HelperReprojection, HelperSource, PostHelper};
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::scene::{Camera, Changes, Light, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, demo};
-use drawloom_benches::backends::BackendName;
 use drawloom_benches::results;
 use drawloom_output::PictureFile;
+use drawloom_testing::adapter;
 use serde::Serialize;
 
 use crate::steps::AmbientOcclusion;
@@ -76,10 +76,12 @@ pub fn measure(quick: bool) -> Result<Vec<Row>, Box<dyn Error>> {
     let directions = if quick { 1 } else { 4 };
     let motions = if quick { &MOTIONS[..1] } else { &MOTIONS[..] };
     let scene = scene()?;
+    let (device, queue) = adapter::device()?;
+    let library = PipelineLibrary::new(device, queue);
     let mut rows = Vec::new();
     for layer in [Layer::Bloom, Layer::Occlusion] {
         for (lookup, reprojection) in LOOKUPS {
-            let mut engine = Engine::new(layer, reprojection)?;
+            let mut engine = Engine::new(&library, layer, reprojection)?;
             for &(motion, metres, degrees) in motions {
                 // The number of channels with each difference.
                 let mut counts = [0_u64; 256];
@@ -152,7 +154,7 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
 }
 
 impl Engine {
-    fn new(layer: Layer, reprojection: HelperReprojection) -> Result<Self, Box<dyn Error>> {
+    fn new(library: &PipelineLibrary, layer: Layer, reprojection: HelperReprojection) -> Result<Self, Box<dyn Error>> {
         let scheduler = Arc::new(Scheduler::new(2)?);
         let bloom = Bloom::default();
         let (helper, layer) = match layer {
@@ -165,7 +167,7 @@ impl Engine {
                 (helper, HelperLayer { blend: HelperBlend::Multiply, reprojection, ..HelperLayer::default() })
             }
         };
-        let mut builder = Renderer::builder(BackendName::Adapter.open()?)
+        let mut builder = Renderer::builder(library.backend()?)
             .deferred(Deferred::new().post(helper.layer(layer)).post(ToneMapping::default()))
             .output(helper.source_target());
         if let Some(downsample) = helper.downsample() {

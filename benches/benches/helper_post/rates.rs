@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Backend, PipelineLibrary, WgpuBackend, WgpuSubmission};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::city;
 use drawloom_benches::harness::{Harness, Rounds};
@@ -63,9 +63,8 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
         }
         BackendName::Adapter => {
             let (device, queue) = adapter::device()?;
-            let open = |_, _: Option<&WgpuBackend>| {
-                WgpuBackend::new(device.clone(), queue.clone()).expect("it was opened for Drawloom")
-            };
+            let library = PipelineLibrary::new(device, queue);
+            let open = |_, _: Option<&WgpuBackend>| library.backend().expect("the device was opened for Drawloom");
             let (boxes, picture) = if quick { (50, [64, 36]) } else { (1_000, [480, 270]) };
             rows.extend(of_device("adapter", open, boxes, picture, [turns, frames], progress)?);
         }

@@ -74,7 +74,7 @@ impl Extent {
         divisor: 1,
     };
     const QUICK: Self =
-        Self { name: "quick", warm_up: [3, 1], rounds: [3, 1], sample: [Duration::ZERO; 2], replays: 1, divisor: 20 };
+        Self { name: "quick", warm_up: [1, 1], rounds: [1, 1], sample: [Duration::ZERO; 2], replays: 1, divisor: 20 };
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -92,7 +92,7 @@ impl Extent {
         objects: 10_000,
     };
     const QUICK: Self =
-        Self { name: "quick", warm_up: [3, 1], rounds: [3, 1], sample: [Duration::ZERO; 2], objects: 1_000 };
+        Self { name: "quick", warm_up: [1, 1], rounds: [1, 1], sample: [Duration::ZERO; 2], objects: 1_000 };
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
