@@ -1,13 +1,30 @@
 //! wgpu devices. An engine has its own.
 
 use std::error::Error;
+use std::sync::OnceLock;
 
-use drawloom::backend::WgpuBackend;
+use drawloom::backend::{PipelineLibrary, WgpuBackend};
 use drawloom::wgpu;
 
 /// Opens a device on the machine's best adapter.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     device_without(wgpu::Features::empty())
+}
+
+/// The device on the machine's best adapter that a program's cases share, opened by the first call.
+///
+/// # Errors
+/// The error of the first call.
+pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error + Send + Sync>> {
+    static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
+    Ok(DEVICE.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
+}
+
+/// A backend on the [`shared_device`]. What one case has compiled no other compiles again: that takes longer than most draw.
+pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error + Send + Sync>> {
+    static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
+    let (device, queue) = shared_device()?;
+    Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
 }
 
 /// Opens a device on the machine's best adapter, as if the adapter lacked some optional features.

@@ -1,17 +1,16 @@
 //! A common interface to all backends.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use drawloom::backend::{
-    Backend, BackendError, NullBackend, NullSubmission, Picture, PipelineLibrary, SoftwareBackend, SoftwareSubmission,
-    WgpuSubmission,
+    Backend, BackendError, NullBackend, NullSubmission, Picture, SoftwareBackend, SoftwareSubmission, WgpuSubmission,
 };
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::Rejection;
-use drawloom::{BuildError, FrameError, Renderer, SubmitError, Submitter, wgpu};
+use drawloom::{BuildError, FrameError, Renderer, SubmitError, Submitter};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
@@ -61,19 +60,11 @@ impl BackendName {
             Self::Software => RendererOn::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, quality),
             Self::Reference => RendererOn::open(SoftwareBackend::reference(), scheduler, quality),
             Self::Wgpu => {
-                static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
-                let (device, queue) = device().ok_or_else(|| "there is no graphics adapter".to_owned())?;
-                let library = LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue));
-                RendererOn::open(library.backend().map_err(|error| error.to_string())?, scheduler, quality)
+                let backend = adapter::shared_backend().map_err(|error| error.to_string())?;
+                RendererOn::open(backend, scheduler, quality)
             }
         }
     }
-}
-
-/// The device of the machine's adapter, which all cases share. `None` without an adapter.
-pub fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
-    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
-    DEVICE.get_or_init(|| adapter::device().ok()).clone()
 }
 
 /// Why a renderer could not be created.

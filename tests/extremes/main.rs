@@ -20,7 +20,7 @@ mod markers;
 mod special;
 mod harness;
 
-use drawloom_testing::slow_cases;
+use drawloom_testing::{adapter, slow_cases};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 use harness::{BackendName, Harness};
@@ -39,7 +39,7 @@ const SLOW_CASES: [&str; 4] = [
 fn main() {
     let arguments = Arguments::from_args();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
-    let no_adapter = harness::device().is_none();
+    let no_adapter = adapter::shared_device().is_err();
     let mut trials = Vec::new();
     for backend in BackendName::ALL {
         let lacks_adapter = backend == BackendName::Wgpu && no_adapter;

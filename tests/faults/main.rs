@@ -71,7 +71,7 @@ fn hide_injected_panics() {
 
 #[cfg(feature = "wgpu")]
 fn has_adapter() -> bool {
-    subjects::shared_device().is_some()
+    drawloom_testing::adapter::shared_device().is_ok()
 }
 
 #[cfg(not(feature = "wgpu"))]

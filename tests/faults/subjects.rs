@@ -36,32 +36,20 @@ impl Subject for SoftwareBackend {
 }
 
 #[cfg(feature = "wgpu")]
-pub use of_wgpu::shared_device;
-
-#[cfg(feature = "wgpu")]
 mod of_wgpu {
-    use std::sync::{Arc, OnceLock};
+    use std::sync::Arc;
 
-    use drawloom::backend::{PipelineLibrary, WgpuBackend, WgpuSubmission};
+    use drawloom::backend::{WgpuBackend, WgpuSubmission};
     use drawloom::task::Scheduler;
-    use drawloom::wgpu;
     use drawloom_testing::adapter;
     use libtest_mimic::Failed;
 
     use super::Subject;
 
-    /// A device on the machine's adapter, which cases share; `None` without an adapter.
-    pub fn shared_device() -> Option<(wgpu::Device, wgpu::Queue)> {
-        static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
-        DEVICE.get_or_init(|| adapter::device().ok()).clone()
-    }
-
     impl Subject for WgpuBackend {
         /// Subjects share what they compile: dozens are opened, one for each call that fails.
         fn open(_: &Arc<Scheduler>) -> Result<Self, Failed> {
-            static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
-            let (device, queue) = shared_device().ok_or("there is no graphics adapter")?;
-            Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+            Ok(adapter::shared_backend()?)
         }
 
         fn read(submission: &WgpuSubmission, view: usize, target: &str) -> Result<Vec<u8>, Failed> {

@@ -1,8 +1,8 @@
 //! A renderer and its submitter on the machine's adapter.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use drawloom::backend::{Picture, PipelineLibrary, SoftwareBackend, WgpuBackend, WgpuSubmission};
+use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
@@ -13,15 +13,12 @@ use libtest_mimic::Failed;
 
 /// A device on the machine's adapter, which all cases share.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
-    static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
-    Ok(DEVICE.get_or_init(|| adapter::device().map_err(|error| error.to_string())).clone()?)
+    Ok(adapter::shared_device()?)
 }
 
-/// A backend on the device that all cases share. What one case has compiled no other compiles again: that takes longer than most draw.
+/// A backend on the device that all cases share, with the pipelines of all.
 pub fn backend() -> Result<WgpuBackend, Failed> {
-    static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
-    let (device, queue) = device()?;
-    Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+    Ok(adapter::shared_backend()?)
 }
 
 /// A renderer and its submitter.
