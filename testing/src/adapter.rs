@@ -15,13 +15,13 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 ///
 /// # Errors
 /// The error of the first call.
-pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error + Send + Sync>> {
+pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
     Ok(DEVICE.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
 }
 
 /// A backend on the [`shared_device`]. What one case has compiled no other compiles again: that takes longer than most draw.
-pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error + Send + Sync>> {
+pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
     static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
     let (device, queue) = shared_device()?;
     Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
