@@ -49,13 +49,14 @@ impl Mesh {
             Surface { vertices: self.vertices().to_vec(), midpoint_ends: Vec::new(), triangles: Vec::new() };
         self.triangles().for_each(|corners| surface.add(corners));
         loop {
-            let splits = surface.count_splits(longest * longest);
+            let long_edges = surface.long_edges(longest * longest);
+            let splits = long_edges.iter().flatten().filter(|&&is_long| is_long).count();
             let triangle_room = triangle_limit.saturating_sub(surface.triangles.len());
             let vertex_room = (u32::MAX as usize).saturating_sub(surface.vertices.len());
             if splits == 0 || splits > triangle_room.min(vertex_room) {
                 break;
             }
-            surface.split(longest * longest);
+            surface.split(&long_edges, splits);
         }
         if surface.triangles.is_empty() {
             surface.triangles.push([self.indices()[0]; 3]);
@@ -75,27 +76,39 @@ struct Surface {
 }
 
 impl Surface {
-    /// The most triangles that [`split`](Self::split) can add: one for each long edge of each triangle. It adds no more
-    /// vertices than that.
-    fn count_splits(&self, longest_squared: f64) -> usize {
-        let edges = self.triangles.iter().flat_map(|&triangle| edges_of(triangle));
-        edges.filter(|&edge| self.long_edge_midpoint(edge, longest_squared).is_some()).count()
+    /// For each triangle, which of its edges are too long.
+    fn long_edges(&self, longest_squared: f64) -> Vec<[bool; 3]> {
+        let mut long_edges = Vec::with_capacity(self.triangles.len());
+        for &triangle in &self.triangles {
+            let mut is_long = [false; 3];
+            for (is_long, edge) in is_long.iter_mut().zip(edges_of(triangle)) {
+                *is_long = self.length_squared(edge) > longest_squared && self.has_midpoint(edge);
+            }
+            long_edges.push(is_long);
+        }
+        long_edges
     }
 
-    /// Splits every long edge once.
-    fn split(&mut self, longest_squared: f64) {
-        let mut midpoints = HashMap::new();
-        for triangle in std::mem::take(&mut self.triangles) {
-            let midpoints = edges_of(triangle).map(|edge| {
-                let midpoint = self.long_edge_midpoint(edge, longest_squared)?;
-                let [one, other] = edge;
-                Some(*midpoints.entry([one.min(other), one.max(other)]).or_insert_with(|| {
-                    self.vertices.push(midpoint);
-                    self.midpoint_ends.push(edge);
-                    self.vertices.len() as u32 - 1
-                }))
-            });
-            self.add_parts(triangle, midpoints);
+    /// Splits each long edge once. Adds a triangle for each of the `splits` long edges of each triangle, and no more vertices than that.
+    fn split(&mut self, long_edges: &[[bool; 3]], splits: usize) {
+        let triangles = std::mem::take(&mut self.triangles);
+        self.triangles.reserve(triangles.len() + splits);
+        // Most edges are of two triangles.
+        let mut midpoints = HashMap::with_capacity(splits / 2);
+        for (triangle, is_long) in triangles.into_iter().zip(long_edges) {
+            let mut triangle_midpoints = [None; 3];
+            for (index, edge) in edges_of(triangle).into_iter().enumerate() {
+                if is_long[index] {
+                    let [one, other] = edge;
+                    let midpoint = *midpoints.entry([one.min(other), one.max(other)]).or_insert_with(|| {
+                        self.vertices.push(self.midpoint(edge));
+                        self.midpoint_ends.push(edge);
+                        self.vertices.len() as u32 - 1
+                    });
+                    triangle_midpoints[index] = Some(midpoint);
+                }
+            }
+            self.add_parts(triangle, triangle_midpoints);
         }
     }
 
@@ -142,15 +155,20 @@ impl Surface {
         }
     }
 
-    /// The midpoint of an edge that is too long. Both directions of the edge give the same bits.
-    fn long_edge_midpoint(&self, edge: [u32; 2], longest_squared: f64) -> Option<Vertex> {
-        if self.length_squared(edge) <= longest_squared {
-            return None;
+    /// Whether f32 can distinguish an edge's midpoint from its ends. Splitting would never finish otherwise.
+    fn has_midpoint(&self, [one, other]: [u32; 2]) -> bool {
+        let midpoint = self.midpoint([one, other]).position;
+        midpoint != self.vertices[one as usize].position && midpoint != self.vertices[other as usize].position
+    }
+
+    /// Both directions of an edge give the same bits.
+    fn midpoint(&self, [one, other]: [u32; 2]) -> Vertex {
+        let mut midpoint: [f32; 8] = bytemuck::cast(self.vertices[one as usize]);
+        let other: [f32; 8] = bytemuck::cast(self.vertices[other as usize]);
+        for (component, other) in midpoint.iter_mut().zip(other) {
+            *component = component.midpoint(other);
         }
-        let [one, other] = edge.map(|end| self.vertices[end as usize]);
-        let midpoint = midpoint_of(one, other);
-        // The midpoint of neighbouring f32 equals an end, and splitting would never finish.
-        (midpoint.position != one.position && midpoint.position != other.position).then_some(midpoint)
+        bytemuck::cast(midpoint)
     }
 
     fn length_squared(&self, edge: [u32; 2]) -> f64 {
@@ -163,13 +181,7 @@ fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-fn midpoint_of(one: Vertex, other: Vertex) -> Vertex {
-    let [one, other]: [[f32; 8]; 2] = [one, other].map(bytemuck::cast);
-    let midpoint: [f32; 8] = std::array::from_fn(|component| one[component].midpoint(other[component]));
-    bytemuck::cast(midpoint)
-}
-
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::{HashMap, HashSet};
 
