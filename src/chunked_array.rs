@@ -64,7 +64,7 @@ impl<T: Clone> Default for ChunkedArray<T> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -341,7 +341,7 @@ impl<T> fmt::Debug for Handle<T> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -53,7 +53,7 @@ pub(crate) fn kept_views<'a>(
     kept
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
 

@@ -166,7 +166,7 @@ fn srgb_byte(value: f32) -> u8 {
     (encoded * 255.0 + 0.5) as u8
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -65,7 +65,7 @@ impl MipSchedule {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::HashSet;
     use std::sync::Arc;

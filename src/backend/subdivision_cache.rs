@@ -164,7 +164,7 @@ pub(crate) fn missing_mesh_error() -> BackendError {
     BackendError::BrokenRule { rule: "a batch draws an existing mesh".to_owned() }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Vec3;
 

@@ -191,7 +191,7 @@ impl BinnedSegment {
 /// With more bins than this per object, sorting the objects takes less time than going through the bins.
 const BINS_PER_OBJECT: usize = 8;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

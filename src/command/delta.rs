@@ -1,7 +1,7 @@
 //! Delta coding of commands.
 
 mod code;
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;
 
 use std::iter::FusedIterator;

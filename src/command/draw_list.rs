@@ -285,7 +285,7 @@ impl PartialEq for DrawList {
 
 impl Eq for DrawList {}
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

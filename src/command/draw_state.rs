@@ -116,7 +116,7 @@ pub enum Cull {
     Nothing = 2,
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

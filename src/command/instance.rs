@@ -22,7 +22,7 @@ pub(crate) fn instance(bucket: &mut Bucket, can_merge: impl Fn(u32) -> bool) {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -85,7 +85,7 @@ fn close_narrowest_gap(bits: u64) -> u64 {
     bits | narrowest
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

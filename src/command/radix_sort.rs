@@ -51,7 +51,7 @@ const MAX_DIGIT_BITS: u32 = 11;
 /// The number of values of the widest digit.
 pub(super) const DIGIT_VALUES: usize = 1 << MAX_DIGIT_BITS;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -104,7 +104,7 @@ impl KeyRange {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -243,7 +243,7 @@ fn in_world<'a>(
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::demo::colonnade;

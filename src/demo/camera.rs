@@ -47,5 +47,5 @@ pub(super) fn camera_of(bvh: Option<&Bvh>, up: UpAxis) -> Camera {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;

@@ -133,7 +133,7 @@ impl CostModel {
 /// The job size in items before the first sample.
 const FIRST_JOB_ITEMS: usize = 512;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::super::job_size::{MAX_JOB, MIN_JOB, PARALLEL_THRESHOLD};
     use super::*;

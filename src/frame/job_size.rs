@@ -45,7 +45,7 @@ fn whole_blocks(items: usize) -> usize {
     if items < ObjectTable::BLOCK_SIZE { items.max(1) } else { items - items % ObjectTable::BLOCK_SIZE }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -122,7 +122,7 @@ pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &Frame
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::tuning::signal::{ControllerBounds, Signal, check_controller};

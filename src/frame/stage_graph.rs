@@ -472,7 +472,7 @@ impl<B: Backend> GraphBuilder<B> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::super::stage::StageInfo;
     use super::*;

@@ -55,7 +55,7 @@ pub(super) fn rearrange<T: Default>(tables: &mut Vec<T>, taken: &[Option<usize>]
     tables.extend(taken.into_iter().map(|table| table.or_else(|| left.next()).unwrap_or_default()));
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

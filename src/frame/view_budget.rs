@@ -477,5 +477,5 @@ fn check_camera_names(views: &[BudgetedView]) -> Result<(), BudgetError> {
     Ok(())
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;

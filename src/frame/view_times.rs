@@ -35,7 +35,7 @@ impl ViewTimes {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -187,7 +187,7 @@ impl RequestLog {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::process::{Declare, Format};

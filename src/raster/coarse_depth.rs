@@ -254,7 +254,7 @@ impl CoarseDepth {
 /// The maximum width of a tile in cells. A layer's mask of 32 bits has room for 5 × 5.
 const MAX_CELLS: usize = 4;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec2;
     use proptest::prelude::*;

@@ -174,5 +174,5 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;

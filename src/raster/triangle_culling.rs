@@ -188,5 +188,5 @@ fn covers_no_center(points: [GridPoint; 3]) -> bool {
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;

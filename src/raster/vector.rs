@@ -164,7 +164,7 @@ impl<R: Real> Quaternion<R> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DQuat;
     use proptest::prelude::*;

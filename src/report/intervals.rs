@@ -75,7 +75,7 @@ pub(super) fn difference(intervals: &[Range<Duration>], others: &[Range<Duration
     rest
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -96,7 +96,7 @@ impl PreciseMotion {
 /// In metres, radians, and as a share of a distance.
 const ROUNDING: f64 = 4e-6;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -33,7 +33,7 @@ impl Mesh {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

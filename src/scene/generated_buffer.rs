@@ -331,7 +331,7 @@ impl GeneratedContents {
 
     /// If its elements are indices: how many of those that count form whole triangles, and the last one of these. Further ones that are equal to
     /// it form triangles without area.
-    #[cfg(any(feature = "wgpu", feature = "software", all(test, not(drawloom_model_check))))]
+    #[cfg(any(feature = "wgpu", feature = "software", test))]
     pub(crate) fn whole_triangles(&self, topology: Topology) -> (usize, u32) {
         let count = match (topology, self.count()) {
             (_, 0..3) => 0,
@@ -373,7 +373,7 @@ impl fmt::Debug for GeneratedContents {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

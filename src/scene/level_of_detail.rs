@@ -41,7 +41,7 @@ impl LevelOfDetail {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Mesh, Topology, Vertex};

@@ -212,7 +212,7 @@ fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
         .then_some("its cone's angles are not 0 <= inner < outer <= 90 degrees, or too close to fade")
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -60,7 +60,7 @@ impl fmt::Debug for MaterialPredicate {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

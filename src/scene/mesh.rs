@@ -383,7 +383,7 @@ impl Bounds {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

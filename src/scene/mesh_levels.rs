@@ -111,7 +111,7 @@ impl Mesh {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Topology, Vertex};

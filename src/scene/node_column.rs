@@ -241,7 +241,7 @@ impl<'a, T: Copy> Column<'a, T> {
 
 const CHUNK: usize = NodeColumn::<()>::CHUNK;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

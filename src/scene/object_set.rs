@@ -116,7 +116,7 @@ impl fmt::Debug for ObjectSet {
 /// The number of objects in a word.
 const WORD: u32 = u64::BITS;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 

@@ -329,7 +329,7 @@ fn as_object(stale: StaleHandle) -> StaleHandle {
     StaleHandle { kind: "RenderObject", ..stale }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Topology, Vertex};

@@ -71,7 +71,7 @@ fn to_half_bits(value: f64) -> u16 {
     f16::from_f64(value.clamp(-largest, largest)).to_bits()
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

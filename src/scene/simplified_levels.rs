@@ -48,7 +48,7 @@ impl Mesh {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
 

@@ -194,7 +194,7 @@ fn shuttle_waiting_returns_the_result_of_a_background_job_wherever_it_ran() {
             move || ran.fetch_add(1, Ordering::Relaxed)
         });
         let failing = scheduler.background(|| panic_as_planned());
-        assert_eq!(failing.wait().map(|()| ()), Err(JobPanic { message: "as planned".to_owned() }));
+        assert_eq!(failing.wait(), Err(JobPanic { message: "as planned".to_owned() }));
         assert_eq!(job.wait(), Ok(0));
         assert_eq!(ran.load(Ordering::Relaxed), 1);
     });

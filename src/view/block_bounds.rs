@@ -53,7 +53,7 @@ impl BlockBounds {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
     use proptest::prelude::*;

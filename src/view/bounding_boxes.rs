@@ -180,7 +180,7 @@ impl Frustum {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DMat3;
     use proptest::prelude::*;

@@ -96,7 +96,7 @@ fn enclosing_sphere((one, one_radius): (DVec3, f64), (other, other_radius): (DVe
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -167,7 +167,7 @@ impl ChangedObjects {
 
 const WORD: usize = u64::BITS as usize;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 

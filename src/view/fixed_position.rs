@@ -77,7 +77,7 @@ pub(super) fn nearest_step(coordinate: f64) -> i64 {
 /// In the middle of the f64s that are all integers, and no others.
 const INTEGERS: f64 = 1.5 * (1_u64 << 52) as f64;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

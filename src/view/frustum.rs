@@ -249,7 +249,7 @@ fn moved_outwards(offset: f32) -> f32 {
 /// 16 unit roundoffs of 2⁻²⁴ each: see [`Frustum::intersects_sphere`].
 pub(super) const ROUNDING_TOLERANCE: f32 = 16.0 * (f32::EPSILON / 2.0);
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 pub(super) mod tests {
     use glam::Quat;
     use proptest::prelude::*;

@@ -115,7 +115,7 @@ fn origin(view: &RenderView) -> DVec3 {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Vec3;
 

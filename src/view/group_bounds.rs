@@ -201,7 +201,7 @@ fn overlaps(frustum: &Frustum, bounds: &GroupBounds) -> [Overlap; GroupBounds::G
     overlaps
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
     use proptest::prelude::*;

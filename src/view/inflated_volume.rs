@@ -114,7 +114,7 @@ fn widened_angle(corners: impl Iterator<Item = [f64; 2]>, angle: f64) -> Option<
 /// radians. So rounding does not move a ray outside.
 const EXCESS: f64 = 1e-7;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Quat;
     use proptest::prelude::*;

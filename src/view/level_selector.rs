@@ -89,7 +89,7 @@ impl LevelSelector {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DQuat, Quat, Vec2, Vec3};
     use proptest::prelude::*;

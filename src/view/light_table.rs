@@ -143,7 +143,7 @@ impl LightTable {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Vec3;
 

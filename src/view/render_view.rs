@@ -158,7 +158,7 @@ impl RenderView {
 /// stays finite.
 const MIN_OBLIQUE_SLOPE: f64 = 1e-6;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{Vec4, Vec4Swizzles};
 

@@ -237,7 +237,7 @@ fn looking_along(direction: Vec3) -> Quat {
     Camera::looking_at("", DVec3::ZERO, direction.as_dvec3()).orientation
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Vec2;
     use proptest::prelude::*;

@@ -70,7 +70,7 @@ fn distance_to_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

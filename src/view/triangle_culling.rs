@@ -144,7 +144,7 @@ fn cull_vertex(error: f64, clip: DVec4, clip_from_relative: &DMat4, size: [u32; 
     CullVertex { clip: Vector(clip.to_array()), is_accurate }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Mat4, Vec4};
     use proptest::prelude::*;

@@ -217,7 +217,7 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

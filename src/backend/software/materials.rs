@@ -133,7 +133,7 @@ impl<R: Real> Materials<R> for MaterialTable {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::software::mip_chain::tests::noise;

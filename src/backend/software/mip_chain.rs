@@ -69,7 +69,7 @@ impl MipChain {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 pub(super) mod tests {
     use fastrand::Rng;
     use proptest::prelude::*;

@@ -172,7 +172,7 @@ static LINEAR_OF_BYTES: LazyLock<[f32; 256]> =
 static BYTE_THRESHOLDS: LazyLock<[f32; 255]> =
     LazyLock::new(|| from_fn(|byte| srgb_to_linear((byte as f64 + 0.5) / 255.0) as f32));
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -111,7 +111,7 @@ fn weights<R: Real>(index: usize, finer_size: usize) -> [R; 3] {
     [size - index, size, index + 1].map(|part| R::of_integer(part as i64) / R::of_integer(finer_size as i64))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

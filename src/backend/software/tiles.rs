@@ -94,7 +94,7 @@ pub(super) fn pixels_of(bounds: PixelBounds) -> impl Iterator<Item = [usize; 2]>
     (bounds.top..bounds.bottom).flat_map(move |y| (bounds.left..bounds.right).map(move |x| [x, y]))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

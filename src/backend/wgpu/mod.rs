@@ -21,7 +21,7 @@ mod begin_frame;
 mod error_scope;
 mod fences;
 mod frame;
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod noop_device;
 mod pass_bind_groups;
 mod pipeline_library;

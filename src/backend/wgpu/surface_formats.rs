@@ -55,7 +55,7 @@ pub(super) fn picture_format(offered: &[wgpu::TextureFormat]) -> Format {
     offered.iter().find_map(find).unwrap_or(Format::Rgba8Srgb)
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgb10a2Unorm, Rgba8Unorm, Rgba8UnormSrgb, Rgba16Float};
 

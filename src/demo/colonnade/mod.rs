@@ -13,7 +13,7 @@ mod quasirandom;
 mod scene;
 mod shared_assets;
 mod site;
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests;
 
 pub use scene::colonnade;

@@ -59,7 +59,7 @@ pub(in crate::process) fn with_alpha<R: Real>(color: Vector3<R>, alpha: R) -> Ve
     Vector([red, green, blue, alpha])
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -38,7 +38,7 @@ pub(super) fn bilinear<R: Real>(
     blend(row(upper), row(lower), down)
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use crate::process::SampledTexture;
     use crate::raster::{Vector, Vector4};

@@ -10,7 +10,7 @@ mod inputs;
 mod interface;
 mod level_sampling;
 mod prelude;
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 pub(super) mod test_inputs;
 
 pub use deformation::DeformationCpuShader;

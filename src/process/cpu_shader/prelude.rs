@@ -113,7 +113,7 @@ fn fold<R: Real>(point: Vector2<R>) -> Vector2<R> {
     Vector([(R::one() - y.abs()) * sign(x), (R::one() - x.abs()) * sign(y)])
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DQuat, DVec2, DVec3, Vec3};
     use proptest::prelude::*;

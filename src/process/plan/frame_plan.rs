@@ -282,7 +282,7 @@ fn reads_shadow_map(planned: &PlannedProcess) -> bool {
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
 

@@ -100,7 +100,7 @@ fn numbered_views(
     found
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
 

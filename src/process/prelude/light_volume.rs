@@ -104,7 +104,7 @@ fn cone() -> Vec<[f32; 3]> {
     (0..SIDES).flat_map(side).flatten().collect()
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::HashSet;
     use std::f64::consts::{FRAC_PI_2, PI};

@@ -41,7 +41,7 @@ const TOLERANCE: f64 = 1.0 / 1_048_576.0;
 /// Parts with an area below this share of the largest part's hide little that others do not hide.
 const MIN_AREA_SHARE: f64 = 1.0 / 256.0;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Quat, Vec3};
 

@@ -25,7 +25,7 @@ pub(super) fn nested_tracks(slices: impl IntoIterator<Item = (Duration, Duration
     slices.into_iter().map(&mut place).collect()
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::cmp::Reverse;
     use std::time::Duration;

@@ -158,7 +158,7 @@ pub(super) fn nanoseconds(time: Duration) -> u64 {
     time.min(MAX_TIME).as_nanos() as u64
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::sync::Arc;
 

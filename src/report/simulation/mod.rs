@@ -7,7 +7,7 @@ mod run;
 mod scheduler_costs;
 mod workers;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod test_run;
 
 pub use replay::{Replay, ReplayedFrame};

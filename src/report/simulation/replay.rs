@@ -187,7 +187,7 @@ fn chooses_serial(serial: u64, parallel: u64, costs: &SchedulerCosts) -> bool {
     is_serial
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::time::Duration;
 

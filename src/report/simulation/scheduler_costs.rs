@@ -206,7 +206,7 @@ fn wait_until(condition: impl Fn() -> bool) -> bool {
     true
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::time::Duration;
 

@@ -150,7 +150,7 @@ pub(super) fn first_readable<T>(
     Err(reason)
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -227,7 +227,7 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
     names.inspect_err(|reason| warn(format!("a texture was left out: {reason}"))).ok()
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

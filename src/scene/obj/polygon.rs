@@ -170,7 +170,7 @@ fn project(corners: &[DVec3]) -> Vec<DVec2> {
     corners.iter().map(|&corner| to_plane(corner - origin)).collect()
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

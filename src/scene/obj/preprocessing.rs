@@ -330,7 +330,7 @@ fn number(word: &str) -> Option<(f64, bool)> {
     ends.into_iter().find_map(|end| word[..end].parse().ok()).map(|number| (number, false))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -279,7 +279,7 @@ fn push_escaped(text: &mut String, character: char) {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -210,7 +210,7 @@ fn nearest([source_width, source_height]: [u32; 2], [width, height]: [u32; 2]) -
     rows.flat_map(move |row| (0..width).map(move |column| row + scaled(column, source_width, width)))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use image::{ExtendedColorType, ImageEncoder};

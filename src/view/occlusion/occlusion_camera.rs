@@ -264,7 +264,7 @@ const INTERPOLATION_ERROR: f64 = 4.0 / 16_777_216.0;
 /// See [`OcclusionCamera::max_nearness`].
 const DEPTH_ERROR: f64 = 1.0 / 262_144.0;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::Vec4;
     use proptest::prelude::*;

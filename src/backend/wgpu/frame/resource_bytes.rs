@@ -68,7 +68,7 @@ impl ResourceBytes {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::sync::Arc;
 

@@ -69,7 +69,7 @@ fn line_and_column(text: &str, offset: usize) -> Option<(usize, usize, &str)> {
     Some((line + 1, column + 1, text.lines().nth(line).unwrap_or_default().trim_end()))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;

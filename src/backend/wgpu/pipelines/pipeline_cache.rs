@@ -181,7 +181,7 @@ pub(crate) fn shader_label(process: &str) -> String {
     format!("the shader of {process:?}")
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;

@@ -281,7 +281,7 @@ fn primitive_topology(primitive: Primitive) -> wgpu::PrimitiveTopology {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::sync::{Arc, mpsc};
     use std::time::Duration;

@@ -53,7 +53,7 @@ fn begins_a_line(texts: &[(&str, &str)], ResourceBinding { group, binding }: Res
     texts.iter().flat_map(|(_, text)| text.lines()).any(|line| line.trim_start().starts_with(&attributes))
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::process::{Declare, StorageBuffer};

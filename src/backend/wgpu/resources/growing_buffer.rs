@@ -80,7 +80,7 @@ pub(crate) fn check_storage_binding_size(device: &wgpu::Device, bytes: usize) ->
     Ok(())
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

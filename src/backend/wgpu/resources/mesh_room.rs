@@ -144,7 +144,7 @@ impl Search {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Topology, Vertex};

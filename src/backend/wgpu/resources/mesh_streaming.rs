@@ -301,7 +301,7 @@ impl MeshCache {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Topology, Vertex};

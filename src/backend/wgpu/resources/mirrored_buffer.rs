@@ -94,7 +94,7 @@ fn runs(values: impl Iterator<Item = bool>) -> impl Iterator<Item = (bool, usize
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;

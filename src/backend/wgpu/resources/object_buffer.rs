@@ -141,7 +141,7 @@ pub(crate) fn shares_memory(adapter: &wgpu::AdapterInfo) -> bool {
     adapter.backend == Backend::Noop || matches!(adapter.device_type, DeviceType::IntegratedGpu | DeviceType::Cpu)
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;

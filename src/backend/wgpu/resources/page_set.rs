@@ -136,7 +136,7 @@ impl<B> PageSet<B> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

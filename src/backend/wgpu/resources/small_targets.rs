@@ -99,7 +99,7 @@ impl SmallTargets {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use fastrand::Rng;
 

@@ -92,7 +92,7 @@ impl<T> SnapshotLifetimes<T> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

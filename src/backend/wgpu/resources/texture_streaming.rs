@@ -316,7 +316,7 @@ impl TextureArrays {
 /// The layers of a new array, if the budget allows.
 const MIN_LAYERS: u64 = 8;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;

@@ -133,7 +133,7 @@ fn lives(plan: &FramePlan, views: &[RenderView], passes: &[Pass], sampled_views:
     lives
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::collections::{HashMap, HashSet};
     use std::sync::Arc;

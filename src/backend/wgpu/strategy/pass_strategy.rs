@@ -105,7 +105,7 @@ impl PassStrategy {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::command::{Batch, DrawState};

@@ -43,7 +43,7 @@ impl Allowance {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::time::Duration;
 

@@ -244,7 +244,7 @@ impl BudgetWarning {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use std::iter;
 

@@ -214,7 +214,7 @@ impl<'a> ClockProbe<'a> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::DevicePassTime;

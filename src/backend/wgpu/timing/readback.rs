@@ -134,7 +134,7 @@ fn pass_times(names: &[PassName], tick_period: TickPeriod, stamps: &[[u64; 2]]) 
     DevicePassTimes { skipped: names.len() - passes.len(), passes }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

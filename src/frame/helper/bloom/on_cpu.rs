@@ -120,7 +120,7 @@ fn add_weighted<'a>(weights: &[f32], sums: &mut [f32], at: impl Fn(usize) -> [&'
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

@@ -24,7 +24,7 @@ impl<R: Real> ObjectCpuShader<R> for DepthPrePassCpuShader {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DQuat, DVec3};
     use proptest::prelude::*;

@@ -40,7 +40,7 @@ impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::process::cpu_shader::TypedCpuShader;

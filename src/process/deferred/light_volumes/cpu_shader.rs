@@ -57,7 +57,7 @@ const NORMAL: usize = 1;
 const DIFFUSE: usize = 2;
 const SHADOW_MAPS: usize = 3;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
     use proptest::prelude::*;

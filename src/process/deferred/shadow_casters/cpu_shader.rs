@@ -37,7 +37,7 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::process::MAX_ATTRIBUTES;

@@ -62,7 +62,7 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
 /// The index of the only sampled target.
 const SHADOW_MAPS: usize = 0;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
 

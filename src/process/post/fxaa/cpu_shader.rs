@@ -152,7 +152,7 @@ impl<R: Real> Source<'_, R> {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

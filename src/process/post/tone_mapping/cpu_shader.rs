@@ -40,7 +40,7 @@ fn filmic<R: Real>(radiance: Vector3<R>) -> Vector3<R> {
     })
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 

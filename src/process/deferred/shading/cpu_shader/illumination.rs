@@ -40,7 +40,7 @@ pub(in crate::process::deferred) fn illuminance_from<R: Real>(
 /// Above the range of f32 light would be infinite, and NaN once it is multiplied by 0.
 const MAX_ILLUMINANCE: f64 = 1e30;
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
     use proptest::prelude::*;

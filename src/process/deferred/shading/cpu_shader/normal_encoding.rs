@@ -44,7 +44,7 @@ impl GeometryFormats {
     }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::DVec3;
 

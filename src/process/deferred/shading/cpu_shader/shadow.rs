@@ -203,7 +203,7 @@ fn along_map_axes<R: Real>(light: &ShaderLight<R>, direction: Vector3<R>) -> Vec
     light.shadow_orientation.inverse().rotate(direction)
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
     use proptest::prelude::*;

@@ -79,7 +79,7 @@ fn normalize_or<R: Real>(vector: Vector3<R>, other: Vector3<R>) -> Vector3<R> {
     if has_direction { vector * inverse_square_root(length_squared) } else { other }
 }
 
-#[cfg(all(test, not(drawloom_model_check)))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::process::MAX_ATTRIBUTES;
