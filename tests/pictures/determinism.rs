@@ -39,25 +39,32 @@ fn opaque(mut scene: Scene) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
+/// Numbers of workers, with ways to split a pass.
+const RUNS: [(usize, Granularity); 7] = [
+    (1, Granularity::PerCamera),
+    (1, Granularity::Chunk(5)),
+    (2, Granularity::PerCamera),
+    (2, Granularity::PerDraw),
+    (2, Granularity::Chunk(256)),
+    (4, Granularity::PerDraw),
+    (4, Granularity::Chunk(5)),
+];
+
 fn same_for_all(scene: &Scene) -> Result<(), Failed> {
     let mut first = None;
-    for workers in [1, 2, 4] {
-        for granularity in
-            [Granularity::PerCamera, Granularity::PerDraw, Granularity::Chunk(5), Granularity::Chunk(256)]
-        {
-            let mut fixture = Fixture::with_granularity(workers, granularity)?;
-            let picture = fixture.draw(scene)?;
-            let processes = ["shadow casters", "geometry buffer", "transparency"];
-            let views = 0..scene.cameras.len() + scene.lights.iter().filter(|light| light.casts_shadow()).count();
-            let list = |process, view| fixture.renderer.draw_list(process, view).map(|list| list.clone());
-            let lists: Vec<_> = views.map(|view| processes.map(|process| list(process, view))).collect();
-            let (first_picture, first_lists) = first.get_or_insert_with(|| (picture.clone(), lists.clone()));
-            if *first_lists != lists {
-                return Err(format!("commands or batches differ with {workers} workers, {granularity:?}").into());
-            }
-            if *first_picture != picture {
-                return Err(format!("pictures differ with {workers} workers, {granularity:?}").into());
-            }
+    for (workers, granularity) in RUNS {
+        let mut fixture = Fixture::with_granularity(workers, granularity)?;
+        let picture = fixture.draw(scene)?;
+        let processes = ["shadow casters", "geometry buffer", "transparency"];
+        let views = 0..scene.cameras.len() + scene.lights.iter().filter(|light| light.casts_shadow()).count();
+        let list = |process, view| fixture.renderer.draw_list(process, view).map(|list| list.clone());
+        let lists: Vec<_> = views.map(|view| processes.map(|process| list(process, view))).collect();
+        let (first_picture, first_lists) = first.get_or_insert_with(|| (picture.clone(), lists.clone()));
+        if *first_lists != lists {
+            return Err(format!("commands or batches differ with {workers} workers, {granularity:?}").into());
+        }
+        if *first_picture != picture {
+            return Err(format!("pictures differ with {workers} workers, {granularity:?}").into());
         }
     }
     Ok(())

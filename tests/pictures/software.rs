@@ -47,7 +47,7 @@ fn compare(scene: Scene) -> Result<(), Failed> {
 
 /// Compares wgpu's picture with those of the software backend in f32 and in f64.
 fn compare_with(mut scene: Scene, maps: ShadowMaps) -> Result<(), Failed> {
-    let size = if slow_cases::are_enabled() { [480, 270] } else { [240, 135] };
+    let size = if slow_cases::are_enabled() { [320, 180] } else { [240, 135] };
     scene.cameras.iter_mut().for_each(|camera| camera.size = size);
     let by_wgpu = fixture_with(maps)?.draw(&scene)?;
     let scheduler = Arc::new(Scheduler::new(2)?);

@@ -85,7 +85,9 @@ fn a_recorded_frame_draws_the_scene_as_it_was() {
 #[test]
 fn occlusion_culling_changes_nothing() {
     for scene in [odd_field(), everything()] {
-        let quality = Quality { culling: CullingVolume::OrientedBox, ..Quality::balanced() };
+        let balanced = Quality::balanced();
+        let shadows = ShadowQuality { side: 100, ..balanced.shadows };
+        let quality = Quality { culling: CullingVolume::OrientedBox, shadows, ..balanced };
         let draw = |occlusion| {
             let quality = Quality { occlusion, ..quality };
             let maps = |builder: RendererBuilder<SoftwareBackend>| builder.deferred(deferred()).quality(quality);
