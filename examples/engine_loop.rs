@@ -24,7 +24,7 @@ use drawloom::{Renderer, wgpu};
 use drawloom_output::PictureFile;
 use parking_lot::Mutex;
 
-const FRAMES: usize = 120;
+const FRAMES: usize = 60;
 const STEP: Duration = Duration::from_millis(16);
 
 fn main() -> Result<(), Box<dyn Error>> {
