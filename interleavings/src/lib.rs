@@ -1,7 +1,7 @@
-//! The modules of the library whose code threads share, and in which all its unsafe code is: those before `quality` in `src/lib.rs`. The
-//! others use them, and would only be built.
+//! `graph` and the modules of the library that it uses. Threads share their data without locks, and all unsafe code is there, as
+//! `tests/architecture` checks.
 
-// Modules that are not here use the rest.
+// What only other modules of the library use is here too.
 #![allow(dead_code, unused_imports)]
 
 #[path = "../../src/graph/mod.rs"]

@@ -4,6 +4,7 @@
 //! - `circles`: the files of one module do not import each other in circles.
 //! - `files`: files are short, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files through `drawloom-output`.
+//! - `unsafe_code`: unsafe code is in modules that Miri and the thread sanitizer run.
 //! - `atomics`: the tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
 
 mod atomics;
@@ -14,3 +15,4 @@ mod outputs;
 mod paths;
 mod sources;
 mod tokens;
+mod unsafe_code;
