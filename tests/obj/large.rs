@@ -56,7 +56,7 @@ fn material_names() {
 }
 
 fn polygon() {
-    const CORNERS: usize = 300_000;
+    const CORNERS: usize = 1_000_000;
     let mut text = String::new();
     for corner in 0..CORNERS {
         let (sine, cosine) = (corner as f64 / CORNERS as f64 * std::f64::consts::TAU).sin_cos();
