@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use proc_macro2::{TokenStream, TokenTree};
+use proc_macro2::TokenTree;
 
 use crate::sources::{Source, read_all};
 use crate::tokens::{is, trees_of};
@@ -25,7 +25,7 @@ fn unsafe_elsewhere(sources: &[Source]) -> Vec<String> {
             continue;
         }
         // `files` reports a file that does not parse.
-        for line in source.text.parse().map(unsafe_lines).unwrap_or_default() {
+        for line in source.parse().map(unsafe_lines).unwrap_or_default() {
             problems.push(format!("{}:{line}", source.path.display()));
         }
     }
@@ -33,13 +33,13 @@ fn unsafe_elsewhere(sources: &[Source]) -> Vec<String> {
 }
 
 /// The lines of each keyword `unsafe`.
-fn unsafe_lines(stream: TokenStream) -> Vec<usize> {
+fn unsafe_lines(trees: Vec<TokenTree>) -> Vec<usize> {
     let lines_of = |tree| match tree {
-        TokenTree::Group(group) => unsafe_lines(group.stream()),
+        TokenTree::Group(group) => unsafe_lines(trees_of(group.stream())),
         tree if is(Some(&tree), "unsafe") => vec![tree.span().start().line],
         _ => Vec::new(),
     };
-    trees_of(stream).into_iter().flat_map(lines_of).collect()
+    trees.into_iter().flat_map(lines_of).collect()
 }
 
 #[test]
