@@ -108,7 +108,7 @@ impl RankedAdjacency {
 
     /// Computes each node's cost from the start and to the end, and sorts dependents and roots by cost to the end.
     /// `cost_of` returns the nanoseconds of a node.
-    pub(crate) fn rank(&mut self, cost_of: impl Fn(usize) -> u64) {
+    pub(crate) fn rank(&mut self, cost_of: &dyn Fn(usize) -> u64) {
         self.cost_from_start.fill(0);
         for node in 0..self.len() {
             let end = self.cost_from_start[node].saturating_add(cost_of(node));
@@ -170,7 +170,7 @@ mod tests {
                 list
             }).collect();
             let mut adjacency = RankedAdjacency::new(&dependencies);
-            adjacency.rank(|node| costs[node]);
+            adjacency.rank(&|node| costs[node]);
             let paths: Vec<u64> = (0..costs.len()).map(|node| cost_to_end(&dependencies, &costs, node)).collect();
             let longest = *paths.iter().max().unwrap();
             for node in 0..costs.len() {

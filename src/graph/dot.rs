@@ -6,7 +6,9 @@ use petgraph::adj::UnweightedList;
 use petgraph::algo::tred::dag_transitive_reduction_closure;
 use petgraph::visit::{EdgeRef, IntoEdgeReferences};
 
+use super::adjacency::Adjacency;
 use super::builder::FrameGraph;
+use super::declarations::Declarations;
 use super::edges::{self, Roles};
 use super::order::{positions, topological_order};
 use super::schedule::Schedule;
@@ -18,11 +20,17 @@ impl<P> FrameGraph<P> {
     /// Outputs have a double border, imported resources are filled. What leads to no output is dashed. A graph that does not
     /// compile can be drawn, too.
     pub fn to_dot(&self) -> String {
+        self.declarations.to_dot()
+    }
+}
+
+impl Declarations {
+    fn to_dot(&self) -> String {
         let roles = Roles::of_all(self);
         let mut edges = edges::derive(self, &roles);
         let position = positions(edges.node_count(), &topological_order(&edges, self.nodes.len()));
         edges::add_versions(&mut edges, &roles, &position);
-        let needed = edges::needed(self, &roles, &edges, |_| Vec::new());
+        let needed = edges::needed(self, &roles, &edges, &|_| Vec::new());
 
         let mut dot = Dot::new();
         for (index, node) in self.nodes.iter().enumerate() {
@@ -71,7 +79,7 @@ impl<P> Schedule<P> {
         for (index, name) in self.dropped().iter().enumerate() {
             dot.line(format_args!("dropped{index} [shape=box, label={}, style=dashed];", Quoted(name)));
         }
-        for (index, dependent) in self.direct_dependencies() {
+        for (index, dependent) in direct_dependencies(self.len(), &self.dependents) {
             let label = label(index, dependent);
             if label.is_empty() {
                 dot.line(format_args!("node{index} -> node{dependent};"));
@@ -81,22 +89,22 @@ impl<P> Schedule<P> {
         }
         dot.finish()
     }
+}
 
-    /// The edges of the transitive reduction, from dependency to dependent.
-    fn direct_dependencies(&self) -> Vec<(usize, usize)> {
-        let mut all = UnweightedList::<usize>::with_capacity(self.len());
-        for _ in 0..self.len() {
-            all.add_node();
-        }
-        for index in 0..self.len() {
-            for &dependent in self.dependents(index) {
-                all.add_edge(index, dependent, ());
-            }
-        }
-        // The indices are a topological order, which this function requires.
-        let (direct, _) = dag_transitive_reduction_closure(&all);
-        direct.edge_references().map(|edge| (edge.source(), edge.target())).collect()
+/// The edges of the transitive reduction, from dependency to dependent.
+fn direct_dependencies(nodes: usize, dependents: &Adjacency) -> Vec<(usize, usize)> {
+    let mut all = UnweightedList::<usize>::with_capacity(nodes);
+    for _ in 0..nodes {
+        all.add_node();
     }
+    for index in 0..nodes {
+        for &dependent in dependents.of(index) {
+            all.add_edge(index, dependent, ());
+        }
+    }
+    // The indices are a topological order, which this function requires.
+    let (direct, _) = dag_transitive_reduction_closure(&all);
+    direct.edge_references().map(|edge| (edge.source(), edge.target())).collect()
 }
 
 /// A DOT file while it is written.

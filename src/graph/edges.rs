@@ -1,4 +1,4 @@
-//! Dependency edges: the rules of [`FrameGraph`], applied.
+//! Dependency edges: the rules of [`FrameGraph`](super::FrameGraph), applied.
 //!
 //! If every maker of a resource had an edge to every reader, the number of edges would be their product. So all makers
 //! have an edge to one *junction*, and the junction has an edge to each reader. A junction is a vertex but not a node:
@@ -8,7 +8,7 @@ use petgraph::Direction;
 use petgraph::graph::{DiGraph, NodeIndex};
 use petgraph::visit::EdgeRef;
 
-use super::builder::{Access, FrameGraph};
+use super::declarations::{Access, Declarations};
 use super::traversal::Traversal;
 
 /// An edge for each reason to wait, from the dependency to the dependent. The first vertices are the graph's nodes, by
@@ -18,7 +18,7 @@ pub(super) type Edges = DiGraph<(), Relation>;
 /// Why a node waits for another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relation {
-    /// [`FrameGraph::order`] says so.
+    /// [`FrameGraph::order`](super::FrameGraph::order) says so.
     Order,
     /// It needs what the other node writes to the resource of this index.
     Data(usize),
@@ -34,7 +34,7 @@ pub(super) struct Roles {
 
 impl Roles {
     /// The roles for every resource of the graph.
-    pub(super) fn of_all<P>(graph: &FrameGraph<P>) -> Vec<Self> {
+    pub(super) fn of_all(graph: &Declarations) -> Vec<Self> {
         let mut accesses = graph.accesses.clone();
         accesses.sort_unstable_by_key(|access| (access.resource, access.node, access.writes));
         let mut roles: Vec<Self> = graph.resources.iter().map(|_| Self::default()).collect();
@@ -60,7 +60,7 @@ impl Roles {
 }
 
 /// The explicit edges, and those that follow from each node's accesses. [`add_versions`] adds the rest.
-pub(super) fn derive<P>(graph: &FrameGraph<P>, roles: &[Roles]) -> Edges {
+pub(super) fn derive(graph: &Declarations, roles: &[Roles]) -> Edges {
     let mut edges = Edges::default();
     for _ in &graph.nodes {
         edges.add_node(());
@@ -149,12 +149,12 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize
 }
 
 /// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data. The resources that `outputs_of`
-/// names for the payload of a needed node are outputs too.
-pub(super) fn needed<P>(
-    graph: &FrameGraph<P>,
+/// names for the index of a needed node are outputs too.
+pub(super) fn needed(
+    graph: &Declarations,
     roles: &[Roles],
     edges: &Edges,
-    outputs_of: impl Fn(&P) -> Vec<String>,
+    outputs_of: &dyn Fn(usize) -> Vec<String>,
 ) -> Vec<bool> {
     let mut needed = vec![false; edges.node_count()];
     let mut stack: Vec<NodeIndex> = Vec::new();
@@ -170,7 +170,8 @@ pub(super) fn needed<P>(
     while let Some(vertex) = stack.pop() {
         let edges = edges.edges_directed(vertex, Direction::Incoming);
         edges.filter(|edge| *edge.weight() != Relation::Order).for_each(|edge| need(edge.source(), &mut stack));
-        let outputs = graph.nodes.get(vertex.index()).map_or_else(Vec::new, |node| outputs_of(&node.payload));
+        let is_node = vertex.index() < graph.nodes.len();
+        let outputs = if is_node { outputs_of(vertex.index()) } else { Vec::new() };
         let outputs = outputs.iter().filter_map(|name| graph.resource_by_name.get(name));
         outputs.for_each(|resource| roles[*resource].makers().for_each(|maker| need(maker, &mut stack)));
     }
@@ -202,7 +203,7 @@ mod tests {
                 }
             }
         }
-        let edges = derive(&graph, &Roles::of_all(&graph));
+        let edges = derive(&graph.declarations, &Roles::of_all(&graph.declarations));
         // The explicit chain of makers; writers to modifiers; makers to readers.
         assert_eq!(edges.edge_count(), (2 * EACH - 1) + 2 * EACH + 3 * EACH);
         assert_eq!(edges.node_count(), 3 * EACH + 2);

@@ -129,7 +129,7 @@ impl<P> Schedule<P> {
     /// Adds a measured run to the nodes' costs, ranks the nodes by them, and returns the run's work.
     fn update_costs(&mut self) -> Duration {
         let work = self.costs.update();
-        self.adjacency.rank(|node| self.costs.nanoseconds(node));
+        self.adjacency.rank(&|node| self.costs.nanoseconds(node));
         work
     }
 

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::adjacency::{Adjacency, RankedAdjacency};
-use super::builder::NodeId;
 use super::costs::NodeCosts;
+use super::declarations::NodeId;
 use super::execution_policy::{ExecutionPolicy, ModeChoice};
+use super::flat_graph::FlatGraph;
 use super::progress::Progress;
 use crate::timeline::{Graph, Labels};
 
@@ -36,6 +37,27 @@ pub struct Schedule<P> {
 }
 
 impl<P> Schedule<P> {
+    /// A schedule that has not run yet. `nodes` are the payloads of the graph's nodes.
+    pub(super) fn new(graph: FlatGraph, nodes: Vec<P>) -> Self {
+        let FlatGraph { names, labels, indices, dependencies, dependents, dropped, adjacency } = graph;
+        let (progress, costs) = (Progress::new(&adjacency), NodeCosts::new(adjacency.len()));
+        Self {
+            names,
+            labels,
+            nodes,
+            indices,
+            dependencies,
+            dependents,
+            dropped,
+            adjacency,
+            progress,
+            costs,
+            policy: ExecutionPolicy::default(),
+            description: None,
+            always_parallel: false,
+        }
+    }
+
     /// The number of nodes.
     pub fn len(&self) -> usize {
         self.nodes.len()

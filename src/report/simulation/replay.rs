@@ -159,7 +159,7 @@ impl Replay {
         for _run in 0..RUNS_TO_LEARN {
             let spans = simulation.run(&adjacency).node_spans;
             let costs: Vec<u64> = spans.iter().map(|span| span.end - span.start).collect();
-            adjacency.rank(|node| costs[node]);
+            adjacency.rank(&|node| costs[node]);
         }
         simulation.run(&adjacency)
     }
