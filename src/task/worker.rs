@@ -68,6 +68,13 @@ pub(super) enum ExitCondition {
     Finished { region: &'static Region<Worker> },
 }
 
+/// The wait inside of which a worker opens a region, and goes on with afterwards.
+struct InterruptedWait {
+    awaited: Option<&'static Region<Worker>>,
+    /// As [`Queues::end_wait`] takes it.
+    pushed: [usize; Priority::ALL.len()],
+}
+
 impl Worker {
     pub(super) fn new(index: usize, queues: Box<Queues<Self>>, shared: Arc<Shared<Self>>) -> Self {
         Self {
@@ -211,38 +218,45 @@ impl Worker {
         let region: &'static Region<Self> = unsafe { &*ptr::from_ref(&storage) };
         // The last local, so that an unwind drops it before any other.
         let guard = AbortOnUnwind::new("an open region of jobs");
-        let result =
-            self.work_until_finished(region, || catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone())));
+        let interrupted = self.enter(region);
+        let result = catch(|| body(region)).inspect_err(|panic| region.fail(panic.clone()));
+        let result = match self.work_until_finished(region, interrupted) {
+            None => result,
+            Some(first) => {
+                discard(result);
+                Err(first)
+            }
+        };
         guard.disarm();
         result
     }
 
-    /// Calls `body`, and then works until all jobs of the region have run. `body` must not unwind.
-    fn work_until_finished<R>(
-        &self,
-        region: &'static Region<Self>,
-        body: impl FnOnce() -> Result<R, JobPanic>,
-    ) -> Result<R, JobPanic> {
+    /// Enters a region: what follows belongs to it. Returns the wait that this interrupts.
+    fn enter(&self, region: &'static Region<Self>) -> InterruptedWait {
         let is_outermost = region.is_outermost();
         self.depth.set(self.depth.get() + 1);
-        let outer = (self.awaited.replace((!is_outermost).then_some(region)), self.queues.start_wait());
+        let awaited = self.awaited.replace((!is_outermost).then_some(region));
+        let interrupted = InterruptedWait { awaited, pushed: self.queues.start_wait() };
         if is_outermost {
             self.shared.placement().avoid_current_processor();
             self.shared.begin_frame();
         }
-        let result = body();
+        interrupted
+    }
+
+    /// Works until all jobs of the region have run, whose body has returned, and leaves it. Returns the first panic of a job or of the
+    /// body. Does not unwind.
+    fn work_until_finished(&self, region: &'static Region<Self>, interrupted: InterruptedWait) -> Option<JobPanic> {
         // The count that the latch began with is that of the body.
         self.release_count(region);
         self.work(ExitCondition::Finished { region });
-        if is_outermost {
+        if region.is_outermost() {
             self.shared.end_frame();
         }
-        self.awaited.set(outer.0);
-        self.queues.end_wait(outer.1);
+        self.awaited.set(interrupted.awaited);
+        self.queues.end_wait(interrupted.pushed);
         self.depth.set(self.depth.get() - 1);
-        let Some(first) = region.take_panic() else { return result };
-        discard(result);
-        Err(first)
+        region.take_panic()
     }
 
     /// Runs jobs, and sleeps while there are none, until the exit condition holds. Does not unwind.
