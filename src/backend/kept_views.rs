@@ -18,11 +18,15 @@ pub(crate) struct KeptView {
 /// several the one at the same place among them; otherwise one of the same kind that no other view keeps. Of several views with the same kind
 /// and name none is the same as before if their number has changed, because it is unknown which of them is new or gone.
 pub(crate) fn kept_views<'a>(
-    before: impl Iterator<Item = (ViewKind, &'a str)> + Clone,
+    before: impl Iterator<Item = (ViewKind, &'a str)>,
     views: &'a [RenderView],
 ) -> Vec<Option<KeptView>> {
+    kept_views_of(&before.collect::<Vec<_>>(), views)
+}
+
+fn kept_views_of(before: &[(ViewKind, &str)], views: &[RenderView]) -> Vec<Option<KeptView>> {
     let mut named: HashMap<(ViewKind, &str), VecDeque<usize>> = HashMap::new();
-    for (index, view) in before.clone().enumerate() {
+    for (index, view) in before.iter().copied().enumerate() {
         named.entry(view).or_default().push_back(index);
     }
     let mut count_changes: HashMap<(ViewKind, &str), isize> = HashMap::new();
@@ -41,10 +45,9 @@ pub(crate) fn kept_views<'a>(
 
     let mut left: Vec<_> = named.into_values().flatten().collect();
     left.sort_unstable();
-    let kinds: Vec<_> = before.map(|(kind, _)| kind).collect();
     let mut of_kind: HashMap<ViewKind, VecDeque<usize>> = HashMap::new();
     for index in left {
-        of_kind.entry(kinds[index]).or_default().push_back(index);
+        of_kind.entry(before[index].0).or_default().push_back(index);
     }
     for (kept, view) in kept.iter_mut().zip(views).filter(|(kept, _)| kept.is_none()) {
         let index = of_kind.get_mut(&view.kind()).and_then(VecDeque::pop_front);

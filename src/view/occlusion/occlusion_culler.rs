@@ -99,22 +99,7 @@ impl OcclusionCuller {
                 }
             }
         }
-        if occluders.candidates.len() > Self::MAX_OCCLUDERS {
-            let by_width = |one: &Candidate, other: &Candidate| {
-                other.width.total_cmp(&one.width).then(one.object.cmp(&other.object))
-            };
-            occluders.candidates.select_nth_unstable_by(Self::MAX_OCCLUDERS, by_width);
-            occluders.candidates.truncate(Self::MAX_OCCLUDERS);
-        }
-        // Nearest first, which keeps the nearness of merged tiles as great as possible.
-        let by_depth =
-            |one: &Candidate, other: &Candidate| one.depth.total_cmp(&other.depth).then(one.object.cmp(&other.object));
-        occluders.candidates.sort_unstable_by(by_depth);
-        for index in 0..occluders.candidates.len() {
-            let object = occluders.candidates[index].object as usize;
-            let objects = table.block(object / ObjectTable::BLOCK_SIZE);
-            occluders.project(camera, scene, &objects, object, meshes);
-        }
+        occluders.project_largest(camera, scene, table, meshes);
     }
 
     /// The number of convex parts to draw.
@@ -188,6 +173,32 @@ impl OcclusionCuller {
 }
 
 impl Occluders {
+    /// Drops all candidates but the largest, and projects their parts, nearest first, which keeps the nearness of merged tiles as great as
+    /// possible.
+    fn project_largest(
+        &mut self,
+        camera: &OcclusionCamera,
+        scene: &SceneRef<'_>,
+        table: &ObjectTable,
+        meshes: &OccluderMeshes,
+    ) {
+        if self.candidates.len() > OcclusionCuller::MAX_OCCLUDERS {
+            let by_width = |one: &Candidate, other: &Candidate| {
+                other.width.total_cmp(&one.width).then(one.object.cmp(&other.object))
+            };
+            self.candidates.select_nth_unstable_by(OcclusionCuller::MAX_OCCLUDERS, by_width);
+            self.candidates.truncate(OcclusionCuller::MAX_OCCLUDERS);
+        }
+        let by_depth =
+            |one: &Candidate, other: &Candidate| one.depth.total_cmp(&other.depth).then(one.object.cmp(&other.object));
+        self.candidates.sort_unstable_by(by_depth);
+        for index in 0..self.candidates.len() {
+            let object = self.candidates[index].object as usize;
+            let objects = table.block(object / ObjectTable::BLOCK_SIZE);
+            self.project(camera, scene, &objects, object, meshes);
+        }
+    }
+
     /// Adds the silhouettes of an occluder.
     fn project(
         &mut self,
