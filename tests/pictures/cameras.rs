@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use drawloom::Renderer;
 use drawloom::backend::{Picture, SoftwareBackend};
-use drawloom::demo;
 use drawloom::glam::{DVec3, Vec2, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, ClipPlane, Light, Material, RenderObject, Scene};
@@ -16,6 +15,7 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::{self, Fixture};
 use crate::image_distance::{Distance, as_image, assert_alike, assert_different};
+use crate::references::small_colonnade;
 
 pub const CASES: &[Case] = &[
     ("tiles_put_together_are_the_whole_picture", tiles),
@@ -30,7 +30,7 @@ pub const CASES: &[Case] = &[
 const SIZE: [u32; 2] = [96, 54];
 
 fn colonnade() -> Result<(Scene, Camera), Failed> {
-    let mut scene = demo::colonnade()?;
+    let mut scene = small_colonnade()?;
     let camera = sized(scene.cameras.remove(0), SIZE);
     Ok((scene, camera))
 }

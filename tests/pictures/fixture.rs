@@ -6,7 +6,7 @@ use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom::{Granularity, Recorded, Renderer, RendererBuilder, Submitter, wgpu};
+use drawloom::{Recorded, Renderer, RendererBuilder, Submitter, wgpu};
 use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
@@ -67,11 +67,6 @@ impl Fixture {
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let (renderer, submitter) = build(Renderer::builder(backend)).build(scheduler)?;
         Ok(Self { renderer, submitter })
-    }
-
-    /// The shipped processes with this many workers and this granularity.
-    pub fn with_granularity(workers: usize, granularity: Granularity) -> Result<Self, Failed> {
-        Self::with(workers, |builder| builder.deferred(Deferred::to_picture()).granularity(granularity))
     }
 
     pub fn record(&mut self, scene: &Scene) -> Result<Recorded<WgpuBackend>, Failed> {

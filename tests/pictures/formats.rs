@@ -15,7 +15,7 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::{Fixture, draw, pixel};
 use crate::image_distance::{Distance, as_image, assert_color, tone_mapped};
-use crate::references::colonnade;
+use crate::references::{colonnade, small_colonnade};
 
 pub const CASES: &[Case] = &[
     ("normals_read_back_are_within_their_bound", normals),
@@ -262,12 +262,6 @@ fn packed_without_loss() -> Result<(), Failed> {
     Ok(())
 }
 
-fn small_colonnade() -> Result<Scene, Failed> {
-    let mut scene = colonnade()?;
-    scene.cameras[0].size = [160, 90];
-    Ok(scene)
-}
-
 /// Fails if the distance between the scene's picture in this quality and `balanced`, its picture in the balanced one, exceeds `max`.
 fn expect_within(
     name: &str,
@@ -287,7 +281,7 @@ fn expect_within(
 /// flatter than sRGB's inverse where it matters, plus half a step of 255. One tile may also differ in a few pixels of a texture.
 fn packed_within_bound() -> Result<(), Failed> {
     let max = Distance { root_mean_square: 0.0068 + 0.002, worst_tile: 0.03 };
-    let scene = small_colonnade()?;
+    let scene = colonnade()?;
     expect_within("colonnade", (&scene, &draw(&scene)?), packed(), max)
 }
 

@@ -10,7 +10,7 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::Fixture;
 use crate::image_distance::{Distance, as_image};
-use crate::references::colonnade;
+use crate::references::small_colonnade;
 
 pub const CASES: &[Case] = &[
     ("a_depth_pre_pass_changes_no_byte", depth_pre_pass),
@@ -40,12 +40,6 @@ fn scenes() -> Result<Vec<(&'static str, Scene)>, Failed> {
         ("field without perspective", flat),
         ("everything twice", twice),
     ])
-}
-
-fn small_colonnade() -> Result<Scene, Failed> {
-    let mut scene = colonnade()?;
-    scene.cameras[0].size = [160, 90];
-    Ok(scene)
 }
 
 /// Without shadow maps, which do not use the geometry buffer.

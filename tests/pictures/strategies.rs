@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drawloom::backend::{BackendError, EncodingStrategy, Picture, RecordingStrategy, WgpuBackend, WgpuPassStatistics};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
-use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Texture};
+use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Granularity, Recorded, Renderer, SubmitError};
@@ -17,7 +17,7 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, backend, device};
-use crate::references::colonnade;
+use crate::references::small_colonnade;
 
 pub const CASES: &[Case] = &[
     ("every_strategy_draws_the_same_bytes", same_bytes),
@@ -99,19 +99,6 @@ fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
 /// The pictures of a new renderer.
 pub fn drawn_by_a_new_renderer(scene: &Scene) -> Result<Vec<Picture>, Failed> {
     draw(&mut fixture_with(RecordingStrategy::Bundles, EncodingStrategy::PerPass)?, scene)
-}
-
-/// The colonnade in a small picture. Its lamp casts no shadow: the subdivision of all objects near it takes seconds per strategy,
-/// and `everything` has such a lamp as well.
-fn small_colonnade() -> Result<Scene, Failed> {
-    let mut scene = colonnade()?;
-    scene.cameras[0].size = [120, 80];
-    for light in &mut scene.lights {
-        if let Light::Hemispherical { casts_shadow, .. } = light {
-            *casts_shadow = false;
-        }
-    }
-    Ok(scene)
 }
 
 /// Many meshes and panes of glass that hardly merge: several bundles of opaque and of blended batches per view.

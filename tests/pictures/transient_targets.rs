@@ -1,7 +1,6 @@
 //! Targets that share textures, because their lives do not overlap.
 
 use drawloom::backend::{BackendError, Picture, TargetMemory, WgpuBackend, WgpuSubmission};
-use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::{
     ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, RenderProcess, ToneMapping, ViewOrder,
@@ -15,6 +14,7 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::fixture::{Fixture, device};
 use crate::imported_targets::{USAGE, texture};
+use crate::references::small_colonnade;
 use crate::sampled_views::{MIRROR, PLANE, mirror_scene};
 use crate::strategies::expect;
 
@@ -98,7 +98,7 @@ fn colonnade() -> Result<(), Failed> {
     // Some frames draw shadow maps, and the others read those of the frame before.
     let quality = Quality { shadows: ShadowQuality { interval: 2, side: 64, ..quality.shadows }, ..quality };
     let mut both = Both::new(|builder| builder.deferred(smooth()).quality(quality))?;
-    let mut scene = demo::colonnade()?;
+    let mut scene = small_colonnade()?;
     let (wide, small) = ([96, 54], [40, 40]);
     for (frame, sizes) in [
         &[wide, small, wide, wide][..],

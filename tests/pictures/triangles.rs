@@ -13,7 +13,7 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::backend;
-use crate::references::colonnade;
+use crate::references::small_colonnade;
 use crate::strategies::{
     drawn_by_a_new_renderer, expect, few_strategies, fixture_of, fixture_with, many_batches, pictures, small_maps,
     strategies,
@@ -34,12 +34,6 @@ const SCENES: [(Make, usize, bool); 4] = [
     (small_colonnade, 1, true),
     (|| Ok(many_batches()), 2, true),
 ];
-
-fn small_colonnade() -> Result<Scene, Failed> {
-    let mut scene = colonnade()?;
-    scene.cameras[0].size = [160, 90];
-    Ok(scene)
-}
 
 /// The scene with triangle culling enabled for every n-th mesh. Strips become lists, because a strip's triangles are
 /// rounded differently.
