@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use drawloom::demo;
 use drawloom::scene::{Scene, obj};
+use drawloom_testing::scenes::everything::everything;
 
 use crate::Failure;
 
@@ -12,7 +13,7 @@ use crate::Failure;
 #[derive(Parser)]
 #[command(name = "tradeoff")]
 pub struct Arguments {
-    /// An OBJ file. Default: the scene that comes with the project.
+    /// An OBJ file. Default: the scene that comes with the project, or a small one for a quick run.
     pub scene: Option<PathBuf>,
 
     /// The camera path: `sway` moves a little to the side, `orbit` around the scene; or a file with a line `x,y,z,tx,ty,tz` for each
@@ -36,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// Small pictures from one position of the path, and no rounds. Errors are measured, except that of maps that are drawn every few
+    /// A small scene unless one is named, small pictures from one position of the path, and no rounds. Errors are measured, except that of maps that are drawn every few
     /// frames; times are those of cold frames, and inaccurate.
     #[arg(long)]
     pub quick: bool,
@@ -78,14 +79,17 @@ impl Arguments {
 
     /// The scene's name in reports and file names.
     pub fn scene_name(&self) -> String {
+        let default = if self.quick { "everything" } else { "colonnade" };
         let stem = self.scene.as_ref().and_then(|path| path.file_stem());
-        stem.map_or_else(|| String::from("colonnade"), |stem| stem.to_string_lossy().into_owned())
+        stem.map_or_else(|| default.to_owned(), |stem| stem.to_string_lossy().into_owned())
     }
 
     /// # Errors
     /// Returns an error if the file cannot be read.
     pub fn load_scene(&self) -> Result<Scene, Failure> {
-        let Some(path) = &self.scene else { return Ok(demo::colonnade()?) };
+        let Some(path) = &self.scene else {
+            return if self.quick { Ok(everything()) } else { Ok(demo::colonnade()?) };
+        };
         let mut imported = obj::load(path)?;
         for warning in &imported.warnings {
             eprintln!("warning: {warning}");
