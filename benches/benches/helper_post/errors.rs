@@ -16,6 +16,7 @@ use drawloom::{Renderer, Submitter, demo};
 use drawloom_benches::results;
 use drawloom_output::PictureFile;
 use drawloom_testing::adapter;
+use drawloom_testing::scenes::everything::everything;
 use serde::Serialize;
 
 use crate::steps::AmbientOcclusion;
@@ -75,7 +76,7 @@ pub fn measure(quick: bool) -> Result<Vec<Row>, Box<dyn Error>> {
     let size = if quick { [48, 27] } else { [640, 360] };
     let directions = if quick { 1 } else { 4 };
     let motions = if quick { &MOTIONS[..1] } else { &MOTIONS[..] };
-    let scene = scene()?;
+    let scene = at_dusk(if quick { everything() } else { demo::colonnade()? });
     let (device, queue) = adapter::device()?;
     let library = PipelineLibrary::new(device, queue);
     let mut rows = Vec::new();
@@ -139,9 +140,8 @@ fn row(layer: Layer, motion: &'static str, lookup: &'static str, counts: &[u64; 
     }
 }
 
-/// The colonnade at dusk, with lamps between its columns that are brighter than white, and a bright sky.
-fn scene() -> Result<Scene, Box<dyn Error>> {
-    let mut scene = demo::colonnade()?;
+/// The scene at dusk, with lamps around its camera that are brighter than white, and a bright sky.
+fn at_dusk(mut scene: Scene) -> Scene {
     scene.background = Vec3::new(1.6, 1.9, 2.6);
     let camera = scene.cameras[0].clone();
     for index in 0..6 {
@@ -150,7 +150,7 @@ fn scene() -> Result<Scene, Box<dyn Error>> {
         let intensity = Vec3::new(16.0, 9.0, 3.0);
         scene.lights.push(Light::Point { position, intensity, range: 12.0, casts_shadow: false });
     }
-    Ok(scene)
+    scene
 }
 
 impl Engine {

@@ -21,6 +21,7 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use drawloom::backend::WgpuBackend;
+use drawloom::demo;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, WarmUp};
@@ -32,6 +33,7 @@ use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::table::Table;
 use drawloom_testing::random::Random;
+use drawloom_testing::scenes::everything::everything;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -100,7 +102,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut unneeded = Vec::new();
     for backend in arguments.backends() {
         let (rounds, size) = if quick { (2, [32, 32]) } else { (101, [480, 270]) };
-        unneeded.extend(unneeded::measure(backend, rounds, size, &progress)?);
+        let scene = || if quick { Ok(everything()) } else { demo::colonnade() };
+        unneeded.extend(unneeded::measure(backend, scene, rounds, size, &progress)?);
     }
     progress.finish_and_clear();
 

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
-use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, ClipPlane, LayerMask, Material, Mesh, RenderObject, Scene, ViewKind};
+use drawloom::scene::{Camera, ClipPlane, LayerMask, Material, Mesh, RenderObject, Scene, SceneError, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
 use drawloom_benches::backends::BackendName;
@@ -37,9 +36,10 @@ pub struct Row {
     milliseconds: f64,
 }
 
-/// Measures frames of the colonnade, without lights, as it is, and with a mirror, each with both pipelines in turn.
+/// Measures frames of a scene without lights, as it is, and with a mirror, each with both pipelines in turn.
 pub fn measure(
     backend: BackendName,
+    scene: impl Fn() -> Result<Scene, SceneError>,
     rounds: usize,
     size: [u32; 2],
     progress: &ProgressBar,
@@ -47,7 +47,7 @@ pub fn measure(
     let mut rows = Vec::new();
     // One for all, because the workers of others would wait beside it.
     let scheduler = Arc::new(Scheduler::new(2)?);
-    for (name, scene) in scenes(size)? {
+    for (name, scene) in variants([scene()?, scene()?, scene()?], size)? {
         let runners = [true, false].map(|keeps_all| Runner::new((backend, &scheduler), &scene, keeps_all));
         let mut runners = runners.into_iter().collect::<Result<Vec<_>, _>>()?;
         let mut times = Harness::new(Rounds { warm_up: WARM_UP, measured: rounds }, progress)
@@ -81,10 +81,12 @@ pub fn print(rows: &[Row]) {
     table.print();
 }
 
-fn scenes(size: [u32; 2]) -> Result<[(&'static str, Scene); 3], Box<dyn Error>> {
-    let [mut bare, mut whole, mut mirrored] = [demo::colonnade()?, demo::colonnade()?, demo::colonnade()?];
+fn variants(
+    [mut bare, mut whole, mut mirrored]: [Scene; 3],
+    size: [u32; 2],
+) -> Result<[(&'static str, Scene); 3], Box<dyn Error>> {
     for scene in [&mut bare, &mut whole, &mut mirrored] {
-        let camera = scene.cameras.first().cloned().ok_or("the colonnade has no camera")?;
+        let camera = scene.cameras.first().cloned().ok_or("the scene has no camera")?;
         scene.cameras = vec![sized(camera, size)];
     }
     bare.lights.clear();
@@ -94,7 +96,7 @@ fn scenes(size: [u32; 2]) -> Result<[(&'static str, Scene); 3], Box<dyn Error>> 
     let (mesh, material) = (mirrored.add(Mesh::cuboid("water", Vec3::ONE)?)?, mirrored.add(Material::default())?);
     let water = RenderObject::new(mesh, material, plane.point);
     mirrored.add_object(RenderObject { layers: mirror::LAYER, scale: Vec3::new(4.0, 0.01, 4.0), ..water })?;
-    Ok([("colonnade without lights", bare), ("colonnade", whole), ("colonnade with a mirror", mirrored)])
+    Ok([("without lights", bare), ("as it is", whole), ("with a mirror", mirrored)])
 }
 
 struct Runner {
