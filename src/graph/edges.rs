@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn the_number_of_edges_is_linear_in_the_number_of_accesses() {
-        const EACH: usize = if cfg!(miri) { 10 } else { 200 };
+        const EACH: usize = if cfg!(miri) { 4 } else { 200 };
         let mut graph = FrameGraph::new();
         let image = graph.resource("image");
         let mut before = None;

@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn idle_workers_sleep() {
         let scheduler = Scheduler::new(5).unwrap();
-        for _frame in 0..20 {
+        for _frame in 0..if cfg!(miri) { 5 } else { 20 } {
             assert_eq!(sleepers(&scheduler, 4), 4);
             scheduler.parallel_for(100, 1, |_range, _worker| thread::yield_now()).unwrap();
         }
