@@ -73,13 +73,13 @@ impl<P> Schedule<P> {
     /// As [`to_dot`](Self::to_dot), with `label(from, to)` on each arrow unless it is empty. `from` and `to` are indices of nodes.
     pub(crate) fn to_labelled_dot(&self, label: impl Fn(usize, usize) -> String) -> String {
         let mut dot = Dot::new();
-        for (index, name) in self.names.iter().enumerate() {
+        for (index, name) in self.graph.names.iter().enumerate() {
             dot.line(format_args!("node{index} [shape=box, label={}];", Quoted(name)));
         }
         for (index, name) in self.dropped().iter().enumerate() {
             dot.line(format_args!("dropped{index} [shape=box, label={}, style=dashed];", Quoted(name)));
         }
-        for (index, dependent) in direct_dependencies(self.len(), &self.dependents) {
+        for (index, dependent) in direct_dependencies(self.len(), &self.graph.dependents) {
             let label = label(index, dependent);
             if label.is_empty() {
                 dot.line(format_args!("node{index} -> node{dependent};"));

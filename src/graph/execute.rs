@@ -116,8 +116,8 @@ impl<P> Schedule<P> {
     {
         if self.description.is_none() && ActiveInstrument::is_wanted(worker) {
             let node = |index: usize| NodeInfo {
-                name: self.names[index].clone(),
-                labels: self.labels[index].clone(),
+                name: self.graph.names[index].clone(),
+                labels: self.graph.labels[index].clone(),
                 dependencies: self.dependencies(index).to_vec(),
                 pinned: catch(|| self.nodes[index].pinned()).unwrap_or(false),
                 chunked_by_cost: catch(|| self.nodes[index].chunked_by_cost(context)).unwrap_or(false),
@@ -129,14 +129,14 @@ impl<P> Schedule<P> {
     /// Adds a measured run to the nodes' costs, ranks the nodes by them, and returns the run's work.
     fn update_costs(&mut self) -> Duration {
         let work = self.costs.update();
-        self.adjacency.rank(&|node| self.costs.nanoseconds(node));
+        self.graph.adjacency.rank(&|node| self.costs.nanoseconds(node));
         work
     }
 
     /// Prepares the schedule for the next run after a panic outside of every node.
     fn reset(&mut self) {
-        for node in 0..self.adjacency.len() as u32 {
-            self.progress.set_pending_dependencies(node, self.adjacency.dependency_count(node));
+        for node in 0..self.graph.adjacency.len() as u32 {
+            self.progress.set_pending_dependencies(node, self.graph.adjacency.dependency_count(node));
             // If a subscriber panicked, a node's span may not have been closed.
             discard(self.progress.open_node(node).span.take());
         }
@@ -250,7 +250,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     }
 
     fn name(&self, location: Location) -> String {
-        self.schedule.names[location.node as usize].clone()
+        self.schedule.graph.names[location.node as usize].clone()
     }
 
     /// Stops the run, and keeps the failure with the lowest location.

@@ -15,6 +15,7 @@
 use std::ops::Range;
 
 use super::execute::Run;
+use super::flat_graph::FlatGraph;
 use super::instrument::{Instrument, NodeSpan};
 use super::node::Node;
 use super::progress::OpenNode;
@@ -32,7 +33,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     pub(super) fn run_parallel(&self, worker: &Worker) -> Result<(), JobPanic> {
         self.start_parallel(worker);
         run_tokens(worker, self, |context| {
-            let adjacency = &self.schedule.adjacency;
+            let adjacency = &self.schedule.graph.adjacency;
             let mut ready = ReadyNodes::new(self, adjacency.edge_count() as u32, context);
             for &root in adjacency.roots() {
                 ready.add(root);
@@ -56,7 +57,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
             // The span of a complete node is dropped before any of its dependents begins.
             let half_done = is_half_done.then_some(span);
             // All counters are set before any of them can be counted down.
-            let rest = current + 1..self.schedule.adjacency.len() as u32;
+            let rest = current + 1..self.schedule.graph.adjacency.len() as u32;
             for node in rest.clone() {
                 self.schedule.progress.set_pending_dependencies(node, self.pending_dependencies(node, first_pending));
             }
@@ -118,7 +119,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         let worker = context.worker();
         let mut next = Some((node, is_pinned));
         while let Some((node, is_pinned)) = next {
-            self.schedule.progress.set_pending_dependencies(node, self.schedule.adjacency.dependency_count(node));
+            self.schedule.progress.set_pending_dependencies(node, self.schedule.graph.adjacency.dependency_count(node));
             self.timer.start(node);
             self.instrument.count_taken(worker);
             let is_done = self.run_node_parallel(node, is_pinned, context);
@@ -229,7 +230,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     /// and returns that one for this worker to run next.
     fn complete(&self, node: u32, context: &TokenContext<'_>) -> Option<u32> {
         self.timer.end(node);
-        let Schedule { adjacency, progress, .. } = self.schedule;
+        let Schedule { graph: FlatGraph { adjacency, .. }, progress, .. } = self.schedule;
         let mut ready = ReadyNodes::new(self, adjacency.dependents_start(node), context);
         for &dependent in adjacency.dependents(node) {
             if progress.complete_dependency(dependent) {
@@ -245,7 +246,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
     }
 
     fn priority(&self, node: u32) -> Priority {
-        if self.schedule.adjacency.is_critical(node) { Priority::Urgent } else { Priority::Normal }
+        if self.schedule.graph.adjacency.is_critical(node) { Priority::Urgent } else { Priority::Normal }
     }
 }
 

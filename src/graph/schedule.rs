@@ -1,17 +1,15 @@
 //! A compiled graph.
 
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::adjacency::{Adjacency, RankedAdjacency};
 use super::costs::NodeCosts;
 use super::declarations::NodeId;
 use super::execution_policy::{ExecutionPolicy, ModeChoice};
 use super::flat_graph::FlatGraph;
 use super::progress::Progress;
-use crate::timeline::{Graph, Labels};
+use crate::timeline::Graph;
 
 /// A compiled graph: checked, in execution order, and stored in flat arrays. It is compiled once and [run](Self::run) every
 /// frame.
@@ -20,14 +18,9 @@ use crate::timeline::{Graph, Labels};
 /// dependencies. Where several nodes could be next, the one that was added first is, so the same graph always compiles to the
 /// same schedule.
 pub struct Schedule<P> {
-    pub(super) names: Vec<String>,
-    pub(super) labels: Vec<Labels>,
+    pub(super) graph: FlatGraph,
+    /// The payload of each node.
     pub(super) nodes: Vec<P>,
-    pub(super) indices: HashMap<NodeId, usize>,
-    pub(super) dependencies: Adjacency,
-    pub(super) dependents: Adjacency,
-    pub(super) dropped: Vec<String>,
-    pub(super) adjacency: RankedAdjacency,
     pub(super) progress: Progress,
     pub(super) costs: NodeCosts,
     pub(super) policy: ExecutionPolicy,
@@ -39,17 +32,10 @@ pub struct Schedule<P> {
 impl<P> Schedule<P> {
     /// A schedule that has not run yet. `nodes` are the payloads of the graph's nodes.
     pub(super) fn new(graph: FlatGraph, nodes: Vec<P>) -> Self {
-        let FlatGraph { names, labels, indices, dependencies, dependents, dropped, adjacency } = graph;
-        let (progress, costs) = (Progress::new(&adjacency), NodeCosts::new(adjacency.len()));
+        let (progress, costs) = (Progress::new(&graph.adjacency), NodeCosts::new(graph.adjacency.len()));
         Self {
-            names,
-            labels,
+            graph,
             nodes,
-            indices,
-            dependencies,
-            dependents,
-            dropped,
-            adjacency,
             progress,
             costs,
             policy: ExecutionPolicy::default(),
@@ -70,18 +56,18 @@ impl<P> Schedule<P> {
 
     /// The names and payloads of the nodes, in execution order.
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = (&str, &P)> {
-        self.names.iter().map(String::as_str).zip(&self.nodes)
+        self.graph.names.iter().map(String::as_str).zip(&self.nodes)
     }
 
     /// The names and payloads of the nodes, in execution order, to be changed between two runs.
     pub fn nodes_mut(&mut self) -> impl ExactSizeIterator<Item = (&str, &mut P)> {
         self.description = None;
-        self.names.iter().map(String::as_str).zip(&mut self.nodes)
+        self.graph.names.iter().map(String::as_str).zip(&mut self.nodes)
     }
 
     /// The index of a node: `None` if it was dropped, or belongs to another graph.
     pub fn index(&self, node: NodeId) -> Option<usize> {
-        self.indices.get(&node).copied()
+        self.graph.indices.get(&node).copied()
     }
 
     /// The payload of a node: `None` if it was dropped, or belongs to another graph.
@@ -99,12 +85,12 @@ impl<P> Schedule<P> {
     ///
     /// Nodes that it only waits for through other nodes may be left out.
     pub fn dependencies(&self, index: usize) -> &[usize] {
-        self.dependencies.of(index)
+        self.graph.dependencies.of(index)
     }
 
     /// The indices of the nodes that wait for a node, ascending; empty if there is no such node.
     pub fn dependents(&self, index: usize) -> &[usize] {
-        self.dependents.of(index)
+        self.graph.dependents.of(index)
     }
 
     /// Executes every run in parallel, however little work it is. This is for nodes that wait for each other while they run, which
@@ -131,7 +117,7 @@ impl<P> Schedule<P> {
     /// Whether a node is on a critical path, by the measured [costs](Self::cost): the longest path through the node is at most a
     /// tenth shorter than the longest path of the graph. Idle workers take critical nodes first.
     pub fn is_critical(&self, index: usize) -> bool {
-        index < self.len() && self.adjacency.is_critical(index as u32)
+        index < self.len() && self.graph.adjacency.is_critical(index as u32)
     }
 
     /// The mode of the latest run that had a choice, and the estimates by which it was chosen; `None` before the first one. There
@@ -143,7 +129,7 @@ impl<P> Schedule<P> {
 
     /// The names of the nodes that were dropped because no output needs them, in the order they were added.
     pub fn dropped(&self) -> &[String] {
-        &self.dropped
+        &self.graph.dropped
     }
 }
 
@@ -151,8 +137,8 @@ impl<P> fmt::Debug for Schedule<P> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter
             .debug_struct("Schedule")
-            .field("nodes", &self.names)
-            .field("dropped", &self.dropped)
+            .field("nodes", &self.graph.names)
+            .field("dropped", &self.graph.dropped)
             .finish_non_exhaustive()
     }
 }

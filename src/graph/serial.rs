@@ -30,7 +30,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         let mut deadline = limit.map(|(start, limit)| Deadline { start, limit, chunks: 0, next_check: 1 });
         // One attempt for all nodes: an attempt for each would cost more than the rest of a node's overhead.
         let suspended = self.attempt(0, |location| {
-            for node in 0..self.schedule.adjacency.len() as u32 {
+            for node in 0..self.schedule.graph.adjacency.len() as u32 {
                 *location = Location { node, item: 0 };
                 span.switch_to(node);
                 if let Some((chunks, done)) = self.run_node_serial(location, worker, deadline.as_mut(), &mut span)? {

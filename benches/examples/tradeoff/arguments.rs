@@ -37,8 +37,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// A small scene unless one is named, small pictures from one position of the path, and no rounds. Errors are measured, except that of maps that are drawn every few
-    /// frames; times are those of cold frames, and inaccurate.
+    /// A small scene unless one is named, small pictures from one position of the path, and no rounds. Errors are measured, except that of
+    /// maps that are drawn every few frames; times are those of cold frames, and inaccurate.
     #[arg(long)]
     pub quick: bool,
 }
