@@ -140,9 +140,29 @@ impl RankedAdjacency {
 
 #[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
-    use proptest::prelude::*;
+    use std::iter;
+
+    use fastrand::Rng;
 
     use super::RankedAdjacency;
+
+    const GRAPHS: usize = if cfg!(miri) { 8 } else { 1_024 };
+
+    /// The dependencies of up to eleven nodes, up to three of each, and the cost of each node.
+    fn random_graph(random: &mut Rng) -> (Vec<Vec<usize>>, Vec<u64>) {
+        let count = random.usize(1..12);
+        let dependencies = (0..count).map(|node| {
+            let picks = if node == 0 { 0 } else { random.usize(0..4) };
+            let mut list: Vec<usize> = iter::repeat_with(|| random.usize(..node)).take(picks).collect();
+            list.sort_unstable();
+            list.dedup();
+            list
+        });
+        let dependencies = dependencies.collect();
+        // Some graphs cost nothing, and in some many paths are as long as each other.
+        let limit = [1, 3, 1_000][random.usize(..3)];
+        (dependencies, iter::repeat_with(|| random.u64(..limit)).take(count).collect())
+    }
 
     /// The length of the longest path from the node to the end, by trying all paths.
     fn cost_to_end(dependencies: &[Vec<usize>], costs: &[u64], node: usize) -> u64 {
@@ -155,38 +175,39 @@ mod tests {
         before.map(|&earlier| cost_from_start(dependencies, costs, earlier) + costs[earlier]).max().unwrap_or(0)
     }
 
-    proptest! {
-        #[test]
-        #[cfg_attr(miri, ignore = "proptest reads files")]
-        fn dependents_are_sorted_by_cost_to_the_end_and_the_longest_paths_are_critical(
-            picks in prop::collection::vec((prop::collection::vec(any::<prop::sample::Index>(), 0..4), 0_u64..1000), 1..12),
-        ) {
-            let costs: Vec<u64> = picks.iter().map(|(_, cost)| *cost).collect();
-            let dependencies: Vec<Vec<usize>> = picks.iter().enumerate().map(|(node, (picks, _))| {
-                let mut list: Vec<usize> =
-                    picks.iter().filter(|_| node > 0).map(|pick| pick.index(node)).collect();
-                list.sort_unstable();
-                list.dedup();
-                list
-            }).collect();
+    #[test]
+    fn dependents_are_sorted_by_cost_to_the_end_and_the_longest_paths_are_critical() {
+        let mut random = Rng::with_seed(9);
+        for graph in 0..GRAPHS {
+            let (dependencies, costs) = random_graph(&mut random);
             let mut adjacency = RankedAdjacency::new(&dependencies);
             adjacency.rank(&|node| costs[node]);
+
             let paths: Vec<u64> = (0..costs.len()).map(|node| cost_to_end(&dependencies, &costs, node)).collect();
             let longest = *paths.iter().max().unwrap();
             for node in 0..costs.len() {
+                let context = format!("graph {graph}, node {node} of {dependencies:?} with costs {costs:?}");
                 let path = cost_from_start(&dependencies, &costs, node) + paths[node];
-                prop_assert_eq!(adjacency.is_critical(node as u32), longest > 0 && path >= longest - longest / 10);
-                let order: Vec<u64> =
-                    adjacency.dependents(node as u32).iter().map(|&dependent| paths[dependent as usize]).collect();
-                prop_assert!(order.is_sorted_by(|first, second| first >= second));
+                let is_critical = longest > 0 && path >= longest - longest / 10;
+                assert_eq!(adjacency.is_critical(node as u32), is_critical, "{context}");
+
                 let mut dependents = adjacency.dependents(node as u32).to_vec();
+                assert!(
+                    dependents.is_sorted_by(|first, second| paths[*first as usize] >= paths[*second as usize]),
+                    "{context}"
+                );
                 dependents.sort_unstable();
-                let expected: Vec<u32> =
-                    (0..costs.len()).filter(|&later| dependencies[later].contains(&node)).map(|later| later as u32).collect();
-                prop_assert_eq!(dependents, expected);
+                let expected: Vec<u32> = (0..costs.len())
+                    .filter(|&later| dependencies[later].contains(&node))
+                    .map(|later| later as u32)
+                    .collect();
+                assert_eq!(dependents, expected, "{context}");
             }
-            let roots: Vec<u64> = adjacency.roots().iter().map(|&root| paths[root as usize]).collect();
-            prop_assert!(roots.is_sorted_by(|first, second| first >= second));
+            let roots = adjacency.roots();
+            assert!(
+                roots.is_sorted_by(|first, second| paths[*first as usize] >= paths[*second as usize]),
+                "graph {graph}"
+            );
         }
     }
 }
