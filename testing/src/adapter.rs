@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::backend::{PipelineLibrary, WgpuBackend};
 use drawloom::wgpu;
@@ -11,20 +12,38 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     device_without(wgpu::Features::empty())
 }
 
-/// The device on the machine's best adapter that a program's cases share, opened by the first call.
+/// The device on the machine's best adapter that a program's cases share, opened by the first call. It is the same for all calls on one thread.
 ///
 /// # Errors
 /// The error of the first call.
 pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    static DEVICE: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>> = OnceLock::new();
-    Ok(DEVICE.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
+    let device = &SHARED[index_of_this_thread()].device;
+    Ok(device.get_or_init(|| self::device().map_err(|error| error.to_string())).clone()?)
 }
 
 /// A backend on the [`shared_device`]. What one case has compiled no other compiles again: that takes longer than most draw.
 pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
-    static LIBRARY: OnceLock<PipelineLibrary> = OnceLock::new();
     let (device, queue) = shared_device()?;
-    Ok(LIBRARY.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+    let library = &SHARED[index_of_this_thread()].library;
+    Ok(library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+}
+
+/// What the cases on one thread share.
+struct Shared {
+    device: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>>,
+    library: OnceLock<PipelineLibrary>,
+}
+
+/// A software driver has one thread for each device's queue, so cases that share a device wait for each other. A third device would compile all
+/// pipelines once more.
+static SHARED: [Shared; 2] = [const { Shared { device: OnceLock::new(), library: OnceLock::new() } }; 2];
+
+fn index_of_this_thread() -> usize {
+    static THREADS: AtomicUsize = AtomicUsize::new(0);
+    thread_local! {
+        static INDEX: usize = THREADS.fetch_add(1, Ordering::Relaxed) % SHARED.len();
+    }
+    INDEX.with(|index| *index)
 }
 
 /// Opens a device on the machine's best adapter, as if the adapter lacked some optional features.
