@@ -12,20 +12,20 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     device_without(wgpu::Features::empty())
 }
 
-/// The device on the machine's best adapter that a program's cases share, opened by the first call. It is the same for all calls on one thread.
+/// One of two devices on the machine's best adapter that a program's cases share, opened by the first call. All calls on one thread get the same.
 ///
 /// # Errors
 /// The error of the first call.
 pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    let device = &SHARED[index_of_this_thread()].device;
-    Ok(device.get_or_init(|| self::device().map_err(|error| error.to_string())).clone()?)
+    let shared = &SHARED[index_of_this_thread()];
+    Ok(shared.device.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
 }
 
 /// A backend on the [`shared_device`]. What one case has compiled no other compiles again: that takes longer than most draw.
 pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
     let (device, queue) = shared_device()?;
-    let library = &SHARED[index_of_this_thread()].library;
-    Ok(library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+    let shared = &SHARED[index_of_this_thread()];
+    Ok(shared.library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
 }
 
 /// What the cases on one thread share.
