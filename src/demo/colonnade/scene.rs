@@ -8,7 +8,7 @@ use super::shared_assets::SharedAssets;
 use super::site::Site;
 use crate::scene::{Camera, Projection, Scene, SceneError};
 
-/// A Cornell box on a podium in a colonnade at dusk, some 1,040 objects of 26 meshes: slabs of checkered floor, fluted columns
+/// A Cornell box on a podium in a colonnade at dusk, some 1,040 objects of 27 meshes: slabs of checkered floor, fluted columns
 /// with bases, capitals and arches, roof beams, banners, urns, candlesticks and cypresses. Its camera `main` looks down the
 /// nave into the box.
 ///

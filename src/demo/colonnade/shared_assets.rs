@@ -12,6 +12,8 @@ use crate::scene::{Material, Mesh, Scene, SceneError, Texture};
 pub(super) struct SharedAssets {
     /// A cube of side 1 around its origin.
     pub block: Handle<Mesh>,
+    /// A square of side 1 around its origin, which is seen from above only.
+    pub square: Handle<Mesh>,
     /// A square of side 1, with its upper side at height 0.
     pub slab: Handle<Mesh>,
     /// 0.5 high.
@@ -74,6 +76,9 @@ impl SharedAssets {
             Material { name: "floor".into(), diffuse: Vec3::ONE, texture: Some(checker), ..Material::default() };
         Ok(Self {
             block: MeshBuilder::default().cuboid(Vec3::splat(-0.5), Vec3::splat(0.5)).add_to(scene, "block")?,
+            square: MeshBuilder::default()
+                .quad([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]].map(|[x, z]| Vec3::new(x, 0.0, z)))
+                .add_to(scene, "square")?,
             slab: MeshBuilder::default()
                 .cuboid(Vec3::new(-0.5, -0.3, -0.5), Vec3::new(0.5, 0.0, 0.5))
                 .add_to(scene, "slab")?,
