@@ -11,12 +11,11 @@ use std::fs;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
-use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::Camera;
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, demo};
+use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use drawloom_testing::{adapter, slow_cases};
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -59,18 +58,16 @@ fn drop_and_measure() -> Result<(), Box<dyn Error>> {
     })
 }
 
-/// Draws the project's scene, with all that it requires, from a camera that moves.
+/// Draws a scene that requires every process, from a camera that moves.
 fn draw_and_measure() -> Result<(), Box<dyn Error>> {
     let (device, queue) = adapter::device()?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
         .deferred(Deferred::to_picture().depth_pre_pass(true))
         .build(scheduler)?;
-    let mut scene = demo::colonnade()?;
+    let mut scene = everything();
     expect_steady_memory(FRAMES_IN_A_PERIOD, |frame| {
-        let position = DVec3::new(0.01 * frame as f64, 2.0, 8.0);
-        scene.cameras =
-            vec![Camera { size: [64, 36], ..Camera::looking_at("main", position, DVec3::new(0.0, 1.5, 0.0)) }];
+        scene.cameras[0].position.x = 0.01 * frame as f64;
         submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
         Ok(())
     })
