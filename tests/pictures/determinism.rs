@@ -10,7 +10,7 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::Fixture;
-use crate::references::{colonnade, cornell, generated, small, sponza};
+use crate::references::{colonnade, cornell, generated, small, small_colonnade, sponza};
 
 pub const CASES: &[Case] = &[
     ("same_bytes_of_the_projects_own_scene", || same_for_all(&colonnade()?)),
@@ -18,7 +18,7 @@ pub const CASES: &[Case] = &[
     ("same_bytes_of_an_interior", || same_for_all(&small(generated(&interior())?))),
     ("same_bytes_of_a_hall", || same_for_all(&small(generated(&hall())?))),
     ("same_bytes_of_coincident_copies", || {
-        let mut scene = opaque(colonnade()?)?;
+        let mut scene = opaque(small_colonnade()?)?;
         let once = Fixture::new()?.draw(&scene)?;
         scene.duplicate_objects(3);
         if Fixture::new()?.draw(&scene)? != once {
