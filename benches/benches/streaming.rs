@@ -57,7 +57,7 @@ struct Extent {
 fn main() -> Result<(), Failure> {
     let quick = ExtentArguments::parse().is_quick();
     let extent = match quick {
-        true => Extent { meshes: 200, textures: 10, world_bytes: 40 << 20, rounds: 1 },
+        true => Extent { meshes: 50, textures: 4, world_bytes: 10 << 20, rounds: 1 },
         false => Extent { meshes: 10_000, textures: 300, world_bytes: 1 << 30, rounds: 3 },
     };
     let progress = progress_bar("cases");

@@ -69,8 +69,8 @@ impl Extent {
     const QUICK: Self = Self {
         name: "quick",
         rounds: [3, 1],
-        picture: [320, 180],
-        boxes: 300,
+        picture: [64, 36],
+        boxes: 100,
         lights: &[0, 1, 30, 1_000],
         shadow_maps: &[0, 1, 16],
     };
