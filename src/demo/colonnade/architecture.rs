@@ -18,7 +18,7 @@ impl Site {
     pub(super) fn ground(&mut self) -> Result<(), SceneError> {
         let SharedAssets { square, slab, lawn, checker, .. } = self.assets;
         // In squares, so that edges near a lamp are short enough for its paraboloid shadow map. Subdivision for that map multiplies every
-        // triangle near a lamp, so the lawn has no underside.
+        // triangle near a lamp, so each square is one face.
         for (x, z) in (-5..5).flat_map(|x| (-5..5).map(move |z| (x as f32 + 0.5, z as f32 + 0.5))) {
             let position = Vec3::new(x * LAWN, -0.35, z * LAWN - 20.0);
             self.add_upright(square, lawn, position, Vec3::new(LAWN, 1.0, LAWN))?;

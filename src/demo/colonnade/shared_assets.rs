@@ -12,7 +12,7 @@ use crate::scene::{Material, Mesh, Scene, SceneError, Texture};
 pub(super) struct SharedAssets {
     /// A cube of side 1 around its origin.
     pub block: Handle<Mesh>,
-    /// A square of side 1 around its origin, which is seen from above only.
+    /// A square of side 1 around its origin, facing up.
     pub square: Handle<Mesh>,
     /// A square of side 1, with its upper side at height 0.
     pub slab: Handle<Mesh>,
