@@ -4,7 +4,7 @@
 //!     cargo bench -p drawloom-benches --bench streaming -- --quick
 //!
 //! *At once* is the first frame of a renderer whose pipelines are made. *More* is the longest of 30 frames that each bring a twentieth
-//! more. *Streamed* is the longest frame until everything is on the device, and how many it takes. *Through 64 MB* is a world of which each
+//! more. *Streamed* is the longest frame until everything is on the device, and how many it takes. *Through* so many MB is a world of which each
 //! frame brings a mesh and a texture and drops as many: its longest frame, and that divided by the median. Times are of
 //! `Renderer::record`, but in the last rows, which are of whole frames; two workers, on wgpu's `noop` device and on the machine's adapter, if
 //! there is one. `target/drawloom/streaming.json` has the same.
@@ -49,16 +49,34 @@ struct Row {
 struct Extent {
     meshes: usize,
     textures: usize,
-    /// Of the world that is streamed through the budget.
+    /// Of the world that is streamed through a budget.
     world_bytes: u64,
+    /// The budget's bytes for meshes and for textures.
+    budget_bytes: [u64; 2],
+    /// Objects of that world at any time.
+    live: usize,
     rounds: usize,
 }
 
 fn main() -> Result<(), Failure> {
     let quick = ExtentArguments::parse().is_quick();
     let extent = match quick {
-        true => Extent { meshes: 50, textures: 4, world_bytes: 10 << 20, rounds: 1 },
-        false => Extent { meshes: 10_000, textures: 300, world_bytes: 1 << 30, rounds: 3 },
+        true => Extent {
+            meshes: 60,
+            textures: 20,
+            world_bytes: 20 << 20,
+            budget_bytes: [4 << 20, 6 << 20],
+            live: 20,
+            rounds: 1,
+        },
+        false => Extent {
+            meshes: 10_000,
+            textures: 300,
+            world_bytes: 1 << 30,
+            budget_bytes: [26 << 20, 38 << 20],
+            live: 180,
+            rounds: 3,
+        },
     };
     let progress = progress_bar("cases");
     let mut rows = Vec::new();
@@ -73,7 +91,7 @@ fn main() -> Result<(), Failure> {
                 progress.inc(1);
             }
         }
-        rows.push(through_a_budget(name, &device, extent.world_bytes)?);
+        rows.push(through_a_budget(name, &device, &extent)?);
         progress.inc(1);
     }
     progress.finish_and_clear();
@@ -313,21 +331,21 @@ fn streamed(adapter: &'static str, device: &Device, content: Content) -> Result<
 }
 
 /// A world that comes and goes: each frame a mesh of 228 KB and a texture of 350 KB, of which 90 each are there at any time.
-fn through_a_budget(adapter: &'static str, device: &Device, world_bytes: u64) -> Result<Row, Failure> {
-    const LIVE: usize = 180;
+fn through_a_budget(adapter: &'static str, device: &Device, extent: &Extent) -> Result<Row, Failure> {
+    let [mesh_bytes, texture_bytes] = extent.budget_bytes;
     let budget = StreamingBudget {
-        mesh_bytes: 26 << 20,
-        texture_bytes: 38 << 20,
+        mesh_bytes,
+        texture_bytes,
         upload_bytes_per_frame: 2 << 20,
         upload_time_per_frame: Duration::from_millis(3),
     };
     let mut world = World::new(device, Some(budget), 64)?;
     let (before, mut times, mut resident) = (world.uploaded(), Vec::new(), 0);
-    while world.uploaded() - before < world_bytes {
+    while world.uploaded() - before < extent.world_bytes {
         let start = Instant::now();
         world.add(Content::Meshes(1))?;
         world.add(Content::Textures(1))?;
-        while world.objects.len() > LIVE {
+        while world.objects.len() > extent.live {
             world.drop_oldest()?;
         }
         world.frame()?;
@@ -336,6 +354,6 @@ fn through_a_budget(adapter: &'static str, device: &Device, world_bytes: u64) ->
         resident = resident.max(world.resident());
         std::thread::sleep(Duration::from_millis(8).saturating_sub(elapsed));
     }
-    let scene = format!("{} MB through 64 MB", world_bytes >> 20);
+    let scene = format!("{} MB through {} MB", extent.world_bytes >> 20, (mesh_bytes + texture_bytes) >> 20);
     Ok(Measured { adapter, scene, case: "whole frames", times }.row(&world, before, resident))
 }

@@ -69,7 +69,7 @@ impl Extent {
     const QUICK: Self = Self {
         name: "quick",
         rounds: [3, 1],
-        picture: [64, 36],
+        picture: [192, 108],
         boxes: 100,
         lights: &[0, 1, 30, 1_000],
         shadow_maps: &[0, 1, 16],
