@@ -146,9 +146,9 @@ mod tests {
 
     use super::RankedAdjacency;
 
-    const GRAPHS: usize = if cfg!(miri) { 8 } else { 1_024 };
+    const GRAPH_COUNT: usize = if cfg!(miri) { 8 } else { 1_024 };
 
-    /// The dependencies of up to eleven nodes, up to three of each, and the cost of each node.
+    /// A graph of one to eleven nodes: the dependencies of each node, at most three, and its cost.
     fn random_graph(random: &mut Rng) -> (Vec<Vec<usize>>, Vec<u64>) {
         let count = random.usize(1..12);
         let dependencies = (0..count).map(|node| {
@@ -160,8 +160,8 @@ mod tests {
         });
         let dependencies = dependencies.collect();
         // Some graphs cost nothing, and in some many paths are as long as each other.
-        let limit = [1, 3, 1_000][random.usize(..3)];
-        (dependencies, iter::repeat_with(|| random.u64(..limit)).take(count).collect())
+        let cost_limit = [1, 3, 1_000][random.usize(..3)];
+        (dependencies, iter::repeat_with(|| random.u64(..cost_limit)).take(count).collect())
     }
 
     /// The length of the longest path from the node to the end, by trying all paths.
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn dependents_are_sorted_by_cost_to_the_end_and_the_longest_paths_are_critical() {
         let mut random = Rng::with_seed(9);
-        for graph in 0..GRAPHS {
+        for graph in 0..GRAPH_COUNT {
             let (dependencies, costs) = random_graph(&mut random);
             let mut adjacency = RankedAdjacency::new(&dependencies);
             adjacency.rank(&|node| costs[node]);
@@ -206,7 +206,7 @@ mod tests {
             let roots = adjacency.roots();
             assert!(
                 roots.is_sorted_by(|first, second| paths[*first as usize] >= paths[*second as usize]),
-                "graph {graph}"
+                "graph {graph}, {dependencies:?} with costs {costs:?}"
             );
         }
     }

@@ -54,9 +54,9 @@ mod tests {
     #[test]
     fn a_decoded_token_equals_the_encoded_one() {
         let mut random = Rng::with_seed(31);
-        let limits = [0, 1, MASK as u32 - 1, MASK as u32];
-        let random = iter::repeat_with(|| random.u32(..=MASK as u32)).take(RANDOM_NUMBERS);
-        let numbers: Vec<u32> = limits.into_iter().chain(random).collect();
+        let edges = [0, 1, MASK as u32 - 1, MASK as u32];
+        let drawn = iter::repeat_with(|| random.u32(..=MASK as u32)).take(RANDOM_NUMBERS);
+        let numbers: Vec<u32> = edges.into_iter().chain(drawn).collect();
         for &low in &numbers {
             for token in [Token::Start(low), Token::StartPinned(low), Token::Join(low)] {
                 assert_eq!(Token::decode(token.clone().encode()), token);

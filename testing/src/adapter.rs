@@ -12,36 +12,37 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     device_without(wgpu::Features::empty())
 }
 
-/// One of two devices on the machine's best adapter that a program's cases share, opened by the first call. All calls on one thread get the same.
+/// A device on the machine's best adapter. A program's cases share two: all calls on one thread get the same, and the first one opens it.
 ///
 /// # Errors
-/// The error of the first call.
+/// The error of the call that tried to open it.
 pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    let shared = &SHARED[index_of_this_thread()];
+    let shared = &SHARED_DEVICES[index_of_this_thread()];
     Ok(shared.device.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
 }
 
-/// A backend on the [`shared_device`]. What one case has compiled no other compiles again: that takes longer than most draw.
+/// A backend on the [`shared_device`]. Each device compiles a pipeline once, for all its cases: that takes longer than most of them draw.
 pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
     let (device, queue) = shared_device()?;
-    let shared = &SHARED[index_of_this_thread()];
+    let shared = &SHARED_DEVICES[index_of_this_thread()];
     Ok(shared.library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
 }
 
 /// What the cases on one thread share.
-struct Shared {
+struct SharedDevice {
     device: OnceLock<Result<(wgpu::Device, wgpu::Queue), String>>,
     library: OnceLock<PipelineLibrary>,
 }
 
 /// A software driver has one thread for each device's queue, so cases that share a device wait for each other. A third device would compile all
 /// pipelines once more.
-static SHARED: [Shared; 2] = [const { Shared { device: OnceLock::new(), library: OnceLock::new() } }; 2];
+static SHARED_DEVICES: [SharedDevice; 2] =
+    [const { SharedDevice { device: OnceLock::new(), library: OnceLock::new() } }; 2];
 
 fn index_of_this_thread() -> usize {
     static THREADS: AtomicUsize = AtomicUsize::new(0);
     thread_local! {
-        static INDEX: usize = THREADS.fetch_add(1, Ordering::Relaxed) % SHARED.len();
+        static INDEX: usize = THREADS.fetch_add(1, Ordering::Relaxed) % SHARED_DEVICES.len();
     }
     INDEX.with(|index| *index)
 }

@@ -11,12 +11,12 @@ use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
 
-/// A device on the machine's adapter, which all cases share.
+/// The device of this thread's cases: see [`adapter::shared_device`].
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Failed> {
     Ok(adapter::shared_device()?)
 }
 
-/// A backend on the device that all cases share, with the pipelines of all.
+/// A backend on that device, with all pipelines that cases on it have compiled.
 pub fn backend() -> Result<WgpuBackend, Failed> {
     Ok(adapter::shared_backend()?)
 }
