@@ -17,15 +17,13 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 /// # Errors
 /// The error of the call that tried to open it.
 pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
-    let shared = &SHARED_DEVICES[index_of_this_thread()];
-    Ok(shared.device.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
+    Ok(shared_by_this_thread().device.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
 }
 
 /// A backend on the [`shared_device`]. Each device compiles a pipeline once, for all its cases: that takes longer than most of them draw.
 pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
     let (device, queue) = shared_device()?;
-    let shared = &SHARED_DEVICES[index_of_this_thread()];
-    Ok(shared.library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
+    Ok(shared_by_this_thread().library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
 }
 
 /// What the cases on one thread share.
@@ -39,12 +37,13 @@ struct SharedDevice {
 static SHARED_DEVICES: [SharedDevice; 2] =
     [const { SharedDevice { device: OnceLock::new(), library: OnceLock::new() } }; 2];
 
-fn index_of_this_thread() -> usize {
+fn shared_by_this_thread() -> &'static SharedDevice {
     static THREADS: AtomicUsize = AtomicUsize::new(0);
     thread_local! {
-        static INDEX: usize = THREADS.fetch_add(1, Ordering::Relaxed) % SHARED_DEVICES.len();
+        static SHARED: &'static SharedDevice =
+            &SHARED_DEVICES[THREADS.fetch_add(1, Ordering::Relaxed) % SHARED_DEVICES.len()];
     }
-    INDEX.with(|index| *index)
+    SHARED.with(|shared| *shared)
 }
 
 /// Opens a device on the machine's best adapter, as if the adapter lacked some optional features.

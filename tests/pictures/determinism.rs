@@ -1,5 +1,6 @@
 //! Pictures have the same bytes for every number of workers and every granularity.
 
+use drawloom::backend::WgpuBackend;
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Blend, Material, Scene};
@@ -20,10 +21,7 @@ pub const CASES: &[Case] = &[
     ("same_bytes_of_coincident_copies", || {
         let mut scene = opaque(colonnade()?)?;
         scene.cameras[0].size = [160, 90];
-        let draw = |scene: &Scene| {
-            let build = |builder: RendererBuilder<_>| builder.deferred(Deferred::to_picture()).quality(coarse_edges());
-            Fixture::with(2, build)?.draw(scene)
-        };
+        let draw = |scene: &Scene| Fixture::with(2, with_coarse_edges)?.draw(scene);
         let once = draw(&scene)?;
         scene.duplicate_objects(3);
         if draw(&scene)? != once {
@@ -46,10 +44,12 @@ fn opaque(mut scene: Scene) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// Long edges in the shadow maps of lamps, whose subdivided meshes so take as many draws, but seconds less time for each renderer.
-fn coarse_edges() -> Quality {
+/// The deferred pipeline, with long edges in the shadow maps of lamps: subdivided meshes take as many draws, but seconds less time for each
+/// renderer.
+fn with_coarse_edges(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
     let balanced = Quality::balanced();
-    Quality { shadows: ShadowQuality { widest_edge: 20.0, ..balanced.shadows }, ..balanced }
+    let quality = Quality { shadows: ShadowQuality { widest_edge: 20.0, ..balanced.shadows }, ..balanced };
+    builder.deferred(Deferred::to_picture()).quality(quality)
 }
 
 /// Numbers of workers, with ways to split a pass.
@@ -66,9 +66,7 @@ const RUNS: [(usize, Granularity); 7] = [
 fn same_for_all(scene: &Scene) -> Result<(), Failed> {
     let mut first = None;
     for (workers, granularity) in RUNS {
-        let mut fixture = Fixture::with(workers, |builder| {
-            builder.deferred(Deferred::to_picture()).granularity(granularity).quality(coarse_edges())
-        })?;
+        let mut fixture = Fixture::with(workers, |builder| with_coarse_edges(builder).granularity(granularity))?;
         let picture = fixture.draw(scene)?;
         let processes = ["shadow casters", "geometry buffer", "transparency"];
         let views = 0..scene.cameras.len() + scene.lights.iter().filter(|light| light.casts_shadow()).count();
