@@ -330,7 +330,7 @@ fn streamed(adapter: &'static str, device: &Device, content: Content) -> Result<
     Ok(measured.row(&world, before, world.resident()))
 }
 
-/// A world that comes and goes: each frame a mesh of 228 KB and a texture of 350 KB, of which 90 each are there at any time.
+/// A world that comes and goes: each frame adds an object with a mesh of 228 KB and one with a texture of 350 KB.
 fn through_a_budget(adapter: &'static str, device: &Device, extent: &Extent) -> Result<Row, Failure> {
     let [mesh_bytes, texture_bytes] = extent.budget_bytes;
     let budget = StreamingBudget {
