@@ -52,8 +52,8 @@ fn no_visible_object_is_culled_by_its_volume() -> Result<(), Box<dyn Error>> {
 
 /// Lights whose reach ends 3% of it inside the picture, and lights whose reach ends 3% outside.
 #[test]
-fn no_light_that_reaches_the_picture_is_left_out() {
-    let (mut reaching, mut outside, mut kept_outside) = (0, 0, 0);
+fn lights_are_kept_if_they_reach_the_picture() {
+    let (mut reaching, mut outside) = (0, 0);
     for batch in 0..400 {
         let mut random = Random::stream(batch);
         let camera = any_camera(&mut random);
@@ -75,23 +75,25 @@ fn no_light_that_reaches_the_picture_is_left_out() {
         let kept: Vec<_> = table.sources().map(|(light, _)| light).collect();
         for (index, light) in lights.iter().enumerate() {
             let (center, range) = light.bounding_sphere().expect("it has a range");
-            let radius = f64::from(range);
-            match oracle.classify(oracle.relative(center), [radius; 6], radius) {
-                Classification::Inside => {
-                    reaching += 1;
-                    assert!(kept.contains(&index), "{light:?} reaches what {camera:?} sees");
-                }
-                Classification::Outside => {
-                    outside += 1;
-                    kept_outside += usize::from(kept.contains(&index));
-                }
-                Classification::Touching => {}
+            let (center, radius) = (oracle.relative(center), f64::from(range));
+            if oracle.classify(center, [radius; 6], radius) == Classification::Inside {
+                reaching += 1;
+                assert!(kept.contains(&index), "{light:?} reaches what {camera:?} sees");
+            } else if is_outside_beyond_tolerance(&oracle, center, radius) {
+                outside += 1;
+                assert!(!kept.contains(&index), "{light:?} reaches nothing that {camera:?} sees");
             }
         }
     }
-    assert!(reaching > 5_000 && outside > 3_000, "{reaching} lights reach a picture, and {outside} do not");
-    // Far away, 3% of a small reach is less than the error of f32.
-    assert!(kept_outside * 4 < outside, "{kept_outside} of {outside} lights that reach no picture are kept");
+    assert!(reaching > 5_000 && outside > 3_000, "{reaching} lights reach a picture, and {outside} certainly do not");
+}
+
+/// Whether a sphere is so far outside of a plane that a test in f32 finds it. [`Frustum::intersects_sphere`] derives its tolerance: 16 · 2⁻²⁴ of
+/// the centre's ‖·‖₁, the radius and the plane's distance from the camera. Its errors, which may add to that, are smaller.
+fn is_outside_beyond_tolerance(oracle: &Oracle, center: DVec3, radius: f64) -> bool {
+    let tolerance = |offset: f64| 32.0 / f64::from(1 << 24) * (center.abs().element_sum() + radius + offset.abs());
+    let planes = oracle.depths(center).into_iter().zip(oracle.depths(DVec3::ZERO));
+    planes.into_iter().any(|(depth, offset)| depth + radius < -tolerance(offset))
 }
 
 /// A light of one of the kinds that have a range.
