@@ -237,6 +237,49 @@ mod tests {
     }
 
     #[test]
+    fn the_first_run_may_take_a_wake_up_and_later_ones_twice_what_parallel_ones_do() {
+        let mut policy = ExecutionPolicy::default();
+        assert_eq!(policy.choose(WAKE_UP_COST), RunMode::Serial { limit: Some(WAKE_UP_COST) });
+        assert!(policy.latest().is_some_and(|choice| choice.is_trial));
+        assert_eq!(run(&mut policy, 100, 100, 200), 10);
+        assert_eq!(policy.choose(WAKE_UP_COST), RunMode::Serial { limit: Some(Duration::from_micros(500)) });
+        assert!(policy.latest().is_some_and(|choice| !choice.is_trial));
+    }
+
+    #[test]
+    fn the_mode_changes_only_for_one_that_is_faster_by_a_quarter() {
+        for (first, then, serial_runs) in [([50, 70], [50, 45], 10), ([50, 70], [50, 35], 0)] {
+            let mut policy = ExecutionPolicy::default();
+            assert_eq!(run(&mut policy, 100, first[0], first[1]), 10);
+            assert_eq!(run(&mut policy, 300, then[0], then[1]), serial_runs, "{then:?}");
+        }
+    }
+
+    #[test]
+    fn one_parallel_run_in_thirty_one_is_measured() {
+        let mut policy = ExecutionPolicy::default();
+        run(&mut policy, 100, 1_700, 850);
+        let is_measured: Vec<bool> = (0..62)
+            .map(|_| {
+                let mode = policy.choose(WAKE_UP_COST);
+                run_once(&mut policy, 1_700, 850);
+                mode == RunMode::Parallel { is_measured: true }
+            })
+            .collect();
+        let measured: Vec<usize> = (0..62).filter(|&run| is_measured[run]).collect();
+        assert!(measured.len() == 2 && measured[1] - measured[0] == 31, "{measured:?}");
+    }
+
+    #[test]
+    fn the_latest_choice_is_known_after_runs_that_exceed_their_limit() {
+        let mut policy = ExecutionPolicy::default();
+        policy.choose(WAKE_UP_COST);
+        let choice = policy.latest();
+        (0..3).for_each(|_| policy.report_exceeded());
+        assert!(choice.is_some() && policy.latest() == choice);
+    }
+
+    #[test]
     fn one_outlier_does_not_change_the_mode() {
         let mut policy = ExecutionPolicy::default();
         assert_eq!(run(&mut policy, 100, 20, 60), 10);

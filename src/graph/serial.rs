@@ -99,3 +99,24 @@ impl Deadline {
         self.start.elapsed() > self.limit
     }
 }
+
+#[cfg(all(test, not(drawloom_model_check)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_is_read_ever_more_rarely() {
+        let mut deadline =
+            Deadline { start: Instant::now(), limit: Duration::from_secs(3_600), chunks: 0, next_check: 1 };
+        let mut read_at = Vec::new();
+        for chunk in 1..=64 {
+            assert!(!deadline.has_passed());
+            if deadline.chunks == 0 {
+                read_at.push(chunk);
+            }
+        }
+        assert_eq!(read_at, [1, 3, 7, 15, 31, 47, 63]);
+        deadline.limit = Duration::ZERO;
+        assert_eq!((65..).find(|_| deadline.has_passed()), Some(79));
+    }
+}

@@ -3,6 +3,7 @@
 mod compile;
 mod dot;
 mod extremes;
+mod measurements;
 mod oracle;
 mod problems;
 mod run;

@@ -1,9 +1,10 @@
 //! A run processes every item once, after its dependencies, on all workers.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Barrier, Mutex};
 use std::thread;
+use std::time::Duration;
 
 use drawloom::graph::{Closure, FrameGraph, Node, NodeError, Schedule};
 use drawloom::task::{Scheduler, Worker};
@@ -103,7 +104,7 @@ proptest! {
 }
 
 /// A schedule of one kept node.
-pub fn single<'a, C>(node: Closure<'a, C>) -> Schedule<Closure<'a, C>> {
+pub fn single<P>(node: P) -> Schedule<P> {
     let mut graph = FrameGraph::new();
     let node = graph.add("single", node);
     graph.keep(node);
@@ -232,6 +233,54 @@ fn the_context_may_be_unsized() {
 }
 
 #[test]
+fn a_pinned_node_does_not_wait_for_the_end_of_a_wide_one() {
+    const CHUNKS: usize = 64;
+    let caller = thread::current().id();
+    let (caller_is_in_wide, finished_chunks) = (AtomicBool::new(false), AtomicUsize::new(0));
+    // Another worker makes the pinned node ready while the caller runs chunks of the wide one. Which of the two starts which node is left to
+    // the scheduler, so there are several runs.
+    let is_other_worker = AtomicBool::new(false);
+    let finished_before_pinned = AtomicUsize::new(CHUNKS);
+    let mut graph = FrameGraph::new();
+    let wide = Closure::new(|_: &(), _, _| {
+        caller_is_in_wide.fetch_or(thread::current().id() == caller, Ordering::Relaxed);
+        thread::sleep(Duration::from_millis(1));
+        finished_chunks.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    });
+    let wide = graph.add("wide", wide.with_width(|_| CHUNKS));
+    let before = graph.add(
+        "before the pinned one",
+        Closure::new(|_, _, _| {
+            is_other_worker.store(thread::current().id() != caller, Ordering::Relaxed);
+            while is_other_worker.load(Ordering::Relaxed) && !caller_is_in_wide.load(Ordering::Relaxed) {
+                thread::yield_now();
+            }
+            Ok(())
+        }),
+    );
+    let pinned = graph.add(
+        "pinned",
+        Closure::new(|_, _, _| {
+            finished_before_pinned.store(finished_chunks.load(Ordering::Relaxed), Ordering::Relaxed);
+            Ok(())
+        })
+        .on_calling_thread(),
+    );
+    graph.order(before, pinned);
+    [wide, before, pinned].into_iter().for_each(|node| graph.keep(node));
+    let mut schedule = graph.compile().expect("the graph is valid");
+    schedule.always_parallel(true);
+    let does_not_wait = (0..100).any(|_| {
+        caller_is_in_wide.store(false, Ordering::Relaxed);
+        finished_chunks.store(0, Ordering::Relaxed);
+        run(&mut schedule, &SCHEDULERS[1], &());
+        is_other_worker.load(Ordering::Relaxed) && finished_before_pinned.load(Ordering::Relaxed) < CHUNKS / 2
+    });
+    assert!(does_not_wait, "the pinned node came late in 100 runs");
+}
+
+#[test]
 fn pinned_roots_run_on_the_calling_thread() {
     // The first node blocks the caller until another worker takes part, which would run the last node if it could.
     let meeting = |(barrier, _): &(Barrier, thread::ThreadId), _: Range<usize>, _: &Worker| {
@@ -256,4 +305,28 @@ fn pinned_roots_run_on_the_calling_thread() {
             run(&mut schedule, scheduler, &(Barrier::new(2), thread::current().id()));
         }
     }
+}
+
+#[test]
+fn a_run_that_nobody_records_asks_for_nothing_that_only_records_need() {
+    struct Asked(AtomicUsize);
+
+    impl Node<()> for Asked {
+        fn width(&self, _context: &()) -> usize {
+            1
+        }
+
+        fn chunked_by_cost(&self, _context: &()) -> bool {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            true
+        }
+
+        fn run(&self, _context: &(), _range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+            Ok(())
+        }
+    }
+
+    let mut schedule = single(Asked(AtomicUsize::new(0)));
+    run(&mut schedule, &SCHEDULERS[1], &());
+    assert!(schedule.nodes().all(|(_, asked)| asked.0.load(Ordering::Relaxed) == 0));
 }
