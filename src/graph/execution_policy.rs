@@ -184,6 +184,16 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_successor_keeps_a_mode_that_a_new_policy_would_not_choose() {
+        let mut policy = ExecutionPolicy::default();
+        run(&mut policy, 100, 50, 70);
+        // Serial runs are faster, but not by enough to replace parallel ones.
+        assert_eq!(run(&mut policy, 300, 50, 55), 10);
+        assert!(run_once(&mut policy.of_successor(), 50, 55));
+        assert_eq!(run(&mut ExecutionPolicy::default(), 300, 50, 55), 0);
+    }
+
     fn run_once(policy: &mut ExecutionPolicy, serial: u64, parallel: u64) -> bool {
         let [serial, parallel] = [serial, parallel].map(Duration::from_micros);
         match policy.choose(WAKE_UP_COST) {
@@ -292,6 +302,14 @@ mod tests {
         let mut policy = ExecutionPolicy::default();
         assert_eq!(run(&mut policy, 100, 400, 500), 10);
         assert_eq!(run(&mut policy, 300, 400, 100), 0);
+    }
+
+    #[test]
+    fn a_trial_replaces_what_was_measured_long_before() {
+        let mut policy = ExecutionPolicy::default();
+        run(&mut policy, 100, 400, 500);
+        assert_eq!(run(&mut policy, 200, 400, 450), 10);
+        assert!(policy.latest().is_some_and(|choice| choice.parallel_nanoseconds == 450_000.0));
     }
 
     /// At a thousand frames a second, the counters saturate after 50 days.

@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::collections::HashSet;
+use std::mem;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, ThreadId};
@@ -71,6 +72,14 @@ fn costs_are_those_of_the_nodes_alone_and_name_the_critical_path() {
     assert!(!schedule.is_critical(schedule.len()));
     // It was parallel by request, not by choice.
     assert_eq!(schedule.run_mode(), None);
+    // All of the first parallel runs but one are measured.
+    for is_parallel in [true, true, true, true, false] {
+        schedule.always_parallel(is_parallel);
+        schedule.run(&SCHEDULERS[1], &()).expect("no node fails");
+    }
+    let mode = schedule.run_mode().expect("there was a choice");
+    // All nodes on one thread.
+    assert!(mode.serial_nanoseconds.is_some_and(|time| time >= SLEEP.as_nanos() as f32), "{mode:?}");
 }
 
 #[test]
@@ -164,8 +173,13 @@ fn threads_of_a_long_first_run(is_pinned: bool) -> HashSet<ThreadId> {
     let mut schedule = graph.compile().expect("the graph has no cycle");
     schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
     assert!(schedule.run_mode().is_some_and(|mode| mode.is_trial && !mode.parallel));
-    drop(schedule);
-    threads.into_inner().expect("no thread panics")
+    let first_run = mem::take(&mut *threads.lock().expect("no thread panics"));
+    if !is_pinned {
+        // What a run took that began serially and ended in parallel says nothing about either.
+        schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
+        assert!(schedule.run_mode().is_some_and(|mode| mode.parallel && mode.serial_nanoseconds.is_none()));
+    }
+    first_run
 }
 
 #[test]
