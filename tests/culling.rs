@@ -52,7 +52,7 @@ fn no_visible_object_is_culled_by_its_volume() -> Result<(), Box<dyn Error>> {
 
 /// Lights whose reach ends 3% of it inside the picture, and lights whose reach ends 3% outside.
 #[test]
-fn lights_are_kept_if_they_reach_the_picture() {
+fn a_light_is_kept_if_and_only_if_it_reaches_the_picture() {
     let (mut reaching, mut outside) = (0, 0);
     for batch in 0..400 {
         let mut random = Random::stream(batch);
@@ -85,11 +85,15 @@ fn lights_are_kept_if_they_reach_the_picture() {
             }
         }
     }
-    assert!(reaching > 5_000 && outside > 3_000, "{reaching} lights reach a picture, and {outside} certainly do not");
+    assert!(
+        reaching > 5_000 && outside > 3_000,
+        "{reaching} lights reach a picture, and {outside} are outside of it beyond the tolerance"
+    );
 }
 
-/// Whether a sphere is so far outside of a plane that a test in f32 finds it. [`Frustum::intersects_sphere`] derives its tolerance: 16 · 2⁻²⁴ of
-/// the centre's ‖·‖₁, the radius and the plane's distance from the camera. Its errors, which may add to that, are smaller.
+/// Whether a sphere is so far outside of a plane that a test in f32 must cull it. [`Frustum::intersects_sphere`] widens spheres and planes by
+/// 16 · 2⁻²⁴ of the centre's ‖·‖₁, the radius and the plane's distance from the camera. Its rounding errors are smaller than that, so twice as much
+/// suffices here. That holds for cameras without a shift, as here. Others have shorter normals.
 fn is_outside_beyond_tolerance(oracle: &Oracle, center: DVec3, radius: f64) -> bool {
     let tolerance = |offset: f64| 32.0 / f64::from(1 << 24) * (center.abs().element_sum() + radius + offset.abs());
     let planes = oracle.depths(center).into_iter().zip(oracle.depths(DVec3::ZERO));

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_run_may_take_a_wake_up_and_later_ones_twice_what_parallel_ones_do() {
+    fn the_first_run_may_take_one_wake_up_and_later_ones_two_and_a_half_parallel_runs() {
         let mut policy = ExecutionPolicy::default();
         assert_eq!(policy.choose(WAKE_UP_COST), RunMode::Serial { limit: Some(WAKE_UP_COST) });
         assert!(policy.latest().is_some_and(|choice| choice.is_trial));
@@ -258,10 +258,10 @@ mod tests {
 
     #[test]
     fn the_mode_changes_only_for_one_that_is_faster_by_a_quarter() {
-        for (first, then, serial_runs) in [([50, 70], [50, 45], 10), ([50, 70], [50, 35], 0)] {
+        for (parallel, serial_runs) in [(81, 10), (79, 0)] {
             let mut policy = ExecutionPolicy::default();
-            assert_eq!(run(&mut policy, 100, first[0], first[1]), 10);
-            assert_eq!(run(&mut policy, 300, then[0], then[1]), serial_runs, "{then:?}");
+            assert_eq!(run(&mut policy, 100, 100, 140), 10);
+            assert_eq!(run(&mut policy, 300, 100, parallel), serial_runs, "{parallel}");
         }
     }
 
@@ -310,6 +310,24 @@ mod tests {
         run(&mut policy, 100, 400, 500);
         assert_eq!(run(&mut policy, 200, 400, 450), 10);
         assert!(policy.latest().is_some_and(|choice| choice.parallel_nanoseconds == 450_000.0));
+    }
+
+    #[test]
+    fn the_latest_measured_run_counts_most_but_not_alone() {
+        let mut policy = ExecutionPolicy::default();
+        for microseconds in [100, 200] {
+            policy.report_parallel(Duration::from_micros(microseconds), Some(Duration::from_micros(1_000)));
+        }
+        policy.choose(WAKE_UP_COST);
+        let parallel = policy.latest().expect("a mode was chosen").parallel_nanoseconds;
+        assert!(150_000.0 < parallel && parallel < 200_000.0, "{parallel}");
+    }
+
+    #[test]
+    fn work_as_long_as_a_wake_up_is_never_tried_in_parallel() {
+        let (mut policy, wake_up) = (ExecutionPolicy::default(), WAKE_UP_COST.as_micros() as u64);
+        assert_eq!(run(&mut policy, 100, wake_up, 100), 10);
+        assert!((0..300).all(|_| run_once(&mut policy, wake_up, 100)));
     }
 
     /// At a thousand frames a second, the counters saturate after 50 days.

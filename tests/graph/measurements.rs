@@ -2,17 +2,18 @@
 
 use std::cell::Cell;
 use std::collections::HashSet;
-use std::mem;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 use drawloom::graph::{Closure, FrameGraph, ModeChoice, Schedule};
+use drawloom::task::Worker;
 
 use crate::SCHEDULERS;
+use crate::run::single;
 
-/// How long the slow node of a test sleeps. A sleep may take longer, but not less.
+/// How long a slow node sleeps at least.
 const SLEEP: Duration = Duration::from_millis(4);
 
 type Step = Closure<'static, ()>;
@@ -52,7 +53,7 @@ fn run_until(schedule: &mut Schedule<Step>, is_reached: impl Fn(&Schedule<Step>)
 }
 
 #[test]
-fn costs_are_those_of_the_nodes_alone_and_name_the_critical_path() {
+fn costs_count_from_each_nodes_own_start_and_decide_the_critical_path() {
     let mut schedule = diamond();
     schedule.always_parallel(true);
     let index_of = |name: &str| schedule.nodes().position(|(node, _)| node == name).expect("it was not dropped");
@@ -61,7 +62,7 @@ fn costs_are_those_of_the_nodes_alone_and_name_the_critical_path() {
         assert_eq!(schedule.cost(node), None);
         assert!(!schedule.is_critical(node));
     }
-    // The last node starts after more time than it may cost, so a cost that counted from the start of the run would never be reached.
+    // The last node starts later than `SLEEP / 2`. So if costs counted from the start of the run, this would never hold.
     run_until(&mut schedule, |schedule| {
         let costs_less = |node| schedule.cost(node).is_some_and(|cost| cost < SLEEP / 2);
         [first, quick, last].into_iter().all(costs_less) && !schedule.is_critical(quick)
@@ -72,24 +73,19 @@ fn costs_are_those_of_the_nodes_alone_and_name_the_critical_path() {
     assert!(!schedule.is_critical(schedule.len()));
     // It was parallel by request, not by choice.
     assert_eq!(schedule.run_mode(), None);
-    // All of the first parallel runs but one are measured.
+    // Several measured runs, so that the work of earlier ones counts no more.
     for is_parallel in [true, true, true, true, false] {
         schedule.always_parallel(is_parallel);
         schedule.run(&SCHEDULERS[1], &()).expect("no node fails");
     }
     let mode = schedule.run_mode().expect("there was a choice");
-    // All nodes on one thread.
+    // A serial run includes the sleep.
     assert!(mode.serial_nanoseconds.is_some_and(|time| time >= SLEEP.as_nanos() as f32), "{mode:?}");
 }
 
 #[test]
 fn little_work_is_run_serially_after_a_trial() {
-    let schedule = || {
-        let mut graph = FrameGraph::<Step>::new();
-        let node = graph.add("node", Closure::new(|_, _, _| Ok(())));
-        graph.keep(node);
-        graph.compile().expect("the graph has no cycle")
-    };
+    let schedule = || single::<Step>(Closure::new(|_, _, _| Ok(())));
     let mut on_one_worker = schedule();
     on_one_worker.run(&SCHEDULERS[0], &()).expect("the node does not fail");
     assert_eq!(on_one_worker.run_mode(), None, "one worker has no choice");
@@ -110,10 +106,7 @@ fn little_work_is_run_serially_after_a_trial() {
 
 #[test]
 fn failed_runs_are_not_measured() {
-    let mut graph = FrameGraph::new();
-    let node = graph.add("node", Closure::new(|_, _, _| Err("on purpose".into())));
-    graph.keep(node);
-    let mut schedule: Schedule<Step> = graph.compile().expect("the graph has no cycle");
+    let mut schedule = single::<Step>(Closure::new(|_, _, _| Err("on purpose".into())));
     for _ in 0..10 {
         schedule.run(&SCHEDULERS[1], &()).expect_err("the node fails");
         let mode = schedule.run_mode().expect("there was a choice");
@@ -130,20 +123,14 @@ fn failed_runs_are_not_measured() {
 fn the_work_of_failed_runs_does_not_count_for_the_next_measured_one() {
     let is_failing = AtomicBool::new(true);
     let serial_nanoseconds = || {
-        let mut graph = FrameGraph::new();
-        let node = graph.add(
-            "node",
-            Closure::new(|_: &(), _, _| {
-                if !is_failing.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                thread::sleep(SLEEP);
-                Err("on purpose".into())
-            }),
-        );
-        graph.keep(node);
-        let mut schedule = graph.compile().expect("the graph has no cycle");
-        // The second parallel run is measured, until one succeeds.
+        let mut schedule = single(Closure::new(|_: &(), _, _| {
+            if !is_failing.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            thread::sleep(SLEEP);
+            Err("on purpose".into())
+        }));
+        // The second parallel run is measured. A failed one does not count, so the next is measured in its place.
         schedule.always_parallel(true);
         for fails in [false, true, true, false] {
             is_failing.store(fails, Ordering::Relaxed);
@@ -157,40 +144,40 @@ fn the_work_of_failed_runs_does_not_count_for_the_next_measured_one() {
     assert!((0..100).any(|_| serial_nanoseconds() < SLEEP.as_nanos() as f32));
 }
 
-/// The threads that run a node of 32 chunks in the first run of a schedule. The run begins serially, with a time limit of one wake-up, and takes
-/// far longer.
-fn threads_of_a_long_first_run(is_pinned: bool) -> HashSet<ThreadId> {
-    let threads = Mutex::new(HashSet::new());
-    let long = Closure::new(|_: &(), _, _| {
+/// A node of 32 chunks, which take far longer than a wake-up, the limit of a schedule's first run. It keeps the threads that run them.
+fn long_node(threads: &Mutex<HashSet<ThreadId>>) -> Closure<'_, ()> {
+    let body = |_: &(), _, _: &Worker| {
         threads.lock().expect("no thread panics").insert(thread::current().id());
         thread::sleep(Duration::from_millis(1));
         Ok(())
-    });
-    let long = long.with_width(|_| 32);
-    let mut graph = FrameGraph::new();
-    let node = graph.add("node", if is_pinned { long.on_calling_thread() } else { long });
-    graph.keep(node);
-    let mut schedule = graph.compile().expect("the graph has no cycle");
-    schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
-    assert!(schedule.run_mode().is_some_and(|mode| mode.is_trial && !mode.parallel));
-    let first_run = mem::take(&mut *threads.lock().expect("no thread panics"));
-    if !is_pinned {
-        // What a run took that began serially and ended in parallel says nothing about either.
-        schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
-        assert!(schedule.run_mode().is_some_and(|mode| mode.parallel && mode.serial_nanoseconds.is_none()));
-    }
-    first_run
+    };
+    Closure::new(body).with_width(|_| 32)
 }
 
 #[test]
 fn a_serial_run_that_takes_too_long_is_continued_by_all_workers() {
     // Another process may delay the other worker, but not always.
-    assert!((0..100).any(|_| threads_of_a_long_first_run(false).len() == 2));
+    let is_continued_by_both = (0..100).any(|_| {
+        let threads = Mutex::default();
+        let mut schedule = single(long_node(&threads));
+        schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
+        assert!(schedule.run_mode().is_some_and(|mode| mode.is_trial && !mode.parallel));
+        let count = threads.lock().expect("no thread panics").len();
+        // A run that began serially and ended in parallel measures neither mode.
+        schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
+        assert!(schedule.run_mode().is_some_and(|mode| mode.parallel && mode.serial_nanoseconds.is_none()));
+        count == 2
+    });
+    assert!(is_continued_by_both);
 }
 
 #[test]
 fn a_pinned_node_stays_on_its_thread_when_a_serial_run_takes_too_long() {
     for _ in 0..5 {
-        assert_eq!(threads_of_a_long_first_run(true), HashSet::from([thread::current().id()]));
+        let threads = Mutex::default();
+        let mut schedule = single(long_node(&threads).on_calling_thread());
+        schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
+        assert!(schedule.run_mode().is_some_and(|mode| mode.is_trial && !mode.parallel));
+        assert_eq!(*threads.lock().expect("no thread panics"), HashSet::from([thread::current().id()]));
     }
 }

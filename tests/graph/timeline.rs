@@ -15,6 +15,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use crate::oracle::valid_graph;
+use crate::run::single;
 
 /// A node with items that take some time. The context sets the chunk size.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +60,7 @@ fn check(log: &Log, schedule: &Schedule<Busy>, chunk: usize, workers: usize) {
     for (index, (node, (name, busy))) in run.graph.nodes.iter().zip(schedule.nodes()).enumerate() {
         assert_eq!(node.name, name);
         assert_eq!(node.dependencies, schedule.dependencies(index));
-        assert_eq!(node.pinned, busy.pinned);
+        assert_eq!((node.pinned, node.chunked_by_cost), (busy.pinned, false));
         let mut next = 0;
         let empty = run.empty.iter().filter(|empty| empty.node == index);
         let parts: Vec<&Chunk> = run.chunks_of(index).iter().chain(empty).collect();
@@ -315,13 +316,13 @@ fn background_runs_do_not_extend_frames() {
     streaming.wait().unwrap();
     let log = scheduler.timeline().take();
     let runs: Vec<_> = log.runs.iter().map(|run| (run.in_background, run.graph.nodes[0].name.as_str())).collect();
-    assert_eq!(runs, [(false, "busy"), (false, "busy"), (true, "stream")]);
+    assert_eq!(runs, [(false, "single"), (false, "single"), (true, "stream")]);
     assert_ne!(log.runs[0].frame, log.runs[1].frame, "each run is a frame of its own");
     for run in &log.runs[..2] {
         let frame = log.frames.iter().find(|frame| frame.number == run.frame).unwrap();
         assert_eq!((frame.began, frame.ended), (run.began, run.ended));
         let report = FrameReport::new(&log, run.frame, &SchedulerCosts::ZERO).unwrap();
-        assert_eq!((report.duration, report.critical_path[0].name.as_str()), (run.duration(), "busy"));
+        assert_eq!((report.duration, report.critical_path[0].name.as_str()), (run.duration(), "single"));
     }
 }
 
@@ -434,13 +435,6 @@ fn any_capacity_is_accepted() {
         let scheduler = Scheduler::builder().workers(1).timeline_capacity(capacity).build().unwrap();
         assert!(!scheduler.timeline().is_on());
     }
-}
-
-fn single(busy: Busy) -> Schedule<Busy> {
-    let mut graph = FrameGraph::new();
-    let node = graph.add("busy", busy);
-    graph.keep(node);
-    graph.compile().unwrap()
 }
 
 /// Separate from the schedulers of the other tests, because all runs of a scheduler are recorded.
