@@ -173,6 +173,19 @@ mod tests {
         are_serial.iter().rev().take(10).filter(|&&is_serial| is_serial).count()
     }
 
+    fn run_once(policy: &mut ExecutionPolicy, serial: u64, parallel: u64) -> bool {
+        let [serial, parallel] = [serial, parallel].map(Duration::from_micros);
+        match policy.choose(WAKE_UP_COST) {
+            RunMode::Serial { limit } if limit.is_some_and(|limit| serial > limit) => policy.report_exceeded(),
+            RunMode::Serial { .. } => {
+                policy.report_serial(serial);
+                return true;
+            }
+            RunMode::Parallel { is_measured } => policy.report_parallel(parallel, is_measured.then_some(serial)),
+        }
+        false
+    }
+
     #[test]
     fn a_successor_begins_in_the_mode_that_was_faster() {
         for (serial, parallel) in [(100, 300), (900, 300)] {
@@ -192,19 +205,6 @@ mod tests {
         assert_eq!(run(&mut policy, 300, 50, 55), 10);
         assert!(run_once(&mut policy.of_successor(), 50, 55));
         assert_eq!(run(&mut ExecutionPolicy::default(), 300, 50, 55), 0);
-    }
-
-    fn run_once(policy: &mut ExecutionPolicy, serial: u64, parallel: u64) -> bool {
-        let [serial, parallel] = [serial, parallel].map(Duration::from_micros);
-        match policy.choose(WAKE_UP_COST) {
-            RunMode::Serial { limit } if limit.is_some_and(|limit| serial > limit) => policy.report_exceeded(),
-            RunMode::Serial { .. } => {
-                policy.report_serial(serial);
-                return true;
-            }
-            RunMode::Parallel { is_measured } => policy.report_parallel(parallel, is_measured.then_some(serial)),
-        }
-        false
     }
 
     #[test]
@@ -269,14 +269,13 @@ mod tests {
     fn one_parallel_run_in_thirty_one_is_measured() {
         let mut policy = ExecutionPolicy::default();
         run(&mut policy, 100, 1_700, 850);
-        let is_measured: Vec<bool> = (0..62)
-            .map(|_| {
+        let measured: Vec<usize> = (0..62)
+            .filter(|_| {
                 let mode = policy.choose(WAKE_UP_COST);
                 run_once(&mut policy, 1_700, 850);
                 mode == RunMode::Parallel { is_measured: true }
             })
             .collect();
-        let measured: Vec<usize> = (0..62).filter(|&run| is_measured[run]).collect();
         assert!(measured.len() == 2 && measured[1] - measured[0] == 31, "{measured:?}");
     }
 
