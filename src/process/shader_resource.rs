@@ -25,7 +25,9 @@ pub enum ShaderResource<'a> {
     /// A buffer with the usage `STORAGE`: `var<storage, read>`.
     #[cfg(feature = "wgpu")]
     Buffer(wgpu::Buffer),
-    /// A texture with the usage `TEXTURE_BINDING`.
+    /// A texture with the usage `TEXTURE_BINDING`. Write all of it before a frame that reads it is recorded, or write it by copies from
+    /// buffers: up to wgpu 30.0.2, `Queue::write_texture` hangs beside a submission, such as the device thread's, that has to clear what
+    /// was never written of the same texture (wgpu issue 9460).
     #[cfg(feature = "wgpu")]
     Texture {
         /// The view of it.

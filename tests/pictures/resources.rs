@@ -154,6 +154,7 @@ fn image(device: &wgpu::Device, queue: &wgpu::Queue) -> ShaderResource<'static> 
         view_formats: &[],
     });
     let layout = wgpu::TexelCopyBufferLayout { bytes_per_row: Some(8), ..wgpu::TexelCopyBufferLayout::default() };
+    #[expect(clippy::disallowed_methods, reason = "the texture is new")]
     queue.write_texture(texture.as_image_copy(), &[255, 0, 0, 255, 0, 255, 0, 255], layout, size);
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     ShaderResource::Texture { view, dimension: wgpu::TextureViewDimension::D2 }

@@ -52,6 +52,7 @@ fn upload_array(device: &wgpu::Device, queue: &wgpu::Queue, array: &TextureArray
                 ..wgpu::TexelCopyBufferLayout::default()
             };
             let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+            #[expect(clippy::disallowed_methods, reason = "the texture is new")]
             queue.write_texture(target, &bytes[first..end], layout, size);
             first = end;
         }

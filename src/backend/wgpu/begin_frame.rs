@@ -88,7 +88,7 @@ impl WgpuBackend {
         let (used, vertices) = (request.objects.used_meshes(), request.quality.vertices);
         let meshes = meshes.update(&self.device, &self.uploads, scene.assets, used, vertices)?;
         let types = plan.material_types();
-        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, rejections);
+        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, rejections)?;
         Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
     }
 

@@ -1,11 +1,13 @@
 //! The cache of materials and their textures.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use super::gpu_material::GpuMaterial;
 use super::snapshot_lifetimes::SnapshotToken;
 use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
+use crate::backend::BackendError;
 use crate::scene::{Assets, Material, MaterialLayout};
 use crate::view::{RejectionReason, Rejections};
 
@@ -57,6 +59,9 @@ struct Current {
 
 impl MaterialCache {
     /// The snapshot of these materials and textures, with the values of these types: the latest one if nothing changed.
+    ///
+    /// # Errors
+    /// If the device has no room for a texture.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
@@ -64,11 +69,11 @@ impl MaterialCache {
         assets: &Assets,
         types: &[MaterialLayout],
         rejections: &Rejections,
-    ) -> MaterialSnapshot {
+    ) -> Result<MaterialSnapshot, BackendError> {
         let textures = (assets.textures.identity(), assets.textures.revision());
         self.update_snapshot(device, assets, types, rejections, textures, |cache| {
             cache.rejected_textures.clear();
-            cache.textures.update(device, uploads, assets, &mut cache.rejected_textures);
+            cache.textures.update(device, uploads, assets, &mut cache.rejected_textures)
         })
     }
 
@@ -82,20 +87,24 @@ impl MaterialCache {
     ) -> (MaterialSnapshot, Arc<[bool]>) {
         // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on the device.
         let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
-        let snapshot = self.update_snapshot(device, assets, types, rejections, textures, |_| {});
+        let Ok(snapshot) =
+            self.update_snapshot(device, assets, types, rejections, textures, |_| Ok::<_, Infallible>(()));
         (snapshot, Arc::clone(&self.lacks_texture))
     }
 
     /// The latest snapshot if nothing changed. If `textures` did, calls `update_textures`.
-    fn update_snapshot(
+    ///
+    /// # Errors
+    /// That of `update_textures`. The next snapshot is made anew then.
+    fn update_snapshot<E>(
         &mut self,
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
         rejections: &Rejections,
         textures: (u64, u64),
-        update_textures: impl FnOnce(&mut Self),
-    ) -> MaterialSnapshot {
+        update_textures: impl FnOnce(&mut Self) -> Result<(), E>,
+    ) -> Result<MaterialSnapshot, E> {
         let materials = (assets.materials.identity(), assets.materials.revision());
         let mut snapshot = match self.current.take() {
             Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
@@ -104,7 +113,7 @@ impl MaterialCache {
             }
             before => {
                 let before = before.map(|current| (current.moves, current.snapshot.textures));
-                update_textures(self);
+                update_textures(self)?;
                 let same_arrays = before.filter(|(moves, _)| *moves == self.textures.moves());
                 let textures = same_arrays.map_or_else(|| self.bound_textures(device), |(_, textures)| textures);
                 let token = self.textures.begin_snapshot();
@@ -121,7 +130,7 @@ impl MaterialCache {
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             rejections.count(reason, index);
         }
-        snapshot
+        Ok(snapshot)
     }
 
     fn bound_textures(&self, device: &wgpu::Device) -> Arc<MaterialTextures> {

@@ -4,8 +4,9 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
-use super::texture_layers::{TextureLayers, layer_bytes, new_array, write_layer};
+use super::texture_layers::{TextureLayers, copy_layer, layer_bytes, new_array};
 use super::upload_queue::UploadQueue;
+use crate::backend::BackendError;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::handle::Handle;
 use crate::scene::{Assets, Texture};
@@ -56,14 +57,18 @@ pub(super) struct ResidentTexture {
 }
 
 impl TextureArrays {
-    /// Uploads new and changed textures, and rejects those that exceed the device's layers.
+    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Copies are submitted at once, before anything
+    /// that reads them.
+    ///
+    /// # Errors
+    /// If the device has no room. The textures from the one on that it had no room for are uploaded with the next update.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
         uploads: &UploadQueue,
         assets: &Assets,
         rejected: &mut Vec<(RejectionReason, usize)>,
-    ) {
+    ) -> Result<(), BackendError> {
         let current = |slot| assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
         self.retire_changed(assets, |texture| current(texture.handle.index()) != Some(texture.revision));
         self.free_unread();
@@ -80,18 +85,26 @@ impl TextureArrays {
                 missing.iter().filter(|(.., other)| *other == index).count(),
             );
         }
-        for (handle, revision, texture, index) in missing {
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let label = Some("new and changed textures");
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+        let copied = missing.into_iter().try_for_each(|(handle, revision, texture, index)| {
             let slot = handle.index() as usize;
             let array = &mut self.arrays[index];
-            match (array.take(), array.texture()) {
-                (Some(layer), Some(on_device)) => {
-                    write_layer(uploads, on_device, layer, texture);
-                    let location = TextureLocation { array: index as u32, layer };
-                    self.textures[slot] = Some(ResidentTexture { handle, revision, location });
-                }
-                _ => rejected.push((RejectionReason::TextureLimit, slot)),
-            }
-        }
+            let (Some(layer), Some(on_device)) = (array.take(), array.texture()) else {
+                rejected.push((RejectionReason::TextureLimit, slot));
+                return Ok(());
+            };
+            copy_layer(device, &mut encoder, on_device, layer, texture).inspect_err(|_| array.free(layer))?;
+            uploads.count(layer_bytes(ARRAY_SIDES[index]));
+            let location = TextureLocation { array: index as u32, layer };
+            self.textures[slot] = Some(ResidentTexture { handle, revision, location });
+            Ok(())
+        });
+        uploads.queue().submit([encoder.finish()]);
+        copied
     }
 
     /// Makes a snapshot of the textures as they are.

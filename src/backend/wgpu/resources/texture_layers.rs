@@ -1,6 +1,5 @@
 //! One texture array, and which of its layers are in use.
 
-use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::scene::Texture;
@@ -113,26 +112,26 @@ pub(crate) const fn layer_bytes(side: u32) -> u64 {
     bytes
 }
 
-/// Uploads a texture with all mip levels.
-pub(super) fn write_layer(uploads: &UploadQueue, array: &wgpu::Texture, layer: u32, texture: &Texture) {
+/// Records that the device copies a texture, with all mip levels, to a layer.
+///
+/// # Errors
+/// If the device has no room.
+pub(super) fn copy_layer(
+    device: &wgpu::Device,
+    encoder: &mut wgpu::CommandEncoder,
+    array: &wgpu::Texture,
+    layer: u32,
+    texture: &Texture,
+) -> Result<(), BackendError> {
     for (level, pixels) in (0..).zip(mip_chain(texture, array.width())) {
-        write_rows(uploads, array, (layer, level), 0, &pixels);
+        copy_rows(device, encoder, array, (layer, level), 0, &pixels)?;
     }
-}
-
-/// Writes whole rows of a mip level of a layer, from row `first` on.
-fn write_rows(uploads: &UploadQueue, array: &wgpu::Texture, (layer, mip_level): (u32, u32), first: u32, pixels: &[u8]) {
-    let (destination, size) = rows_of(array, (layer, mip_level), first, pixels);
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(size.width * 4),
-        rows_per_image: Some(size.height),
-    };
-    uploads.write_texture(destination, pixels, layout, size);
+    Ok(())
 }
 
 /// Records that the device copies whole rows to a mip level of a layer, from row `first` on. They are in a buffer of their own until then:
-/// `Queue::write_texture` copies them under a lock that every submission takes.
+/// `Queue::write_texture` copies them under a lock that every submission takes, and hangs beside a submission that has to clear layers of
+/// the same texture (wgpu issue 9460).
 ///
 /// # Errors
 /// If the device has no room.
@@ -144,10 +143,11 @@ pub(crate) fn copy_rows(
     first: u32,
     pixels: &[u8],
 ) -> Result<(), BackendError> {
-    let (destination, extent) = rows_of(array, (layer, mip_level), first, pixels);
-    let row_bytes = extent.width * 4;
+    let width = array.width() >> mip_level;
+    let row_bytes = width * 4;
+    let extent = wgpu::Extent3d { width, height: pixels.len() as u32 / row_bytes, depth_or_array_layers: 1 };
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let label = "rows of a streamed texture";
+    let label = "rows of a texture";
     let size = u64::from(stride) * u64::from(extent.height);
     let usage = wgpu::BufferUsages::COPY_SRC;
     let buffer =
@@ -170,22 +170,9 @@ pub(crate) fn copy_rows(
     buffer.unmap();
     let layout =
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(stride), rows_per_image: Some(extent.height) };
+    let origin = wgpu::Origin3d { x: 0, y: first, z: layer };
+    let destination =
+        wgpu::TexelCopyTextureInfo { texture: array, mip_level, origin, aspect: wgpu::TextureAspect::All };
     encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer: &buffer, layout }, destination, extent);
     Ok(())
-}
-
-/// Where whole rows of a mip level of a layer lie, from row `first` on.
-fn rows_of<'a>(
-    array: &'a wgpu::Texture,
-    (layer, mip_level): (u32, u32),
-    first: u32,
-    pixels: &[u8],
-) -> (wgpu::TexelCopyTextureInfo<'a>, wgpu::Extent3d) {
-    let side = array.width() >> mip_level;
-    let origin = wgpu::Origin3d { x: 0, y: first, z: layer };
-    let height = pixels.len() as u32 / (side * 4);
-    (
-        wgpu::TexelCopyTextureInfo { texture: array, mip_level, origin, aspect: wgpu::TextureAspect::All },
-        wgpu::Extent3d { width: side, height, depth_or_array_layers: 1 },
-    )
 }

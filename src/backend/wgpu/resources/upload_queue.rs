@@ -3,7 +3,7 @@
 use std::num::NonZeroU64;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Writes to buffers and textures, and counts the bytes.
+/// Writes to buffers, and counts the bytes.
 pub(crate) struct UploadQueue {
     queue: wgpu::Queue,
     bytes: AtomicU64,
@@ -38,17 +38,6 @@ impl UploadQueue {
     ) -> Option<wgpu::QueueWriteBufferView> {
         self.count(size.get());
         self.queue.write_buffer_with(buffer, offset, size)
-    }
-
-    pub(crate) fn write_texture(
-        &self,
-        texture: wgpu::TexelCopyTextureInfo<'_>,
-        bytes: &[u8],
-        layout: wgpu::TexelCopyBufferLayout,
-        size: wgpu::Extent3d,
-    ) {
-        self.count(bytes.len() as u64);
-        self.queue.write_texture(texture, bytes, layout, size);
     }
 
     /// Counts bytes that were written into mapped memory.
