@@ -41,9 +41,10 @@ fn main() {
     let seed = setting("DRAWLOOM_SOAK_SEED", 1);
     abort_when_nothing_happens();
     engine::hide_planned_panics();
-    // Once before anything is counted, so that what the process makes once is there.
+    let threads = Resources::count().threads;
+    // Once before anything else is counted, so that what the process makes once is there.
     drop(Engine::new());
-    let before = Resources::count();
+    let before = Resources::count_with_threads(threads);
 
     let bar = ProgressBar::new(length.as_secs());
     bar.set_style(ProgressStyle::with_template("{elapsed_precise} [{wide_bar}] {eta_precise} left, {msg}").unwrap());
@@ -55,7 +56,7 @@ fn main() {
             engine.frame(&mut random);
         }
         engine.rest();
-        let now = Resources::count();
+        let now = rests.first().map_or_else(Resources::count, |first| Resources::count_with_threads(first.threads));
         let first = rests.first().unwrap_or(&now);
         assert_eq!((now.threads, now.files), (first.threads, first.files), "seed {seed}, rest {}", rests.len());
         rests.push(now);
@@ -64,11 +65,11 @@ fn main() {
     }
     bar.finish();
     let totals = engine.finish();
-    let after = Resources::count();
+    let after = Resources::count_with_threads(threads);
     println!("{:.0?}: {totals:?}", start.elapsed());
     println!("before {before:?}, after {after:?}");
     judge_memory(seed, &rests[WARM_UP_RESTS..]);
-    assert_eq!((after.threads, after.files), (before.threads, before.files), "seed {seed}");
+    assert_eq!((after.threads, after.files), (threads, before.files), "seed {seed}");
     let kinds = [totals.faults, totals.panics, totals.losses, totals.resizes, totals.qualities, totals.bufferings];
     // A device is lost once in two thousand frames.
     let is_short = engine::frames_so_far() < 50_000;

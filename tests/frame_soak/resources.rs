@@ -1,7 +1,8 @@
 //! What the process has.
 
 use std::alloc::System;
-use std::fs;
+use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
@@ -27,6 +28,17 @@ impl Resources {
             bytes: stats.bytes_allocated - stats.bytes_deallocated,
             threads: entries("/proc/self/task"),
             files: entries("/proc/self/fd"),
+        }
+    }
+    /// Counts as soon as there are so many threads, or after ten seconds: the OS lists a thread that was joined for some time yet.
+    pub fn count_with_threads(threads: usize) -> Self {
+        let end = Instant::now() + Duration::from_secs(10);
+        loop {
+            let now = Self::count();
+            if now.threads == threads || Instant::now() >= end {
+                return now;
+            }
+            thread::sleep(Duration::from_millis(1));
         }
     }
 }
