@@ -149,7 +149,8 @@ pub(crate) fn copy_rows(
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let label = "rows of a texture";
     let size = u64::from(stride) * u64::from(extent.height);
-    let usage = wgpu::BufferUsages::COPY_SRC;
+    // Without `MAP_WRITE`, wgpu would write into another buffer, and have the device copy that one to this one.
+    let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
     {
