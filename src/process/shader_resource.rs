@@ -25,9 +25,9 @@ pub enum ShaderResource<'a> {
     /// A buffer with the usage `STORAGE`: `var<storage, read>`.
     #[cfg(feature = "wgpu")]
     Buffer(wgpu::Buffer),
-    /// A texture with the usage `TEXTURE_BINDING`. Write all of it before a frame that reads it is recorded, or write it by copies from
-    /// buffers: up to wgpu 30.0.2, `Queue::write_texture` hangs beside a submission, such as the device thread's, that has to clear what
-    /// was never written of the same texture (wgpu issue 9460).
+    /// A texture with the usage `TEXTURE_BINDING`. Write all of it before the first frame that reads it is recorded, or write it only by
+    /// copies from buffers. Otherwise `Queue::write_texture` can deadlock with a submission on another thread, such as that of a
+    /// [`FrameLoop`](crate::FrameLoop) (wgpu issue 9460, up to 30.0.2).
     #[cfg(feature = "wgpu")]
     Texture {
         /// The view of it.
@@ -35,7 +35,7 @@ pub enum ShaderResource<'a> {
         /// The dimension that the view was made with: `D2` for `texture_2d`.
         dimension: wgpu::TextureViewDimension,
     },
-    /// Another texture in each view.
+    /// Another texture in each view. What is said of [`Texture`](Self::Texture) holds for each.
     #[cfg(feature = "wgpu")]
     TextureOfView {
         /// The textures of views, by name. All have the format of `other`, or one that shaders read as the same kind of number.

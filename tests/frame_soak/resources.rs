@@ -1,7 +1,7 @@
 //! What the process has.
 
 use std::alloc::System;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use std::{fs, thread};
 
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
@@ -30,15 +30,18 @@ impl Resources {
             files: entries("/proc/self/fd"),
         }
     }
-    /// Counts as soon as there are so many threads, or after ten seconds: the OS lists a thread that was joined for some time yet.
+
+    /// Counts until there are so many threads, but not more than a thousand times. The OS goes on listing a thread for a while after it was
+    /// joined.
     pub fn count_with_threads(threads: usize) -> Self {
-        let end = Instant::now() + Duration::from_secs(10);
-        loop {
-            let now = Self::count();
-            if now.threads == threads || Instant::now() >= end {
-                return now;
+        let mut now = Self::count();
+        for _ in 0..1_000 {
+            if now.threads == threads {
+                break;
             }
             thread::sleep(Duration::from_millis(1));
+            now = Self::count();
         }
+        now
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::backend::WgpuBackend;
-use super::error_scope::{catch_wgpu_panic, check_device, with_error_scope};
+use super::error_scope::{catch_wgpu_panic, check_device, loss_or, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
 use super::recording::{
@@ -121,6 +121,7 @@ impl Backend for WgpuBackend {
     ) -> Result<(), BackendError> {
         with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, request, blocks))
             .flatten()
+            .map_err(|error| loss_or(&self.device, error))
             .inspect_err(|_| self.buffers.clear())
     }
 
@@ -200,6 +201,7 @@ impl Backend for WgpuBackend {
             .time_parallel(|| with_error_scope(&self.device, &pass.label, || catch_wgpu_panic(&pass.label, all)))
             .flatten()
             .flatten()
+            .map_err(|error| loss_or(&self.device, error))
             .inspect_err(|_| self.buffers.clear())
     }
 
@@ -318,6 +320,7 @@ impl Backend for WgpuBackend {
         // Not all may have been written.
         with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
             .flatten()
+            .map_err(|error| loss_or(&self.device, error))
             .inspect_err(|_| self.buffers.clear())
     }
 

@@ -27,8 +27,13 @@ pub(crate) fn with_error_scope<R>(
         None => Ok(result),
         Some(wgpu::Error::OutOfMemory { .. }) => Err(BackendError::OutOfMemory { label: label.to_owned() }),
         // What is created on a lost device is invalid, and only its first use is an error.
-        Some(error) => Err(check_device(device).err().unwrap_or_else(|| refused(label, error.to_string()))),
+        Some(error) => Err(loss_or(device, refused(label, error.to_string()))),
     }
+}
+
+/// The loss of the device if it is lost, as that makes what is created on it invalid. Otherwise the error.
+pub(crate) fn loss_or(device: &wgpu::Device, error: BackendError) -> BackendError {
+    check_device(device).err().unwrap_or(error)
 }
 
 /// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have none.

@@ -31,7 +31,7 @@ pub(super) fn upload_picture(
         });
         let bytes_per_row = Some(width * format.bytes() as u32);
         let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: None };
-        // No command reads the texture yet, so no submission can wait for a lock of it (wgpu issue 9460).
+        // No command uses the texture yet, so no submission takes its lock (wgpu issue 9460).
         #[expect(clippy::disallowed_methods, reason = "the texture is new")]
         queue.write_texture(texture.as_image_copy(), bytes, layout, size);
         texture.create_view(&wgpu::TextureViewDescriptor::default())

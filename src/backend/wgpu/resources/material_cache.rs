@@ -61,7 +61,7 @@ impl MaterialCache {
     /// The snapshot of these materials and textures, with the values of these types: the latest one if nothing changed.
     ///
     /// # Errors
-    /// If the device has no room for a texture.
+    /// If the device has no room for a texture, or is lost. What is in the cache is undefined then, so drop it.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
@@ -95,7 +95,7 @@ impl MaterialCache {
     /// The latest snapshot if nothing changed. If `textures` did, calls `update_textures`.
     ///
     /// # Errors
-    /// That of `update_textures`. The next snapshot is made anew then.
+    /// Returns the error of `update_textures`.
     fn update_snapshot<E>(
         &mut self,
         device: &wgpu::Device,

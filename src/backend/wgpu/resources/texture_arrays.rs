@@ -57,11 +57,11 @@ pub(super) struct ResidentTexture {
 }
 
 impl TextureArrays {
-    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Copies are submitted at once, before anything
-    /// that reads them.
+    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Submits the copies at once, before anything that
+    /// reads the textures.
     ///
     /// # Errors
-    /// If the device has no room. The textures from the one on that it had no room for are uploaded with the next update.
+    /// If the device has no room, or is lost. What is in the arrays is undefined then, so drop them.
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
@@ -90,21 +90,21 @@ impl TextureArrays {
         }
         let label = Some("new and changed textures");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
-        let copied = missing.into_iter().try_for_each(|(handle, revision, texture, index)| {
+        for (handle, revision, texture, index) in missing {
             let slot = handle.index() as usize;
             let array = &mut self.arrays[index];
-            let (Some(layer), Some(on_device)) = (array.take(), array.texture()) else {
-                rejected.push((RejectionReason::TextureLimit, slot));
-                return Ok(());
-            };
-            copy_layer(device, &mut encoder, on_device, layer, texture).inspect_err(|_| array.free(layer))?;
-            uploads.count(layer_bytes(ARRAY_SIDES[index]));
-            let location = TextureLocation { array: index as u32, layer };
-            self.textures[slot] = Some(ResidentTexture { handle, revision, location });
-            Ok(())
-        });
+            match (array.take(), array.texture()) {
+                (Some(layer), Some(on_device)) => {
+                    copy_layer(device, &mut encoder, on_device, layer, texture)?;
+                    uploads.count(layer_bytes(ARRAY_SIDES[index]));
+                    let location = TextureLocation { array: index as u32, layer };
+                    self.textures[slot] = Some(ResidentTexture { handle, revision, location });
+                }
+                _ => rejected.push((RejectionReason::TextureLimit, slot)),
+            }
+        }
         uploads.queue().submit([encoder.finish()]);
-        copied
+        Ok(())
     }
 
     /// Makes a snapshot of the textures as they are.

@@ -2,6 +2,7 @@
 
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
+use crate::backend::wgpu::error_scope::loss_or;
 use crate::scene::Texture;
 
 /// A texture array of square layers with all mip levels.
@@ -112,10 +113,10 @@ pub(crate) const fn layer_bytes(side: u32) -> u64 {
     bytes
 }
 
-/// Records that the device copies a texture, with all mip levels, to a layer.
+/// Records a copy of a texture, with all mip levels, to a layer.
 ///
 /// # Errors
-/// If the device has no room.
+/// If the device has no room, or is lost.
 pub(super) fn copy_layer(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
@@ -129,12 +130,12 @@ pub(super) fn copy_layer(
     Ok(())
 }
 
-/// Records that the device copies whole rows to a mip level of a layer, from row `first` on. They are in a buffer of their own until then:
-/// `Queue::write_texture` copies them under a lock that every submission takes, and hangs beside a submission that has to clear layers of
-/// the same texture (wgpu issue 9460).
+/// Records a copy of whole rows to a mip level of a layer, from row `first` on. The rows wait in a buffer of their own.
+/// `Queue::write_texture` would copy them under a lock that every submission takes. It can also deadlock with a submission of commands that
+/// were recorded before all layers of the texture were initialised (wgpu issue 9460).
 ///
 /// # Errors
-/// If the device has no room.
+/// If the device has no room, or is lost.
 pub(crate) fn copy_rows(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
@@ -149,14 +150,13 @@ pub(crate) fn copy_rows(
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let label = "rows of a texture";
     let size = u64::from(stride) * u64::from(extent.height);
-    // Without `MAP_WRITE`, wgpu would write into another buffer, and have the device copy that one to this one.
+    // With `MAP_WRITE` the rows are written into this buffer. Without it, wgpu maps another one, which the device copies to this one.
     let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
     {
-        let refused = |error: wgpu::MapRangeError| BackendError::Validation {
-            label: label.to_owned(),
-            message: error.to_string(),
+        let refused = |error: wgpu::MapRangeError| {
+            loss_or(device, BackendError::Validation { label: label.to_owned(), message: error.to_string() })
         };
         let mut view = buffer.get_mapped_range_mut(..).map_err(refused)?;
         if stride == row_bytes {
@@ -176,4 +176,24 @@ pub(crate) fn copy_rows(
         wgpu::TexelCopyTextureInfo { texture: array, mip_level, origin, aspect: wgpu::TextureAspect::All };
     encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer: &buffer, layout }, destination, extent);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::error_scope::with_error_scope;
+    use crate::backend::wgpu::noop_device::noop_device;
+
+    #[test]
+    fn on_a_lost_device_a_copy_returns_the_loss() {
+        let (device, _queue) = noop_device();
+        let array = new_array(&device, 256, 2);
+        let texture = Texture::new("plain", 1, 1, vec![255; 4]).unwrap();
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut copy =
+            || with_error_scope(&device, "a copy", || copy_layer(&device, &mut encoder, &array, 1, &texture)).flatten();
+        copy().unwrap();
+        device.destroy();
+        assert!(matches!(copy(), Err(BackendError::DeviceLost { .. })));
+    }
 }
