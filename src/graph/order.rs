@@ -66,3 +66,34 @@ pub(super) fn find_cycle<E>(graph: &DiGraph<(), E>, nodes: usize, ordered: &[Nod
     path.rotate_left(lowest);
     path
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn indices(vertices: &[NodeIndex]) -> Vec<usize> {
+        vertices.iter().map(|vertex| vertex.index()).collect()
+    }
+
+    #[test]
+    fn a_junction_does_not_change_the_order_of_nodes() {
+        // Node 0 depends on node 1, and node 2 on nothing.
+        let mut direct: DiGraph<(), ()> = DiGraph::from_edges([(1, 0)]);
+        direct.add_node(());
+        assert_eq!(indices(&topological_order(&direct, 3)), [1, 0, 2]);
+        let mut through_junction = direct.clone();
+        through_junction.clear_edges();
+        let junction = through_junction.add_node(());
+        through_junction.extend_with_edges([(NodeIndex::new(1), junction), (junction, NodeIndex::new(0))]);
+        assert_eq!(indices(&topological_order(&through_junction, 3)), [1, 3, 0, 2]);
+    }
+
+    #[test]
+    fn a_cycle_through_a_junction_is_one_of_nodes() {
+        // Node 1 depends on node 0 through junction 2, and node 0 on node 1.
+        let graph: DiGraph<(), ()> = DiGraph::from_edges([(0, 2), (2, 1), (1, 0)]);
+        let ordered = topological_order(&graph, 2);
+        assert!(ordered.is_empty());
+        assert_eq!(indices(&find_cycle(&graph, 2, &ordered)), [0, 1]);
+    }
+}

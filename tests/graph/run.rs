@@ -336,3 +336,10 @@ fn chunked_by_cost_is_not_called_if_nobody_records() {
     run(&mut schedule, &SCHEDULERS[1], &());
     assert!(schedule.nodes().all(|(_, asked)| asked.0.load(Ordering::Relaxed) == 0));
 }
+
+#[test]
+fn debug_texts_show_settings_and_names() {
+    let closure = Closure::new(|_: &(), _, _| Ok(())).with_chunk(3).on_calling_thread();
+    assert_eq!(format!("{closure:?}"), "Closure { chunk: 3, pinned: true, .. }");
+    assert_eq!(format!("{:?}", single(closure)), r#"Schedule { nodes: ["single"], dropped: [], .. }"#);
+}

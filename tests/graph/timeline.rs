@@ -440,3 +440,48 @@ fn any_capacity_is_accepted() {
 /// Separate from the schedulers of the other tests, because all runs of a scheduler are recorded.
 static RECORDED: LazyLock<[Scheduler; 3]> =
     LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));
+
+#[test]
+fn a_boxed_node_is_run_as_the_node_in_the_box() {
+    /// Differs from the defaults in everything.
+    struct Unusual;
+
+    impl Node<()> for Unusual {
+        fn width(&self, _context: &()) -> usize {
+            5
+        }
+
+        fn chunk(&self, _context: &()) -> usize {
+            2
+        }
+
+        fn chunked_by_cost(&self, _context: &()) -> bool {
+            true
+        }
+
+        fn pinned(&self) -> bool {
+            true
+        }
+
+        fn run(&self, _context: &(), _range: Range<usize>, _worker: &Worker) -> Result<(), NodeError> {
+            Ok(())
+        }
+    }
+
+    let mut graph: FrameGraph<Box<dyn Node<()> + Send + Sync>> = FrameGraph::new();
+    let unusual = graph.add("unusual", Box::new(Unusual));
+    let plain = graph.add("plain", Box::new(Closure::new(|_: &(), _range, _worker| Ok(()))));
+    [unusual, plain].into_iter().for_each(|node| graph.keep(node));
+    let mut schedule = graph.compile().unwrap();
+    let scheduler = Scheduler::new(1).unwrap();
+    scheduler.timeline().start();
+    schedule.run(&scheduler, &()).unwrap();
+    let log = scheduler.timeline().take();
+    let [run] = log.runs.as_slice() else { panic!("{} runs", log.runs.len()) };
+    for (index, node) in run.graph.nodes.iter().enumerate() {
+        let is_unusual = node.name == "unusual";
+        assert_eq!((node.pinned, node.chunked_by_cost), (is_unusual, is_unusual), "{}", node.name);
+        let ranges: Vec<_> = run.chunks_of(index).iter().map(|chunk| chunk.items.clone()).collect();
+        assert_eq!(ranges, if is_unusual { vec![0..2, 2..4, 4..5] } else { vec![0..1] }, "{}", node.name);
+    }
+}
