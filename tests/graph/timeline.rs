@@ -481,7 +481,7 @@ fn a_boxed_node_is_run_as_the_node_in_the_box() {
     for (index, node) in run.graph.nodes.iter().enumerate() {
         let is_unusual = node.name == "unusual";
         assert_eq!((node.pinned, node.chunked_by_cost), (is_unusual, is_unusual), "{}", node.name);
-        let ranges: Vec<_> = run.chunks_of(index).iter().map(|chunk| chunk.items.clone()).collect();
-        assert_eq!(ranges, if is_unusual { vec![0..2, 2..4, 4..5] } else { vec![0..1] }, "{}", node.name);
+        let chunks: Vec<_> = run.chunks_of(index).iter().map(|chunk| chunk.items.len()).collect();
+        assert_eq!(chunks, if is_unusual { vec![2, 2, 1] } else { vec![1] }, "{}", node.name);
     }
 }
