@@ -90,7 +90,7 @@ fn little_work_is_run_serially_after_a_trial() {
     on_one_worker.run(&SCHEDULERS[0], &()).expect("the node does not fail");
     assert_eq!(on_one_worker.run_mode(), None, "one worker has no choice");
 
-    let mut schedule = schedule();
+    let [mut schedule, mut successor] = [schedule(), schedule()];
     assert_eq!(schedule.run_mode(), None);
     schedule.run(&SCHEDULERS[1], &()).expect("the node does not fail");
     let first = schedule.run_mode().expect("there was a choice");
@@ -102,6 +102,10 @@ fn little_work_is_run_serially_after_a_trial() {
         serial_runs.set(if schedule.run_mode().is_some_and(is_serial) { serial_runs.get() + 1 } else { 0 });
         serial_runs.get() == 10
     });
+    successor.inherit_measurements(&schedule);
+    successor.run(&SCHEDULERS[1], &()).expect("the node does not fail");
+    let inherited = successor.run_mode().expect("there was a choice");
+    assert!(is_serial(inherited), "needs no trial: {inherited:?}");
 }
 
 #[test]
