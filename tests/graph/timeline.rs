@@ -437,10 +437,6 @@ fn any_capacity_is_accepted() {
     }
 }
 
-/// Separate from the schedulers of the other tests, because all runs of a scheduler are recorded.
-static RECORDED: LazyLock<[Scheduler; 3]> =
-    LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));
-
 #[test]
 fn a_boxed_node_is_run_as_the_node_in_the_box() {
     /// Differs from the defaults in everything.
@@ -485,3 +481,7 @@ fn a_boxed_node_is_run_as_the_node_in_the_box() {
         assert_eq!(chunks, if is_unusual { vec![2, 2, 1] } else { vec![1] }, "{}", node.name);
     }
 }
+
+/// Separate from the schedulers of the other tests, because all runs of a scheduler are recorded.
+static RECORDED: LazyLock<[Scheduler; 3]> =
+    LazyLock::new(|| [1, 2, 4].map(|workers| Scheduler::new(workers).expect("four threads can be started")));

@@ -201,7 +201,6 @@ impl Backend for WgpuBackend {
             .time_parallel(|| with_error_scope(&self.device, &pass.label, || catch_wgpu_panic(&pass.label, all)))
             .flatten()
             .flatten()
-            .map_err(|error| loss_or(&self.device, error))
             .inspect_err(|_| self.buffers.clear())
     }
 
@@ -320,7 +319,6 @@ impl Backend for WgpuBackend {
         // Not all may have been written.
         with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
             .flatten()
-            .map_err(|error| loss_or(&self.device, error))
             .inspect_err(|_| self.buffers.clear())
     }
 

@@ -81,7 +81,8 @@ pub(crate) fn poll(device: &wgpu::Device, poll: wgpu::PollType) -> Result<(), Ba
     }
 }
 
-fn refused(label: &str, message: String) -> BackendError {
+/// What wgpu refuses with this message.
+pub(crate) fn refused(label: &str, message: String) -> BackendError {
     // wgpu has no error type for a lost device, but all its messages about one contain these words.
     if message.contains("device is lost") {
         BackendError::DeviceLost { message }

@@ -7,7 +7,7 @@ use parking_lot::Mutex;
 
 use super::growing_buffer::GrowingBuffer;
 use crate::backend::BackendError;
-use crate::backend::wgpu::error_scope::{poll, with_error_scope};
+use crate::backend::wgpu::error_scope::{poll, refused, with_error_scope};
 
 /// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write straight into it while it is mapped, so
 /// nothing is staged, and nothing copied when the frame is submitted.
@@ -103,11 +103,7 @@ impl ObjectBuffer {
     pub(crate) fn mapped(&self, bytes: Range<usize>) -> Result<Option<wgpu::BufferViewMut>, BackendError> {
         let Some(buffer) = self.on_device.buffer().filter(|_| self.is_mapped()) else { return Ok(None) };
         let view = buffer.get_mapped_range_mut(bytes.start as u64..bytes.end as u64);
-        let refused = |error: wgpu::MapRangeError| BackendError::Validation {
-            label: self.label.to_owned(),
-            message: error.to_string(),
-        };
-        view.map(Some).map_err(refused)
+        view.map(Some).map_err(|error| refused(self.label, error.to_string()))
     }
 
     /// Gives the buffer to the device, before a submission that reads it.

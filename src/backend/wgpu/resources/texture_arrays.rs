@@ -77,6 +77,9 @@ impl TextureArrays {
             is_missing.then(|| (handle, revision, texture, array_for(texture)))
         };
         let missing: Vec<_> = assets.textures.iter_with_revision().filter_map(missing).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
         for index in 0..ARRAY_SIDES.len() {
             self.make_room(
                 device,
@@ -84,9 +87,6 @@ impl TextureArrays {
                 index,
                 missing.iter().filter(|(.., other)| *other == index).count(),
             );
-        }
-        if missing.is_empty() {
-            return Ok(());
         }
         let label = Some("new and changed textures");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });

@@ -2,7 +2,7 @@
 
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
-use crate::backend::wgpu::error_scope::loss_or;
+use crate::backend::wgpu::error_scope::{loss_or, refused};
 use crate::scene::Texture;
 
 /// A texture array of square layers with all mip levels.
@@ -155,10 +155,8 @@ pub(crate) fn copy_rows(
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
     {
-        let refused = |error: wgpu::MapRangeError| {
-            loss_or(device, BackendError::Validation { label: label.to_owned(), message: error.to_string() })
-        };
-        let mut view = buffer.get_mapped_range_mut(..).map_err(refused)?;
+        let view = buffer.get_mapped_range_mut(..);
+        let mut view = view.map_err(|error| loss_or(device, refused(label, error.to_string())))?;
         if stride == row_bytes {
             view.copy_from_slice(pixels);
         } else {
