@@ -17,28 +17,34 @@ pub trait Real: Float + NumAssign + Default + Debug + Send + Sync + 'static {
 }
 
 impl Real for f32 {
+    #[inline]
     fn of(value: f64) -> Self {
         value as Self
     }
 
+    #[inline]
     fn of_integer(value: i64) -> Self {
         value as Self
     }
 
+    #[inline]
     fn as_f64(self) -> f64 {
         f64::from(self)
     }
 }
 
 impl Real for f64 {
+    #[inline]
     fn of(value: f64) -> Self {
         value
     }
 
+    #[inline]
     fn of_integer(value: i64) -> Self {
         value as Self
     }
 
+    #[inline]
     fn as_f64(self) -> f64 {
         self
     }

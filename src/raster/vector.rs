@@ -1,6 +1,8 @@
 //! Vectors of any [`Real`], because glam's vectors are not generic.
+//!
+//! CPU shaders spend much of their time here. Where crates are built in several units and without link-time optimisation, as in a debug build
+//! with optimisations, only functions that are marked are inlined across units. The standard library's for arrays are not, so these loop.
 
-use std::array::from_fn;
 use std::ops::{Add, Index, IndexMut, Mul, Neg, Sub};
 
 use glam::{DQuat, DVec3, Vec3};
@@ -20,36 +22,49 @@ pub type Vector4<R> = Vector<R, 4>;
 
 impl<R: Real, const N: usize> Vector<R, N> {
     /// The zero vector.
+    #[inline]
     pub fn zero() -> Self {
         Self::splat(R::zero())
     }
 
     /// A vector whose components all equal `value`.
+    #[inline]
     pub fn splat(value: R) -> Self {
         Self([value; N])
     }
 
     /// Applies a function to each component.
-    pub fn map(self, change: impl FnMut(R) -> R) -> Self {
-        Self(self.0.map(change))
+    #[inline]
+    pub fn map(mut self, mut change: impl FnMut(R) -> R) -> Self {
+        for number in &mut self.0 {
+            *number = change(*number);
+        }
+        self
     }
 
     /// Combines two vectors component by component.
-    pub fn with(self, other: Self, mut join: impl FnMut(R, R) -> R) -> Self {
-        Self(from_fn(|axis| join(self.0[axis], other.0[axis])))
+    #[inline]
+    pub fn with(mut self, other: Self, mut join: impl FnMut(R, R) -> R) -> Self {
+        for axis in 0..N {
+            self.0[axis] = join(self.0[axis], other.0[axis]);
+        }
+        self
     }
 
     /// The dot product.
+    #[inline]
     pub fn dot(self, other: Self) -> R {
         (0..N).fold(R::zero(), |sum, axis| sum + self.0[axis] * other.0[axis])
     }
 
     /// The length.
+    #[inline]
     pub fn length(self) -> R {
         self.dot(self).sqrt()
     }
 
     /// The vector scaled to unit length; NaN for the zero vector.
+    #[inline]
     pub fn normalized(self) -> Self {
         self * (R::one() / self.length())
     }
@@ -57,11 +72,13 @@ impl<R: Real, const N: usize> Vector<R, N> {
 
 impl<R: Real> Vector3<R> {
     /// Creates a vector from its components.
+    #[inline]
     pub fn new(x: R, y: R, z: R) -> Self {
         Self([x, y, z])
     }
 
     /// The cross product.
+    #[inline]
     pub fn cross(self, other: Self) -> Self {
         let [a, b, c] = self.0;
         let [x, y, z] = other.0;
@@ -69,17 +86,20 @@ impl<R: Real> Vector3<R> {
     }
 
     /// Rounds a vector of f64.
+    #[inline]
     pub fn of(vector: DVec3) -> Self {
         Self(vector.to_array().map(R::of))
     }
 
     /// Converts a vector of f32.
+    #[inline]
     pub fn of_single(vector: Vec3) -> Self {
         Self::of(vector.as_dvec3())
     }
 }
 
 impl<R: Real, const N: usize> Default for Vector<R, N> {
+    #[inline]
     fn default() -> Self {
         Self::zero()
     }
@@ -88,6 +108,7 @@ impl<R: Real, const N: usize> Default for Vector<R, N> {
 impl<R: Real, const N: usize> Add for Vector<R, N> {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         self.with(other, |one, other| one + other)
     }
@@ -96,6 +117,7 @@ impl<R: Real, const N: usize> Add for Vector<R, N> {
 impl<R: Real, const N: usize> Sub for Vector<R, N> {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self.with(other, |one, other| one - other)
     }
@@ -104,6 +126,7 @@ impl<R: Real, const N: usize> Sub for Vector<R, N> {
 impl<R: Real, const N: usize> Mul for Vector<R, N> {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         self.with(other, |one, other| one * other)
     }
@@ -112,6 +135,7 @@ impl<R: Real, const N: usize> Mul for Vector<R, N> {
 impl<R: Real, const N: usize> Mul<R> for Vector<R, N> {
     type Output = Self;
 
+    #[inline]
     fn mul(self, factor: R) -> Self {
         self.map(|value| value * factor)
     }
@@ -120,6 +144,7 @@ impl<R: Real, const N: usize> Mul<R> for Vector<R, N> {
 impl<R: Real, const N: usize> Neg for Vector<R, N> {
     type Output = Self;
 
+    #[inline]
     fn neg(self) -> Self {
         self.map(|value| -value)
     }
@@ -128,12 +153,14 @@ impl<R: Real, const N: usize> Neg for Vector<R, N> {
 impl<R, const N: usize> Index<usize> for Vector<R, N> {
     type Output = R;
 
+    #[inline]
     fn index(&self, axis: usize) -> &R {
         &self.0[axis]
     }
 }
 
 impl<R, const N: usize> IndexMut<usize> for Vector<R, N> {
+    #[inline]
     fn index_mut(&mut self, axis: usize) -> &mut R {
         &mut self.0[axis]
     }
@@ -145,17 +172,20 @@ pub struct Quaternion<R>(pub [R; 4]);
 
 impl<R: Real> Quaternion<R> {
     /// Rounds a quaternion of f64.
+    #[inline]
     pub fn of(rotation: DQuat) -> Self {
         Self(rotation.to_array().map(R::of))
     }
 
     /// The inverse of a unit quaternion.
+    #[inline]
     pub fn inverse(self) -> Self {
         let [x, y, z, w] = self.0;
         Self([-x, -y, -z, w])
     }
 
     /// Rotates a vector; the quaternion must have unit length.
+    #[inline]
     pub fn rotate(self, vector: Vector3<R>) -> Vector3<R> {
         let [x, y, z, w] = self.0;
         let axis = Vector3::new(x, y, z);
