@@ -298,6 +298,7 @@ mod tests {
         fn executed_pieces_merge_and_their_bundles_are_apart_from_others(
             counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..900),
             own in 0_usize..600,
+            partial in prop::collection::btree_set(0_u32..1_500, 0..6),
             merges in any::<bool>(),
         ) {
             let mut list = DrawList::default();
@@ -340,7 +341,51 @@ mod tests {
                 slots.sort_unstable();
                 slots.dedup();
                 prop_assert_eq!(slots.len(), ranges.len());
+                for &batch in partial.range(..list.batches.len() as u32) {
+                    list.make_partial(batch, |indices| indices.extend([batch, 8, 9]));
+                }
+                for (bundle, mut batches) in ranges.into_iter().enumerate() {
+                    let is_whole = !batches.any(|batch| partial.contains(&(batch as u32)));
+                    prop_assert_eq!(list.bundle_is_whole(bundle), is_whole);
+                }
             }
+            let executed = list.batches[..list.pieces().batch_count()].to_vec();
+            list.execute_pieces(Version { frame: 2, index: 0 }, std::iter::empty(), |_| merges);
+            prop_assert_eq!(list.batches, executed, "a version has one content");
+        }
+    }
+    #[test]
+    fn lists_are_equal_if_they_draw_the_same() {
+        let command = |object| RenderCommand { object, ..RenderCommand::EMPTY };
+        let batch = |count| Batch { mesh: 0, state: DrawState::PLAIN, first: 0, count };
+        let list = |object: u32, of_pieces: u32, corner: u32, partial: u32, commands: [u32; 2]| {
+            let mut list = DrawList::default();
+            list.set_piece_objects(Version { frame: 1, index: 0 }, &vec![1; of_pieces as usize]);
+            list.objects.extend(vec![1; 2 - of_pieces as usize]);
+            list.objects.push(object);
+            list.batches.push(batch(2));
+            list.batches.push(batch(1));
+            list.make_partial(partial, |indices| indices.push(corner));
+            list.commands.push(commands.map(command).to_vec());
+            list.bucket_count = 1;
+            list
+        };
+        let one = list(4, 0, 0, 0, [1, 2]);
+        let mut same = one.clone();
+        same.set_version(Version { frame: 3, index: 0 });
+        same.commands.push(vec![command(7)]);
+        assert_eq!(same, one);
+        let mut other_batches = one.clone();
+        other_batches.batches[1] = batch(3);
+        for other in [
+            other_batches,
+            list(5, 0, 0, 0, [1, 2]),
+            list(4, 1, 0, 0, [1, 2]),
+            list(4, 0, 1, 0, [1, 2]),
+            list(4, 0, 0, 1, [1, 2]),
+            list(4, 0, 0, 0, [1, 3]),
+        ] {
+            assert_ne!(other, one);
         }
     }
 }

@@ -129,6 +129,7 @@ mod tests {
                     let state = DrawState::new(topology, cull, blend);
                     assert_eq!((state.topology(), state.cull(), state.blend()), (topology, cull, blend));
                     assert!(state.index() < DrawState::COUNT);
+                    assert_eq!(DrawState::from_bits(state.bits()), Some(state));
                     let subdivided = state.with_subdivision_level(9);
                     assert_eq!(
                         (state.subdivision_level(), subdivided.subdivision_level()),
@@ -148,5 +149,10 @@ mod tests {
                 }
             }
         }
+    }
+    #[test]
+    fn no_state_has_more_bits_than_all_fields_together() {
+        assert!(DrawState::from_bits(DrawState::COUNT as u16 - 1).is_some());
+        assert_eq!(DrawState::from_bits(DrawState::COUNT as u16), None);
     }
 }

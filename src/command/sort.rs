@@ -73,3 +73,37 @@ fn collect(commands: &ChunkedArray<RenderCommand>, count: usize, range: KeyRange
         output.extend_from_slice(&selected[..selected_count]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::command::DrawState;
+
+    proptest! {
+        /// Where keys differ in all of their bits, no index fits beside them. Whole blocks may be empty.
+        #[test]
+        fn commands_are_sorted_by_key_and_then_by_object(
+            keys in prop::collection::vec(prop::option::weighted(0.9, 0..u64::MAX), 0..2 * RADIX_SORT_THRESHOLD),
+            differing in prop_oneof![Just(u64::MAX), Just(0), Just(0xf0_0000_000f), any::<u64>()],
+            empty_block in 0_usize..6,
+        ) {
+            const BLOCK_SIZE: usize = ChunkedArray::<RenderCommand>::BLOCK_SIZE;
+            let mut commands = ChunkedArray::new();
+            commands.grow(keys.len(), RenderCommand::EMPTY);
+            let mut expected = Vec::new();
+            for (object, key) in keys.iter().enumerate().filter(|(object, _)| object / BLOCK_SIZE != empty_block) {
+                let Some(key) = key else { continue };
+                let key = SortKey::from_bits(key & differing);
+                let command = RenderCommand { key, object: object as u32, mesh: 1, material: 2, state: DrawState::PLAIN };
+                commands.write(object / BLOCK_SIZE)[object % BLOCK_SIZE] = command;
+                expected.push(command);
+            }
+            expected.sort_by_key(|command| command.key);
+            let mut sorted = vec![RenderCommand::EMPTY; 3];
+            sort(&commands, keys.len(), KeyRange::ALL, &mut SortScratch::default(), &mut sorted);
+            prop_assert!(sorted == expected);
+        }
+    }
+}

@@ -123,6 +123,7 @@ mod tests {
             let state = DrawState::from_bits(bits & !0b1_1000).unwrap();
             prop_assert_eq!(SortKey::opaque(state, mesh, depth).state_and_mesh(), Some((state, mesh)));
             prop_assert_eq!(SortKey::blended(depth).state_and_mesh(), None);
+            prop_assert_eq!(SortKey::ordered(depth).state_and_mesh(), None);
             prop_assert_eq!(SortKey::LAST.state_and_mesh(), None);
         }
     }

@@ -6,7 +6,7 @@ use drawloom::handle::Handle;
 use drawloom::scene::{Assets, Changes, Mesh, SceneRef};
 use drawloom::view::ObjectTable;
 use drawloom_testing::changing_world::ChangingWorld;
-use drawloom_testing::scenes::field;
+use drawloom_testing::scenes::{cube, field};
 use proptest::prelude::*;
 
 /// The first object of each run, and the one after its last.
@@ -102,6 +102,30 @@ fn scenes_of_several_assets_use_their_own_meshes() {
             assert_eq!(used_meshes(&table, scene.assets()).len(), expected);
         }
         assert!(used_meshes(&table, two.assets()).is_empty());
+    }
+}
+
+#[test]
+fn bins_that_objects_had_are_given_up() {
+    let mut scene = field(3);
+    let mut table = ObjectTable::default();
+    let of_field = scene.as_scene_ref().meshes.to_vec();
+    let meshes: Vec<_> = (0..100).map(|_| scene.add(cube()).unwrap()).collect();
+    let drawn_in_turn: Vec<_> = meshes.iter().map(|mesh| [*mesh, of_field[1], of_field[2]]).collect();
+    for meshes in &drawn_in_turn {
+        draw(&mut table, &SceneRef { meshes, changes: Changes::Objects(&[0]), ..scene.as_scene_ref() });
+    }
+    assert_eq!(table.bins().len(), 102);
+
+    meshes[..99].iter().for_each(|mesh| drop(scene.remove(*mesh).unwrap()));
+    let last = SceneRef { meshes: &drawn_in_turn[99], changes: Changes::NONE, ..scene.as_scene_ref() };
+    draw(&mut table, &last);
+    assert_eq!(table.bins().len(), 3);
+    let mut new = ObjectTable::default();
+    draw(&mut new, &last);
+    let bin = |table: &ObjectTable, object: usize| table.bins().get(table.block(0).bins[object]);
+    for object in 0..3 {
+        assert_eq!(bin(&table, object), bin(&new, object));
     }
 }
 
