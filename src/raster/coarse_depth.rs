@@ -294,6 +294,41 @@ mod tests {
     }
 
     #[test]
+    fn nothing_outside_the_picture_is_covered() {
+        let mut silhouettes = Silhouettes::default();
+        silhouettes.add(rectangle([-20.0; 2], [90.0; 2]), 0.0, [[0.0, 0.0, 0.5]], [f64::INFINITY; 2]);
+        let depth = drawn([64, 48], 8, &silhouettes);
+        assert_eq!(depth.nearness_at(63.9, 47.9), 0.5);
+        for (x, y) in [(-1.0, 9.0), (9.0, -1.0), (64.0, 9.0), (9.0, 48.0), (f64::NAN, 9.0), (9.0, f64::NAN)] {
+            assert_eq!(depth.nearness_at(x, y), 0.0, "{x} {y}");
+        }
+        assert!(!drawn([0, 0], 8, &silhouettes).hides([-9.0; 2], [9.0; 2], 0.1));
+    }
+
+    #[test]
+    fn a_tile_is_as_near_as_the_farthest_of_its_corners_and_open_if_one_is_too_near() {
+        let [right, down, offset] = [0.004, -0.007, 0.6];
+        for opening_nearness in [f64::INFINITY, 0.62] {
+            let mut silhouettes = Silhouettes::default();
+            let corners = rectangle([-20.0; 2], [90.0; 2]);
+            silhouettes.add(corners, 0.0, [[right, down, offset]], [opening_nearness, f64::INFINITY]);
+            let depth = drawn([64, 48], 8, &silhouettes);
+            let mut open = 0;
+            for (row, column) in (0..6).flat_map(|row| (0..8).map(move |column| (row, column))) {
+                let [left, top] = [column, row].map(|tile| f64::from(tile) * 8.0);
+                let nearnesses = rectangle([left, top], [left + 8.0, top + 8.0])
+                    .map(|corner| right * corner.x + down * corner.y + offset);
+                let is_open = nearnesses.iter().any(|nearness| *nearness >= opening_nearness);
+                open += usize::from(is_open);
+                let expected = if is_open { 0.0 } else { nearnesses.into_iter().fold(1.0, f64::min) };
+                let found = f64::from(depth.nearness_at(left + 4.0, top + 4.0));
+                assert!((found - expected).abs() < 1e-6, "{found} at {left} {top}, not {expected}");
+            }
+            assert_eq!(open > 0, opening_nearness.is_finite());
+        }
+    }
+
+    #[test]
     fn a_margin_shrinks_a_silhouette() {
         let count = |margin: f64| {
             let mut silhouettes = Silhouettes::default();
@@ -342,6 +377,8 @@ mod tests {
         assert_eq!(silhouettes.len(), 0);
         silhouettes.add(rectangle([0.0; 2], [9.0; 2]), 0.0, plane, [1.0; 2]);
         assert_eq!(silhouettes.len(), 1);
+        silhouettes.add([DVec2::ZERO, DVec2::X, DVec2::Y], 0.0, plane, [1.0; 2]);
+        assert_eq!(silhouettes.len(), 2);
     }
 
     proptest! {

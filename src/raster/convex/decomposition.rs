@@ -73,12 +73,50 @@ mod tests {
             let [part] = parts.as_slice() else { panic!("{} parts after {turns} turns", parts.len()) };
             assert!(part.is_closed && part.faces.len() == 6 && part.points.len() == 8, "{part:?}");
             assert!(part.slack < 1e-4 && (turns > 0 || part.slack == 0.0), "{}", part.slack);
+            let mut lengths: Vec<_> = part
+                .edges
+                .iter()
+                .map(|edge| edge.map(|corner| part.points[corner as usize]))
+                .map(|[from, to]| (from.distance(to) * 10.0).round() / 10.0)
+                .collect();
+            lengths.sort_by(f64::total_cmp);
+            assert_eq!(lengths, [[0.4; 4], [6.0; 4], [80.0; 4]].concat());
             for face in &part.faces {
                 assert!(
                     part.points.iter().all(|&point| face.signed_distance(point) <= part.slack),
                     "after {turns} turns"
                 );
             }
+        }
+    }
+
+    /// The corners and the triangles of a wedge of length 5, turned and moved so that its corners are rounded.
+    fn wedge(half_thickness: f32) -> (Vec<Vec3>, [[u32; 3]; 8]) {
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+        let profile = [[0.0, 0.0], [5.0, -half_thickness], [5.0, half_thickness]];
+        let corners = [-1.0, 1.0].into_iter().flat_map(|z| profile.map(|[x, y]| Vec3::new(x, y, z)));
+        let points = corners.map(|corner| turn * corner + Vec3::new(7.0, -3.0, 1.0)).collect();
+        (points, [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
+    }
+
+    #[test]
+    fn the_slack_of_a_wedge_grows_with_its_sharpness() {
+        for degrees in [8.0_f32, 30.0, 55.0] {
+            let half_angle = (degrees / 2.0).to_radians();
+            let (points, triangles) = wedge(5.0 * half_angle.tan());
+            let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+            let [part] = parts.as_slice() else { panic!("{} parts at {degrees} degrees", parts.len()) };
+            assert!(part.is_closed && part.faces.len() == 5, "{part:?}");
+            // The distance of each face from its own corners; other corners are much farther away.
+            let deviation = part
+                .faces
+                .iter()
+                .flat_map(|face| part.points.iter().map(|&point| face.signed_distance(point).abs()))
+                .filter(|distance| *distance < 1e-3)
+                .fold(0.0, f64::max);
+            // Where two planes that are off by δ meet at this angle, their edge is off by δ ÷ sin(angle ÷ 2).
+            let expected = deviation / f64::from(half_angle).sin();
+            assert!(deviation > 0.0 && (part.slack / expected - 1.0).abs() < 1e-4, "{} {expected}", part.slack);
         }
     }
 
@@ -113,6 +151,112 @@ mod tests {
         let parts = ConvexPart::decompose(&mesh(&points, &triangles));
         let areas: Vec<_> = parts.iter().map(|part| part.area).collect();
         assert_eq!(areas, [96.0, 24.0]);
+    }
+
+    #[test]
+    fn a_wedge_so_sharp_that_nothing_bounds_its_outline_is_not_a_body() {
+        let (points, triangles) = wedge(0.0003);
+        let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+        assert!(!parts.is_empty() && parts.iter().all(|part| !part.is_closed));
+        // Without any deviation, the sharpest of all edges do no harm: a triangle with two sides.
+        let [a, b, c] = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let parts = ConvexPart::decompose(&mesh(&[a, b, c], &[[0, 1, 2], [0, 2, 1]]));
+        let [part] = parts.as_slice() else { panic!("{} parts", parts.len()) };
+        assert!(part.is_closed && part.slack == 0.0, "{part:?}");
+    }
+
+    /// A regular polygon of radius 1 with this many corners, at a height.
+    fn ring(corners: u32, height: f32) -> impl Iterator<Item = Vec3> {
+        (0..corners).map(move |corner| {
+            let (sine, cosine) = (corner as f32 / corners as f32 * std::f32::consts::TAU).sin_cos();
+            Vec3::new(cosine, sine, height)
+        })
+    }
+
+    #[test]
+    fn limits_are_the_most_that_is_decomposed() {
+        // Without a corner in the middle.
+        let fan = |corners: u32| (2..corners).map(|corner| [0, corner - 1, corner]);
+        for (corners, is_closed) in
+            [(ConvexPart::MAX_FACES as u32 - 2, true), (ConvexPart::MAX_FACES as u32 - 1, false)]
+        {
+            let points: Vec<_> = ring(corners, -1.0).chain(ring(corners, 1.0)).collect();
+            let mut triangles: Vec<_> = fan(corners).map(|[a, b, c]| [a, c, b]).collect();
+            triangles.extend(fan(corners).map(|triangle| triangle.map(|corner| corner + corners)));
+            for (one, other) in (0..corners).map(|corner| (corner, (corner + 1) % corners)) {
+                triangles.extend([[one, other, other + corners], [one, other + corners, one + corners]]);
+            }
+            let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+            assert_eq!(parts.len() == 1, is_closed, "a prism of {corners} corners");
+            assert!(parts.iter().all(|part| part.is_closed == is_closed), "a prism of {corners} corners");
+        }
+        for corners in [ConvexPart::MAX_CORNERS as u32, ConvexPart::MAX_CORNERS as u32 + 1] {
+            let parts = ConvexPart::decompose(&mesh(
+                &ring(corners, 0.0).collect::<Vec<_>>(),
+                &fan(corners).collect::<Vec<_>>(),
+            ));
+            let most = parts.iter().map(|part| part.points.len()).max();
+            assert_eq!(most, Some(ConvexPart::MAX_CORNERS), "a polygon of {corners} corners");
+        }
+        let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        for (count, is_decomposed) in [(ConvexPart::MAX_TRIANGLES, true), (ConvexPart::MAX_TRIANGLES + 1, false)] {
+            let parts = ConvexPart::decompose(&mesh(&points, &vec![[0, 1, 2]; count]));
+            assert_eq!(!parts.is_empty(), is_decomposed, "{count} triangles");
+        }
+    }
+
+    #[test]
+    fn triangles_around_points_are_one_polygon() {
+        let outline_of = |points: &[Vec3], triangles: &[[u32; 3]]| {
+            let parts = ConvexPart::decompose(&mesh(points, triangles));
+            let [part] = parts.as_slice() else { panic!("{} parts", parts.len()) };
+            let count = part.points.len() as u32;
+            let expected: Vec<_> =
+                (0..count).map(|corner| [corner, if corner + 1 < count { corner + 1 } else { 0 }]).collect();
+            assert_eq!(part.edges, expected);
+            (count, part.area)
+        };
+        // Fans around a point in the middle.
+        let square = [
+            Vec3::ZERO,
+            Vec3::new(-1.0, -1.0, 0.0),
+            Vec3::new(1.0, -1.0, 0.0),
+            Vec3::ONE.with_z(0.0),
+            Vec3::new(-1.0, 1.0, 0.0),
+        ];
+        assert_eq!(outline_of(&square, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]), (4, 4.0));
+        let fan: Vec<_> = (0..12).map(|corner| [12, corner, (corner + 1) % 12]).collect();
+        let (corners, area) = outline_of(&ring(12, 0.0).chain([Vec3::ZERO]).collect::<Vec<_>>(), &fan);
+        assert!(corners == 12 && (area - 3.0).abs() < 1e-6, "{corners} {area}");
+        // A grid of four times two rectangles has three corners inside, one after the other. The edges between columns are the longer
+        // ones, so each row is a polygon before both are one.
+        let points: Vec<_> = (0..15).map(|index| Vec3::new((index % 5) as f32, (index / 5 * 2) as f32, 0.0)).collect();
+        let rectangles = (0..8).map(|rectangle| rectangle / 4 * 5 + rectangle % 4);
+        let triangles: Vec<_> = rectangles.flat_map(|at| [[at, at + 1, at + 6], [at, at + 6, at + 5]]).collect();
+        assert_eq!(outline_of(&points, &triangles), (12, 16.0));
+        // Corners that differ in the sign of 0.
+        let points = [
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::new(1.0, 1.0, -0.0),
+            Vec3::new(-0.0, 0.0, -0.0),
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::Y,
+        ];
+        assert_eq!(outline_of(&points, &[[0, 1, 2], [3, 4, 5]]), (4, 1.0));
+    }
+
+    #[test]
+    fn the_slack_of_a_polygon_is_twice_the_deviation_from_its_plane() {
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+        let (points, triangles) = box_of(Vec3::new(3.0, 0.2, 40.0));
+        let points: Vec<_> = points.into_iter().map(|point| turn * point + Vec3::new(7.0, -3.0, 1.0)).collect();
+        let parts = ConvexPart::decompose(&mesh(&points, &triangles[..10]));
+        let deviation = |part: &ConvexPart| {
+            part.points.iter().map(|&point| part.faces[0].signed_distance(point).abs()).fold(0.0, f64::max)
+        };
+        assert!(parts.iter().all(|part| part.slack >= 2.0 * deviation(part)));
+        assert!(parts.iter().any(|part| deviation(part) > 0.0));
     }
 
     /// The parts of an L of six triangles on a grid cover it exactly once.

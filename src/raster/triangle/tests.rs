@@ -181,10 +181,36 @@ fn derivatives_towards_pixels_behind_the_camera_are_0() {
 
 #[test]
 fn the_far_edge_of_a_triangle_that_begins_at_the_camera_has_its_varyings() {
-    let corner = |point, w| (corner_at::<f32, 0>(point, [0.5, w]).0, [7.0]);
+    // Along that edge, 1 ÷ w is 0, and the second varying grows by 1 from pixel to pixel.
+    let corner = |point, w, varying| (corner_at::<f32, 0>(point, [0.5, w]).0, [7.0, varying]);
     let far = f64::from(2_f32.powi(100));
-    let triangles = set_up(&[corner([128, 128], far), corner([4224, 128], far), corner([128, 2176], 1.0 / far)], None);
-    assert_eq!(triangles[0].interpolate([5, 0]).value, [7.0]);
+    let corners =
+        [corner([128, 128], far, 0.0), corner([4224, 128], far, 16.0), corner([128, 2176], 1.0 / far, 1000.0)];
+    for corners in [corners, [corners[2], corners[0], corners[1]], [corners[1], corners[2], corners[0]]] {
+        let [constant, varying] = set_up(&corners, None)[0].interpolate([5, 0]).value;
+        assert!(constant == 7.0 && (varying - 5.0).abs() < 1e-5, "{constant} {varying}");
+    }
+}
+
+#[test]
+fn an_edge_is_clipped_between_numbers_whose_difference_overflows() {
+    let corner = |z: f32, varying: f32| (Vector([0.0, 0.0, z, 1.0]), [varying]);
+    let polygon = clip::clip(&[corner(0.5, f32::MAX), corner(2.5, -f32::MAX), corner(0.5, f32::MAX)]);
+    let shares: Vec<f32> = polygon.iter().map(|(_, [varying])| varying / f32::MAX).collect();
+    let expected: [f32; 4] = [1.0, 0.5, 0.5, 1.0];
+    assert_eq!(shares.len(), expected.len());
+    assert!(shares.iter().zip(expected).all(|(share, expected)| (share - expected).abs() < 1e-6), "{shares:?}");
+}
+
+#[test]
+fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
+    let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, 0.5, 1.0_f32]), []));
+    for (width, count) in [(MAX_PICTURE_SIZE, 1), (MAX_PICTURE_SIZE + 1, 0)] {
+        let mut triangles = Vec::new();
+        Triangle::set_up(&corners, [width, 4], None, &mut triangles);
+        assert_eq!(triangles.len(), count);
+        assert!(triangles.iter().all(|triangle| triangle.bounds() == PixelBounds::of_picture([width, 4])));
+    }
 }
 
 #[test]
