@@ -150,6 +150,7 @@ mod tests {
             }
         }
     }
+
     #[test]
     fn no_state_has_more_bits_than_all_fields_together() {
         assert!(DrawState::from_bits(DrawState::COUNT as u16 - 1).is_some());

@@ -81,6 +81,19 @@ mod tests {
     use super::*;
     use crate::command::DrawState;
 
+    #[test]
+    fn keys_that_differ_in_all_bits_are_compared() {
+        let mut commands = ChunkedArray::new();
+        commands.grow(2, RenderCommand::EMPTY);
+        let keys = [0xaaaa_aaaa_aaaa_aaaa, 0x5555_5555_5555_5555].map(SortKey::from_bits);
+        for (object, key) in keys.into_iter().enumerate() {
+            commands.write(0)[object] = RenderCommand { key, object: object as u32, ..RenderCommand::EMPTY };
+        }
+        let mut sorted = Vec::new();
+        sort(&commands, 2, KeyRange::ALL, &mut SortScratch::default(), &mut sorted);
+        assert_eq!(sorted.iter().map(|command| command.object).collect::<Vec<_>>(), [1, 0]);
+    }
+
     proptest! {
         /// Where keys differ in all of their bits, no index fits beside them. Whole blocks may be empty.
         #[test]

@@ -307,11 +307,14 @@ mod tests {
 
     #[test]
     fn a_tile_is_as_near_as_the_farthest_of_its_corners_and_open_if_one_is_too_near() {
-        let [right, down, offset] = [0.004, -0.007, 0.6];
-        for opening_nearness in [f64::INFINITY, 0.62] {
+        let [right, down, offset] = [-0.004, -0.007, 0.9];
+        // In two parts, one covers some cells of a tile and the other one the others.
+        for (opening_nearness, split) in [(f64::INFINITY, 90.0), (0.63, 90.0), (f64::INFINITY, 36.0)] {
             let mut silhouettes = Silhouettes::default();
-            let corners = rectangle([-20.0; 2], [90.0; 2]);
-            silhouettes.add(corners, 0.0, [[right, down, offset]], [opening_nearness, f64::INFINITY]);
+            for [from, to] in [[-20.0, split], [split, 90.0]] {
+                let corners = rectangle([from, -20.0], [to, 90.0]);
+                silhouettes.add(corners, 0.0, [[right, down, offset]], [opening_nearness, f64::INFINITY]);
+            }
             let depth = drawn([64, 48], 8, &silhouettes);
             let mut open = 0;
             for (row, column) in (0..6).flat_map(|row| (0..8).map(move |column| (row, column))) {
@@ -351,9 +354,9 @@ mod tests {
         };
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)]), 0.4);
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.4), ([8.0, 17.0], 0.5)]), 0.4);
-        // A cell of four pixels that neither covers, and one that both cover.
+        // A cell of four pixels that neither covers, and two that both cover.
         assert_eq!(nearness_of(&[([-1.0, 7.9], 0.5), ([7.9, 17.0], 0.4)]), 0.0);
-        assert_eq!(nearness_of(&[([-1.0, 9.0], 0.5), ([7.0, 17.0], 0.4)]), 0.4);
+        assert_eq!(nearness_of(&[([-1.0, 12.0], 0.5), ([4.0, 17.0], 0.4)]), 0.4);
         // In front of a silhouette that covers the tile, and behind it.
         let whole = ([-1.0, 17.0], 0.45);
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), whole, ([8.0, 17.0], 0.4)]), 0.45);
@@ -361,6 +364,16 @@ mod tests {
         // Nearer silhouettes after the tile is covered.
         let halves = [([-1.0, 8.0], 0.3), ([8.0, 17.0], 0.2), ([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)];
         assert_eq!(nearness_of(&halves), 0.4);
+    }
+
+    #[test]
+    fn a_plane_counts_only_in_the_rows_of_cells_that_it_covers() {
+        let mut silhouettes = Silhouettes::default();
+        for ([top, bottom], plane) in [([-1.0, 8.0], [0.0, -0.05, 0.9]), ([8.0, 17.0], [0.0, 0.0, 0.6])] {
+            silhouettes.add(rectangle([-1.0, top], [17.0, bottom]), 0.0, [plane], [f64::INFINITY; 2]);
+        }
+        let nearness = drawn([16, 16], 16, &silhouettes).nearness_at(8.0, 8.0);
+        assert!((nearness - 0.5).abs() < 1e-6, "{nearness}");
     }
 
     #[test]

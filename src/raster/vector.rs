@@ -209,8 +209,9 @@ mod tests {
             let (ours_a, ours_b) = (Vector3::<f64>::of(a), Vector3::<f64>::of(b));
             prop_assert_eq!(ours_a.cross(ours_b), Vector3::of(a.cross(b)));
             prop_assert!((ours_a.dot(ours_b) - a.dot(b)).abs() < 1e-12);
-            prop_assume!(a.length() > 1e-3);
-            prop_assert!((ours_a.normalized() - Vector3::of(a.normalize())).length() < 1e-12);
+            if a.length() > 1e-3 {
+                prop_assert!((ours_a.normalized() - Vector3::of(a.normalize())).length() < 1e-12);
+            }
             let rotation = DQuat::from_scaled_axis(a);
             let turned = Quaternion::<f64>::of(rotation).rotate(ours_b);
             prop_assert!((turned - Vector3::of(rotation * b)).length() < 1e-12);

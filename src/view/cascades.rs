@@ -98,7 +98,103 @@ fn enclosing_sphere((one, one_radius): (DVec3, f64), (other, other_radius): (DVe
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::view::frustum::tests::any_camera;
+
+    /// The corners of what a camera sees at a distance, on either side of the picture's middle, along its own axes and from its own
+    /// position.
+    fn corners(camera: &Camera, along: f64) -> [DVec3; 4] {
+        let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
+        let [half_width, half_height] = match camera.projection {
+            Projection::Perspective { field_of_view } => {
+                let half = along * (f64::from(field_of_view) / 2.0).tan();
+                // A shift of up to a pixel does not count.
+                let shift = [0, 1].map(|pair| f64::from(camera.shift[pair].abs()) - 2.0 / f64::from(camera.size[pair]));
+                [half * aspect * (1.0 + shift[0].max(0.0)), half * (1.0 + shift[1].max(0.0))]
+            }
+            Projection::Orthographic { height } => [f64::from(height) / 2.0 * aspect, f64::from(height) / 2.0],
+            Projection::Paraboloid => unreachable!("it has no corners"),
+        };
+        [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+            .map(|[x, y]| DVec3::new(x * half_width, y * half_height, -along))
+    }
+
+    proptest! {
+        #[test]
+        fn the_sphere_of_a_slice_is_the_smallest_around_its_corners(
+            camera in any_camera(),
+            begin in 0.0..50.0_f64,
+            depth in prop_oneof![0.01..1.0_f64, 1.0..100.0_f64],
+        ) {
+            let end = begin + depth;
+            let (center, radius) = recorded_slice_sphere(&camera, [begin, end]);
+            let aside = center - camera.position;
+            // The aspect ratio and the orientation are in f32.
+            let rounding = 1e-6 * (radius + end) + 1e-12 * camera.position.length();
+            if camera.projection == Projection::Paraboloid {
+                prop_assert_eq!((aside, radius), (DVec3::ZERO, end));
+            } else {
+                let rotation = camera.orientation.normalize().as_dquat();
+                let [near, far] = [begin, end].map(|along| {
+                    let corners = corners(&camera, along);
+                    corners.map(|corner| (rotation * corner).distance(aside)).into_iter().fold(0.0, f64::max)
+                });
+                let along = aside.dot(rotation * DVec3::NEG_Z);
+                prop_assert!((aside.length() - along).abs() < rounding, "{} along the axis", along);
+                // The smallest one has its centre where both ends are equally far away, or at the far end if the near one is within it.
+                prop_assert!((far - radius).abs() < rounding && near < radius + rounding, "{} {} of {}", near, far, radius);
+                prop_assert!(
+                    (near - radius).abs() < rounding || (along - end).abs() < rounding,
+                    "{} of {} at {}", near, radius, along,
+                );
+            }
+        }
+
+        #[test]
+        fn the_sphere_of_two_cameras_is_the_smallest_around_what_both_see(
+            positions in prop::array::uniform2(prop::array::uniform3(-9.0..9.0_f64)),
+            reaches in prop::array::uniform2(0.1..30.0_f32),
+        ) {
+            let camera = |(position, far): ([f64; 3], f32)| Camera {
+                projection: Projection::Paraboloid,
+                far,
+                ..Camera::looking_at("main", DVec3::from(position), DVec3::ZERO)
+            };
+            let cameras = [camera((positions[0], reaches[0])), camera((positions[1], reaches[1]))];
+            let (center, radius) = visible_sphere(&cameras, |camera| [0.0, f64::from(camera.far)]).unwrap();
+            let reaches = reaches.map(f64::from);
+            for (camera, reach) in cameras.iter().zip(reaches) {
+                prop_assert!(center.distance(camera.position) + reach <= radius * (1.0 + 1e-12));
+            }
+            let apart = (cameras[0].position.distance(cameras[1].position) + reaches[0] + reaches[1]) / 2.0;
+            prop_assert!(radius <= apart.max(reaches[0]).max(reaches[1]) * (1.0 + 1e-12));
+        }
+
+        #[test]
+        fn the_last_cascade_ends_where_the_map_does(
+            near in 1e-3..10.0_f32, depth in 0.1..1e4_f32, lambda in 0.0..1.0_f32, count in 1_u32..9,
+        ) {
+            let far = near + depth;
+            prop_assert_eq!(cascade_slice([near, far], lambda, count - 1, count)[1], f64::from(far));
+        }
+    }
+
+    #[test]
+    fn no_sphere_is_around_what_has_no_end_or_ends_before_it_begins() {
+        let perspective = Camera::looking_at("main", DVec3::ZERO, DVec3::X);
+        let paraboloid = Camera { projection: Projection::Paraboloid, ..perspective.clone() };
+        for camera in [perspective, paraboloid] {
+            let sphere = |slice: [f64; 2]| visible_sphere(std::slice::from_ref(&camera), |_| slice);
+            assert!(sphere([1.0, 2.0]).is_some());
+            for slice in [[0.0, f64::INFINITY], [2.0, 1.0], [-2.0, -1.0], [0.0, 0.0], [f64::NAN, 1.0], [0.0, f64::NAN]]
+            {
+                assert_eq!(sphere(slice), None, "{slice:?}");
+            }
+        }
+        assert_eq!(visible_sphere(&[], |_| [1.0, 2.0]), None);
+    }
 
     /// The ends of four cascades from 0.5 m to 40 m.
     fn ends(lambda: f32) -> Vec<f64> {

@@ -235,6 +235,14 @@ mod tests {
             if spheres.iter().any(is_beyond) {
                 prop_assert!(frustum.may_end_before(&bounds, 2));
             }
+            // The box around them, moved to the camera.
+            let centers = spheres.iter().map(|(center, _)| *center - camera.position);
+            let (low, high) = centers.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), center| (low.min(center), high.max(center)));
+            let farthest = (low * forward).max(high * forward).element_sum();
+            let radius = spheres.iter().map(|(_, radius)| f64::from(*radius)).fold(0.0, f64::max);
+            if farthest + 1e-5 * (low.abs().max(high.abs()).element_sum() + radius) < f64::from(camera.far) * (1.0 - 1e-5) {
+                prop_assert!(!frustum.may_end_before(&bounds, 2));
+            }
         }
 
         #[test]
@@ -281,6 +289,31 @@ mod tests {
             Overlap::Outside => prop_assert_eq!(found.intersecting, 0),
             Overlap::Inside => prop_assert_eq!((found.intersecting, found.inside & valid), (valid, valid)),
             Overlap::Partial => {}
+        }
+        // More than twice the margin outside or inside, the box around the centres suffices.
+        let valid: Vec<_> = (0..Frustum::WORD)
+            .map(|entry| table.get(Frustum::WORD + entry))
+            .filter(|sphere| sphere.radius >= 0.0)
+            .collect();
+        let (low, high) = valid.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), sphere| {
+            let center = sphere.center - camera.position;
+            (low.min(center), high.max(center))
+        });
+        let radius = valid.iter().map(|sphere| f64::from(sphere.radius)).fold(0.0, f64::max);
+        let norm = low.abs().max(high.abs()).element_sum();
+        let finite = frustum.planes.iter().filter(|(_, offset)| offset.is_finite());
+        let distances = finite.map(|&(normal, offset)| {
+            let normal = DVec3::from(normal);
+            let margin = 2e-5 * (norm + radius + offset.abs()) + 1e-30;
+            let [nearest, farthest] =
+                [(low * normal).min(high * normal), (low * normal).max(high * normal)].map(DVec3::element_sum);
+            (nearest + offset - margin, farthest + offset + margin)
+        });
+        let distances: Vec<_> = distances.collect();
+        if !valid.is_empty() && distances.iter().any(|(_, farthest)| *farthest < -radius) {
+            prop_assert_eq!(overlap, Overlap::Outside);
+        } else if !valid.is_empty() && distances.iter().all(|(nearest, _)| *nearest > radius) {
+            prop_assert_eq!(overlap, Overlap::Inside);
         }
         Ok(())
     }

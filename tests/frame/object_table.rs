@@ -106,7 +106,7 @@ fn scenes_of_several_assets_use_their_own_meshes() {
 }
 
 #[test]
-fn bins_that_objects_had_are_given_up() {
+fn bins_without_objects_are_given_up() {
     let mut scene = field(3);
     let mut table = ObjectTable::default();
     let of_field = scene.as_scene_ref().meshes.to_vec();

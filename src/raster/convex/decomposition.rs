@@ -55,6 +55,12 @@ mod tests {
         Mesh::new("shape", Topology::TriangleList, vertices, triangles.iter().flatten().copied().collect()).unwrap()
     }
 
+    /// Points turned around an axis, and moved: their coordinates are rounded.
+    fn turned(points: Vec<Vec3>, angle: f32) -> Vec<Vec3> {
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), angle);
+        points.into_iter().map(|point| turn * point + Vec3::new(7.0, -3.0, 1.0)).collect()
+    }
+
     /// The corners and the outward-facing triangles of a box.
     fn box_of(half: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let sign = |corner: u32, axis: u32| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
@@ -66,10 +72,8 @@ mod tests {
     #[test]
     fn a_box_in_any_orientation_is_one_body_with_six_faces() {
         for turns in 0..20 {
-            let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), turns as f32 * 0.7);
             let (points, triangles) = box_of(Vec3::new(3.0, 0.2, 40.0));
-            let points: Vec<_> = points.into_iter().map(|point| turn * point + Vec3::new(7.0, -3.0, 1.0)).collect();
-            let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+            let parts = ConvexPart::decompose(&mesh(&turned(points, turns as f32 * 0.7), &triangles));
             let [part] = parts.as_slice() else { panic!("{} parts after {turns} turns", parts.len()) };
             assert!(part.is_closed && part.faces.len() == 6 && part.points.len() == 8, "{part:?}");
             assert!(part.slack < 1e-4 && (turns > 0 || part.slack == 0.0), "{}", part.slack);
@@ -90,12 +94,11 @@ mod tests {
         }
     }
 
-    /// The corners and the triangles of a wedge of length 5, turned and moved so that its corners are rounded.
+    /// The corners and the triangles of a wedge of length 5, turned.
     fn wedge(half_thickness: f32) -> (Vec<Vec3>, [[u32; 3]; 8]) {
-        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
         let profile = [[0.0, 0.0], [5.0, -half_thickness], [5.0, half_thickness]];
         let corners = [-1.0, 1.0].into_iter().flat_map(|z| profile.map(|[x, y]| Vec3::new(x, y, z)));
-        let points = corners.map(|corner| turn * corner + Vec3::new(7.0, -3.0, 1.0)).collect();
+        let points = turned(corners.collect(), 0.7);
         (points, [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
     }
 
@@ -174,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_the_most_that_is_decomposed() {
+    fn meshes_at_a_limit_are_decomposed_and_those_beyond_it_are_not() {
         // Without a corner in the middle.
         let fan = |corners: u32| (2..corners).map(|corner| [0, corner - 1, corner]);
         for (corners, is_closed) in
@@ -187,6 +190,7 @@ mod tests {
                 triangles.extend([[one, other, other + corners], [one, other + corners, one + corners]]);
             }
             let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+            assert!(!parts.is_empty());
             assert_eq!(parts.len() == 1, is_closed, "a prism of {corners} corners");
             assert!(parts.iter().all(|part| part.is_closed == is_closed), "a prism of {corners} corners");
         }
@@ -205,36 +209,18 @@ mod tests {
         }
     }
 
+    /// The number of corners, and the area, of the only part of a surface.
+    fn only_part(points: &[Vec3], triangles: &[[u32; 3]]) -> (u32, f64) {
+        let parts = ConvexPart::decompose(&mesh(points, triangles));
+        let [part] = parts.as_slice() else { panic!("{} parts", parts.len()) };
+        let count = part.points.len() as u32;
+        let next = |corner: u32| if corner + 1 < count { corner + 1 } else { 0 };
+        assert_eq!(part.edges, (0..count).map(|corner| [corner, next(corner)]).collect::<Vec<_>>());
+        (count, part.area)
+    }
+
     #[test]
-    fn triangles_around_points_are_one_polygon() {
-        let outline_of = |points: &[Vec3], triangles: &[[u32; 3]]| {
-            let parts = ConvexPart::decompose(&mesh(points, triangles));
-            let [part] = parts.as_slice() else { panic!("{} parts", parts.len()) };
-            let count = part.points.len() as u32;
-            let expected: Vec<_> =
-                (0..count).map(|corner| [corner, if corner + 1 < count { corner + 1 } else { 0 }]).collect();
-            assert_eq!(part.edges, expected);
-            (count, part.area)
-        };
-        // Fans around a point in the middle.
-        let square = [
-            Vec3::ZERO,
-            Vec3::new(-1.0, -1.0, 0.0),
-            Vec3::new(1.0, -1.0, 0.0),
-            Vec3::ONE.with_z(0.0),
-            Vec3::new(-1.0, 1.0, 0.0),
-        ];
-        assert_eq!(outline_of(&square, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]), (4, 4.0));
-        let fan: Vec<_> = (0..12).map(|corner| [12, corner, (corner + 1) % 12]).collect();
-        let (corners, area) = outline_of(&ring(12, 0.0).chain([Vec3::ZERO]).collect::<Vec<_>>(), &fan);
-        assert!(corners == 12 && (area - 3.0).abs() < 1e-6, "{corners} {area}");
-        // A grid of four times two rectangles has three corners inside, one after the other. The edges between columns are the longer
-        // ones, so each row is a polygon before both are one.
-        let points: Vec<_> = (0..15).map(|index| Vec3::new((index % 5) as f32, (index / 5 * 2) as f32, 0.0)).collect();
-        let rectangles = (0..8).map(|rectangle| rectangle / 4 * 5 + rectangle % 4);
-        let triangles: Vec<_> = rectangles.flat_map(|at| [[at, at + 1, at + 6], [at, at + 6, at + 5]]).collect();
-        assert_eq!(outline_of(&points, &triangles), (12, 16.0));
-        // Corners that differ in the sign of 0.
+    fn corners_that_differ_in_the_sign_of_0_are_one() {
         let points = [
             Vec3::ZERO,
             Vec3::X,
@@ -243,20 +229,41 @@ mod tests {
             Vec3::new(1.0, 1.0, 0.0),
             Vec3::Y,
         ];
-        assert_eq!(outline_of(&points, &[[0, 1, 2], [3, 4, 5]]), (4, 1.0));
+        assert_eq!(only_part(&points, &[[0, 1, 2], [3, 4, 5]]), (4, 1.0));
     }
 
     #[test]
-    fn the_slack_of_a_polygon_is_twice_the_deviation_from_its_plane() {
-        let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+    fn a_polygon_with_corners_inside_is_one_part() {
+        // Fans around a point in the middle.
+        let square = [
+            Vec3::ZERO,
+            Vec3::new(-1.0, -1.0, 0.0),
+            Vec3::new(1.0, -1.0, 0.0),
+            Vec3::ONE.with_z(0.0),
+            Vec3::new(-1.0, 1.0, 0.0),
+        ];
+        assert_eq!(only_part(&square, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]), (4, 4.0));
+        let fan: Vec<_> = (0..12).map(|corner| [12, corner, (corner + 1) % 12]).collect();
+        let (corners, area) = only_part(&ring(12, 0.0).chain([Vec3::ZERO]).collect::<Vec<_>>(), &fan);
+        assert!(corners == 12 && (area - 3.0).abs() < 1e-6, "{corners} {area}");
+        // A grid of four times two rectangles has three corners inside, one after the other. The edges between columns are the longer
+        // ones, so each row is a polygon before both are one.
+        let points: Vec<_> = (0..15).map(|index| Vec3::new((index % 5) as f32, (index / 5 * 2) as f32, 0.0)).collect();
+        let rectangles = (0..8).map(|rectangle| rectangle / 4 * 5 + rectangle % 4);
+        let triangles: Vec<_> = rectangles.flat_map(|at| [[at, at + 1, at + 6], [at, at + 6, at + 5]]).collect();
+        assert_eq!(only_part(&points, &triangles), (12, 16.0));
+    }
+
+    #[test]
+    fn the_slack_of_a_polygon_is_at_least_twice_the_deviation_from_its_plane() {
         let (points, triangles) = box_of(Vec3::new(3.0, 0.2, 40.0));
-        let points: Vec<_> = points.into_iter().map(|point| turn * point + Vec3::new(7.0, -3.0, 1.0)).collect();
-        let parts = ConvexPart::decompose(&mesh(&points, &triangles[..10]));
+        let parts = ConvexPart::decompose(&mesh(&turned(points, 0.7), &triangles[..10]));
         let deviation = |part: &ConvexPart| {
             part.points.iter().map(|&point| part.faces[0].signed_distance(point).abs()).fold(0.0, f64::max)
         };
         assert!(parts.iter().all(|part| part.slack >= 2.0 * deviation(part)));
         assert!(parts.iter().any(|part| deviation(part) > 0.0));
+        assert!(parts.iter().all(|part| part.slack < 1e-4));
     }
 
     /// The parts of an L of six triangles on a grid cover it exactly once.

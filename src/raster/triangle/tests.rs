@@ -203,6 +203,16 @@ fn an_edge_is_clipped_between_numbers_whose_difference_overflows() {
 }
 
 #[test]
+fn triangles_in_the_near_and_the_far_plane_are_drawn() {
+    for z in [0.0, 1.0] {
+        let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, z, 1.0_f32]), []));
+        let drawn = draw(&corners, None);
+        assert_eq!(drawn.len(), PICTURE[0] * PICTURE[1]);
+        assert!(drawn.values().all(|depth| *depth == z));
+    }
+}
+
+#[test]
 fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
     let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, 0.5, 1.0_f32]), []));
     for (width, count) in [(MAX_PICTURE_SIZE, 1), (MAX_PICTURE_SIZE + 1, 0)] {
@@ -210,6 +220,40 @@ fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
         Triangle::set_up(&corners, [width, 4], None, &mut triangles);
         assert_eq!(triangles.len(), count);
         assert!(triangles.iter().all(|triangle| triangle.bounds() == PixelBounds::of_picture([width, 4])));
+    }
+}
+
+#[test]
+fn an_edge_is_clipped_from_the_corner_that_is_nearer_to_the_plane() {
+    let corner = |z: f32, varying: f32| (Vector([0.0, 0.0, z, 1.0]), [varying]);
+    let polygon = clip::clip(&[corner(0.0, 3.0), corner(1e30, 1e30), corner(0.0, 3.0)]);
+    let varyings: Vec<f32> = polygon.iter().map(|(_, [varying])| *varying).collect();
+    assert_eq!(varyings, [3.0, 4.0, 4.0, 3.0]);
+}
+
+/// In the largest picture, coordinates are limited just beyond the guard band.
+#[test]
+fn an_edge_to_a_corner_beyond_the_guard_band_keeps_its_direction() {
+    let picture = [MAX_PICTURE_SIZE; 2];
+    let half = MAX_PICTURE_SIZE as f64 / 2.0;
+    for [x, y] in [[200.0, 50.0], [-200.0, 50.0], [50.0, 200.0], [50.0, -200.0]] {
+        let corner = |x: f64, y: f64| (Vector([x, y, 0.5, 1.0]), []);
+        let mut triangles: Vec<Triangle<f64, 0>> = Vec::new();
+        // The edge from the middle of the picture; the third corner is to its left.
+        Triangle::set_up(&[corner(0.0, 0.0), corner(x, y), corner(-y * 0.2, x * 0.2)], picture, None, &mut triangles);
+        let is_covered = |x: f64, y: f64| {
+            let [left, top] = [half + x * half, half - y * half].map(|pixels| pixels as usize);
+            let pixel = PixelBounds { left, top, right: left + 1, bottom: top + 1 };
+            let mut count = 0;
+            triangles.iter().for_each(|triangle| triangle.rasterize(pixel, |_, _| count += 1));
+            count == 1
+        };
+        let aside = [-y, x].map(|coordinate| coordinate / x.hypot(y) * 5.0 / half);
+        for share in [0.001, 0.002, 0.004] {
+            let on_edge = [x * share, y * share];
+            assert!(is_covered(on_edge[0] + aside[0], on_edge[1] + aside[1]), "{x} {y} {share}");
+            assert!(!is_covered(on_edge[0] - aside[0], on_edge[1] - aside[1]), "{x} {y} {share}");
+        }
     }
 }
 

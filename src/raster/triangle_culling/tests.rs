@@ -48,6 +48,45 @@ proptest! {
     }
 }
 
+/// A corner is outside a plane only by more than a 4096th of |x| + |y| + |z| + |w|, whichever of them is the largest.
+#[test]
+fn a_triangle_is_off_screen_if_it_is_outside_by_more_than_the_tolerance() {
+    // The axis of each plane, and the sign with which a corner's distance from it is w − sign × coordinate. Where the sign is 0, it is the far
+    // plane, and the distance is z.
+    for (axis, sign) in [(2, 1.0), (2, 0.0), (0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
+        let others = [0, 1, 2].into_iter().filter(|other| *other != axis);
+        for largest in others.chain([3]) {
+            for (share, is_culled) in [(0.9, false), (1.1, true)] {
+                let w = if largest == 3 { 1000.0 } else { 1.0 };
+                let other = if largest == 3 { 0.0 } else { 1000.0 };
+                // How far outside: `share` of the tolerance, of whose magnitudes it is a part.
+                let magnitudes = w + other + if sign == 0.0 { 0.0 } else { w };
+                let outside = share * magnitudes / (4096.0 - share);
+                // Spread along another axis, so that no other plane has all three outside.
+                let (aside, along) = if largest == 3 { ((axis + 1) % 3, 1.0) } else { (largest, other) };
+                let corners = [along, -along, along / 2.0].map(|coordinate| {
+                    let mut corner = [0.0, 0.0, 0.0, w];
+                    corner[aside] = coordinate;
+                    corner[axis] = if sign == 0.0 { -outside } else { sign * (w + outside) };
+                    Vector(corner)
+                });
+                let (_, counts) = cull(&corners, &[[0, 1, 2]], None);
+                assert_eq!(counts.off_screen == 1, is_culled, "axis {axis}, sign {sign}, largest {largest}, {share}");
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_add_up_by_reason() {
+    let one = CulledTriangles { triangles: 50, degenerate: 1, off_screen: 2, back_facing: 3, zero_size: 4 };
+    let mut sum = CulledTriangles { triangles: 70, degenerate: 5, off_screen: 6, back_facing: 7, zero_size: 8 };
+    sum += one;
+    let expected = CulledTriangles { triangles: 120, degenerate: 6, off_screen: 8, back_facing: 10, zero_size: 12 };
+    assert_eq!(sum, expected);
+    assert_eq!((sum.culled(), sum.share()), (36, 0.3));
+}
+
 /// The expected result tries all ways to move the corners by a step along each axis, in i128.
 #[test]
 fn no_sliver_that_a_device_may_draw_is_culled() {
