@@ -235,12 +235,12 @@ mod tests {
             if spheres.iter().any(is_beyond) {
                 prop_assert!(frustum.may_end_before(&bounds, 2));
             }
-            // The box around them, moved to the camera.
-            let centers = spheres.iter().map(|(center, _)| *center - camera.position);
-            let (low, high) = centers.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), center| (low.min(center), high.max(center)));
-            let farthest = (low * forward).max(high * forward).element_sum();
+            let relative_box = relative_box(spheres.iter().map(|(center, _)| *center), &camera);
+            let [_, farthest] = extent_along(relative_box, forward);
             let radius = spheres.iter().map(|(_, radius)| f64::from(*radius)).fold(0.0, f64::max);
-            if farthest + 1e-5 * (low.abs().max(high.abs()).element_sum() + radius) < f64::from(camera.far) * (1.0 - 1e-5) {
+            let tolerance = 2.0 * f64::from(ROUNDING_TOLERANCE);
+            // A box clearly before the far plane has nothing beyond it.
+            if farthest + 4.0 * tolerance * (norm(relative_box) + radius) < f64::from(camera.far) * (1.0 - tolerance) {
                 prop_assert!(!frustum.may_end_before(&bounds, 2));
             }
         }
@@ -256,6 +256,23 @@ mod tests {
         ) {
             check(&camera, place, distance, extent, radius, &spheres)?;
         }
+    }
+
+    /// The corners of a box around some points, relative to a camera.
+    fn relative_box(points: impl Iterator<Item = DVec3>, camera: &Camera) -> [DVec3; 2] {
+        points
+            .map(|point| point - camera.position)
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], point| [low.min(point), high.max(point)])
+    }
+
+    /// The least and the greatest coordinate of a box along an axis.
+    fn extent_along([low, high]: [DVec3; 2], axis: DVec3) -> [f64; 2] {
+        [(low * axis).min(high * axis), (low * axis).max(high * axis)].map(DVec3::element_sum)
+    }
+
+    /// The largest ‖p‖₁ of the points in a box.
+    fn norm([low, high]: [DVec3; 2]) -> f64 {
+        low.abs().max(high.abs()).element_sum()
     }
 
     fn check(
@@ -291,28 +308,23 @@ mod tests {
             Overlap::Partial => {}
         }
         // More than twice the margin outside or inside, the box around the centres suffices.
-        let valid: Vec<_> = (0..Frustum::WORD)
+        let filled: Vec<_> = (0..Frustum::WORD)
             .map(|entry| table.get(Frustum::WORD + entry))
             .filter(|sphere| sphere.radius >= 0.0)
             .collect();
-        let (low, high) = valid.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), sphere| {
-            let center = sphere.center - camera.position;
-            (low.min(center), high.max(center))
-        });
-        let radius = valid.iter().map(|sphere| f64::from(sphere.radius)).fold(0.0, f64::max);
-        let norm = low.abs().max(high.abs()).element_sum();
+        let relative_box = relative_box(filled.iter().map(|sphere| sphere.center), camera);
+        let radius = filled.iter().map(|sphere| f64::from(sphere.radius)).fold(0.0, f64::max);
         let finite = frustum.planes.iter().filter(|(_, offset)| offset.is_finite());
         let distances = finite.map(|&(normal, offset)| {
-            let normal = DVec3::from(normal);
-            let margin = 2e-5 * (norm + radius + offset.abs()) + 1e-30;
-            let [nearest, farthest] =
-                [(low * normal).min(high * normal), (low * normal).max(high * normal)].map(DVec3::element_sum);
-            (nearest + offset - margin, farthest + offset + margin)
+            let margin =
+                2.0 * f64::from(ROUNDING_TOLERANCE) * (4.0 * (norm(relative_box) + radius) + 0.25 * offset.abs());
+            let [nearest, farthest] = extent_along(relative_box, DVec3::from(normal));
+            (nearest + offset - margin - 1e-37, farthest + offset + margin + 1e-37)
         });
         let distances: Vec<_> = distances.collect();
-        if !valid.is_empty() && distances.iter().any(|(_, farthest)| *farthest < -radius) {
+        if !filled.is_empty() && distances.iter().any(|(_, farthest)| *farthest < -radius) {
             prop_assert_eq!(overlap, Overlap::Outside);
-        } else if !valid.is_empty() && distances.iter().all(|(nearest, _)| *nearest > radius) {
+        } else if !filled.is_empty() && distances.iter().all(|(nearest, _)| *nearest > radius) {
             prop_assert_eq!(overlap, Overlap::Inside);
         }
         Ok(())
