@@ -296,9 +296,9 @@ mod tests {
         /// Batches of pieces, then others, against a plain list of what is drawn.
         #[test]
         fn executed_pieces_merge_and_their_bundles_are_apart_from_others(
-            counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..900),
-            own in 0_usize..600,
-            partial in prop::collection::btree_set(0_u32..1_500, 0..6),
+            counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..1_800),
+            own in 0_usize..1_100,
+            partial in prop::collection::btree_set(0_u32..2_000, 0..6),
             merges in any::<bool>(),
         ) {
             let mut list = DrawList::default();
