@@ -27,7 +27,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::chunked_array::ChunkedArray;
+    use crate::command::sort::tests::blocks_of;
     use crate::command::splitters::KeyRange;
     use crate::command::{Cull, DrawList, DrawState, SortKey, SortScratch, sort};
     use crate::scene::{Blend, Topology};
@@ -56,11 +56,7 @@ mod tests {
                 .zip(commands)
                 .map(|(object, command)| command.map_or(RenderCommand::EMPTY, |command| RenderCommand { object, ..command }))
                 .collect();
-            let mut slots = ChunkedArray::new();
-            slots.grow(commands.len(), RenderCommand::EMPTY);
-            for (index, &command) in commands.iter().enumerate() {
-                slots.write(index / 256)[index % 256] = command;
-            }
+            let slots = blocks_of(&commands);
             let mut starts: Vec<_> = cuts.iter().flatten().map(|command| command.key).collect();
             starts.sort();
             let edges: Vec<_> = [SortKey::FIRST].into_iter().chain(starts).chain([SortKey::LAST]).collect();

@@ -75,20 +75,26 @@ fn collect(commands: &ChunkedArray<RenderCommand>, count: usize, range: KeyRange
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use proptest::prelude::*;
 
     use super::*;
     use crate::command::DrawState;
 
+    /// Commands in the blocks in which [`sort`] reads them.
+    pub(in crate::command) fn blocks_of(commands: &[RenderCommand]) -> ChunkedArray<RenderCommand> {
+        let mut blocks = ChunkedArray::new();
+        blocks.grow(commands.len(), RenderCommand::EMPTY);
+        for (index, commands) in commands.chunks(ChunkedArray::<RenderCommand>::BLOCK_SIZE).enumerate() {
+            blocks.write(index)[..commands.len()].copy_from_slice(commands);
+        }
+        blocks
+    }
+
     #[test]
     fn keys_that_differ_in_all_bits_are_compared() {
-        let mut commands = ChunkedArray::new();
-        commands.grow(2, RenderCommand::EMPTY);
-        let keys = [0xaaaa_aaaa_aaaa_aaaa, 0x5555_5555_5555_5555].map(SortKey::from_bits);
-        for (object, key) in keys.into_iter().enumerate() {
-            commands.write(0)[object] = RenderCommand { key, object: object as u32, ..RenderCommand::EMPTY };
-        }
+        let command = |(object, bits)| RenderCommand { key: SortKey::from_bits(bits), object, ..RenderCommand::EMPTY };
+        let commands = blocks_of(&[(0, 0xaaaa_aaaa_aaaa_aaaa), (1, 0x5555_5555_5555_5555)].map(command));
         let mut sorted = Vec::new();
         sort(&commands, 2, KeyRange::ALL, &mut SortScratch::default(), &mut sorted);
         assert_eq!(sorted.iter().map(|command| command.object).collect::<Vec<_>>(), [1, 0]);
@@ -102,20 +108,22 @@ mod tests {
             differing in prop_oneof![Just(u64::MAX), Just(0), Just(0xf0_0000_000f), any::<u64>()],
             empty_block in 0_usize..6,
         ) {
-            const BLOCK_SIZE: usize = ChunkedArray::<RenderCommand>::BLOCK_SIZE;
-            let mut commands = ChunkedArray::new();
-            commands.grow(keys.len(), RenderCommand::EMPTY);
-            let mut expected = Vec::new();
-            for (object, key) in keys.iter().enumerate().filter(|(object, _)| object / BLOCK_SIZE != empty_block) {
-                let Some(key) = key else { continue };
-                let key = SortKey::from_bits(key & differing);
-                let command = RenderCommand { key, object: object as u32, mesh: 1, material: 2, state: DrawState::PLAIN };
-                commands.write(object / BLOCK_SIZE)[object % BLOCK_SIZE] = command;
-                expected.push(command);
-            }
+            let command = |(object, key): (usize, &Option<u64>)| match key {
+                Some(key) if object / ChunkedArray::<RenderCommand>::BLOCK_SIZE != empty_block => RenderCommand {
+                    key: SortKey::from_bits(key & differing),
+                    object: object as u32,
+                    mesh: 1,
+                    material: 2,
+                    state: DrawState::PLAIN,
+                },
+                _ => RenderCommand::EMPTY,
+            };
+            let commands: Vec<_> = keys.iter().enumerate().map(command).collect();
+            let mut expected = commands.clone();
+            expected.retain(|command| *command != RenderCommand::EMPTY);
             expected.sort_by_key(|command| command.key);
             let mut sorted = vec![RenderCommand::EMPTY; 3];
-            sort(&commands, keys.len(), KeyRange::ALL, &mut SortScratch::default(), &mut sorted);
+            sort(&blocks_of(&commands), keys.len(), KeyRange::ALL, &mut SortScratch::default(), &mut sorted);
             prop_assert!(sorted == expected);
         }
     }

@@ -109,23 +109,21 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::command::sort::tests::blocks_of;
     use crate::command::{DrawState, SortScratch, sort};
 
     fn commands_of(depths: &[f32]) -> ChunkedArray<RenderCommand> {
-        let mut commands = ChunkedArray::new();
-        commands.grow(depths.len(), RenderCommand::EMPTY);
-        for (index, &depth) in depths.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-            let key = SortKey::opaque(DrawState::PLAIN, index as u32 % 3, depth.to_bits() << 1);
-            commands.write(index / ChunkedArray::<RenderCommand>::BLOCK_SIZE)
-                [index % ChunkedArray::<RenderCommand>::BLOCK_SIZE] = RenderCommand {
-                key,
-                object: index as u32,
-                mesh: index as u32 % 3,
+        let command = |(index, &depth): (usize, &f32)| match index as u32 {
+            object if depth > 0.0 => RenderCommand {
+                key: SortKey::opaque(DrawState::PLAIN, object % 3, depth.to_bits() << 1),
+                object,
+                mesh: object % 3,
                 material: 0,
                 state: DrawState::PLAIN,
-            };
-        }
-        commands
+            },
+            _ => RenderCommand::EMPTY,
+        };
+        blocks_of(&depths.iter().enumerate().map(command).collect::<Vec<_>>())
     }
 
     #[test]

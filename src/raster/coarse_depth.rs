@@ -354,8 +354,9 @@ mod tests {
         };
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.5), ([8.0, 17.0], 0.4)]), 0.4);
         assert_eq!(nearness_of(&[([-1.0, 8.0], 0.4), ([8.0, 17.0], 0.5)]), 0.4);
-        // A cell of four pixels that neither covers, and two that both cover.
+        // A cell of four pixels that neither covers, parts of cells that both cover, and two cells that both cover.
         assert_eq!(nearness_of(&[([-1.0, 7.9], 0.5), ([7.9, 17.0], 0.4)]), 0.0);
+        assert_eq!(nearness_of(&[([-1.0, 9.0], 0.5), ([7.0, 17.0], 0.4)]), 0.4);
         assert_eq!(nearness_of(&[([-1.0, 12.0], 0.5), ([4.0, 17.0], 0.4)]), 0.4);
         // In front of a silhouette that covers the tile, and behind it.
         let whole = ([-1.0, 17.0], 0.45);

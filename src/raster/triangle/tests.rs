@@ -205,8 +205,7 @@ fn an_edge_is_clipped_between_numbers_whose_difference_overflows() {
 #[test]
 fn triangles_in_the_near_and_the_far_plane_are_drawn() {
     for z in [0.0, 1.0] {
-        let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, z, 1.0_f32]), []));
-        let drawn = draw(&corners, None);
+        let drawn = draw(&around_the_picture(z), None);
         assert_eq!(drawn.len(), PICTURE[0] * PICTURE[1]);
         assert!(drawn.values().all(|depth| *depth == z));
     }
@@ -214,10 +213,9 @@ fn triangles_in_the_near_and_the_far_plane_are_drawn() {
 
 #[test]
 fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
-    let corners = [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, 0.5, 1.0_f32]), []));
     for (width, count) in [(MAX_PICTURE_SIZE, 1), (MAX_PICTURE_SIZE + 1, 0)] {
         let mut triangles = Vec::new();
-        Triangle::set_up(&corners, [width, 4], None, &mut triangles);
+        Triangle::set_up(&around_the_picture(0.5), [width, 4], None, &mut triangles);
         assert_eq!(triangles.len(), count);
         assert!(triangles.iter().all(|triangle| triangle.bounds() == PixelBounds::of_picture([width, 4])));
     }
@@ -274,6 +272,11 @@ fn a_floor_that_begins_far_behind_the_camera_covers_all_below_the_horizon() {
     let horizon = PICTURE[1] / 2;
     let expected: [usize; PICTURE[1]] = from_fn(|row| if row < horizon { 0 } else { PICTURE[0] });
     assert_eq!(rows, expected);
+}
+
+/// The corners of a triangle around all of the picture.
+fn around_the_picture(z: f32) -> [ClipCorner<f32, 0>; 3] {
+    [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| (Vector([x, y, z, 1.0]), []))
 }
 
 fn check_any<R: Real>(numbers: [R; 12], picture: [usize; 2]) {
