@@ -174,6 +174,9 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
         table.configure(volume);
         table.update(&scene_ref);
         assert_eq!(table.block(0).visible(&frustum, volume, 0..3), visible, "{volume:?}");
+        let mut words = Vec::new();
+        table.block(0).visible_words(&frustum, volume, 0..2, |word, mask| words.push((word, mask)));
+        assert_eq!(words, [(0, visible), (1, 0)], "{volume:?}");
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }
     Ok(())

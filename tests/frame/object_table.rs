@@ -17,6 +17,16 @@ fn runs(table: &ObjectTable, epoch: u64, gap: usize) -> Vec<(usize, usize)> {
 }
 
 #[test]
+fn a_table_has_as_many_objects_as_the_latest_scene() {
+    let mut table = ObjectTable::default();
+    assert!(table.is_empty());
+    for objects in [603, 1, 0] {
+        table.update(&field(objects).as_scene_ref());
+        assert_eq!((table.len(), table.is_empty()), (objects, objects == 0));
+    }
+}
+
+#[test]
 fn neighbours_that_changed_are_one_run() {
     let scene = field(603);
     let mut table = ObjectTable::default();

@@ -21,7 +21,15 @@ use drawloom_testing::scenes::cube;
 use proptest::prelude::*;
 
 fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    renderer_of(Deferred::to_picture(), quality, workers)
+}
+
+fn renderer_of(
+    deferred: Deferred,
+    quality: Quality,
+    workers: usize,
+) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let builder = Renderer::builder(NullBackend).deferred(deferred).quality(quality);
     builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
 }
 
@@ -261,6 +269,34 @@ fn a_view_executes_the_pieces_that_it_sees_and_that_its_filter_shows_as_a_whole(
     rows.scene.cameras[0] = Camera { far: 200.0, ..Camera::looking_at("main", DVec3::Z * 200.0, DVec3::X * 60.0) };
     let (pieces, visible) = views(&mut rows)[0];
     assert!(pieces == 0 && (1..ROWS * IN_ROW).contains(&visible), "{pieces} {visible}");
+}
+
+#[test]
+fn shares_of_materials_draw_each_object_of_a_piece_once() {
+    const SHARES: u32 = 3;
+    let mut rows = Rows::new();
+    rows.renderer = renderer_of(Deferred::to_picture().geometry_shares(SHARES), Quality::balanced(), 2).0;
+    let materials: Vec<_> = (0..SHARES).map(|_| rows.scene.add(Material::default()).unwrap()).collect();
+    let objects: Vec<_> = rows.scene.objects().collect();
+    for (object, material) in objects.into_iter().zip(materials.into_iter().cycle()) {
+        let now = RenderObject { material, ..rows.scene.object(object).unwrap() };
+        rows.scene.replace_object(object, now).unwrap();
+    }
+    rows.frame(Changes::Unknown);
+    rows.settle();
+    let recorded = rows.renderer.record(SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() }).unwrap();
+    let of_shares: Vec<_> = drawn(&rows.renderer, recorded.statistics())
+        .into_iter()
+        .filter(|(process, ..)| process.starts_with("geometry buffer"))
+        .map(|(.., objects)| objects.into_iter().map(|(object, ..)| object as usize).collect::<Vec<_>>())
+        .collect();
+    assert_eq!(of_shares.len(), SHARES as usize);
+    let mut together: Vec<_> = of_shares.iter().flatten().copied().collect();
+    together.sort_unstable();
+    assert_eq!(together, (0..ROWS * IN_ROW).collect::<Vec<_>>());
+    for objects in of_shares {
+        assert!(objects.iter().all(|object| object % SHARES as usize == objects[0]), "{objects:?}");
+    }
 }
 
 #[test]

@@ -130,6 +130,18 @@ fn an_object_that_crosses_the_near_plane_is_never_hidden_and_hides_only_beyond_t
     assert_eq!(walls.hidden(), [3, 4]);
 }
 
+/// The camera looks along a wall that begins behind it. Rounding may turn the face beside it into one that is seen from behind, or the other
+/// way round, if it is nearer than 256 times the wall's position error, here some 0.02 m.
+#[test]
+fn a_clipped_wall_that_is_seen_almost_edge_on_hides_nothing() {
+    for (gap, expected) in [(0.1, &[2][..]), (0.019, &[])] {
+        let mut walls = WallScene::new();
+        walls.add(DVec3::new(-3.0 - gap, 0.0, -40.0), Vec3::new(3.0, 9.0, 50.0));
+        walls.add(DVec3::new(-4.0, 7.0, -95.0), Vec3::splat(0.3));
+        assert_eq!(walls.hidden(), expected, "{gap} m beside the camera");
+    }
+}
+
 #[test]
 fn blended_and_moved_objects_do_not_hide_but_are_hidden() {
     let mut walls = WallScene::new();

@@ -339,6 +339,10 @@ mod tests {
             let min = occlusion_camera.min_nearness(exact.z + placement.slack);
             let max = occlusion_camera.max_nearness(depth);
             prop_assert!((min..=max).contains(&nearness), "{min} {nearness} {max}");
+            // The bounds are no wider than they must be.
+            let from_slack = if occlusion_camera.is_perspective() { max / depth } else { 1.0 / f64::from(camera.far - camera.near) };
+            let width = 2.0 * (DEPTH_ERROR * max.max(1.0) + placement.slack * from_slack);
+            prop_assert!(max - min <= width * 1.001, "{min} {max}, {width} apart");
         }
 
         #[test]
@@ -348,7 +352,9 @@ mod tests {
             scale in prop::array::uniform3(-3.0..3.0_f32),
             turn in prop::array::uniform4(-1.0..1.0_f32),
             offset in prop::array::uniform3(-50.0..50.0_f64),
+            near in -1.0..3.0_f32,
         ) {
+            let camera = Camera { near: 10_f32.powf(near), ..camera };
             let [a, b, c, inside] = corners.map(DVec3::from);
             let normal = (b - a).cross(c - a);
             let orientation = Quat::from_array(turn);
@@ -366,12 +372,17 @@ mod tests {
             prop_assert!(points.iter().all(|&point| placed.signed_distance(point).abs() < 1e-5));
             prop_assert!(placed.signed_distance(placement.transform_point(inside)) < 0.0);
             // If the camera is in front of the face, its plane has the corners' nearness at the corners.
-            if let Some([right, down, offset]) = occlusion_camera.nearness_plane(&placed, f64::INFINITY) {
-                for point in points.into_iter().filter(|point| point.z > 1.0 && placed.offset < -1.0) {
+            let eye = if occlusion_camera.is_perspective() { DVec3::ZERO } else { points[0] - DVec3::Z };
+            let plane = occlusion_camera.nearness_plane(&placed, f64::INFINITY);
+            prop_assert_eq!(plane.is_some(), placed.signed_distance(eye) > 0.0);
+            let is_edge_on = placed.signed_distance(eye) < if occlusion_camera.is_perspective() { 1.0 } else { 0.01 };
+            if let Some([right, down, offset]) = plane.filter(|_| !is_edge_on) {
+                for point in points.into_iter().filter(|point| point.z > 1.0) {
                     let pixel = occlusion_camera.project(point);
                     let found = right * pixel.x + down * pixel.y + offset;
                     let expected = occlusion_camera.min_nearness(point.z);
-                    prop_assert!((found - expected).abs() <= 1e-4 * occlusion_camera.max_nearness(point.z).abs(), "{found} {expected}");
+                    let tolerance = 1e-6 * occlusion_camera.max_nearness(point.z).abs().max(1e-3);
+                    prop_assert!((found - expected).abs() <= tolerance, "{found} {expected}");
                 }
             }
         }
