@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-/// Ear clipping takes cubic time in the worst case, so it is limited to polygons of this many corners.
+/// Ear clipping takes quadratic time, and cubic in the worst case, so it is limited to polygons of this many corners.
 const MAX_EAR_CLIPPING_CORNERS: usize = 256;
 
 /// A polygon with less area than this share of that of its largest part is one whose parts cancel each other.
@@ -112,35 +112,51 @@ fn angle(from: DVec2, one: DVec2, other: DVec2) -> f64 {
 
 /// Ear clipping: removes corners whose triangle is inside the polygon, until three are left. Returns false if it finds none.
 fn clip_ears(flat: &[DVec2], ring: &mut Vec<usize>, triangles: &mut Vec<[usize; 3]>) -> bool {
-    while ring.len() > 3 {
+    let triangle_at = |ring: &[usize], index: usize| {
         let count = ring.len();
-        let triangle_at = |index: usize| [ring[(index + count - 1) % count], ring[index], ring[(index + 1) % count]];
+        [ring[(index + count - 1) % count], ring[index], ring[(index + 1) % count]]
+    };
+    let mut obstacles: Vec<_> = (0..ring.len()).map(|index| obstacle(flat, ring, triangle_at(ring, index))).collect();
+    while ring.len() > 3 {
         // Ears with an area come first: a corner on a straight edge gives a degenerate triangle until a neighbour is clipped.
-        let ears = || (0..count).filter(|&index| is_ear(flat, ring, triangle_at(index)));
+        let ears = || (0..ring.len()).filter(|&index| obstacles[ring[index]].is_none());
         let has_area = |&index: &usize| {
-            let [a, b, c] = triangle_at(index).map(|corner| flat[corner]);
+            let [a, b, c] = triangle_at(ring, index).map(|corner| flat[corner]);
             signed_area(a, b, c) > 0.0
         };
         let Some(index) = ears().find(has_area).or_else(|| ears().next()) else {
             return false;
         };
-        triangles.push(triangle_at(index));
+        let [before, clipped, after] = triangle_at(ring, index);
+        triangles.push([before, clipped, after]);
         ring.remove(index);
+        // All others are ears, or not, as they were.
+        for at in 0..ring.len() {
+            let corner = ring[at];
+            if corner == before || corner == after || obstacles[corner] == Some(clipped) {
+                obstacles[corner] = obstacle(flat, ring, triangle_at(ring, at));
+            }
+        }
     }
     // If the polygon intersects itself, the remaining triangle has the opposite winding.
     signed_area(flat[ring[0]], flat[ring[1]], flat[ring[2]]) >= 0.0
 }
 
-fn is_ear(flat: &[DVec2], ring: &[usize], ear: [usize; 3]) -> bool {
-    let [a, b, c] = ear.map(|corner| flat[corner]);
-    // Points that coincide with a corner of the ear do not count: polygons with holes repeat corners.
+/// Why the middle corner of a triangle is no ear: a corner of the polygon inside the triangle, or itself where the polygon is concave.
+fn obstacle(flat: &[DVec2], ring: &[usize], triangle: [usize; 3]) -> Option<usize> {
+    let [a, b, c] = triangle.map(|corner| flat[corner]);
+    // Points that coincide with a corner of the triangle do not count: polygons with holes repeat corners.
     let is_inside = |point: DVec2| {
         signed_area(a, b, point) >= 0.0
             && signed_area(b, c, point) >= 0.0
             && signed_area(c, a, point) >= 0.0
             && ![a, b, c].contains(&point)
     };
-    signed_area(a, b, c) >= 0.0 && !ring.iter().any(|&corner| is_inside(flat[corner]))
+    if signed_area(a, b, c) >= 0.0 {
+        ring.iter().copied().find(|&corner| is_inside(flat[corner]))
+    } else {
+        Some(triangle[1])
+    }
 }
 
 /// Twice the signed area of a triangle, which is positive if it is counter-clockwise.
@@ -172,6 +188,8 @@ fn project(corners: &[DVec3]) -> Vec<DVec2> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn area(corners: &[DVec3], triangles: &[[usize; 3]]) -> f64 {
@@ -201,6 +219,26 @@ mod tests {
                     assert!((area(&corners, &triangles) - expected).abs() < 1e-9, "{axes:?} {reversed} {start}");
                 }
             }
+        }
+    }
+
+    proptest! {
+        /// No ray from its centre leaves a star more than once.
+        #[test]
+        fn triangles_cover_a_star_once(radii in prop::collection::vec(0.05..1.0_f64, 4..=MAX_EAR_CLIPPING_CORNERS)) {
+            let count = radii.len();
+            let corner = |(index, radius): (usize, f64)| {
+                let (sine, cosine) = (index as f64 / count as f64 * TAU).sin_cos();
+                DVec3::new(radius * cosine, radius * sine, 3.0)
+            };
+            let corners: Vec<_> = radii.into_iter().enumerate().map(corner).collect();
+            let mut triangles = Vec::new();
+            prop_assert!(triangulate(&corners, &mut triangles));
+            prop_assert_eq!(triangles.len(), count - 2);
+            let sizes = triangles.iter().map(|&[a, b, c]| (corners[b] - corners[a]).cross(corners[c] - corners[a]).z / 2.0);
+            prop_assert!(sizes.clone().all(|size| size >= 0.0));
+            let expected = (0..count).map(|at| corners[at].cross(corners[(at + 1) % count]).z / 2.0).sum::<f64>();
+            prop_assert!((sizes.sum::<f64>() - expected).abs() < 1e-9);
         }
     }
 
