@@ -162,8 +162,8 @@ fn changes_nothing(keyword: &str, values: &str) -> bool {
         "Ns" | "Ni" => true,
         "Ks" => all(|number| number == 0.0),
         "Tf" => all(|number| number == 1.0),
-        // Without light, with it, and with highlights, which are those of `Ks`.
-        "illum" => all(|number| number <= 2.0),
+        // With light, and with highlights, which are those of `Ks`. 0 is without light.
+        "illum" => all(|number| (1.0..=2.0).contains(&number)),
         _ => false,
     }
 }
@@ -188,8 +188,12 @@ fn color(values: &str, max: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> 
 }
 
 fn opacity(values: &str, warn: &mut impl FnMut(String)) -> Option<f32> {
-    // `-halo` makes the rim of a curved surface more opaque than its middle; a uniform opacity approximates that.
-    let number = values.trim_start_matches("-halo").split_whitespace().next().and_then(|word| word.parse::<f32>().ok());
+    // It makes the rim of a curved surface more opaque than its middle; a uniform opacity approximates that.
+    let uniform = values.strip_prefix("-halo");
+    if uniform.is_some() {
+        warn("the opacity's option `-halo` was left out".to_owned());
+    }
+    let number = uniform.unwrap_or(values).split_whitespace().next().and_then(|word| word.parse::<f32>().ok());
     match number {
         Some(opacity) if (0.0..=1.0).contains(&opacity) => Some(opacity),
         _ => {
@@ -256,7 +260,8 @@ mod tests {
         assert_eq!(parse_one("Kd 0.1 0.2 0.3 # red").0.diffuse, Some(Vec3::new(0.1, 0.2, 0.3)));
         assert_eq!(parse_one("Ke 17 12 4").0.emission, Vec3::new(17.0, 12.0, 4.0));
         assert_eq!(parse_one("Tr 0.25").0.opacity, Some(0.75));
-        assert_eq!(parse_one("d -halo 0.25").0.opacity, Some(0.25));
+        let (halo, warnings) = parse_one("d -halo 0.25");
+        assert_eq!((halo.opacity, warnings), (Some(0.25), 1));
         assert_eq!(texture_name("map_Kd in\\a file.png"), "folder/in/a file.png");
         assert_eq!(texture_name("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), "folder/-x.png");
         assert_eq!(parse_one("map_Kd -s 2 2 -bm 1 -clamp on -x.png").1, 3);
@@ -295,9 +300,10 @@ mod tests {
     fn what_is_not_drawn_is_counted_unless_it_changes_nothing() {
         let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0 # black\nNs 10\nNi 1.5\nTf 1 1 1\nillum 2";
         assert_eq!(parse_one(neutral).1, 0);
-        for spectrum in ["Ka spectral a.rfl", "Ks spectral a.rfl 1", "Tf spectral a.rfl", "Ks 0 0 red", "illum full"] {
-            let warnings = parse(&format!("newmtl a\nKd 0.5\n{spectrum}")).1;
-            assert!(matches!(warnings[..], [ObjWarning::IgnoredStatements { .. }]), "{spectrum}: {warnings:?}");
+        let spectra = ["Ka spectral a.rfl", "Ks spectral a.rfl 1", "Tf spectral a.rfl"];
+        for ignored in [&spectra[..], &["Ks 0 0 red", "illum full", "illum 0"]].concat() {
+            let warnings = parse(&format!("newmtl a\nKd 0.5\n{ignored}")).1;
+            assert!(matches!(warnings[..], [ObjWarning::IgnoredStatements { .. }]), "{ignored}: {warnings:?}");
         }
         let mut text =
             format!("newmtl a\n{neutral}\nKs 0 0 1\nnewmtl b\nKa 1 0 0\nKs 1\nillum 3\nTf 0 1 1\nmap_Ke b.png");
