@@ -70,11 +70,17 @@ fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>, off_surfac
 
 // How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256 of a
 // pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a pixel's width at its distance, for
-// which 1/256 is an upper bound. And the corners were rounded to the steps of fixed-point positions.
+// which 1/256 is an upper bound. Where an oblique near plane makes depth differ across the picture, the same depth is that of a position
+// farther or nearer there, too. And the corners were rounded to the steps of fixed-point positions.
 fn distance_off_surface(position: vec3<f32>) -> f32 {
     var pixel = 2.0 * length(view.up) / view.height;
     if view.projection == PERSPECTIVE {
-        pixel *= length(position);
+        let distance = length(position);
+        let matrix = view.clip_from_relative;
+        let row = vec3<f32>(matrix[0].z, matrix[1].z, matrix[2].z);
+        // The depth of a position at distance t is row · ray + matrix[3].z ÷ t, for a ray that is at least 1 long.
+        let depth_change = abs(dot(row, view.right)) / view.width + abs(dot(row, view.up)) / view.height;
+        pixel = distance * (pixel + distance * depth_change / abs(matrix[3].z));
     }
     return pixel / 256.0 + 0x1p-29;
 }
