@@ -1,5 +1,9 @@
 //! The path of a camera: keyframes in a file, and a smooth curve through them.
 
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
 use drawloom::glam::DVec3;
 
 use crate::arguments::{CameraPosition, parse_numbers};
@@ -19,6 +23,29 @@ struct Keyframe {
 }
 
 impl CameraPath {
+    /// The most bytes of a file.
+    pub const MAX_BYTES: u64 = 1 << 26;
+
+    /// Reads keyframes from a file: see [`CameraPath::parse`].
+    ///
+    /// # Errors
+    /// If it is no regular file, as others may have no end; if it is too large, cannot be read, or has a line that is wrong.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let read = || -> io::Result<String> {
+            // To open a pipe is to wait for its writer.
+            if !fs::metadata(path)?.is_file() {
+                return Err(io::Error::other("it is no regular file"));
+            }
+            let mut text = String::new();
+            File::open(path)?.take(Self::MAX_BYTES + 1).read_to_string(&mut text)?;
+            if text.len() as u64 > Self::MAX_BYTES {
+                return Err(io::Error::other(format!("it has more than {} bytes", Self::MAX_BYTES)));
+            }
+            Ok(text)
+        };
+        Self::parse(&read().map_err(|error| error.to_string())?)
+    }
+
     /// Parses keyframes, one a line: the frame's number, and position and target, `12 x y z tx ty tz`. Frames ascend. What follows a `#` is a comment.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use drawloom::scene::obj::{Imported, ObjWarning};
 use drawloom::scene::{Mesh, Scene};
+use drawloom_output::print_diagnostic;
 use serde::Serialize;
 
 /// The figures of a scene.
@@ -28,7 +29,7 @@ impl Content {
             not_listed.entry(warning.kind()).and_modify(|count| *count -= 1);
         }
         for (kind, count) in not_listed.into_iter().filter(|(_, count)| *count > 0) {
-            eprintln!("warning: {count} more of the kind `{kind}`");
+            print_diagnostic(format_args!("warning: {count} more of the kind `{kind}`"));
         }
         Self {
             degenerate_triangles: imported.degenerate_triangles,
@@ -53,6 +54,6 @@ impl Content {
 /// Prints what was left out of a file or replaced.
 pub fn print_warnings(warnings: &[ObjWarning]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        print_diagnostic(format_args!("warning: {warning}"));
     }
 }

@@ -29,6 +29,7 @@ use drawloom::scene::{Mesh, Scene, obj};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Submitted, wgpu};
+use drawloom_output::{path_text, print_diagnostic, print_line};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -41,7 +42,7 @@ use sequence::Sequence;
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
     let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit());
-    let failed = |error: Box<dyn Error>| eprintln!("error: {}", with_causes(error.as_ref()));
+    let failed = |error: Box<dyn Error>| print_diagnostic(format_args!("error: {}", with_causes(error.as_ref())));
     let Ok(input) = Input::load(&arguments).map_err(failed) else {
         return ExitCode::from(2);
     };
@@ -96,7 +97,7 @@ fn run(arguments: &Arguments, Input { scene, content, sequence }: Input) -> Resu
         },
     };
     let report = report.with_content(content);
-    report.print();
+    print_line(&report)?;
     timeline::write_outputs(arguments, &log)?;
     match &arguments.report {
         Some(file) => report.write(file),
@@ -137,12 +138,12 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>>
         Some(path) => {
             let mut imported = obj::load(path).inspect_err(|error| print_warnings(error.warnings()))?;
             content = Content::of_file(&imported);
-            println!(
+            print_line(format_args!(
                 "{}: {} triangles, and {} degenerate ones left out",
-                path.display(),
+                path_text(path),
                 imported.triangles,
                 imported.degenerate_triangles
-            );
+            ))?;
             demo::add_camera_and_lights_upright(&mut imported.scene, arguments.up.axis());
             imported.scene
         }
@@ -224,7 +225,7 @@ fn draw<B: Backend>(
 fn save(arguments: &Arguments, picture: &Picture) -> Result<(), Box<dyn Error>> {
     if let Some(file) = &arguments.out {
         file.write([picture.width, picture.height], &picture.bytes)?;
-        println!("{} written", file.path().display());
+        print_line(format_args!("{} written", path_text(file.path())))?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The times of the frames, as a table and as JSON.
 
 use std::error::Error;
+use std::fmt::{self, Display, Formatter};
 use std::time::Duration;
 
 use drawloom::FrameStatistics;
@@ -137,32 +138,43 @@ impl Report {
         Self { content, ..self }
     }
 
-    /// As a table.
-    pub fn print(&self) {
+    /// As JSON.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, file: &OutputFile) -> Result<(), Box<dyn Error>> {
+        Ok(file.write_all(serde_json::to_string_pretty(self)? + "\n")?)
+    }
+}
+
+/// As a table, without the end of the last line.
+impl Display for Report {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         let Self { adapter, backend, workers, granularity, objects, frames, .. } = self;
         let reason = self.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
-        println!("drawn by {adapter}{reason}");
+        writeln!(formatter, "drawn by {adapter}{reason}")?;
         let record = self.record.map_or(String::new(), |record| format!(", {record}"));
-        println!("frames   {frames} on {backend}, {workers} workers, {granularity}{record}");
+        writeln!(formatter, "frames   {frames} on {backend}, {workers} workers, {granularity}{record}")?;
         let Content { triangles, vertices, .. } = self.content;
-        println!("objects  {objects} of {triangles} triangles and {vertices} vertices");
+        writeln!(formatter, "objects  {objects} of {triangles} triangles and {vertices} vertices")?;
         for Rejections { kind, count, first } in &self.rejections {
-            println!("rejected: {count} × {kind}, the first is number {first}");
+            writeln!(formatter, "rejected: {count} × {kind}, the first is number {first}")?;
         }
-        println!();
-        println!(
+        writeln!(formatter)?;
+        writeln!(
+            formatter,
             "{:<18} {:<8} {:>8} {:>7} {:>9} {:>8} {:>8}",
             "view", "kind", "visible", "lights", "commands", "batches", "bundles"
-        );
+        )?;
         for view in &self.views {
             let View { name, kind, visible, lights, commands, batches, bundles, .. } = view;
-            print!("{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}");
+            write!(formatter, "{name:<18} {kind:<8} {visible:>8} {lights:>7} {commands:>9} {batches:>8} {bundles:>8}")?;
             match view.triangles {
-                0 => println!(),
-                tested => println!("   {} of {tested} triangles left out", view.culled_triangles),
+                0 => writeln!(formatter)?,
+                tested => writeln!(formatter, "   {} of {tested} triangles left out", view.culled_triangles)?,
             }
         }
-        println!();
+        writeln!(formatter)?;
         let stages = &self.stages_ms;
         for (stage, time) in [
             ("visibility", stages.visibility),
@@ -172,17 +184,9 @@ impl Report {
             ("record", stages.record),
             ("submit", stages.submit),
         ] {
-            println!("{stage:<10} {time:>9.3} ms thread time");
+            writeln!(formatter, "{stage:<10} {time:>9.3} ms thread time")?;
         }
-        println!("{:<10} {:>9.3} ms, 95% within {:.3} ms", "cpu", self.cpu_ms.median, self.cpu_ms.p95);
-    }
-
-    /// As JSON.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write(&self, file: &OutputFile) -> Result<(), Box<dyn Error>> {
-        Ok(file.write_all(serde_json::to_string_pretty(self)? + "\n")?)
+        write!(formatter, "{:<10} {:>9.3} ms, 95% within {:.3} ms", "cpu", self.cpu_ms.median, self.cpu_ms.p95)
     }
 }
 

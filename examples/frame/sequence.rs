@@ -3,7 +3,6 @@
 
 use std::error::Error;
 use std::ffi::OsStr;
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +11,7 @@ use drawloom::backend::{Backend, BackendError, Picture, SoftwareSubmission, Wgpu
 use drawloom::demo::UpAxis;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom_output::PictureFile;
+use drawloom_output::{PictureFile, path_text, print_line};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::{Arguments, BackendName, CameraPosition};
@@ -42,9 +41,8 @@ impl Sequence {
         let (Some(path), Some(out)) = (&arguments.path, &arguments.out) else {
             return Err("a range of frames needs --path and --out".into());
         };
-        let wrong = |problem: String| format!("{}: {problem}", path.display());
-        let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
-        let path = CameraPath::parse(&text).map_err(wrong)?;
+        let wrong = |problem: String| format!("{}: {problem}", path_text(path));
+        let path = CameraPath::load(path).map_err(wrong)?;
         let (frame_count, mut missing) = (frames.len(), Vec::new());
         for frame in frames {
             let camera = path.at(frame).map_err(wrong)?;
@@ -67,7 +65,7 @@ impl Sequence {
         scene: Scene,
         open_adapter: impl FnOnce() -> Result<WgpuBackend, Box<dyn Error>>,
     ) -> Result<(), Box<dyn Error>> {
-        println!("{} of {} frames are there", self.frame_count - self.missing.len(), self.frame_count);
+        print_line(format_args!("{} of {} frames are there", self.frame_count - self.missing.len(), self.frame_count))?;
         if self.missing.is_empty() {
             return Ok(());
         }

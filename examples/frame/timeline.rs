@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace, write_page};
 use drawloom::timeline::{Frame, Log};
-use drawloom_output::OutputFile;
+use drawloom_output::{OutputFile, path_text, print_line};
 
 use crate::arguments::Arguments;
 
@@ -35,7 +35,7 @@ pub fn write_outputs(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Err
         write(file, |file| write_page(log, &costs, file))?;
     }
     if let Some(frame) = median_frame(log).filter(|_| arguments.explain) {
-        println!("\n{}", FrameReport::new(log, frame, &costs)?);
+        print_line(format_args!("\n{}", FrameReport::new(log, frame, &costs)?))?;
     }
     Ok(())
 }
@@ -49,6 +49,5 @@ fn median_frame(log: &Log) -> Option<u64> {
 
 fn write(file: &OutputFile, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Box<dyn Error>> {
     file.write(write)?;
-    println!("{} written", file.path().display());
-    Ok(())
+    Ok(print_line(format_args!("{} written", path_text(file.path())))?)
 }

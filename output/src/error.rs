@@ -3,12 +3,14 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::terminal::path_text;
+
 /// Why a file cannot be written. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
     /// The folder is missing, or is a file.
-    #[error("{} cannot be written: {} is no folder", path.display(), folder.display())]
+    #[error("{} cannot be written: {} is no folder", path_text(path), path_text(folder))]
     NoFolder {
         /// The file.
         path: PathBuf,
@@ -16,13 +18,13 @@ pub enum OutputError {
         folder: PathBuf,
     },
     /// The name is that of a folder.
-    #[error("{} cannot be written: it names a folder", path.display())]
+    #[error("{} cannot be written: it names a folder", path_text(path))]
     IsFolder {
         /// The folder.
         path: PathBuf,
     },
     /// Nothing can be written there, or writing failed.
-    #[error("{} could not be written: {source}", path.display())]
+    #[error("{} could not be written: {source}", path_text(path))]
     Failed {
         /// The file, or the folder if no file can be created in it.
         path: PathBuf,
@@ -32,8 +34,8 @@ pub enum OutputError {
     /// The extension of a picture is missing, unknown, or that of a format that is not written.
     #[error(
         "{} cannot be written: {}, and pictures are written as .png, .jpg, .tga or .bmp",
-        path.display(),
-        extension.as_ref().map_or_else(|| "it has no extension".to_owned(), |extension| format!("it ends in .{extension}"))
+        path_text(path),
+        extension.as_ref().map_or_else(|| "it has no extension".to_owned(), |extension| format!("it ends in .{}", path_text(extension.as_ref())))
     )]
     PictureFormat {
         /// The file.

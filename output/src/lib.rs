@@ -17,7 +17,9 @@ mod destination;
 mod error;
 mod file;
 mod picture;
+mod terminal;
 
 pub use error::OutputError;
 pub use file::{OutputFile, create_folder};
 pub use picture::PictureFile;
+pub use terminal::{path_text, print_diagnostic, print_line};

@@ -16,13 +16,15 @@ use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+#[cfg(unix)]
+use std::process::Command;
 
 use arguments::{Arguments, Frames};
 use camera_path::CameraPath;
 use drawloom::backend::WgpuBackend;
 use drawloom::demo::{self, UpAxis};
 use drawloom::glam::DVec3;
-use drawloom::scene::{Camera, Material, RenderObject, Scene};
+use drawloom::scene::{Camera, Material, RenderObject, Scene, obj};
 use drawloom_testing::scenes::cube;
 use proptest::prelude::*;
 use sequence::{Sequence, file_of};
@@ -171,6 +173,50 @@ fn wrong_paths_are_named_with_the_line_or_the_frame() {
     // Position and target pass through each other.
     let crossing = CameraPath::parse("0 0 0 0 4 0 0\n4 4 0 0 0 0 0").unwrap();
     assert_eq!(crossing.at(2).unwrap_err(), "frame 2: the camera's position and target must differ");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_path_that_may_have_no_end_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [&pipe, Path::new("/dev/zero")] {
+        assert_eq!(CameraPath::load(path).unwrap_err(), "it is no regular file", "{}", path.display());
+    }
+    // It takes no space on the disk.
+    let large = folder.path().join("large");
+    fs::File::create(&large).unwrap().set_len(CameraPath::MAX_BYTES + 1).unwrap();
+    assert_eq!(CameraPath::load(&large).unwrap_err(), "it has more than 67108864 bytes");
+}
+
+/// A triangle far away makes the scene large, but what is near to the camera is drawn as it is without the triangle.
+#[test]
+fn a_far_triangle_hides_nothing_of_a_near_cube() -> Result<(), Box<dyn Error>> {
+    let cube = "v -1 0 -1\nv 1 0 -1\nv 1 2 -1\nv -1 2 -1\nv -1 0 1\nv 1 0 1\nv 1 2 1\nv -1 2 1\n\
+        f 5 6 7 8\nf 2 1 4 3\nf 6 2 3 7\nf 1 5 8 4\nf 8 7 3 4\nf 1 2 6 5\n";
+    let far_triangle = "v 1e5 0 0\nv 100001 0 0\nv 1e5 1 0\nf 9 10 11\n";
+    // Whether each pixel shows something, as none in the upper left corner does.
+    let covered = |text: &str| -> Result<Vec<bool>, Box<dyn Error>> {
+        let folder = TempDir::new()?;
+        let file = folder.path().join("a.obj");
+        fs::write(&file, text)?;
+        let mut scene = obj::load(&file)?.scene;
+        demo::add_camera_and_lights(&mut scene);
+        scene.cameras[0].size = [48, 27];
+        let (mut arguments, _) = sequence(folder.path(), "#.png", &["--backend", "software", "--frames", "0..1"])?;
+        let path = folder.path().join("near.txt");
+        fs::write(&path, "0 4 3 6 0 1.2 0")?;
+        arguments.path = Some(path);
+        Sequence::new(&arguments, 0..1)?.draw(&arguments, scene, no_adapter)?;
+        let picture = image::open(folder.path().join("0.png"))?.to_rgb8();
+        Ok(picture.pixels().map(|pixel| pixel != picture.get_pixel(0, 0)).collect())
+    };
+    let alone = covered(cube)?;
+    let share = alone.iter().filter(|covered| **covered).count() as f64 / alone.len() as f64;
+    assert!((0.05..0.5).contains(&share), "{share} of the picture");
+    assert!(covered(&(cube.to_owned() + far_triangle))? == alone);
+    Ok(())
 }
 
 #[test]

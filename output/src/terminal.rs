@@ -1,0 +1,53 @@
+//! What programs print.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+
+/// A path as text. Control characters are escaped, so that none reaches a terminal.
+pub fn path_text(path: &Path) -> String {
+    let mut text = String::new();
+    for character in path.display().to_string().chars() {
+        if character.is_control() {
+            text.extend(character.escape_unicode());
+        } else {
+            text.push(character);
+        }
+    }
+    text
+}
+
+/// Prints a line on the standard output. That its reader has closed the pipe is no error: it wants no more, and what the program does beside
+/// printing goes on.
+///
+/// # Errors
+/// If the line cannot be written, on a full disk for example.
+pub fn print_line(line: impl Display) -> io::Result<()> {
+    or_unread(writeln!(io::stdout(), "{line}"))
+}
+
+/// Prints a line on the standard error output. If that fails there is nowhere to say so.
+pub fn print_diagnostic(line: impl Display) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+fn or_unread(written: io::Result<()>) -> io::Result<()> {
+    written.or_else(|error| if error.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(error) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_in_paths_are_escaped() {
+        assert_eq!(path_text(Path::new("a/été\u{1b}[31m\n.png")), "a/été\\u{1b}[31m\\u{a}.png");
+    }
+
+    #[test]
+    fn a_closed_pipe_is_no_error() {
+        let error = |kind| Err(io::Error::from(kind));
+        assert!(or_unread(error(ErrorKind::BrokenPipe)).is_ok());
+        assert_eq!(or_unread(error(ErrorKind::StorageFull)).unwrap_err().kind(), ErrorKind::StorageFull);
+    }
+}
