@@ -164,6 +164,7 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
     bounds[2].radius = f32::NAN;
     let scene_ref = drawloom::scene::SceneRef { bounds: &bounds, ..scene_ref };
     let frustum = Frustum::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+    let away = Frustum::new(&Camera::looking_at("away", DVec3::Z * 100.0, DVec3::Z * 200.0));
     for (volume, visible) in [
         (CullingVolume::None, 0b011),
         (CullingVolume::Sphere, 0b010),
@@ -174,9 +175,13 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
         table.configure(volume);
         table.update(&scene_ref);
         assert_eq!(table.block(0).visible(&frustum, volume, 0..3), visible, "{volume:?}");
-        let mut words = Vec::new();
-        table.block(0).visible_words(&frustum, volume, 0..2, |word, mask| words.push((word, mask)));
-        assert_eq!(words, [(0, visible), (1, 0)], "{volume:?}");
+        // All are behind the other camera.
+        let all_or_none = if volume == CullingVolume::None { visible } else { 0 };
+        for (frustum, visible) in [(&frustum, visible), (&away, all_or_none)] {
+            let mut words = Vec::new();
+            table.block(0).visible_words(frustum, volume, 0..2, |word, mask| words.push((word, mask)));
+            assert_eq!(words, [(0, visible), (1, 0)], "{volume:?}");
+        }
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }
     Ok(())
