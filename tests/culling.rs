@@ -8,7 +8,7 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, Topology, Vertex, ViewKind};
+use drawloom::scene::{Camera, ClipPlane, Light, Material, Mesh, RenderObject, Scene, Topology, Vertex, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{Frustum, LightTable, ObjectTable, RenderView};
 use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
@@ -185,4 +185,52 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
         assert_eq!(table.block(0).boxes.is_some(), VOLUMES[1..].contains(&volume), "{volume:?}");
     }
     Ok(())
+}
+
+/// Few objects are tested one by one, and more in groups.
+#[test]
+fn a_range_has_the_visible_objects_of_its_parts() -> Result<(), Box<dyn Error>> {
+    let mut random = Random::stream(7);
+    let mut scene = Scene::new();
+    let vertices = [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.1), Vec3::new(0.1, 0.2, 1.0)]
+        .map(|position| Vertex { position: position.into(), ..Vertex::default() });
+    let mesh = scene.add(Mesh::new("long", Topology::TriangleList, vertices.into(), vec![0, 1, 2])?)?;
+    let paint = scene.add(Material::default())?;
+    for _ in 0..256 {
+        let [x, y, z] = [0; 3].map(|_| random.between(-4.0, 4.0));
+        scene.add_object(RenderObject::new(mesh, paint, DVec3::new(x, y, z)))?;
+    }
+    let frustum = Frustum::new(&Camera::looking_at("main", DVec3::Z * 5.0, DVec3::ZERO));
+    for volume in [CullingVolume::None, CullingVolume::Sphere, CullingVolume::Box, CullingVolume::OrientedBox] {
+        let mut table = ObjectTable::default();
+        table.configure(volume);
+        table.update(&scene.as_scene_ref());
+        let block = table.block(0);
+        let (mut found, mut tested) = (0, 0);
+        for _ in 0..400 {
+            let first = random.below(256);
+            let last = first + random.below(64 - first % 64);
+            let visible = block.visible(&frustum, volume, first..last + 1);
+            for object in first..=last {
+                let alone = block.visible(&frustum, volume, object..object + 1);
+                assert_eq!(visible >> (object - first) & 1, alone, "{volume:?}: object {object} of {first} to {last}");
+                (found, tested) = (found + alone, tested + 1);
+            }
+            assert_eq!(visible.checked_shr((last + 1 - first) as u32).unwrap_or(0), 0);
+        }
+        assert_eq!(volume == CullingVolume::None, found == tested);
+        assert!(found > tested / 20, "{volume:?}: {found} of {tested}");
+    }
+    Ok(())
+}
+
+#[test]
+fn what_is_between_a_clip_plane_and_the_near_plane_is_seen() {
+    let clip_plane = Some(ClipPlane { point: DVec3::NEG_Z * 0.5, normal: Vec3::NEG_Z });
+    let camera = Camera { near: 1.0, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
+    let clipped = Camera { clip_plane, ..camera.clone() };
+    for (depth, by_near_plane, by_clip_plane) in [(0.7, false, true), (1.5, true, true), (-0.7, false, false)] {
+        let sees = |camera| Frustum::new(camera).intersects_sphere(DVec3::NEG_Z * depth, 0.05);
+        assert_eq!((sees(&camera), sees(&clipped)), (by_near_plane, by_clip_plane), "{depth}");
+    }
 }

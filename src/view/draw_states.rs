@@ -141,3 +141,37 @@ pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec
 fn has_changed<T: PartialEq>(before: &[Option<T>], now: &[Option<T>]) -> bool {
     before.iter().enumerate().any(|(slot, entry)| entry.is_some() && now.get(slot) != Some(entry))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{MaterialType, Scene, Vertex};
+
+    #[test]
+    fn states_of_selected_materials_and_present_topologies_are_possible() {
+        const GLOW: MaterialType<[f32; 4]> = MaterialType::new("glow");
+        let mut scene = Scene::new();
+        let add_mesh = |scene: &mut Scene, topology| {
+            let mesh = Mesh::new("triangle", topology, vec![Vertex::default(); 3], vec![0, 1, 2]).unwrap();
+            scene.add(mesh).unwrap();
+        };
+        scene.add(Material::default()).unwrap();
+        scene.add(Material { double_sided: true, blend: Blend::Alpha, ..Material::default() }).unwrap();
+        scene.add(Material { double_sided: true, values: Some(GLOW.values([0.0; 4])), ..Material::default() }).unwrap();
+        let [plain, blended, glowing] =
+            [(Cull::Back, Blend::None), (Cull::Nothing, Blend::Alpha), (Cull::Nothing, Blend::None)];
+        let state = |topology| move |(cull, blend)| DrawState::new(topology, cull, blend);
+        let (list, strip) = (state(Topology::TriangleList), state(Topology::TriangleStrip));
+        let of = |scene: &Scene, selection| possible_draw_states(selection, scene.assets());
+        assert_eq!(of(&scene, Selection::ALL), [], "there is no mesh");
+        add_mesh(&mut scene, Topology::TriangleStrip);
+        assert_eq!(of(&scene, Selection::BLENDED), [blended].map(strip));
+        assert_eq!(of(&scene, Selection::OPAQUE.of_shipped_materials()), [plain].map(strip));
+        assert_eq!(of(&scene, Selection::OPAQUE.of_material_type(GLOW)), [glowing].map(strip));
+        add_mesh(&mut scene, Topology::TriangleList);
+        let mut all: Vec<_> =
+            [plain, blended, glowing].into_iter().flat_map(|state| [list(state), strip(state)]).collect();
+        all.sort_unstable();
+        assert_eq!(of(&scene, Selection::ALL), all);
+    }
+}

@@ -280,6 +280,27 @@ mod tests {
         assert_eq!((set.word(0), set.word(2)), (0, 0));
     }
 
+    /// One word tells for 64 others whether they are empty, so for 4,096 objects.
+    #[test]
+    fn words_are_found_and_forgotten_beyond_4096_objects() {
+        let mut set = VisibleSet::default();
+        set.reset(20_000);
+        let filled = [(3, 0b101), (67, 0b11), (130, 1 << 63), (312, 0b1)];
+        filled.iter().for_each(|&(word, visible)| set.replace(word, u64::MAX, visible));
+        let words = |set: &VisibleSet| {
+            set.compact(Version::default());
+            let mut words = Vec::new();
+            set.visit_words(0..set.filled_word_count(), |word, bits| words.push((word, bits)));
+            words
+        };
+        assert_eq!(words(&set), filled);
+        set.replace(67, u64::MAX, 0);
+        assert_eq!(words(&set), [filled[0], filled[2], filled[3]]);
+        set.reset(20_000);
+        assert!((0..set.word_count()).all(|word| set.word(word) == 0));
+        assert_eq!(words(&set), []);
+    }
+
     #[test]
     fn a_set_gets_a_version_where_it_differs_from_the_one_before() {
         let version = |frame| Version { frame, index: 0 };

@@ -271,11 +271,13 @@ fn a_view_executes_the_pieces_that_it_sees_and_that_its_filter_shows_as_a_whole(
     assert!(pieces == 0 && (1..ROWS * IN_ROW).contains(&visible), "{pieces} {visible}");
 }
 
+/// The depth pre-pass draws all materials, so it may walk the objects in the order of their bins.
 #[test]
-fn shares_of_materials_draw_each_object_of_a_piece_once() {
+fn shares_of_materials_draw_each_object_once_with_pieces_and_without() {
     const SHARES: u32 = 3;
     let mut rows = Rows::new();
-    rows.renderer = renderer_of(Deferred::to_picture().geometry_shares(SHARES), Quality::balanced(), 2).0;
+    let deferred = Deferred::to_picture().geometry_shares(SHARES).depth_pre_pass(true);
+    rows.renderer = renderer_of(deferred, Quality::balanced(), 2).0;
     let materials: Vec<_> = (0..SHARES).map(|_| rows.scene.add(Material::default()).unwrap()).collect();
     let objects: Vec<_> = rows.scene.objects().collect();
     for (object, material) in objects.into_iter().zip(materials.into_iter().cycle()) {
@@ -284,18 +286,29 @@ fn shares_of_materials_draw_each_object_of_a_piece_once() {
     }
     rows.frame(Changes::Unknown);
     rows.settle();
-    let recorded = rows.renderer.record(SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() }).unwrap();
-    let of_shares: Vec<_> = drawn(&rows.renderer, recorded.statistics())
-        .into_iter()
-        .filter(|(process, ..)| process.starts_with("geometry buffer"))
-        .map(|(.., objects)| objects.into_iter().map(|(object, ..)| object as usize).collect::<Vec<_>>())
-        .collect();
-    assert_eq!(of_shares.len(), SHARES as usize);
-    let mut together: Vec<_> = of_shares.iter().flatten().copied().collect();
-    together.sort_unstable();
-    assert_eq!(together, (0..ROWS * IN_ROW).collect::<Vec<_>>());
-    for objects in of_shares {
-        assert!(objects.iter().all(|object| object % SHARES as usize == objects[0]), "{objects:?}");
+    for pieces in [ROWS, 0] {
+        rows.scene.pieces.truncate(pieces);
+        for _ in 0..4 {
+            rows.frame(Changes::NONE);
+        }
+        let scene = SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() };
+        let recorded = rows.renderer.record(scene).unwrap();
+        assert_eq!(recorded.statistics().views[0].pieces, pieces);
+        let of_shares: Vec<_> = drawn(&rows.renderer, recorded.statistics())
+            .into_iter()
+            .filter(|(process, ..)| process.starts_with("geometry buffer"))
+            .map(|(.., objects)| objects.into_iter().map(|(object, ..)| object as usize).collect::<Vec<_>>())
+            .collect();
+        assert_eq!(of_shares.len(), SHARES as usize);
+        let mut together: Vec<_> = of_shares.iter().flatten().copied().collect();
+        together.sort_unstable();
+        assert_eq!(together, (0..ROWS * IN_ROW).collect::<Vec<_>>());
+        for objects in of_shares {
+            assert!(
+                objects.iter().all(|object| object % SHARES as usize == objects[0] % SHARES as usize),
+                "{objects:?}"
+            );
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
     Blend, Bounds, Camera, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
 };
+use drawloom::view::{ObjectTable, OccluderMeshes};
 use drawloom_testing::samples::Samples;
 use drawloom_testing::scenes::{cube, sized, square};
 
@@ -69,6 +70,24 @@ fn a_wall_hides_what_is_behind_it_and_nothing_else() {
     // A board inside a wall that is thicker.
     walls.add(DVec3::Z * -10.0, Vec3::new(0.5, 0.5, 0.05));
     assert_eq!(walls.hidden(), [0, 5]);
+}
+
+/// Slots of another scene may have the same revisions.
+#[test]
+fn the_parts_of_another_scene_replace_those_of_the_one_before() {
+    let mut meshes = OccluderMeshes::default();
+    for mesh in [cube(), square(Topology::TriangleList), cube()] {
+        let mut scene = Scene::new();
+        let (mesh, material) = (scene.add(mesh).unwrap(), scene.add(Material::default()).unwrap());
+        scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        let mut table = ObjectTable::default();
+        table.update(&scene.as_scene_ref());
+        meshes.sync(scene.assets(), table.used_meshes());
+        let mut alone = OccluderMeshes::default();
+        alone.sync(scene.assets(), table.used_meshes());
+        assert_eq!(meshes.parts(mesh.index()).len(), 1);
+        assert_eq!(format!("{:?}", meshes.parts(mesh.index())), format!("{:?}", alone.parts(mesh.index())));
+    }
 }
 
 #[test]
