@@ -232,6 +232,28 @@ mod tests {
         }
     }
 
+    /// Depth at infinity is 0 in that corner of the picture whose ray is nearest to the plane's normal, and more in the others.
+    #[test]
+    fn the_least_depth_of_an_oblique_picture_is_zero() {
+        for normal in [[0.3, 0.5, -0.8], [-0.3, 0.5, -0.8], [0.3, -0.5, -0.8], [-0.3, -0.5, -0.8], [0.0, 0.0, -1.0]] {
+            for (shift, size) in [(Vec2::ZERO, [640, 360]), (Vec2::new(0.5, -1.0), [300, 400])] {
+                let normal = Vec3::from(normal).normalize();
+                let clip_plane = Some(ClipPlane { point: DVec3::NEG_Z, normal });
+                let camera =
+                    Camera { shift, size, clip_plane, ..Camera::looking_at("mirror", DVec3::ZERO, DVec3::NEG_Z) };
+                let view = RenderView::new(&camera);
+                let [right, up, center] = view.picture_axes();
+                let depth_at_infinity = |(x, y): (f32, f32)| {
+                    let ray: Vec3 = right * x + up * y + center;
+                    (view.clip_from_relative() * ray.extend(0.0)).z
+                };
+                let depths = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(depth_at_infinity);
+                let least = depths.into_iter().fold(f32::INFINITY, f32::min);
+                assert!(least.abs() < 1e-6, "{normal} {shift}: {depths:?}");
+            }
+        }
+    }
+
     #[test]
     fn a_clip_plane_behind_the_camera_clips_nothing() {
         let clip_plane = Some(ClipPlane { point: DVec3::Z, normal: Vec3::NEG_Z });

@@ -336,6 +336,32 @@ mod tests {
     }
 
     #[test]
+    fn a_map_reaches_from_the_casters_to_the_end_of_its_slice() {
+        let main = Camera { near: 0.01, ..Camera::looking_at("main", DVec3::Y, DVec3::ZERO) };
+        let is_near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 1e-6;
+        for cascades in 1..=ShadowMaps::MAX_CASCADES {
+            let maps = ShadowMaps { cascades, filter: 3, side: 100, max_distance: 0.1, ..ShadowMaps::default() };
+            // A pixel on each side with one cascade, and with more of them 5 of 50 from the centre.
+            let margin = if cascades == 1 { 1.04 } else { 1.0 / 0.9 };
+            let radius = |cascade| {
+                let slice = |_: &Camera| cascade_slice([0.01, 0.1], maps.split_lambda, cascade, cascades);
+                visible_sphere(std::slice::from_ref(&main), slice).unwrap().1 * margin
+            };
+            let of_sun = maps.cameras("sun", &sun(), std::slice::from_ref(&main));
+            for (cascade, map) in (0..).zip(&of_sun) {
+                let (radius, largest) = (radius(cascade), radius(cascades - 1));
+                let Projection::Orthographic { height } = map.projection else { panic!("it has perspective") };
+                assert!(is_near(height, 2.0 * radius) && is_near(map.near, radius), "{map:?}");
+                let casters = (16.0 * largest).min(128.0 * radius);
+                assert!(is_near(map.far, casters + 3.0 * radius), "{} {casters} {radius}", map.far);
+            }
+        }
+        let (position, direction, intensity) = (DVec3::ZERO, Vec3::X, Vec3::ONE);
+        let lamp = Light::Hemispherical { position, direction, intensity, range: 0.5, casts_shadow: true };
+        assert_eq!(ShadowMaps::default().cameras("lamp", &lamp, &[])[0].far, 0.5);
+    }
+
+    #[test]
     fn directional_maps_move_by_whole_pixels() {
         let maps = ShadowMaps { side: 64, cascades: 3, ..ShadowMaps::default() };
         let pixels_of_origin = |x: f64| {

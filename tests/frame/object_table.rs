@@ -2,10 +2,12 @@
 
 use std::collections::HashSet;
 
+use drawloom::glam::{DQuat, DVec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Assets, Changes, Mesh, SceneRef};
-use drawloom::view::ObjectTable;
+use drawloom::view::{ObjectTable, RejectionReason};
 use drawloom_testing::changing_world::ChangingWorld;
+use drawloom_testing::random::Random;
 use drawloom_testing::scenes::{cube, field};
 use proptest::prelude::*;
 
@@ -23,6 +25,43 @@ fn a_table_has_as_many_objects_as_the_latest_scene() {
     for objects in [603, 1, 0] {
         table.update(&field(objects).as_scene_ref());
         assert_eq!((table.len(), table.is_empty()), (objects, objects == 0));
+    }
+}
+
+#[test]
+fn the_first_rejected_object_is_named_by_its_number_in_the_scene() {
+    let scene = field(603);
+    let scene = scene.as_scene_ref();
+    let mut positions = scene.positions.to_vec();
+    for object in [300, 301, 600] {
+        positions[object] = DVec3::NAN;
+    }
+    let mut table = ObjectTable::default();
+    table.update(&SceneRef { positions: &positions, ..scene });
+    let [rejection] = table.rejections().list()[..] else { panic!("{:?}", table.rejections().list()) };
+    assert_eq!((rejection.reason, rejection.count, rejection.first), (RejectionReason::InvalidTransform, 3, 300));
+}
+
+/// An engine's orientations may drift by a thousandth.
+#[test]
+fn orientations_are_normalized() {
+    let scene = field(80);
+    let scene = scene.as_scene_ref();
+    let mut random = Random::stream(3);
+    let orientations: Vec<_> = (0..80)
+        .map(|_| {
+            let turn = DQuat::from_axis_angle(random.direction(), random.between(-3.0, 3.0));
+            let drifted = turn * random.between(0.9992, 1.0008);
+            (turn, drifted.as_quat())
+        })
+        .collect();
+    let drifted: Vec<_> = orientations.iter().map(|(_, drifted)| *drifted).collect();
+    let mut table = ObjectTable::default();
+    table.update(&SceneRef { orientations: &drifted, ..scene });
+    let block = table.block(0);
+    for (object, (turn, _)) in orientations.into_iter().enumerate() {
+        let found = DQuat::from_array(block.gpu_objects[object].orientation.map(f64::from));
+        assert!((found - turn).length() < 2e-7, "{found} {turn}");
     }
 }
 
