@@ -82,21 +82,26 @@ mod tests {
 
     /// A floor of 8 m, seen from a lamp above it.
     fn floor_from(height: f64, scale: Vec3) -> Option<u32> {
-        floor_under(WIDEST_ANGLE, height, scale)
+        floor_under(WIDEST_ANGLE, DVec3::Y * height, scale)
     }
 
-    fn floor_under(widest_angle: f64, height: f64, scale: Vec3) -> Option<u32> {
+    fn floor_under(widest_angle: f64, lamp: DVec3, scale: Vec3) -> Option<u32> {
         let corner = |x, z| Vertex { position: [x, 0.0, z], ..Vertex::default() };
         let corners = vec![corner(-4.0, -4.0), corner(-4.0, 4.0), corner(4.0, -4.0), corner(4.0, 4.0)];
+        let floor = Mesh::new("floor", Topology::TriangleStrip, corners, vec![0, 1, 2, 3]).unwrap();
+        level_under(widest_angle, lamp, floor, scale)
+    }
+
+    /// The level of a mesh, seen by a lamp that looks down.
+    fn level_under(widest_angle: f64, lamp: DVec3, mesh: Mesh, scale: Vec3) -> Option<u32> {
         let mut scene = Scene::new();
-        let mesh = scene.add(Mesh::new("floor", Topology::TriangleStrip, corners, vec![0, 1, 2, 3]).unwrap()).unwrap();
-        let material = scene.add(Material::default()).unwrap();
+        let (mesh, material) = (scene.add(mesh).unwrap(), scene.add(Material::default()).unwrap());
         scene.add_object(RenderObject { scale, ..RenderObject::new(mesh, material, DVec3::ZERO) }).unwrap();
         let lamp = Camera {
             projection: Projection::Paraboloid,
             far: 100.0,
             kind: ViewKind::Shadow,
-            ..Camera::looking_at("lamp", DVec3::Y * height, DVec3::Y * (height - 1.0))
+            ..Camera::looking_at("lamp", lamp, lamp - DVec3::Y)
         };
         subdivision_level(&RenderView::new(&lamp), &scene.as_scene_ref(), (0, 0), widest_angle)
     }
@@ -117,10 +122,33 @@ mod tests {
     #[test]
     fn twice_the_angle_is_one_level_less() {
         for height in [0.5, 2.0, 10.0, 30.0] {
-            let level = |times: f64| floor_under(WIDEST_ANGLE * times, height, Vec3::ONE).unwrap();
+            let level = |times: f64| floor_under(WIDEST_ANGLE * times, DVec3::Y * height, Vec3::ONE).unwrap();
             assert_eq!([level(0.5), level(2.0)], [level(1.0) + 1, level(1.0) - 1], "{height}");
         }
-        assert_eq!(floor_under(1e-300, 2.0, Vec3::ONE), Some(64));
+        assert_eq!(floor_under(1e-300, DVec3::Y * 2.0, Vec3::ONE), Some(64));
+    }
+
+    /// The floor's diagonal of 11.3 m is at most three times as long. At the distances of 2, 6.3 and 28.1 m, edges may have three times as much.
+    #[test]
+    fn the_distance_is_that_of_the_nearest_point_of_the_scaled_box() {
+        let from = |x| floor_under(3.0, DVec3::new(x, 2.0, 0.0), Vec3::new(3.0, 1.0, 1.0));
+        assert_eq!([from(10.0), from(18.0), from(40.0)], [Some(3), Some(1), Some(0)]);
+    }
+
+    #[test]
+    fn a_small_triangle_near_to_a_lamp_needs_no_subdivision() {
+        let below = |height: f32, size: f32| {
+            [[-1.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, -1.0]]
+                .map(|[x, _, z]| Vertex { position: [x * size, -height, z * size], ..Vertex::default() })
+        };
+        let level = |triangles: &[[Vertex; 3]]| {
+            let indices = (0..triangles.len() as u32 * 3).collect();
+            let mesh = Mesh::new("triangles", Topology::TriangleList, triangles.concat(), indices).unwrap();
+            level_under(WIDEST_ANGLE, DVec3::ZERO, mesh, Vec3::ONE)
+        };
+        let (large, small) = (below(4.0, 4.0), below(0.1, 5e-4));
+        assert_eq!(level(&[large]), Some(5));
+        assert_eq!(level(&[small, large]), Some(5));
     }
 
     #[test]

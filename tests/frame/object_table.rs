@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use drawloom::glam::{DQuat, DVec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Assets, Changes, Mesh, SceneRef};
+use drawloom::scene::{Assets, Changes, Mesh, RenderObject, SceneRef};
 use drawloom::view::{ObjectTable, RejectionReason};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
@@ -139,6 +139,21 @@ proptest! {
             world.step().unwrap();
         }
     }
+}
+
+/// All objects are new, so masks of 64 are full, but for the last one.
+#[test]
+fn a_mesh_of_one_late_object_is_used() {
+    let mut scene = field(300);
+    let objects: Vec<_> = scene.objects().collect();
+    for late in [100, 299] {
+        let mesh = scene.add(cube()).unwrap();
+        let now = RenderObject { mesh, ..scene.object(objects[late]).unwrap() };
+        scene.replace_object(objects[late], now).unwrap();
+    }
+    let mut table = ObjectTable::default();
+    table.update(&scene.as_scene_ref());
+    assert_eq!(used_meshes(&table, scene.assets()).len(), 3 + 2);
 }
 
 #[test]

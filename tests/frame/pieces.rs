@@ -271,13 +271,13 @@ fn a_view_executes_the_pieces_that_it_sees_and_that_its_filter_shows_as_a_whole(
     assert!(pieces == 0 && (1..ROWS * IN_ROW).contains(&visible), "{pieces} {visible}");
 }
 
-/// The depth pre-pass draws all materials, so it may walk the objects in the order of their bins.
+/// The shadow of the sun is drawn by a process for all materials, which may walk the objects in the order of their bins.
 #[test]
 fn shares_of_materials_draw_each_object_once_with_pieces_and_without() {
     const SHARES: u32 = 3;
     let mut rows = Rows::new();
-    let deferred = Deferred::to_picture().geometry_shares(SHARES).depth_pre_pass(true);
-    rows.renderer = renderer_of(deferred, Quality::balanced(), 2).0;
+    rows.renderer = renderer_of(Deferred::to_picture().geometry_shares(SHARES), Quality::balanced(), 2).0;
+    rows.scene.lights.push(sun());
     let materials: Vec<_> = (0..SHARES).map(|_| rows.scene.add(Material::default()).unwrap()).collect();
     let objects: Vec<_> = rows.scene.objects().collect();
     for (object, material) in objects.into_iter().zip(materials.into_iter().cycle()) {
@@ -296,7 +296,7 @@ fn shares_of_materials_draw_each_object_once_with_pieces_and_without() {
         assert_eq!(recorded.statistics().views[0].pieces, pieces);
         let of_shares: Vec<_> = drawn(&rows.renderer, recorded.statistics())
             .into_iter()
-            .filter(|(process, ..)| process.starts_with("geometry buffer"))
+            .filter(|(process, view, _)| process.starts_with("geometry buffer") && *view == 0)
             .map(|(.., objects)| objects.into_iter().map(|(object, ..)| object as usize).collect::<Vec<_>>())
             .collect();
         assert_eq!(of_shares.len(), SHARES as usize);
@@ -312,15 +312,15 @@ fn shares_of_materials_draw_each_object_once_with_pieces_and_without() {
     }
 }
 
+fn sun() -> Light {
+    Light::Directional { direction: Vec3::NEG_ONE.normalize(), illuminance: Vec3::ONE, casts_shadow: true }
+}
+
 #[test]
 fn shadow_maps_execute_pieces() {
     let mut rows = Rows::new();
     rows.scene.cameras[0] = Camera::looking_at("main", DVec3::Z * 40.0, DVec3::ZERO);
-    rows.scene.lights.push(Light::Directional {
-        direction: Vec3::NEG_ONE.normalize(),
-        illuminance: Vec3::ONE,
-        casts_shadow: true,
-    });
+    rows.scene.lights.push(sun());
     rows.settle();
     let recorded = rows.renderer.record(SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() }).unwrap();
     let views = &recorded.statistics().views;
