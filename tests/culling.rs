@@ -8,7 +8,9 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Camera, ClipPlane, Light, Material, Mesh, RenderObject, Scene, Topology, Vertex, ViewKind};
+use drawloom::scene::{
+    Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex, ViewKind,
+};
 use drawloom::task::Scheduler;
 use drawloom::view::{Frustum, LightTable, ObjectTable, RenderView};
 use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
@@ -229,8 +231,10 @@ fn what_is_between_a_clip_plane_and_the_near_plane_is_seen() {
     let clip_plane = Some(ClipPlane { point: DVec3::NEG_Z * 0.5, normal: Vec3::NEG_Z });
     let camera = Camera { near: 1.0, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
     let clipped = Camera { clip_plane, ..camera.clone() };
+    let flat = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera.clone() };
     for (depth, by_near_plane, by_clip_plane) in [(0.7, false, true), (1.5, true, true), (-0.7, false, false)] {
         let sees = |camera| Frustum::new(camera).intersects_sphere(DVec3::NEG_Z * depth, 0.05);
-        assert_eq!((sees(&camera), sees(&clipped)), (by_near_plane, by_clip_plane), "{depth}");
+        let found = [&camera, &flat, &clipped].map(sees);
+        assert_eq!(found, [by_near_plane, by_near_plane, by_clip_plane], "{depth}");
     }
 }

@@ -7,7 +7,9 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
 use drawloom::handle::Handle;
 use drawloom::process::Deferred;
-use drawloom::scene::{Arrivals, AssetLoader, Material, Mesh, RenderObject, Scene, SceneError, Texture};
+use drawloom::scene::{
+    Arrivals, AssetLoader, Changes, Material, Mesh, RenderObject, Scene, SceneError, SceneRef, Texture,
+};
 use drawloom::task::Scheduler;
 use drawloom::view::{Rejection, RejectionReason};
 use drawloom::{FrameStatistics, Renderer, Submitter};
@@ -233,4 +235,26 @@ fn an_error_whose_conversion_panics_is_told_and_others_load() {
     let arrivals = engine.receive(2);
     assert_eq!(arrivals.count, 1);
     assert!(arrivals.errors[0].to_string().contains("as planned"), "{}", arrivals.errors[0]);
+}
+
+#[test]
+fn an_object_is_drawn_when_its_mesh_its_material_or_both_at_once_have_arrived() {
+    for (loads_mesh, loads_material) in [(true, false), (false, true), (true, true)] {
+        let mut engine = Engine::new(2);
+        let mesh = match loads_mesh {
+            true => engine.loader.load("cube", 0, cube_of("cube")),
+            false => engine.scene.add(cube()).unwrap(),
+        };
+        let material = match loads_material {
+            true => engine.loader.load("paint", 0, || Ok::<_, SceneError>(Material::default())),
+            false => engine.material(),
+        };
+        engine.scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        assert_eq!(reasons(&engine.frame()), [(RejectionReason::NotResident, 1)]);
+        engine.receive(usize::from(loads_mesh) + usize::from(loads_material));
+        // No object changed, and what they consist of did.
+        let scene = SceneRef { changes: Changes::NONE, ..engine.scene.as_scene_ref() };
+        let statistics = engine.renderer.record(scene).unwrap().statistics().clone();
+        assert_eq!(reasons(&statistics), [], "mesh: {loads_mesh}, material: {loads_material}");
+    }
 }

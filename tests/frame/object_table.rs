@@ -42,6 +42,20 @@ fn the_first_rejected_object_is_named_by_its_number_in_the_scene() {
     assert_eq!((rejection.reason, rejection.count, rejection.first), (RejectionReason::InvalidTransform, 3, 300));
 }
 
+#[test]
+fn objects_that_become_valid_are_rejected_no_more() {
+    let scene = field(16);
+    let scene = scene.as_scene_ref();
+    let mut positions = scene.positions.to_vec();
+    positions[3] = DVec3::NAN;
+    let mut table = ObjectTable::default();
+    table.update(&SceneRef { positions: &positions, ..scene });
+    assert_eq!(table.rejections().list().len(), 1);
+    // Its packet changes as a whole.
+    draw(&mut table, &SceneRef { changes: Changes::Ranges(std::slice::from_ref(&(0..16))), ..scene });
+    assert_eq!(table.rejections().list(), []);
+}
+
 /// An engine's orientations may drift by a thousandth.
 #[test]
 fn orientations_are_normalized() {

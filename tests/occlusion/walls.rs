@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
-    Blend, Bounds, Camera, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
+    Blend, Bounds, Camera, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, Vertex, ViewKind,
 };
 use drawloom::view::{ObjectTable, OccluderMeshes};
 use drawloom_testing::samples::Samples;
@@ -55,6 +55,37 @@ fn hidden(scene: &SceneRef<'_>, tile_sizes: &[u32]) -> Vec<usize> {
     let first = answers.next().unwrap();
     assert!(answers.all(|answer| answer == first), "results differ between tile sizes");
     first
+}
+
+/// Objects are chosen in words of 64 and blocks of 256.
+#[test]
+fn any_object_of_many_may_hide_the_first() {
+    for before in [63, 64, 70, 255, 256, 300] {
+        let mut walls = WallScene::new();
+        // Beside the wall.
+        (1..before).for_each(|index| walls.add(DVec3::new(8.0, 0.01 * f64::from(index), -20.0), Vec3::splat(0.1)));
+        walls.add(DVec3::Z * -10.0, Vec3::new(3.0, 3.0, 0.1));
+        assert_eq!(walls.hidden(), [0], "object {before}");
+    }
+}
+
+/// The middle of its box is hidden, and one end is not.
+#[test]
+fn an_object_beside_its_position_is_hidden_where_it_is() {
+    let cube = cube();
+    let vertices = cube.vertices().iter().map(|vertex| {
+        let [x, y, z] = vertex.position;
+        Vertex { position: [x + 3.0, y, z], ..*vertex }
+    });
+    let beside = Mesh::new("beside", Topology::TriangleList, vertices.collect(), cube.indices().to_vec()).unwrap();
+    // The object begins 18 pixels to the right of the picture's middle, and the wall 14 and 23.
+    for (left, expected) in [(0.7, &[2][..]), (1.1, &[])] {
+        let mut walls = WallScene::new();
+        walls.add(DVec3::new(left + 10.0, 0.0, -10.0), Vec3::new(10.0, 9.0, 0.1));
+        walls.mesh = beside.clone();
+        walls.add(DVec3::Z * -22.0, Vec3::ONE);
+        assert_eq!(walls.hidden(), expected, "{left}");
+    }
 }
 
 #[test]
