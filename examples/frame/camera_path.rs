@@ -34,7 +34,7 @@ impl CameraPath {
         let read = || -> io::Result<String> {
             // To open a pipe is to wait for its writer.
             if !fs::metadata(path)?.is_file() {
-                return Err(io::Error::other("it is no regular file"));
+                return Err(io::Error::other("it is not a regular file"));
             }
             let mut text = String::new();
             File::open(path)?.take(Self::MAX_BYTES + 1).read_to_string(&mut text)?;

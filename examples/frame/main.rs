@@ -40,7 +40,9 @@ use report::Report;
 use sequence::Sequence;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
+    let events = tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false);
+    // That events cannot be printed is no reason to stop.
+    events.log_internal_errors(false).init();
     let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit());
     let failed = |error: Box<dyn Error>| print_diagnostic(format_args!("error: {}", with_causes(error.as_ref())));
     let Ok(input) = Input::load(&arguments).map_err(failed) else {
@@ -55,6 +57,8 @@ fn main() -> ExitCode {
 /// What the files that the command line names hold.
 struct Input {
     scene: Scene,
+    /// What was found in the scene's file, to be printed.
+    found: Option<String>,
     content: Content,
     /// Where a range of frames is to be drawn.
     sequence: Option<Sequence>,
@@ -66,12 +70,13 @@ impl Input {
             Frames::Range(range) => Some(Sequence::new(arguments, range.clone())?),
             Frames::Count(_) => None,
         };
-        let (scene, content) = load_scene(arguments)?;
-        Ok(Self { scene, content, sequence })
+        let (scene, found, content) = load_scene(arguments)?;
+        Ok(Self { scene, found, content, sequence })
     }
 }
 
-fn run(arguments: &Arguments, Input { scene, content, sequence }: Input) -> Result<(), Box<dyn Error>> {
+fn run(arguments: &Arguments, Input { scene, found, content, sequence }: Input) -> Result<(), Box<dyn Error>> {
+    found.map_or(Ok(()), print_line)?;
     if let Some(sequence) = sequence {
         return sequence.draw(arguments, scene, || pipeline::adapter_backend(arguments));
     }
@@ -97,12 +102,17 @@ fn run(arguments: &Arguments, Input { scene, content, sequence }: Input) -> Resu
         },
     };
     let report = report.with_content(content);
-    print_line(&report)?;
-    timeline::write_outputs(arguments, &log)?;
-    match &arguments.report {
-        Some(file) => report.write(file),
-        None => Ok(()),
+    // Files first: they do not depend on where the output goes.
+    if let Some(file) = &arguments.report {
+        report.write(file)?;
     }
+    let of_timeline = timeline::write_outputs(arguments, &log)?;
+    if let Some(picture) = &arguments.out {
+        print_line(format_args!("{} written", path_text(picture.path())))?;
+    }
+    print_line(&report)?;
+    of_timeline.into_iter().try_for_each(print_line)?;
+    Ok(())
 }
 
 fn draw_on_adapter(
@@ -131,19 +141,19 @@ fn draw_in_software(
     Ok((drawn.report.because(reason.map(with_causes)), drawn.log))
 }
 
-fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>> {
-    let mut content = Content::default();
+fn load_scene(arguments: &Arguments) -> Result<(Scene, Option<String>, Content), Box<dyn Error>> {
+    let (mut found, mut content) = (None, Content::default());
     let mut scene = match &arguments.scene {
         None => demo::colonnade()?,
         Some(path) => {
             let mut imported = obj::load(path).inspect_err(|error| print_warnings(error.warnings()))?;
             content = Content::of_file(&imported);
-            print_line(format_args!(
+            found = Some(format!(
                 "{}: {} triangles, and {} degenerate ones left out",
                 path_text(path),
                 imported.triangles,
                 imported.degenerate_triangles
-            ))?;
+            ));
             demo::add_camera_and_lights_upright(&mut imported.scene, arguments.up.axis());
             imported.scene
         }
@@ -162,7 +172,7 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Content), Box<dyn Error>>
             scene.replace(handle, mesh.with_triangle_culling(true))?;
         }
     }
-    Ok((scene, content))
+    Ok((scene, found, content))
 }
 
 /// The results of all frames.
@@ -225,7 +235,6 @@ fn draw<B: Backend>(
 fn save(arguments: &Arguments, picture: &Picture) -> Result<(), Box<dyn Error>> {
     if let Some(file) = &arguments.out {
         file.write([picture.width, picture.height], &picture.bytes)?;
-        print_line(format_args!("{} written", path_text(file.path())))?;
     }
     Ok(())
 }

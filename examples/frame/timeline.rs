@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace, write_page};
 use drawloom::timeline::{Frame, Log};
-use drawloom_output::{OutputFile, path_text, print_line};
+use drawloom_output::{OutputFile, path_text};
 
 use crate::arguments::Arguments;
 
@@ -19,25 +19,26 @@ pub fn first_recorded_frame(arguments: &Arguments) -> Option<u32> {
     is_requested.then_some(arguments.frames.count().saturating_sub(RECORDED_FRAMES))
 }
 
-/// Writes and prints the requested outputs.
+/// Writes the requested files, and returns what is to be printed.
 ///
 /// # Errors
 /// If a file cannot be written, or if the frame to explain was not recorded completely.
-pub fn write_outputs(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
+pub fn write_outputs(arguments: &Arguments, log: &Log) -> Result<Vec<String>, Box<dyn Error>> {
+    let mut lines = Vec::new();
     if let Some(file) = &arguments.timeline {
-        write(file, |file| write_chrome_trace(log, file))?;
+        lines.push(write(file, |file| write_chrome_trace(log, file))?);
     }
     if arguments.html.is_none() && !arguments.explain {
-        return Ok(());
+        return Ok(lines);
     }
     let costs = SchedulerCosts::measure()?;
     if let Some(file) = &arguments.html {
-        write(file, |file| write_page(log, &costs, file))?;
+        lines.push(write(file, |file| write_page(log, &costs, file))?);
     }
     if let Some(frame) = median_frame(log).filter(|_| arguments.explain) {
-        print_line(format_args!("\n{}", FrameReport::new(log, frame, &costs)?))?;
+        lines.push(format!("\n{}", FrameReport::new(log, frame, &costs)?));
     }
-    Ok(())
+    Ok(lines)
 }
 
 /// The frame of median duration.
@@ -47,7 +48,10 @@ fn median_frame(log: &Log) -> Option<u64> {
     Some(frames.get(frames.len() / 2)?.number)
 }
 
-fn write(file: &OutputFile, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Box<dyn Error>> {
+fn write(
+    file: &OutputFile,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<String, Box<dyn Error>> {
     file.write(write)?;
-    Ok(print_line(format_args!("{} written", path_text(file.path())))?)
+    Ok(format!("{} written", path_text(file.path())))
 }

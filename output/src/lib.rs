@@ -1,4 +1,4 @@
-//! Files that Drawloom's examples and benchmarks write: whole, or not at all.
+//! What Drawloom's examples and benchmarks write: files, whole or not at all, and lines on the console.
 //!
 //! A program names each of its files as an [`OutputFile`] or a [`PictureFile`] before it draws anything, so a name that cannot be written is an
 //! error at once. It writes the file when the content is there. The content goes to a temporary file in the same folder, reaches the disk, and
@@ -13,13 +13,13 @@
 //!   reported. So does an open file that is named through `/proc`. `/dev/stdout` and `/dev/stderr` are the streams of the process, wherever a
 //!   shell has redirected them: the content comes behind what was printed before.
 
+mod console;
 mod destination;
 mod error;
 mod file;
 mod picture;
-mod terminal;
 
+pub use console::{path_text, print_diagnostic, print_line};
 pub use error::OutputError;
 pub use file::{OutputFile, create_folder};
 pub use picture::PictureFile;
-pub use terminal::{path_text, print_diagnostic, print_line};

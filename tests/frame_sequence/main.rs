@@ -177,12 +177,12 @@ fn wrong_paths_are_named_with_the_line_or_the_frame() {
 
 #[cfg(unix)]
 #[test]
-fn a_path_that_may_have_no_end_is_refused() {
+fn a_path_that_may_have_no_end_or_is_too_large_is_refused() {
     let folder = TempDir::new().unwrap();
     let pipe = folder.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for path in [&pipe, Path::new("/dev/zero")] {
-        assert_eq!(CameraPath::load(path).unwrap_err(), "it is no regular file", "{}", path.display());
+        assert_eq!(CameraPath::load(path).unwrap_err(), "it is not a regular file", "{}", path.display());
     }
     // It takes no space on the disk.
     let large = folder.path().join("large");
@@ -190,13 +190,13 @@ fn a_path_that_may_have_no_end_is_refused() {
     assert_eq!(CameraPath::load(&large).unwrap_err(), "it has more than 67108864 bytes");
 }
 
-/// A triangle far away makes the scene large, but what is near to the camera is drawn as it is without the triangle.
+/// A triangle far away makes the scene large, but what is near to the camera covers the same pixels as without the triangle.
 #[test]
 fn a_far_triangle_hides_nothing_of_a_near_cube() -> Result<(), Box<dyn Error>> {
     let cube = "v -1 0 -1\nv 1 0 -1\nv 1 2 -1\nv -1 2 -1\nv -1 0 1\nv 1 0 1\nv 1 2 1\nv -1 2 1\n\
         f 5 6 7 8\nf 2 1 4 3\nf 6 2 3 7\nf 1 5 8 4\nf 8 7 3 4\nf 1 2 6 5\n";
     let far_triangle = "v 1e5 0 0\nv 100001 0 0\nv 1e5 1 0\nf 9 10 11\n";
-    // Whether each pixel shows something, as none in the upper left corner does.
+    // Whether each pixel differs from the upper left one, which is background.
     let covered = |text: &str| -> Result<Vec<bool>, Box<dyn Error>> {
         let folder = TempDir::new()?;
         let file = folder.path().join("a.obj");

@@ -1,4 +1,4 @@
-//! What programs print.
+//! Lines on the console, which may be a pipe or a file.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
@@ -23,7 +23,9 @@ pub fn path_text(path: &Path) -> String {
 /// # Errors
 /// If the line cannot be written, on a full disk for example.
 pub fn print_line(line: impl Display) -> io::Result<()> {
-    or_unread(writeln!(io::stdout(), "{line}"))
+    let named =
+        |error: io::Error| io::Error::new(error.kind(), format!("the standard output cannot be written: {error}"));
+    or_unread(writeln!(io::stdout(), "{line}")).map_err(named)
 }
 
 /// Prints a line on the standard error output. If that fails there is nowhere to say so.
@@ -42,6 +44,12 @@ mod tests {
     #[test]
     fn control_characters_in_paths_are_escaped() {
         assert_eq!(path_text(Path::new("a/été\u{1b}[31m\n.png")), "a/été\\u{1b}[31m\\u{a}.png");
+    }
+
+    #[test]
+    fn control_characters_in_the_names_of_files_that_cannot_be_written_are_escaped() {
+        let error = crate::PictureFile::new("missing\u{1b}/a.png").unwrap_err().to_string();
+        assert!(error.contains("missing\\u{1b}/a.png") && !error.contains('\u{1b}'), "{error}");
     }
 
     #[test]
