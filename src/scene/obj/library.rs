@@ -162,7 +162,7 @@ fn changes_nothing(keyword: &str, values: &str) -> bool {
         "Ns" | "Ni" => true,
         "Ks" => all(|number| number == 0.0),
         "Tf" => all(|number| number == 1.0),
-        // With light, and with highlights, which are those of `Ks`. 0 is without light.
+        // 1 is lit, and 2 adds the highlights of `Ks`. 0 is unlit, which is not drawn.
         "illum" => all(|number| (1.0..=2.0).contains(&number)),
         _ => false,
     }
@@ -188,12 +188,12 @@ fn color(values: &str, max: f32, warn: &mut impl FnMut(String)) -> Option<Vec3> 
 }
 
 fn opacity(values: &str, warn: &mut impl FnMut(String)) -> Option<f32> {
-    // It makes the rim of a curved surface more opaque than its middle; a uniform opacity approximates that.
-    let uniform = values.strip_prefix("-halo");
-    if uniform.is_some() {
+    // `-halo` makes the rim of a curved surface more opaque than its middle; a uniform opacity approximates that.
+    let after_halo = values.strip_prefix("-halo");
+    if after_halo.is_some() {
         warn("the opacity's option `-halo` was left out".to_owned());
     }
-    let number = uniform.unwrap_or(values).split_whitespace().next().and_then(|word| word.parse::<f32>().ok());
+    let number = after_halo.unwrap_or(values).split_whitespace().next().and_then(|word| word.parse::<f32>().ok());
     match number {
         Some(opacity) if (0.0..=1.0).contains(&opacity) => Some(opacity),
         _ => {
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_is_counted_unless_it_changes_nothing() {
-        let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0 # black\nNs 10\nNi 1.5\nTf 1 1 1\nillum 2";
+        let neutral = "Kd 0.5\nKa 0.5\nKs 0 0 0 # black\nNs 10\nNi 1.5\nTf 1 1 1\nillum 1\nillum 2";
         assert_eq!(parse_one(neutral).1, 0);
         let spectra = ["Ka spectral a.rfl", "Ks spectral a.rfl 1", "Tf spectral a.rfl"];
         for ignored in [&spectra[..], &["Ks 0 0 red", "illum full", "illum 0"]].concat() {
@@ -316,11 +316,11 @@ mod tests {
         };
         let counts: Vec<_> = keywords[..5].iter().map(ToString::to_string).collect();
         assert_eq!(file, "folder\\a.mtl");
-        assert_eq!(counts[0], "2 × `Ks` from line 9 on");
-        assert_eq!(counts[1..4], ["`illum` in line 13", "`Tf` in line 14", "`map_Ke` in line 15"]);
+        assert_eq!(counts[0], "2 × `Ks` from line 10 on");
+        assert_eq!(counts[1..4], ["`illum` in line 14", "`Tf` in line 15", "`map_Ke` in line 16"]);
         assert_eq!(keywords.len() + others, 99 + 5);
         assert!(
-            warnings[0].to_string().ends_with("`odd11` in line 27 and 88 statements with other keywords left out"),
+            warnings[0].to_string().ends_with("`odd11` in line 28 and 88 statements with other keywords left out"),
             "{}",
             warnings[0]
         );

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-/// Ear clipping takes quadratic time, and cubic in the worst case, so it is limited to polygons of this many corners.
+/// Ear clipping usually takes quadratic time, but cubic time in the worst case, so it is limited to polygons of this many corners.
 const MAX_EAR_CLIPPING_CORNERS: usize = 256;
 
 /// A polygon with less area than this share of that of its largest part is one whose parts cancel each other.
@@ -130,7 +130,7 @@ fn clip_ears(flat: &[DVec2], ring: &mut Vec<usize>, triangles: &mut Vec<[usize; 
         let [before, clipped, after] = triangle_at(ring, index);
         triangles.push([before, clipped, after]);
         ring.remove(index);
-        // All others are ears, or not, as they were.
+        // No other corner's triangle has changed, and its obstacle is still there.
         for at in 0..ring.len() {
             let corner = ring[at];
             if corner == before || corner == after || obstacles[corner] == Some(clipped) {
@@ -142,7 +142,8 @@ fn clip_ears(flat: &[DVec2], ring: &mut Vec<usize>, triangles: &mut Vec<[usize; 
     signed_area(flat[ring[0]], flat[ring[1]], flat[ring[2]]) >= 0.0
 }
 
-/// Why the middle corner of a triangle is no ear: a corner of the polygon inside the triangle, or itself where the polygon is concave.
+/// The corner that keeps the middle corner of a triangle from being an ear: one inside the triangle, or itself if it is reflex. `None` for an
+/// ear.
 fn obstacle(flat: &[DVec2], ring: &[usize], triangle: [usize; 3]) -> Option<usize> {
     let [a, b, c] = triangle.map(|corner| flat[corner]);
     // Points that coincide with a corner of the triangle do not count: polygons with holes repeat corners.
@@ -223,7 +224,7 @@ mod tests {
     }
 
     proptest! {
-        /// No ray from its centre leaves a star more than once.
+        /// The polygon is a star: no ray from its centre leaves it more than once.
         #[test]
         fn triangles_cover_a_star_once(radii in prop::collection::vec(0.05..1.0_f64, 4..=MAX_EAR_CLIPPING_CORNERS)) {
             let count = radii.len();
@@ -239,6 +240,46 @@ mod tests {
             prop_assert!(sizes.clone().all(|size| size >= 0.0));
             let expected = (0..count).map(|at| corners[at].cross(corners[(at + 1) % count]).z / 2.0).sum::<f64>();
             prop_assert!((sizes.sum::<f64>() - expected).abs() < 1e-9);
+        }
+    }
+
+    /// Ear clipping that looks at all corners each time.
+    fn clip_ears_naively(flat: &[DVec2]) -> (bool, Vec<[usize; 3]>) {
+        let (mut ring, mut triangles): (Vec<usize>, Vec<_>) = ((0..flat.len()).collect(), Vec::new());
+        while ring.len() > 3 {
+            let at = |index: usize| {
+                [ring[(index + ring.len() - 1) % ring.len()], ring[index], ring[(index + 1) % ring.len()]]
+            };
+            let sides = |[a, b, c]: [usize; 3], point: DVec2| {
+                [(a, b), (b, c), (c, a)].map(|(from, to)| (flat[to] - flat[from]).perp_dot(point - flat[from]))
+            };
+            let is_ear = |&index: &usize| {
+                let corners = at(index);
+                let is_inside = |point: &usize| {
+                    sides(corners, flat[*point]).iter().all(|side| *side >= 0.0)
+                        && corners.iter().all(|corner| flat[*corner] != flat[*point])
+                };
+                sides(corners, flat[corners[2]])[0] >= 0.0 && !ring.iter().any(is_inside)
+            };
+            let ears: Vec<_> = (0..ring.len()).filter(is_ear).collect();
+            let has_area = |index: &&usize| sides(at(**index), flat[at(**index)[2]])[0] > 0.0;
+            let Some(&ear) = ears.iter().find(has_area).or(ears.first()) else { return (false, triangles) };
+            triangles.push(at(ear));
+            ring.remove(ear);
+        }
+        ((flat[ring[1]] - flat[ring[0]]).perp_dot(flat[ring[2]] - flat[ring[0]]) >= 0.0, triangles)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        /// Corners that coincide or lie on an edge, and edges that cross, are frequent.
+        #[test]
+        fn ears_are_those_of_a_search_among_all_corners(corners in prop::collection::vec(prop::array::uniform2(0..5_i32), 4..14)) {
+            let flat: Vec<_> = corners.iter().map(|[x, y]| DVec2::new(f64::from(*x), f64::from(*y))).collect();
+            let (mut ring, mut triangles) = ((0..flat.len()).collect(), Vec::new());
+            let is_exact = clip_ears(&flat, &mut ring, &mut triangles);
+            prop_assert_eq!((is_exact, triangles), clip_ears_naively(&flat));
         }
     }
 
