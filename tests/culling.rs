@@ -178,8 +178,8 @@ fn an_engines_bounds_take_precedence() -> Result<(), Box<dyn Error>> {
         table.update(&scene_ref);
         assert_eq!(table.block(0).visible(&frustum, volume, 0..3), visible, "{volume:?}");
         // All are behind the other camera.
-        let all_or_none = if volume == CullingVolume::None { visible } else { 0 };
-        for (frustum, visible) in [(&frustum, visible), (&away, all_or_none)] {
+        let visible_from_away = if volume == CullingVolume::None { visible } else { 0 };
+        for (frustum, visible) in [(&frustum, visible), (&away, visible_from_away)] {
             let mut words = Vec::new();
             table.block(0).visible_words(frustum, volume, 0..2, |word, mask| words.push((word, mask)));
             assert_eq!(words, [(0, visible), (1, 0)], "{volume:?}");

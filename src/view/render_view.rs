@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// Depth at infinity is 0 in that corner of the picture whose ray is nearest to the plane's normal, and more in the others.
+    /// At infinity, depth is 0 in a corner of the picture whose ray is nearest to the plane's normal, and nowhere less.
     #[test]
     fn the_least_depth_of_an_oblique_picture_is_zero() {
         for normal in [[0.3, 0.5, -0.8], [-0.3, 0.5, -0.8], [0.3, -0.5, -0.8], [-0.3, -0.5, -0.8], [0.0, 0.0, -1.0]] {

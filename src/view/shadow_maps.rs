@@ -337,14 +337,22 @@ mod tests {
 
     #[test]
     fn a_map_reaches_from_the_casters_to_the_end_of_its_slice() {
-        let main = Camera { near: 1e-3, ..Camera::looking_at("main", DVec3::Y, DVec3::ZERO) };
+        let main = Camera { near: 1e-5, ..Camera::looking_at("main", DVec3::Y, DVec3::ZERO) };
         let is_near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 1e-6;
-        for cascades in 1..=ShadowMaps::MAX_CASCADES {
-            let maps = ShadowMaps { cascades, filter: 3, side: 100, max_distance: 0.01, ..ShadowMaps::default() };
+        let mut limited = 0;
+        for (cascades, split_lambda) in (1..=ShadowMaps::MAX_CASCADES).flat_map(|count| [(count, 0.5), (count, 1.0)]) {
+            let maps = ShadowMaps {
+                cascades,
+                split_lambda,
+                filter: 3,
+                side: 100,
+                max_distance: 0.01,
+                ..ShadowMaps::default()
+            };
             // A pixel on each side with one cascade, and with more of them 5 of 50 from the centre.
             let margin = if cascades == 1 { 1.04 } else { 1.0 / 0.9 };
             let radius = |cascade| {
-                let slice = |_: &Camera| cascade_slice([1e-3, 0.01], maps.split_lambda, cascade, cascades);
+                let slice = |_: &Camera| cascade_slice([1e-5, 0.01], split_lambda, cascade, cascades);
                 visible_sphere(std::slice::from_ref(&main), slice).unwrap().1 * margin
             };
             let of_sun = maps.cameras("sun", &sun(), std::slice::from_ref(&main));
@@ -354,8 +362,10 @@ mod tests {
                 assert!(is_near(height, 2.0 * radius) && is_near(map.near, radius), "{map:?}");
                 let casters = (16.0 * largest).min(128.0 * radius);
                 assert!(is_near(map.far, casters + 3.0 * radius), "{} {casters} {radius}", map.far);
+                limited += usize::from(16.0 * largest > 128.0 * radius);
             }
         }
+        assert!((1..10).contains(&limited), "{limited} maps reach 128 of their radii");
         let (position, direction, intensity) = (DVec3::ZERO, Vec3::X, Vec3::ONE);
         let lamp = Light::Hemispherical { position, direction, intensity, range: 0.5, casts_shadow: true };
         assert_eq!(ShadowMaps::default().cameras("lamp", &lamp, &[])[0].far, 0.5);

@@ -177,7 +177,10 @@ mod tests {
             let spin = glam::Quat::from_rotation_y(turn[0]);
             let clip = exact_matrix * (origin + spin.as_dquat() * local.as_dvec3()).extend(1.0);
             let error = position_error(origin, local.as_dvec3());
-            let fixed_point = (origin * 2_f64.powi(30)).round() * 2_f64.powi(-30);
+            // The camera's position is rounded as well.
+            let steps = |position: DVec3| (position * 2_f64.powi(30)).round();
+            let camera_position = DVec3::new(0.3, 0.7, 0.1) * 2_f64.powi(-30);
+            let fixed_point = (steps(origin + camera_position) - steps(camera_position)) * 2_f64.powi(-30);
             let by_device: Vec4 = matrix * (fixed_point.as_vec3() + spin * local).extend(1.0);
             let by_device = by_device.as_dvec4();
             let corner = cull_vertex(error, clip, &exact_matrix, camera.size);

@@ -157,13 +157,13 @@ proptest! {
 
 /// All objects are new, so masks of 64 are full, but for the last one.
 #[test]
-fn a_mesh_of_one_late_object_is_used() {
+fn a_mesh_of_one_object_far_behind_in_the_scene_is_used() {
     let mut scene = field(300);
     let objects: Vec<_> = scene.objects().collect();
-    for late in [100, 299] {
+    for number in [100, 299] {
         let mesh = scene.add(cube()).unwrap();
-        let now = RenderObject { mesh, ..scene.object(objects[late]).unwrap() };
-        scene.replace_object(objects[late], now).unwrap();
+        let now = RenderObject { mesh, ..scene.object(objects[number]).unwrap() };
+        scene.replace_object(objects[number], now).unwrap();
     }
     let mut table = ObjectTable::default();
     table.update(&scene.as_scene_ref());

@@ -196,8 +196,8 @@ proptest! {
                 LightKind::Directional => -forward,
                 _ => (map.camera.position - position).normalize(),
             };
-            // A surface that faces away is dark anyway.
-            if !is_seen || normal.dot(towards) < 0.01 {
+            // A surface that faces away, or that the light only grazes, is dark anyway.
+            if !is_seen || normal.dot(towards) <= 1e-3 {
                 continue;
             }
             const FINE: usize = 1 << 26;
