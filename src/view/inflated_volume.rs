@@ -231,6 +231,19 @@ mod tests {
         assert!(more > 2.0 * f64::from(angle) && more < 2.6 * f64::from(angle), "{more} for {angle}");
     }
 
+    /// Where the picture is off centre, one corner of the far plane is farther away than the others: here 36.7 m.
+    #[test]
+    fn the_farthest_corner_may_turn_into_the_view_direction() {
+        let motion = CameraMotion { distance: 0.0, angle: 1.2 };
+        for shift in [[-2.0, -2.0], [2.0, -2.0], [-2.0, 2.0], [2.0, 2.0]] {
+            let camera = Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z);
+            let camera =
+                Camera { far: 10.0, size: [1600, 900], shift: shift.into(), late_latch: Some(motion), ..camera };
+            let sees = |distance: f64| Frustum::new(&camera).intersects_sphere(DVec3::NEG_Z * distance, 0.1);
+            assert!(sees(36.0) && !sees(38.0), "{shift:?}");
+        }
+    }
+
     #[test]
     fn a_camera_that_may_look_anywhere_culls_nothing_within_its_far_plane() {
         let motion = CameraMotion { distance: 1.0, angle: 4.0 };
