@@ -57,7 +57,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N|A..B", default_value = "1")]
     pub frames: Frames,
 
-    /// The camera path, in a regular file: lines of a frame's number, and the camera's position and target then, `12 x y z tx ty tz`. It moves smoothly between them.
+    /// The camera path, in a regular file: lines of a frame's number, and the camera's position and target then, `12 x y z tx ty tz`. It moves
+    /// smoothly between them.
     #[arg(long, value_name = "FILE")]
     pub path: Option<PathBuf>,
 

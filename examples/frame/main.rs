@@ -76,8 +76,8 @@ impl Input {
 }
 
 fn run(arguments: &Arguments, Input { scene, found, content, sequence }: Input) -> Result<(), Box<dyn Error>> {
-    found.map_or(Ok(()), print_line)?;
     if let Some(sequence) = sequence {
+        found.map_or(Ok(()), print_line)?;
         return sequence.draw(arguments, scene, || pipeline::adapter_backend(arguments));
     }
     let (report, log) = match arguments.backend {
@@ -107,6 +107,7 @@ fn run(arguments: &Arguments, Input { scene, found, content, sequence }: Input) 
         report.write(file)?;
     }
     let of_timeline = timeline::write_outputs(arguments, &log)?;
+    found.map_or(Ok(()), print_line)?;
     if let Some(picture) = &arguments.out {
         print_line(format_args!("{} written", path_text(picture.path())))?;
     }
