@@ -52,7 +52,7 @@
 //! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
 //!   or a Chrome trace.
 //! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.
-//! - `meshopt`: `scene::Mesh::with_simplified_levels`: levels of detail by meshoptimizer, which is C++.
+//! - `meshopt`: `scene::Mesh::with_simplified_levels`, which makes levels of detail with meshoptimizer, a library in C++.
 //!
 //! # Spans
 //!
