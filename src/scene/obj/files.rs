@@ -1,51 +1,53 @@
-//! Opening and reading files whose names come from other files.
+//! Opening files whose names come from other files.
 
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io::{self, Read};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::limits::Limit;
 
-/// Reads the file of a name, relative to the OBJ file, within a limit.
-pub(super) type Fetch<'a> = &'a dyn Fn(&str, Limit) -> io::Result<Vec<u8>>;
+/// Opens the file of a name, relative to the OBJ file, within a limit.
+pub(super) type Open<'a> = &'a dyn Fn(&str, Limit) -> io::Result<Box<dyn Stream>>;
+
+/// A file that is read piece by piece.
+pub(super) trait Stream: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Stream for T {}
 
 /// Opens a regular file of at most `limit` bytes. What is no file, such as a FIFO or a device, may never end, and opening
 /// a FIFO waits for whoever writes to it.
 ///
 /// # Errors
 /// If it cannot be opened, is no regular file, or is larger.
-pub(super) fn open(path: &Path, limit: Limit) -> io::Result<Bounded<File>> {
+pub(super) fn open(path: &Path, limit: Limit) -> io::Result<BufReader<Bounded<File>>> {
     check(&fs::metadata(path)?, limit)?;
     let file = non_blocking().open(path)?;
     // By now, the path may be that of something else.
     check(&file.metadata()?, limit)?;
-    Ok(Bounded { inner: file, read: 0, limit })
-}
-
-/// Reads a regular file of at most `limit` bytes.
-///
-/// # Errors
-/// As [`open`], and if reading fails or there is no memory for it.
-pub(super) fn read(path: &Path, limit: Limit) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path, limit)?.read_to_end(&mut bytes)?;
-    Ok(bytes)
+    Ok(BufReader::with_capacity(1 << 16, Bounded { inner: file, position: 0, limit }))
 }
 
 /// Reads up to a limit, and then fails: a file may grow while it is read.
 #[derive(Debug)]
 pub(super) struct Bounded<R> {
     inner: R,
-    read: u64,
+    position: u64,
     limit: Limit,
 }
 
 impl<R: Read> Read for Bounded<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
-        self.read += count as u64;
-        self.limit.check(self.read)?;
+        self.position += count as u64;
+        self.limit.check(self.position)?;
         Ok(count)
+    }
+}
+
+impl<R: Seek> Seek for Bounded<R> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.position = self.inner.seek(position)?;
+        Ok(self.position)
     }
 }
 
@@ -212,17 +214,30 @@ mod tests {
         let path = std::env::temp_dir().join(format!("drawloom-limit-{}", std::process::id()));
         fs::write(&path, [7; 100]).unwrap();
         let limit = |bytes| Limit::new("library_bytes", bytes);
-        assert_eq!(read(&path, limit(100)).unwrap(), [7; 100]);
-        let error = read(&path, limit(99)).unwrap_err();
+        let read = |file: &mut BufReader<Bounded<File>>| {
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map(|_| bytes)
+        };
+        let mut file = open(&path, limit(100)).unwrap();
+        assert_eq!(read(&mut file).unwrap(), [7; 100]);
+        // What is read again does not count again.
+        file.seek(SeekFrom::End(-60)).unwrap();
+        assert_eq!(read(&mut file).unwrap(), [7; 60]);
+        // A file that grows is read up to the limit.
+        fs::write(&path, [7; 101]).unwrap();
+        file.rewind().unwrap();
+        assert_eq!(read(&mut file).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        fs::write(&path, [7; 100]).unwrap();
+        let error = open(&path, limit(99)).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         assert_eq!(error.to_string(), "it takes 100 bytes or more, and `ObjLimits::library_bytes` is 99");
-        let error = read(&path, Limit { taken: 50, ..limit(120) }).unwrap_err();
+        let error = open(&path, Limit { taken: 50, ..limit(120) }).unwrap_err();
         assert_eq!(
             error.to_string(),
             "it takes 100 bytes or more, 50 are taken, and `ObjLimits::library_bytes` is 120"
         );
         fs::remove_file(&path).unwrap();
-        let mut endless = Bounded { inner: io::repeat(7), read: 0, limit: limit(5000) };
+        let mut endless = Bounded { inner: io::repeat(7), position: 0, limit: limit(5000) };
         assert_eq!(endless.read_to_end(&mut Vec::new()).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
     }
 

@@ -1,14 +1,14 @@
 //! Loading an OBJ file into a scene.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, Cursor, Read};
 use std::mem;
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::error::{ObjError, ObjWarning};
-use super::files::{self, Fetch};
+use super::files::{self, Open, Stream};
 use super::geometry::{GeometryPart, ModelGeometry};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::{MalformedLine, Preprocessed};
@@ -78,12 +78,8 @@ pub fn load_within(path: impl AsRef<Path>, limits: &ObjLimits) -> Result<Importe
     let reader = files::open(path, Limit::new("scene_bytes", limits.scene_bytes))
         .map_err(|source| ObjError::Unreadable { file: escaped(&file), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    import(
-        &file,
-        BufReader::with_capacity(1 << 16, reader),
-        &|name, limit| files::read(&folder.join(name), limit),
-        limits,
-    )
+    let open = |name: &str, limit: Limit| Ok(Box::new(files::open(&folder.join(name), limit)?) as Box<dyn Stream>);
+    import(&file, reader, &open, limits)
 }
 
 /// As [`load`], from bytes that an engine already has. `file` names them in errors; `fetch` reads the `.mtl` files and
@@ -120,15 +116,15 @@ pub fn read_within(
     Limit::new("scene_bytes", limits.scene_bytes)
         .check(bytes.len() as u64)
         .map_err(|source| ObjError::Unreadable { file: escaped(file), source })?;
-    let fetch = |name: &str, limit: Limit| {
+    let open = |name: &str, limit: Limit| {
         let bytes = fetch(name)?;
         limit.check(bytes.len() as u64)?;
-        Ok(bytes)
+        Ok(Box::new(Cursor::new(bytes)) as Box<dyn Stream>)
     };
-    import(file, bytes, &fetch, limits)
+    import(file, bytes, &open, limits)
 }
 
-fn import(file: &str, reader: impl BufRead, fetch: Fetch<'_>, limits: &ObjLimits) -> Result<Imported, ObjError> {
+fn import(file: &str, reader: impl BufRead, open: Open<'_>, limits: &ObjLimits) -> Result<Imported, ObjError> {
     let file = escaped(file);
     let mut warnings = Warnings::new(limits.warnings);
     let mut preprocessed = Statements::new(reader, limits.line_bytes)
@@ -138,7 +134,7 @@ fn import(file: &str, reader: impl BufRead, fetch: Fetch<'_>, limits: &ObjLimits
         .map_err(|error| ObjError::Refused { file: file.clone(), reason: error.to_string() })?;
     let mut imported = Imported::default();
     imported
-        .fill(models, &preprocessed, fetch, limits, &mut warnings)
+        .fill(models, &preprocessed, open, limits, &mut warnings)
         .map_err(|source| ObjError::Scene { file: file.clone(), source })?;
     if imported.triangles == 0 {
         return Err(nothing_to_draw(file, preprocessed, imported.degenerate_triangles, warnings.listed));
@@ -198,12 +194,12 @@ impl Imported {
         &mut self,
         models: Vec<tobj::Model>,
         file: &Preprocessed,
-        fetch: Fetch<'_>,
+        open: Open<'_>,
         limits: &ObjLimits,
         warnings: &mut Warnings,
     ) -> Result<(), SceneError> {
         warnings_of(file).for_each(|warning| warnings.push(warning));
-        let materials = material::add_materials(&mut self.scene, file, fetch, limits, warnings)?;
+        let materials = material::add_materials(&mut self.scene, file, open, limits, warnings)?;
         let mut emissive = Vec::new();
         for model in models {
             let geometry = ModelGeometry::new(&model.mesh, &file.positions, &file.colors);

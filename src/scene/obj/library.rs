@@ -3,7 +3,7 @@
 //! tobj does not parse them, because it rejects a whole library for one malformed line without naming the line, and panics on
 //! a colour of one number, which the format allows.
 
-use std::io;
+use std::io::{self, BufRead};
 
 use glam::Vec3;
 
@@ -56,18 +56,18 @@ pub(super) struct Definitions {
 /// Adds the materials of a library to others. A malformed line is left out, with a warning.
 ///
 /// # Errors
-/// Never, since the library is in memory.
+/// If the reader fails. What was read before counts.
 pub(super) fn add_definitions(
     definitions: &mut Definitions,
     library: &str,
-    bytes: &[u8],
+    file: impl BufRead,
     is_used: impl Fn(&str) -> bool,
     max_line_bytes: u64,
     warnings: &mut Warnings,
 ) -> io::Result<()> {
     let mut current: Option<Definition> = None;
     let mut ignored = IgnoredStatements::default();
-    let mut statements = Statements::new(bytes, max_line_bytes)?;
+    let mut statements = Statements::new(file, max_line_bytes)?;
     while let Some((line, statement)) = statements.next()? {
         let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();

@@ -1,12 +1,12 @@
 //! Materials and textures of the scene, from the definitions in libraries.
 
 use std::collections::{HashMap, HashSet};
-use std::io;
+use std::io::{self, Seek, SeekFrom};
 
 use glam::Vec3;
 
 use super::error::ObjWarning;
-use super::files::{Fetch, PossibleName, first_readable, possible_names};
+use super::files::{Open, PossibleName, first_readable, possible_names};
 use super::library::{self, Definition, Definitions, TextureStatement};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::Preprocessed;
@@ -25,12 +25,12 @@ const INVERTED_SHARE: f64 = 0.8;
 pub(super) fn add_materials(
     scene: &mut Scene,
     file: &Preprocessed,
-    fetch: Fetch<'_>,
+    open: Open<'_>,
     limits: &ObjLimits,
     warnings: &mut Warnings,
 ) -> Result<Vec<Handle<Material>>, SceneError> {
     let used = file.materials.iter().map(String::as_str).collect();
-    let mut libraries = Libraries { fetch, limits, used, bytes: 0, definitions: Definitions::default() };
+    let mut libraries = Libraries { open, limits, used, bytes: 0, definitions: Definitions::default() };
     for library in &file.libraries {
         libraries.add(library, warnings);
     }
@@ -39,7 +39,7 @@ pub(super) fn add_materials(
     // A later definition of the same name replaces an earlier one.
     let defined: HashMap<_, _> =
         definitions.used.iter().map(|definition| (definition.name.as_str(), definition)).collect();
-    let mut textures = TextureCache::new(fetch, limits);
+    let mut textures = TextureCache::new(open, limits);
     let default = || Material { double_sided: true, ..Material::default() };
     let mut handles = Vec::new();
     for name in &file.materials {
@@ -58,7 +58,7 @@ pub(super) fn add_materials(
 
 /// Reads material libraries.
 struct Libraries<'a> {
-    fetch: Fetch<'a>,
+    open: Open<'a>,
     limits: &'a ObjLimits,
     /// The names of the materials that the OBJ file uses.
     used: HashSet<&'a str>,
@@ -72,11 +72,13 @@ impl Libraries<'_> {
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
         let read = possible_names("", library).and_then(|names| {
-            let (PossibleName { name, .. }, bytes) = first_readable(&names, |name| (self.fetch)(name, limit))?;
-            self.bytes += bytes.len() as u64;
+            let (PossibleName { name, .. }, mut file) = first_readable(&names, |name| (self.open)(name, limit))?;
             let is_used = |name: &str| self.used.contains(name);
             let max_line_bytes = self.limits.line_bytes;
-            library::add_definitions(&mut self.definitions, name, &bytes, is_used, max_line_bytes, warnings)
+            let added =
+                library::add_definitions(&mut self.definitions, name, &mut file, is_used, max_line_bytes, warnings);
+            self.bytes += file.stream_position()?;
+            added
         });
         match read {
             Ok(()) => {}
@@ -108,7 +110,7 @@ fn correct_opacity(definitions: &mut Definitions, warnings: &mut Warnings) {
 
 /// Textures, shared between materials.
 struct TextureCache<'a> {
-    fetch: Fetch<'a>,
+    open: Open<'a>,
     limits: &'a ObjLimits,
     /// Of the textures in the scene.
     all_textures: Limit,
@@ -148,11 +150,11 @@ struct TextureFile {
 }
 
 impl<'a> TextureCache<'a> {
-    fn new(fetch: Fetch<'a>, limits: &'a ObjLimits) -> Self {
+    fn new(open: Open<'a>, limits: &'a ObjLimits) -> Self {
         let (files, by_files, by_statements) = (HashMap::new(), HashMap::new(), HashMap::new());
         let all_textures = Limit::new("all_textures_bytes", limits.all_textures_bytes);
         let decoded = Limit::new("decoded_bytes", limits.decoded_bytes);
-        Self { fetch, limits, all_textures, decoded, files, by_files, by_statements }
+        Self { open, limits, all_textures, decoded, files, by_files, by_statements }
     }
 
     fn material(
@@ -260,8 +262,9 @@ impl<'a> TextureCache<'a> {
 
     fn decode(&mut self, name: &str) -> io::Result<Pixels> {
         let of_file = Limit::new("texture_file_bytes", self.limits.texture_file_bytes);
-        let file = (self.fetch)(name, of_file.min(self.decoded))?;
-        self.decoded.take(file.len() as u64)?;
+        let mut file = (self.open)(name, of_file.min(self.decoded))?;
+        self.decoded.take(file.seek(SeekFrom::End(0))?)?;
+        file.rewind()?;
         let while_decoded = Limit::new("texture_bytes", self.limits.texture_bytes);
         texture::decode(name, file, while_decoded, self.all_textures, &mut self.decoded)
             .map_err(|reason| io::Error::new(io::ErrorKind::InvalidData, reason))

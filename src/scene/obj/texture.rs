@@ -1,6 +1,6 @@
 //! Decoding of textures, whose size is known and checked before.
 
-use std::io::{self, Cursor};
+use std::io::{self, BufRead, Read, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
@@ -25,13 +25,14 @@ pub(super) struct Pixels {
 /// Says why it cannot be decoded, or which limit it exceeds.
 pub(super) fn decode(
     name: &str,
-    file: Vec<u8>,
+    mut file: impl BufRead + Seek,
     while_decoded: Limit,
     result: Limit,
     decoded: &mut Limit,
 ) -> Result<Pixels, String> {
-    let coefficients = progressive_components(&file) * 2;
-    let mut reader = ImageReader::new(Cursor::new(file));
+    let coefficients = progressive_components(&mut file).map_err(message)? * 2;
+    file.rewind().map_err(message)?;
+    let mut reader = ImageReader::new(file);
     // The guess from the contents comes first, but TGA has no magic number.
     if let Ok(format) = ImageFormat::from_path(name) {
         reader.set_format(format);
@@ -73,25 +74,52 @@ fn message(error: impl ToString) -> String {
 
 /// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
 /// scan is read.
-fn progressive_components(file: &[u8]) -> u64 {
-    let Some(mut segments) = file.strip_prefix(b"\xff\xd8") else {
-        return 0;
-    };
+///
+/// # Errors
+/// If reading fails.
+fn progressive_components(file: &mut (impl Read + Seek)) -> io::Result<u64> {
+    match components_of_first_frame(file) {
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(0),
+        found => found,
+    }
+}
+
+/// As [`progressive_components`].
+///
+/// # Errors
+/// Also if the file ends before its first frame or scan.
+fn components_of_first_frame(file: &mut (impl Read + Seek)) -> io::Result<u64> {
+    if read_array(file)? != [0xff, 0xd8] {
+        return Ok(0);
+    }
     loop {
-        match *segments {
+        let [0xff] = read_array(file)? else { return Ok(0) };
+        let mut marker = [0xff];
+        // Any number of fill bytes may precede it.
+        while marker == [0xff] {
+            marker = read_array(file)?;
+        }
+        match marker {
             // The header of a progressive frame: its length, bits, height, width, and number of components.
-            [0xff, 0xc2 | 0xc6 | 0xca | 0xce, _, _, _, _, _, _, _, components, ..] => return u64::from(components),
-            // The first scan.
-            [0xff, 0xda, ..] => return 0,
-            // A fill byte.
-            [0xff, 0xff, ..] => segments = &segments[1..],
-            [0xff, _, high, low, ..] => {
-                let length = usize::from(u16::from_be_bytes([high, low]));
-                segments = segments.get(2 + length..).unwrap_or_default();
+            [0xc2 | 0xc6 | 0xca | 0xce] => {
+                let [_, _, _, _, _, _, _, components] = read_array(file)?;
+                return Ok(u64::from(components));
             }
-            _ => return 0,
+            // The first scan.
+            [0xda] => return Ok(0),
+            _ => {
+                // Its own two bytes count.
+                let length = u16::from_be_bytes(read_array(file)?);
+                file.seek_relative(i64::from(length) - 2)?;
+            }
         }
     }
+}
+
+fn read_array<const LENGTH: usize>(file: &mut impl Read) -> io::Result<[u8; LENGTH]> {
+    let mut bytes = [0; LENGTH];
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Decodes channels of 8 bits into the memory of the result.
@@ -212,6 +240,8 @@ fn nearest([source_width, source_height]: [u32; 2], [width, height]: [u32; 2]) -
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
     use image::{ExtendedColorType, ImageEncoder};
 
@@ -228,7 +258,7 @@ mod tests {
     fn decode_named(name: &str, file: Vec<u8>, bytes: u64) -> Result<Pixels, String> {
         let [texture, all] =
             [("texture_bytes", bytes), ("all_textures_bytes", 1 << 20)].map(|(field, bytes)| Limit::new(field, bytes));
-        decode(name, file, texture, all, &mut Limit::new("decoded_bytes", 1 << 20))
+        decode(name, Cursor::new(file), texture, all, &mut Limit::new("decoded_bytes", 1 << 20))
     }
 
     #[test]
@@ -274,21 +304,27 @@ mod tests {
         assert!(!error.contains(char::is_control) && error.starts_with("Format error decoding Jpeg"), "{error:?}");
     }
 
+    fn components(file: &[u8]) -> u64 {
+        progressive_components(&mut Cursor::new(file)).unwrap()
+    }
+
     #[test]
     fn the_coefficients_of_a_progressive_jpeg_count() {
         let mut file = Vec::new();
         let encoder = image::codecs::jpeg::JpegEncoder::new(&mut file);
         encoder.write_image(&[7; 600 * 3], 30, 20, ExtendedColorType::Rgb8).unwrap();
-        assert_eq!(progressive_components(&file), 0);
+        assert_eq!(components(&file), 0);
         let header = file.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
         file[header + 1] = 0xc2;
-        assert_eq!(progressive_components(&file), 3);
+        assert_eq!(components(&file), 3);
         let error = decode_named("a.jpg", file.clone(), 5999).map(drop).unwrap_err();
         assert_eq!(error, "30x20: it takes 6000 bytes or more, and `ObjLimits::texture_bytes` is 5999");
         for end in 0..file.len() {
-            progressive_components(&file[..end]);
+            components(&file[..end]);
         }
-        assert_eq!(progressive_components(b"\xff\xd8\xff\xe0\0\0\xff\xe0\0\0"), 0);
+        assert_eq!(components(b"\xff\xd8\xff\xe0\0\0\xff\xe0\0\0"), 0);
+        let after_fill_bytes = [&file[..header], &[0xff; 9], &file[header..]].concat();
+        assert_eq!(components(&after_fill_bytes), 3);
     }
 
     #[test]
