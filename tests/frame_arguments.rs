@@ -11,6 +11,7 @@ use arguments::{Arguments, Frames};
 use drawloom::demo::UpAxis;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::Camera;
+use drawloom::scene::obj::ObjLimits;
 
 /// An empty folder of this process, which is removed on drop.
 struct Folder(PathBuf);
@@ -85,6 +86,30 @@ fn the_axis_that_points_up_is_named() {
     assert!(directions.iter().zip(expected).all(|(one, other)| one.abs_diff_eq(other, 1e-6)), "{directions:?}");
     let error = parse(&["--up", "z"]).err().expect("there is no file");
     assert!(error.contains("--up is for an OBJ file"), "{error}");
+}
+
+#[test]
+fn every_limit_in_bytes_is_set_by_its_name() {
+    let limits = parse(&["a.obj"]).unwrap().obj_limits();
+    assert_eq!(limits, ObjLimits::default());
+    let text = format!("{limits:?}");
+    let fields: Vec<_> = text.split([' ', ':']).filter(|word| word.ends_with("_bytes")).collect();
+    assert!(fields.contains(&"scene_bytes"), "{text}");
+    for field in &fields {
+        let limits = parse(&["a.obj", "--limit", &format!("{field}=7")]).unwrap().obj_limits();
+        let text = format!("{limits:?}");
+        assert_eq!((text.contains(&format!(" {field}: 7,")), text.matches(": 7,").count()), (true, 1), "{text}");
+    }
+    let limits = parse(&["a.obj", "--limit", "scene_bytes=1", "--limit", "line_bytes=2"]).unwrap().obj_limits();
+    assert_eq!(limits, ObjLimits { scene_bytes: 1, line_bytes: 2, ..ObjLimits::default() });
+    for (value, problem) in
+        [("scene_bytes", "FIELD=BYTES"), ("scene_bytes=1k", "\"1k\""), ("bytes=1", "none of scene_bytes")]
+    {
+        let error = parse(&["a.obj", "--limit", value]).err().unwrap_or_else(|| panic!("{value} is accepted"));
+        assert!(error.contains(problem), "{value}: {error}");
+    }
+    let error = parse(&["--limit", "scene_bytes=1"]).err().expect("there is no file");
+    assert!(error.contains("--limit is for an OBJ file"), "{error}");
 }
 
 #[test]

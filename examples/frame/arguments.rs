@@ -14,6 +14,7 @@ use drawloom::backend::RecordingStrategy;
 use drawloom::demo::UpAxis;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
+use drawloom::scene::obj::ObjLimits;
 use drawloom_output::{OutputFile, PictureFile};
 
 /// Renders a scene through the whole frame: graph, jobs, views, commands, sorting and instancing, bundles, queues and
@@ -31,6 +32,11 @@ pub struct Arguments {
     /// The axis that points up in the OBJ file.
     #[arg(long, value_enum, value_name = "AXIS", default_value = "y")]
     pub up: UpName,
+
+    /// Replaces a limit of what the OBJ file and the files that it names may take, by the name that messages about it have. May be given
+    /// several times.
+    #[arg(long = "limit", value_name = "FIELD=BYTES")]
+    pub limits: Vec<FileLimit>,
 
     /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
     /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter and no camera path.
@@ -117,6 +123,9 @@ impl Arguments {
         if arguments.up != UpName::Y && arguments.scene.is_none() {
             return Err(conflict("--up is for an OBJ file, and there is none"));
         }
+        if !arguments.limits.is_empty() && arguments.scene.is_none() {
+            return Err(conflict("--limit is for an OBJ file, and there is none"));
+        }
         if let Frames::Range(_) = arguments.frames {
             arguments.check_sequence(draws)?;
         } else if arguments.path.is_some() {
@@ -127,6 +136,13 @@ impl Arguments {
             arguments.out = Some(default.map_err(|error| Self::command().error(ErrorKind::Io, error))?);
         }
         Ok(arguments)
+    }
+
+    /// What the OBJ file may take.
+    pub fn obj_limits(&self) -> ObjLimits {
+        let mut limits = ObjLimits::default();
+        self.limits.iter().for_each(|limit| *(limit.field)(&mut limits) = limit.bytes);
+        limits
     }
 
     /// Checks the arguments of a range of frames.
@@ -241,6 +257,37 @@ impl UpName {
             Self::Y => UpAxis::Y,
             Self::Z => UpAxis::Z,
         }
+    }
+}
+
+/// `FIELD=BYTES`: a limit in bytes of [`ObjLimits`], and its value.
+#[derive(Clone, Copy)]
+pub struct FileLimit {
+    field: LimitField,
+    bytes: u64,
+}
+
+type LimitField = fn(&mut ObjLimits) -> &mut u64;
+
+impl FromStr for FileLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        const FIELDS: [(&str, LimitField); 7] = [
+            ("scene_bytes", |limits| &mut limits.scene_bytes),
+            ("line_bytes", |limits| &mut limits.line_bytes),
+            ("library_bytes", |limits| &mut limits.library_bytes),
+            ("texture_file_bytes", |limits| &mut limits.texture_file_bytes),
+            ("texture_bytes", |limits| &mut limits.texture_bytes),
+            ("all_textures_bytes", |limits| &mut limits.all_textures_bytes),
+            ("decoded_bytes", |limits| &mut limits.decoded_bytes),
+        ];
+        let (name, bytes) = text.split_once('=').ok_or("expected FIELD=BYTES, as in texture_bytes=1000000000")?;
+        let Some((_, field)) = FIELDS.into_iter().find(|(field, _)| *field == name) else {
+            return Err(format!("{name:?} is none of {}", FIELDS.map(|(field, _)| field).join(", ")));
+        };
+        let bytes = bytes.parse().map_err(|error| format!("{bytes:?}: {error}"))?;
+        Ok(Self { field, bytes })
     }
 }
 

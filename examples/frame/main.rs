@@ -147,7 +147,8 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Option<String>, Content),
     let mut scene = match &arguments.scene {
         None => demo::colonnade()?,
         Some(path) => {
-            let mut imported = obj::load(path).inspect_err(|error| print_warnings(error.warnings()))?;
+            let mut imported = obj::load_within(path, &arguments.obj_limits())
+                .inspect_err(|error| print_warnings(error.warnings()))?;
             content = Content::of_file(&imported);
             found = Some(format!(
                 "{}: {} triangles, and {} degenerate ones left out",
