@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::demo;
-use drawloom::glam::DVec3;
+use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, Scene};
+use drawloom::scene::{Camera, ClipPlane, LayerMask, Projection, RenderObject, Scene};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom_testing::obj_files::{hall, interior};
@@ -17,8 +17,10 @@ use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::draw_on_processor;
+use crate::image_distance::assert_different;
+use crate::rays::{Panel, PanelScene};
 use crate::references::{generated, shared};
-use crate::shadows::fixture_with;
+use crate::shadows::{fixture_with, sun};
 
 pub const CASES: &[Case] = &[
     // With small shadow maps, which take a quarter of a minute less.
@@ -27,6 +29,7 @@ pub const CASES: &[Case] = &[
     }),
     ("software_draws_everything_as_wgpu_does", || compare(everything())),
     ("software_draws_cascades_as_wgpu_does", cascades),
+    ("software_has_the_shadow_bias_of_wgpu_behind_a_clip_plane", behind_a_clip_plane),
     ("software_draws_a_field_of_boxes_as_wgpu_does", || compare(field(400))),
     ("software_draws_an_interior_as_wgpu_does", || compare(generated(&interior())?)),
     ("software_draws_a_hall_as_wgpu_does", || compare(generated(&hall())?)),
@@ -42,6 +45,35 @@ fn cascades() -> Result<(), Failed> {
     let mut scene = everything();
     scene.cameras[0] = Camera::looking_at("main", DVec3::new(0.5, 1.5, 4.0), DVec3::new(0.0, 0.3, 0.0));
     compare_with(scene, ShadowMaps { side: 256, cascades: 4, max_distance: 12.0, ..ShadowMaps::default() })
+}
+
+/// The shadow of a ramp begins where the ramp is higher than the bias. With a clip plane near the camera and across its view the bias is
+/// several times what it is without.
+fn behind_a_clip_plane() -> Result<(), Failed> {
+    let projection = Projection::Perspective { field_of_view: 2.0 * 0.5_f32.atan() };
+    // Its corners are on corners of pixels, where neither backend moves them.
+    let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 3.0);
+    let ramp = Panel::new(DVec3::Y * 0.125, DVec3::new(2.5, 0.125, 0.0), DVec3::Z * 2.0).double_sided();
+    let maps = ShadowMaps { side: 1024, filter: 0, max_distance: 12.0, ..ShadowMaps::default() };
+    let lights = vec![sun(DVec3::new(0.0, -1.0, 1.0).normalize())];
+    let mut scene = PanelScene { panels: vec![floor, ramp], lights, maps }.scene(&[])?;
+    // The ramp is seen by the sun alone.
+    let [floor, ramp] = scene.objects().collect::<Vec<_>>()[..] else { return Err("there are two objects".into()) };
+    for (object, layer) in [(floor, 0), (ramp, 1)] {
+        scene.replace_object(object, RenderObject { layers: LayerMask::layer(layer), ..scene.object(object)? })?;
+    }
+    // Of a shadow's edge, rounding decides which pixels are lit. What counts is where it is.
+    scene.ambient = Vec3::splat(0.5);
+    let looking = Camera::looking_at("main", DVec3::Y * 6.0, DVec3::ZERO);
+    let camera = Camera { projection, layers: LayerMask::layer(0), ..looking };
+    let [right, forward] = [Vec3::X, Vec3::NEG_Z].map(|axis| camera.orientation * axis);
+    let point = camera.position + forward.as_dvec3() * 0.02;
+    let clip_plane = Some(ClipPlane { point, normal: (right * 0.85 + forward * 0.5).normalize() });
+    scene.cameras = vec![camera.clone()];
+    let plain = fixture_with(maps)?.draw(&scene)?;
+    scene.cameras = vec![Camera { clip_plane, ..camera }];
+    assert_different(&plain, &fixture_with(maps)?.draw(&scene)?)?;
+    compare_with(scene, maps)
 }
 
 fn compare(scene: Scene) -> Result<(), Failed> {
