@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use drawloom::glam::{DQuat, DVec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Assets, Changes, Mesh, RenderObject, SceneRef};
+use drawloom::scene::{Assets, Changes, Material, Mesh, RenderObject, Scene, SceneRef};
 use drawloom::view::{ObjectTable, RejectionReason};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
@@ -54,6 +54,29 @@ fn objects_that_become_valid_are_rejected_no_more() {
     // Its packet changes as a whole.
     draw(&mut table, &SceneRef { changes: Changes::Ranges(std::slice::from_ref(&(0..16))), ..scene });
     assert_eq!(table.rejections().list(), []);
+}
+
+#[test]
+fn bins_of_meshes_that_are_gone_are_removed() {
+    let mut scene = Scene::new();
+    let material = scene.add(Material::default()).unwrap();
+    let add = |scene: &mut Scene| {
+        let mesh = scene.add(cube()).unwrap();
+        (scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap(), mesh)
+    };
+    let mut objects: Vec<_> = (0..600).map(|_| add(&mut scene)).collect();
+    let mut table = ObjectTable::default();
+    table.update(&scene.as_scene_ref());
+    assert_eq!(table.bins().len(), 600);
+    for (object, mesh) in objects.split_off(3) {
+        scene.remove_object(object).unwrap();
+        scene.remove(mesh).unwrap();
+    }
+    table.update(&scene.as_scene_ref());
+    assert_eq!(table.bins().len(), 3);
+    objects.push(add(&mut scene));
+    table.update(&scene.as_scene_ref());
+    assert_eq!(table.bins().len(), 4);
 }
 
 /// An engine's orientations may drift by a thousandth.

@@ -6,7 +6,7 @@ use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
 use drawloom::quality::{Quality, VertexFormat};
-use drawloom::scene::{Changes, Mesh, Scene, SceneRef, Topology, Vertex};
+use drawloom::scene::{Changes, Mesh, Piece, Scene, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::view::GpuObject;
 use drawloom_testing::adapter;
@@ -48,6 +48,30 @@ fn statistics_and_timeline_report_the_uploaded_bytes() {
     let counted: Vec<_> = log.counters.iter().map(|counter| (counter.name.as_str(), counter.value)).collect();
     let expected: Vec<_> = uploaded.iter().map(|statistics| ("bytes uploaded", statistics.uploaded as f64)).collect();
     assert_eq!(counted, expected);
+}
+
+#[test]
+fn objects_of_pieces_are_uploaded_once() {
+    let (device, queue) = adapter::noop_device().unwrap();
+    let backend = WgpuBackend::new(device, queue).unwrap();
+    let quality = Quality { occlusion: None, ..Quality::balanced() };
+    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let scene = field(600);
+    let pieces = [Piece::new("left", (0..200).collect()), Piece::new("right", (200..600).collect())];
+    let mut draw = |changes| {
+        let lent = SceneRef { changes, pieces: &pieces, ..scene.as_scene_ref() };
+        let statistics = submitter.submit(renderer.record(lent).unwrap()).unwrap().statistics;
+        (statistics.views.iter().map(|view| view.pieces).sum::<usize>(), statistics.uploaded)
+    };
+    draw(Changes::Unknown);
+    // The frame that records them.
+    draw(Changes::NONE);
+    let (executed, uploaded) = draw(Changes::NONE);
+    assert!(executed > 0 && uploaded > 0, "{executed} pieces, {uploaded} bytes");
+    for _ in 0..3 {
+        assert_eq!(draw(Changes::NONE), (executed, 0));
+    }
 }
 
 /// Draws depth, and may declare that it reads the column `tint`.

@@ -143,6 +143,19 @@ mod tests {
     }
 
     #[test]
+    fn a_dent_as_deep_as_the_tolerance_is_no_part_of_a_body() {
+        // With a point in the middle of a side, the plane of a triangle there is off the opposite edge by twice the dent.
+        for (dent, is_closed) in [(0.0, true), (0.2, true), (1.0, false)] {
+            let (mut points, mut triangles) = box_of(Vec3::ONE);
+            triangles.truncate(10);
+            points.push(Vec3::Z * (1.0 - dent * TOLERANCE as f32));
+            triangles.extend([[4, 5, 8], [5, 7, 8], [7, 6, 8], [6, 4, 8]]);
+            let parts = ConvexPart::decompose(&mesh(&points, &triangles));
+            assert!(!parts.is_empty() && parts.iter().all(|part| part.is_closed == is_closed), "{dent}: {parts:?}");
+        }
+    }
+
+    #[test]
     fn components_of_a_mesh_are_separate_parts_in_order_of_size() {
         let (mut points, mut triangles) = box_of(Vec3::ONE);
         let (larger, more) = box_of(Vec3::splat(2.0));

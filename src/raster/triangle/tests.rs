@@ -262,6 +262,14 @@ fn a_triangle_with_a_corner_at_the_camera_is_dropped() {
 }
 
 #[test]
+fn a_triangle_without_area_is_dropped() {
+    for last in [[2048, 1024], [1024, 512], [2048, 1023]] {
+        let corners = [[0, 0], [1024, 512], last].map(|point| corner_at::<f32, 0>(point, [0.5, 1.0]));
+        assert_eq!(set_up(&corners, None).is_empty(), last != [2048, 1023], "{last:?}");
+    }
+}
+
+#[test]
 fn a_floor_that_begins_far_behind_the_camera_covers_all_below_the_horizon() {
     let corner = |x: f32, z: f32| (Vector([x, -1.5, 1e-5, -z]), []);
     let [a, b, c, d] = [corner(-1e6, 1e6), corner(1e6, 1e6), corner(1e6, -1e6), corner(-1e6, -1e6)];
