@@ -25,6 +25,9 @@ pub fn trials() -> Vec<Trial> {
         on_unix("a_fifo_is_refused_without_waiting_for_a_writer", a_fifo_is_refused),
         on_unix("a_device_is_refused", a_device_is_refused),
         on_unix("a_sparse_file_of_10_gb_is_refused", a_sparse_file_is_refused),
+        trial("files::a_library_that_cannot_be_read_is_named_once", a_library_that_cannot_be_read)
+            .with_ignored_flag(!cfg!(target_os = "linux")),
+        trial("files::what_is_missing_behind_the_end_of_a_texture_is_no_limit", behind_the_end_of_a_texture),
         trial("files::every_limit_is_named_with_its_value", every_limit_is_named_with_its_value),
         trial(
             "files::a_file_of_one_long_line_is_an_error_that_says_so",
@@ -103,6 +106,27 @@ fn a_sparse_file_is_refused() {
     for (name, (field, limit)) in FILES.into_iter().zip(limits) {
         let reason = reason(name, ObjLimits::default(), |path| File::create(path).unwrap().set_len(10 << 30).unwrap());
         assert_eq!(reason, format!("it takes 10737418240 bytes or more, and `ObjLimits::{field}` is {limit}"));
+    }
+}
+
+/// The name has a space, so it might be a list of names, too.
+fn a_library_that_cannot_be_read() {
+    let folder = Folder::new().with("a.obj", format!("mtllib my file.mtl\nusemtl one\n{TRIANGLE}"));
+    // The memory at address 0.
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("/proc/self/mem", folder.0.join("my file.mtl")).unwrap();
+    let reason = reason_of("a.mtl", load(folder, ObjLimits::default()));
+    assert!(reason.starts_with("Input/output error"), "{reason}");
+}
+
+/// Pixels, or a segment, that the header says to be behind the end.
+fn behind_the_end_of_a_texture() {
+    let bmp_header = [40_u32, 1, 1, 24 << 16 | 1, 0, 4, 0, 0, 0, 0].map(u32::to_le_bytes).concat();
+    let bmp = [b"BM\x46\0\0\0\0\0\0\0\xff\xff\xff\xff", &bmp_header[..], &[0; 16]].concat();
+    for bytes in [&bmp[..], b"\xff\xd8\xff\xe0\xff\xff"] {
+        let limits = ObjLimits { texture_file_bytes: 100, ..ObjLimits::default() };
+        let reason = reason("a.png", limits, |path| std::fs::write(path, bytes).unwrap());
+        assert!(!reason.contains("ObjLimits"), "{reason}");
     }
 }
 

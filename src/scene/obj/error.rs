@@ -164,7 +164,7 @@ pub enum ObjWarning {
         /// Its name.
         material: String,
     },
-    /// A `.mtl` file that cannot be read. Its materials are then undefined.
+    /// A `.mtl` file that cannot be read, or only up to an error. Its other materials are then undefined.
     #[error("material library `{}` cannot be read: {reason}", excerpt(library))]
     MissingLibrary {
         /// Its name in the OBJ file.

@@ -39,7 +39,10 @@ impl<R: Read> Read for Bounded<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
         self.position += count as u64;
-        self.limit.check(self.position)?;
+        // A decoder may look for something behind the end, where there is nothing to read.
+        if count > 0 {
+            self.limit.check(self.position)?;
+        }
         Ok(count)
     }
 }
@@ -223,6 +226,9 @@ mod tests {
         // What is read again does not count again.
         file.seek(SeekFrom::End(-60)).unwrap();
         assert_eq!(read(&mut file).unwrap(), [7; 60]);
+        // Behind the end there is nothing.
+        file.seek(SeekFrom::Start(1000)).unwrap();
+        assert!(read(&mut file).unwrap().is_empty());
         // A file that grows is read up to the limit.
         fs::write(&path, [7; 101]).unwrap();
         file.rewind().unwrap();

@@ -37,7 +37,7 @@ pub struct Imported {
 
 /// Loads a scene from an OBJ file, with the `.mtl` files and textures that it names.
 ///
-/// - The origin of an object is the centre of its bounding box. A model whose extent is a million times its smallest triangle
+/// - The origin of an object is the centre of its bounding box. A model whose extent is some million times its smallest triangle
 ///   becomes several objects, so that 32-bit coordinates suffice for each.
 /// - Polygons are triangulated, including concave ones. Points, lines and free-form surfaces are left out.
 /// - Colours of vertices (three numbers behind the coordinates) count as sRGB, as in other programs. They become the attribute

@@ -68,7 +68,12 @@ pub(super) fn add_definitions(
     let mut current: Option<Definition> = None;
     let mut ignored = IgnoredStatements::default();
     let mut statements = Statements::new(file, max_line_bytes)?;
-    while let Some((line, statement)) = statements.next()? {
+    let end = loop {
+        let (line, statement) = match statements.next() {
+            Ok(Some(next)) => next,
+            Ok(None) => break Ok(()),
+            Err(error) => break Err(error),
+        };
         let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
         let rest = rest.trim();
         let mut warn =
@@ -112,11 +117,11 @@ pub(super) fn add_definitions(
                 }
             }
         }
-    }
+    };
     definitions.add(current, is_used, &mut ignored);
     ignored.warn(library, warnings);
     statements.warn(library, warnings);
-    Ok(())
+    end
 }
 
 impl Definitions {
@@ -233,6 +238,8 @@ fn texture(library: &str, values: &str, warn: &mut impl FnMut(String)) -> Option
 
 #[cfg(test)]
 mod tests {
+    use std::io::{BufReader, Read};
+
     use super::*;
 
     fn parse(text: &str) -> (Vec<Definition>, Vec<ObjWarning>) {
@@ -266,6 +273,27 @@ mod tests {
         assert_eq!(texture_name("map_Kd -s 2 2 -bm 1 -clamp on -x.png"), "folder/-x.png");
         assert_eq!(parse_one("map_Kd -s 2 2 -bm 1 -clamp on -x.png").1, 3);
         assert_eq!(parse_one("map_d a.png").0.mask.unwrap().names[0].name, "folder/a.png");
+    }
+
+    #[test]
+    fn what_was_read_before_an_error_counts() {
+        struct Failing;
+        impl Read for Failing {
+            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+                Err(io::Error::other("the disk is gone"))
+            }
+        }
+        let text = "newmtl a\nKd 1 1 1\nillum 3\nKd red\nnewmtl b\nKd 0.5 0.5 0.5\nKe 1";
+        let (mut found, mut warnings) = (Definitions::default(), Warnings::new(99));
+        let file = BufReader::new(text.as_bytes().chain(Failing));
+        let error = add_definitions(&mut found, "a.mtl", file, |_| true, 1 << 20, &mut warnings).unwrap_err();
+        assert_eq!(error.to_string(), "the disk is gone");
+        let colors: Vec<_> = found.used.iter().map(|material| (material.name.as_str(), material.diffuse)).collect();
+        assert_eq!(colors, [("a", Some(Vec3::ONE)), ("b", Some(Vec3::splat(0.5)))]);
+        let [ObjWarning::LibraryLine { line: 4, .. }, ObjWarning::IgnoredStatements { .. }] = warnings.listed[..]
+        else {
+            panic!("{:?}", warnings.listed);
+        };
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::io::{self, Seek, SeekFrom};
 use glam::Vec3;
 
 use super::error::ObjWarning;
-use super::files::{Open, PossibleName, first_readable, possible_names};
+use super::files::{Open, PossibleName, Stream, first_readable, possible_names};
 use super::library::{self, Definition, Definitions, TextureStatement};
 use super::limits::{Limit, ObjLimits};
 use super::preprocessing::Preprocessed;
@@ -70,27 +70,31 @@ struct Libraries<'a> {
 impl Libraries<'_> {
     /// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
-        let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
-        let read = possible_names("", library).and_then(|names| {
-            let (PossibleName { name, .. }, mut file) = first_readable(&names, |name| (self.open)(name, limit))?;
-            let is_used = |name: &str| self.used.contains(name);
-            let max_line_bytes = self.limits.line_bytes;
-            let added =
-                library::add_definitions(&mut self.definitions, name, &mut file, is_used, max_line_bytes, warnings);
-            self.bytes += file.stream_position()?;
-            added
-        });
-        match read {
-            Ok(()) => {}
+        let read = match self.open(library) {
+            Ok((name, mut file)) => {
+                let is_used = |name: &str| self.used.contains(name);
+                let max_line_bytes = self.limits.line_bytes;
+                library::add_definitions(&mut self.definitions, &name, &mut file, is_used, max_line_bytes, warnings)
+                    .and_then(|()| file.stream_position())
+                    .map(|bytes| self.bytes += bytes)
+            }
             Err(error) if library.contains(char::is_whitespace) && !exists_but_is_unusable(&error) => {
-                for part in library.split_whitespace() {
-                    self.add(part, warnings);
-                }
+                library.split_whitespace().for_each(|part| self.add(part, warnings));
+                Ok(())
             }
-            Err(error) => {
-                warnings.push(ObjWarning::MissingLibrary { library: library.to_owned(), reason: error.to_string() });
-            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = read {
+            warnings.push(ObjWarning::MissingLibrary { library: library.to_owned(), reason: error.to_string() });
         }
+    }
+
+    /// Opens the file of a library. Returns its name, too.
+    fn open(&self, library: &str) -> io::Result<(String, Box<dyn Stream>)> {
+        let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
+        let names = possible_names("", library)?;
+        let (PossibleName { name, .. }, file) = first_readable(&names, |name| (self.open)(name, limit))?;
+        Ok((name.clone(), file))
     }
 }
 

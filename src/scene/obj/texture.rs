@@ -30,7 +30,11 @@ pub(super) fn decode(
     result: Limit,
     decoded: &mut Limit,
 ) -> Result<Pixels, String> {
-    let coefficients = progressive_components(&mut file).map_err(message)? * 2;
+    let components = match progressive_components(&mut file) {
+        // The decoder will say so.
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => 0,
+        found => found.map_err(message)?,
+    };
     file.rewind().map_err(message)?;
     let mut reader = ImageReader::new(file);
     // The guess from the contents comes first, but TGA has no magic number.
@@ -47,7 +51,7 @@ pub(super) fn decode(
     let rgba_bytes = pixels.saturating_mul(4);
     let has_bytes = decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count();
     let other_bytes =
-        if has_bytes { 0 } else { decoder.total_bytes() }.saturating_add(pixels.saturating_mul(coefficients));
+        if has_bytes { 0 } else { decoder.total_bytes() }.saturating_add(pixels.saturating_mul(components * 2));
     while_decoded
         .check(rgba_bytes.saturating_add(other_bytes))
         .map_err(|error| format!("{width}x{height}: {error}"))?;
@@ -76,42 +80,49 @@ fn message(error: impl ToString) -> String {
 /// scan is read.
 ///
 /// # Errors
-/// If reading fails.
-fn progressive_components(file: &mut (impl Read + Seek)) -> io::Result<u64> {
-    match components_of_first_frame(file) {
-        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(0),
-        found => found,
-    }
-}
-
-/// As [`progressive_components`].
-///
-/// # Errors
-/// Also if the file ends before its first frame or scan.
-fn components_of_first_frame(file: &mut (impl Read + Seek)) -> io::Result<u64> {
-    if read_array(file)? != [0xff, 0xd8] {
+/// If reading fails, or a JPEG ends before its first scan.
+fn progressive_components(file: &mut (impl BufRead + Seek)) -> io::Result<u64> {
+    if !file.fill_buf()?.starts_with(b"\xff\xd8") {
         return Ok(0);
     }
+    file.consume(2);
     loop {
-        let [0xff] = read_array(file)? else { return Ok(0) };
-        let mut marker = [0xff];
-        // Any number of fill bytes may precede it.
-        while marker == [0xff] {
-            marker = read_array(file)?;
-        }
-        match marker {
+        match next_marker(file)? {
             // The header of a progressive frame: its length, bits, height, width, and number of components.
-            [0xc2 | 0xc6 | 0xca | 0xce] => {
+            0xc2 | 0xc6 | 0xca | 0xce => {
                 let [_, _, _, _, _, _, _, components] = read_array(file)?;
                 return Ok(u64::from(components));
             }
             // The first scan.
-            [0xda] => return Ok(0),
+            0xda => return Ok(0),
             _ => {
                 // Its own two bytes count.
                 let length = u16::from_be_bytes(read_array(file)?);
                 file.seek_relative(i64::from(length) - 2)?;
             }
+        }
+    }
+}
+
+/// The next marker of a JPEG. Decoders skip what is between segments, so this does, too.
+fn next_marker(file: &mut impl BufRead) -> io::Result<u8> {
+    loop {
+        file.skip_until(0xff)?;
+        let mut marker = 0xff;
+        while marker == 0xff {
+            let buffer = file.fill_buf()?;
+            let fill_bytes = buffer.iter().take_while(|byte| **byte == 0xff).count();
+            if buffer.is_empty() {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            if let Some(&behind) = buffer.get(fill_bytes) {
+                marker = behind;
+            }
+            let read = buffer.len().min(fill_bytes + 1);
+            file.consume(read);
+        }
+        if marker != 0 {
+            return Ok(marker);
         }
     }
 }
@@ -240,7 +251,7 @@ fn nearest([source_width, source_height]: [u32; 2], [width, height]: [u32; 2]) -
 
 #[cfg(test)]
 mod tests {
-    use std::io::Cursor;
+    use std::io::{BufReader, Cursor};
 
     use super::*;
     use image::{ExtendedColorType, ImageEncoder};
@@ -305,7 +316,7 @@ mod tests {
     }
 
     fn components(file: &[u8]) -> u64 {
-        progressive_components(&mut Cursor::new(file)).unwrap()
+        progressive_components(&mut Cursor::new(file)).unwrap_or(0)
     }
 
     #[test]
@@ -323,8 +334,15 @@ mod tests {
             components(&file[..end]);
         }
         assert_eq!(components(b"\xff\xd8\xff\xe0\0\0\xff\xe0\0\0"), 0);
-        let after_fill_bytes = [&file[..header], &[0xff; 9], &file[header..]].concat();
-        assert_eq!(components(&after_fill_bytes), 3);
+        // What decoders skip in front of a marker, also where it ends a buffer.
+        for skipped in [&[0xff; 9][..], &[0], &[0xff, 0], &[7, 0xff, 0xff, 0, 0xff]] {
+            let skipping = [&file[..header], skipped, &file[header..]].concat();
+            assert_eq!(components(&skipping), 3, "{skipped:?}");
+            let in_pieces = BufReader::with_capacity(header + 4, Cursor::new(&skipping));
+            assert_eq!(progressive_components(&mut { in_pieces }).unwrap(), 3, "{skipped:?}");
+            let error = decode_named("a.jpg", skipping, 5999).map(drop).unwrap_err();
+            assert!(error.contains("it takes 6000 bytes"), "{skipped:?}: {error}");
+        }
     }
 
     #[test]
