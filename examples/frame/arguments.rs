@@ -33,8 +33,7 @@ pub struct Arguments {
     #[arg(long, value_enum, value_name = "AXIS", default_value = "y")]
     pub up: UpName,
 
-    /// Replaces a limit of what the OBJ file and the files that it names may take, by the name that messages about it have. May be given
-    /// several times.
+    /// Sets a limit in bytes of the OBJ file or of the files that it names, by its name in messages. May be given several times.
     #[arg(long = "limit", value_name = "FIELD=BYTES")]
     pub limits: Vec<FileLimit>,
 

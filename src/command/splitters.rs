@@ -126,6 +126,14 @@ mod tests {
         blocks_of(&depths.iter().enumerate().map(command).collect::<Vec<_>>())
     }
 
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Depths {
+        Few,
+        Many,
+        /// So that a sample of the first commands would not be one of all.
+        Ascending,
+    }
+
     #[test]
     fn samples_do_not_follow_a_period_of_the_scene() {
         // Samples at even distances would all but miss one of the three meshes.
@@ -144,15 +152,15 @@ mod tests {
 
         #[test]
         fn buckets_in_sequence_are_all_commands_in_order(
-            count in 0_usize..40_000, buckets in 1_usize..40, seed in any::<u64>(), order in 0..3,
+            count in 0_usize..40_000, buckets in 1_usize..40, seed in any::<u64>(),
+            order in prop::sample::select(vec![Depths::Few, Depths::Many, Depths::Ascending]),
         ) {
-            let few_depths = order == 0;
             let depth = |index: u64| {
                 let random = (index ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
                 match order {
-                    0 => (random % 3) as f32,
-                    1 => (random % 100_000) as f32,
-                    _ => (index / 3 + 1) as f32,
+                    Depths::Few => (random % 3) as f32,
+                    Depths::Many => (random % 100_000) as f32,
+                    Depths::Ascending => (index / 3 + 1) as f32,
                 }
             };
             let depths: Vec<f32> = (0..count as u64).map(depth).collect();
@@ -164,7 +172,7 @@ mod tests {
             let (mut in_buckets, mut whole, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
             for index in 0..splitters.bucket_count() {
                 sort(&commands, count, splitters.key_range(index), &mut scratch, &mut sorted);
-                if !few_depths {
+                if order != Depths::Few {
                     prop_assert!(sorted.len() <= 3 * count / buckets, "{} of {count} in one of {buckets}", sorted.len());
                 }
                 in_buckets.append(&mut sorted);

@@ -216,11 +216,11 @@ fn details_of_any_size_are_kept() {
         |exponent| format!("v 1e{exponent} 0 0\nv 2e{exponent} 0 0\nv 1e{exponent} 1e{exponent} 0\nf -3 -2 -1\n");
     let imported = load(&(-30..=30).step_by(4).map(triangle).collect::<String>());
     assert_eq!((imported.triangles, imported.degenerate_triangles), (16, 0));
-    // An object's extent is up to a million times as large as its smallest triangle. Rounding moves a corner by at most 2⁻²⁵ of that extent
-    // along each axis, a thirtieth of the triangle's side, so that a side changes by at most a fifteenth.
+    // An object has at most two of them, as half its extent is less than two million sides of the smaller one. Coordinates are 10⁴ sides or less
+    // then, and rounding to 24 bits moves a corner by at most 6·10⁻⁴ of a side. A side changes by twice that, and an area by four times.
     for (area, exponent) in areas(&imported).into_iter().zip((-30..=30).step_by(4)) {
         let change = area / (0.5 * 10_f64.powi(2 * exponent)) - 1.0;
-        assert!(change.abs() < (1.0_f64 + 1.0 / 15.0).powi(2) - 1.0, "{area} of 1e{exponent}");
+        assert!(change.abs() < 2.5e-3, "{area} of 1e{exponent}");
     }
 }
 

@@ -47,11 +47,10 @@ fn cascades() -> Result<(), Failed> {
     compare_with(scene, ShadowMaps { side: 256, cascades: 4, max_distance: 12.0, ..ShadowMaps::default() })
 }
 
-/// The shadow of a ramp begins where the ramp is higher than the bias. With a clip plane near the camera and across its view the bias is
-/// several times what it is without.
+/// The shadow of a ramp begins where the ramp is higher than the bias, which a clip plane near the camera and across its view makes larger.
 fn behind_a_clip_plane() -> Result<(), Failed> {
     let projection = Projection::Perspective { field_of_view: 2.0 * 0.5_f32.atan() };
-    // Its corners are on corners of pixels, where neither backend moves them.
+    // Its corners are on corners of pixels, or in their centres, where neither backend moves them.
     let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 3.0);
     let ramp = Panel::new(DVec3::Y * 0.125, DVec3::new(2.5, 0.125, 0.0), DVec3::Z * 2.0).double_sided();
     let maps = ShadowMaps { side: 1024, filter: 0, max_distance: 12.0, ..ShadowMaps::default() };
@@ -62,7 +61,7 @@ fn behind_a_clip_plane() -> Result<(), Failed> {
     for (object, layer) in [(floor, 0), (ramp, 1)] {
         scene.replace_object(object, RenderObject { layers: LayerMask::layer(layer), ..scene.object(object)? })?;
     }
-    // Of a shadow's edge, rounding decides which pixels are lit. What counts is where it is.
+    // Rounding decides which pixels of the shadow's edge are lit. With so much light elsewhere they hardly count.
     scene.ambient = Vec3::splat(0.5);
     let looking = Camera::looking_at("main", DVec3::Y * 6.0, DVec3::ZERO);
     let camera = Camera { projection, layers: LayerMask::layer(0), ..looking };
