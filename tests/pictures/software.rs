@@ -61,7 +61,7 @@ fn behind_a_clip_plane() -> Result<(), Failed> {
     for (object, layer) in [(floor, 0), (ramp, 1)] {
         scene.replace_object(object, RenderObject { layers: LayerMask::layer(layer), ..scene.object(object)? })?;
     }
-    // Rounding decides which pixels of the shadow's edge are lit. With so much light elsewhere they hardly count.
+    // Rounding decides which pixels of the shadow's edge are lit. Ambient light makes their difference small.
     scene.ambient = Vec3::splat(0.5);
     let looking = Camera::looking_at("main", DVec3::Y * 6.0, DVec3::ZERO);
     let camera = Camera { projection, layers: LayerMask::layer(0), ..looking };
