@@ -1,18 +1,20 @@
 //! Blended objects: sorting, lighting and blending.
 
 use std::f64::consts::PI;
+use std::io::{self, Cursor};
 
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology, obj};
 use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::{cube, sized, square};
 use half::f16;
+use image::{GrayImage, ImageFormat, Luma};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, pixel};
+use crate::fixture::{self, Fixture, pixel};
 use crate::image_distance::{assert_color, tone_mapped};
 
 pub const CASES: &[Case] = &[
@@ -24,6 +26,7 @@ pub const CASES: &[Case] = &[
     ("subtractive_blending_leaves_at_least_black", at_least_black),
     ("a_double_sided_pane_is_lit_on_the_visible_side", lit_on_the_visible_side),
     ("more_panes_than_a_bundle_holds_stay_in_order", many_batches),
+    ("what_the_mask_of_an_obj_file_hides_is_not_drawn", masked),
 ];
 
 const BACKGROUND: Vec3 = Vec3::new(0.5, 0.3, 0.2);
@@ -300,4 +303,34 @@ fn many_batches() -> Result<(), Failed> {
     // Each pane removes a tenth of the accumulated rounding error, so the error is at most ten times 2⁻¹⁰.
     expect_within(0.01, "two meshes", &pictures[1], expected)?;
     if pictures[0] == pictures[1] { Ok(()) } else { Err("one mesh gives another picture than two".into()) }
+}
+
+/// A white square that fills the picture. Its `map_d` is black on the left. On the right it is white in one file and grey in another.
+fn masked() -> Result<(), Failed> {
+    let square = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    let file = format!("mtllib a.mtl\nusemtl a\n{square}");
+    for (grey, share) in [(255, 1.0), (51, 0.2)] {
+        let mask = GrayImage::from_fn(8, 8, |column, _| Luma([if column < 4 { 0 } else { grey }]));
+        let mut png = Vec::new();
+        mask.write_to(&mut Cursor::new(&mut png), ImageFormat::Png)?;
+        let fetch = |name: &str| match name {
+            "a.mtl" => Ok(b"newmtl a\nKd 1 1 1\nmap_d mask.png\n".to_vec()),
+            "mask.png" => Ok(png.clone()),
+            _ => Err(io::ErrorKind::NotFound.into()),
+        };
+        let imported = obj::read("a.obj", file.as_bytes(), fetch)?;
+        if !imported.warnings.is_empty() {
+            return Err(format!("{:?}", imported.warnings).into());
+        }
+        let mut scene = imported.scene;
+        scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 1.2, DVec3::ZERO), [SIDE; 2])];
+        (scene.background, scene.ambient) = (BACKGROUND, AMBIENT);
+        let picture = fixture::draw(&scene)?;
+        let visible = BACKGROUND.lerp(AMBIENT, share);
+        for (column, expected) in [(0, BACKGROUND), (SIDE - 1, visible)] {
+            assert_color(pixel(&picture, column, SIDE / 2), tone_mapped(expected.as_dvec3().to_array()))
+                .map_err(|failed| format!("a mask of {grey}, column {column}: {failed:?}"))?;
+        }
+    }
+    Ok(())
 }
