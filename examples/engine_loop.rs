@@ -21,7 +21,7 @@ use drawloom::process::{
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
-use drawloom_output::PictureFile;
+use drawloom_output::{PictureFile, path_text};
 use parking_lot::Mutex;
 
 const FRAMES: usize = 60;
@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Files have red first.
     picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
     file.write([picture.width, picture.height], &picture.bytes)?;
-    println!("{} written, {}x{} after the resize", file.path().display(), picture.width, picture.height);
+    println!("{} written, {}x{} after the resize", path_text(file.path()), picture.width, picture.height);
     Ok(())
 }
 

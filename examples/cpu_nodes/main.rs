@@ -39,7 +39,7 @@ use drawloom::process::{Deferred, ToneMapping};
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
-use drawloom_output::{OutputError, PictureFile, create_folder};
+use drawloom_output::{OutputError, PictureFile, create_folder, path_text};
 use drawloom_testing::adapter;
 
 use arguments::{Arguments, BackendName};
@@ -116,7 +116,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn explain(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
     if let Some(file) = &arguments.timeline {
         file.write(|writer| write_chrome_trace(log, writer))?;
-        println!("{} written", file.path().display());
+        println!("{} written", path_text(file.path()));
     }
     if let Some(frame) = log.frames.last().filter(|_| arguments.explain) {
         println!("\n{}", FrameReport::new(log, frame.number, &SchedulerCosts::measure()?)?);
@@ -131,6 +131,6 @@ fn milliseconds(time: Duration) -> f64 {
 fn save(path: PathBuf, picture: &Picture) -> Result<(), OutputError> {
     let file = PictureFile::new(path)?;
     file.write([picture.width, picture.height], &picture.bytes)?;
-    println!("{} written", file.path().display());
+    println!("{} written", path_text(file.path()));
     Ok(())
 }

@@ -31,7 +31,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use drawloom::backend::Picture;
-use drawloom_output::{OutputError, PictureFile, create_folder};
+use drawloom_output::{OutputError, PictureFile, create_folder, path_text};
 use indicatif::ProgressBar;
 
 use crate::engine::Engine;
@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     save("characters.png", &engine.characters(SIZE)?)?;
     progress.finish_and_clear();
     println!("{} objects; in the middle of the first picture is {}", arguments.objects, picking::describe(object));
-    println!("the pictures are written to {}", arguments.out.display());
+    println!("the pictures are written to {}", path_text(&arguments.out));
     Ok(())
 }
 

@@ -25,7 +25,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, ViewBudget};
-use drawloom_output::{OutputFile, PictureFile};
+use drawloom_output::{OutputFile, PictureFile, path_text};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -122,6 +122,6 @@ fn draw(arguments: &Arguments, gallery: &Gallery) -> Result<(), Box<dyn Error>> 
     };
     contact_sheet::draw_labels(&mut sheet);
     arguments.out.write([sheet.width, sheet.height], &sheet.bytes)?;
-    println!("{} written", arguments.out.path().display());
+    println!("{} written", path_text(arguments.out.path()));
     Ok(())
 }

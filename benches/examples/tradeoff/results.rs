@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use drawloom::scene::{Camera, Scene};
-use drawloom_output::OutputFile;
+use drawloom_output::{OutputFile, path_text};
 use serde::{Deserialize, Serialize};
 
 use crate::Failure;
@@ -169,13 +169,13 @@ impl Results {
         all.retain(|entry| entry.scene != self.scene || entry.backend != self.backend);
         all.extend(self.entries.iter().cloned());
         OutputFile::new(path)?.write_all(serde_json::to_string_pretty(&all)? + "\n")?;
-        println!("{} written", path.display());
+        println!("{} written", path_text(path));
         Ok(())
     }
 }
 
 fn with_path(path: &Path, error: &dyn Error) -> Failure {
-    format!("{}: {error}", path.display()).into()
+    format!("{}: {error}", path_text(path)).into()
 }
 
 /// Marks the Pareto front: `exact`, and then, by increasing distance from the reference, each entry that is at least an eighth faster

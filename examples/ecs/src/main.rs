@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
-use drawloom_output::PictureFile;
+use drawloom_output::{PictureFile, path_text};
 use drawloom_testing::adapter;
 
 use bevy_world::BevyWorld;
@@ -93,7 +93,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if let Some(file) = &options.picture {
         let picture = graphics.picture()?;
         file.write([picture.width, picture.height], &picture.bytes)?;
-        println!("{} written", file.path().display());
+        println!("{} written", path_text(file.path()));
     }
     Ok(())
 }

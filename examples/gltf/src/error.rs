@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use drawloom::scene::SceneError;
+use drawloom_output::path_text;
 
 /// A file that cannot be loaded, and why.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", file.display())]
+#[error("{}: {problem}", path_text(file))]
 pub struct LoadError {
     /// The file that was to be loaded.
     pub file: PathBuf,
@@ -20,13 +21,13 @@ pub struct LoadError {
 #[non_exhaustive]
 pub enum Problem {
     /// A folder, a pipe or a device.
-    #[error("{} is not a regular file", path.display())]
+    #[error("{} is not a regular file", path_text(path))]
     NotARegularFile {
         /// The file, or one that it refers to.
         path: PathBuf,
     },
     /// The file cannot be read.
-    #[error("{} cannot be read: {error}", path.display())]
+    #[error("{} cannot be read: {error}", path_text(path))]
     Unreadable {
         /// The file, or one that it refers to.
         path: PathBuf,

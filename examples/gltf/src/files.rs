@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use data_url::DataUrl;
+use drawloom_output::path_text;
 use percent_encoding::percent_decode_str;
 
 use crate::error::Problem;
@@ -47,7 +48,7 @@ fn check_file_size(path: &Path, bytes: u64) -> Result<(), Problem> {
     if bytes <= MAX_FILE_BYTES {
         return Ok(());
     }
-    let element = path.display().to_string();
+    let element = path_text(path);
     Err(Problem::TooMany { element, what: "bytes or more", count: bytes, limit: MAX_FILE_BYTES })
 }
 

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::task::Scheduler;
-use drawloom_output::PictureFile;
+use drawloom_output::{PictureFile, path_text};
 use gltf_scene::{LoadOptions, draw, load, open_device};
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::filter::LevelFilter;
@@ -80,7 +80,7 @@ fn describe(world: &gltf_scene::World, arguments: &Arguments) -> String {
         _ if world.animations.is_empty() => String::new(),
         _ => format!(", animations {:?} at rest", world.animations),
     };
-    format!("{objects} objects, {} cameras{animations}; {}", world.cameras, arguments.picture.path().display())
+    format!("{objects} objects, {} cameras{animations}; {}", world.cameras, path_text(arguments.picture.path()))
 }
 
 fn parse_time(text: &str) -> Result<f64, String> {

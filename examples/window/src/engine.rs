@@ -12,6 +12,7 @@ use drawloom::process::Format;
 use drawloom::task::{JobPanic, Scheduler};
 use drawloom::{Recorded, SubmitError};
 use drawloom_egui::Inspector;
+use drawloom_output::path_text;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{ElementState, WindowEvent};
@@ -98,7 +99,7 @@ impl Engine {
             picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
         }
         file.write([picture.width, picture.height], &picture.bytes)?;
-        println!("{} written", file.path().display());
+        println!("{} written", path_text(file.path()));
         Ok(())
     }
 
