@@ -70,7 +70,7 @@ struct Libraries<'a> {
 impl Libraries<'_> {
     /// Reads a library. If there is no file of that name and the name contains spaces, it is a list of names.
     fn add(&mut self, library: &str, warnings: &mut Warnings) {
-        let read = match self.open(library) {
+        let read = match self.open_library(library) {
             Ok((name, mut file)) => {
                 let is_used = |name: &str| self.used.contains(name);
                 let max_line_bytes = self.limits.line_bytes;
@@ -89,8 +89,8 @@ impl Libraries<'_> {
         }
     }
 
-    /// Opens the file of a library. Returns its name, too.
-    fn open(&self, library: &str) -> io::Result<(String, Box<dyn Stream>)> {
+    /// Opens the file of a library, and returns its name, too.
+    fn open_library(&self, library: &str) -> io::Result<(String, Box<dyn Stream>)> {
         let limit = Limit { taken: self.bytes, ..Limit::new("library_bytes", self.limits.library_bytes) };
         let names = possible_names("", library)?;
         let (PossibleName { name, .. }, file) = first_readable(&names, |name| (self.open)(name, limit))?;
