@@ -35,16 +35,22 @@ fn choices_come_with_the_costs_that_they_were_made_by() {
     let (tuning, _) = record(40, 2, Granularity::Adaptive);
     let view_count = choices_of(&tuning[0], TuningSubject::OcclusionTest).len();
     assert!(view_count > 0);
+    let mut known_before = vec![[false; 2]; view_count];
+    let mut restarts = 0;
     for (frame, tuning) in tuning.iter().enumerate() {
         let tests = choices_of(tuning, TuningSubject::OcclusionTest);
         assert_eq!((tests.len(), choices_of(tuning, TuningSubject::RunMode).len()), (view_count, 1));
         assert!(tests.iter().all(|choice| choice.labels.view.is_some()));
-        for TuningChoice { alternatives, .. } in tests {
+        for (TuningChoice { alternatives, .. }, before) in tests.into_iter().zip(&mut known_before) {
+            let known = [0, 1].map(|alternative| alternatives[alternative].nanoseconds.is_some());
             // Frame 0 is cold, 1 to 3 measure the test; 4 is cold again, 5 to 7 measure frames without it.
-            let known: Vec<_> = alternatives.iter().map(|alternative| alternative.nanoseconds.is_some()).collect();
-            assert!(known[0] == (frame >= 2) && known[1] == (frame >= 6), "frame {frame}: {alternatives:?}");
+            assert!(frame >= 8 || known == [frame >= 2, frame >= 6], "frame {frame}: {alternatives:?}");
+            restarts += usize::from(*before == [true; 2] && known == [false; 2]);
+            *before = known;
         }
     }
+    // Later, a cost that has changed much is measured anew, at most once in 256 frames. On a busy machine any may change.
+    assert!(restarts <= view_count, "{restarts} restarts in {view_count} views");
 }
 
 #[test]
@@ -138,8 +144,9 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
             RecordingStrategy::Indirect => "indirect",
         };
         assert_eq!(choice.alternatives[choice.chosen].name.trim_start_matches("split "), name, "{choice} {pass:?}");
-        let has_batches = pass.batches > 0;
-        assert_eq!(choice.alternatives[choice.chosen].nanoseconds.is_some(), has_batches, "{choice} {pass:?}");
+        let (has_batches, is_known) = (pass.batches > 0, choice.alternatives[choice.chosen].nanoseconds.is_some());
+        // The cost of a trial is not known in its first frame.
+        assert!(is_known == has_batches || (choice.is_trial && !is_known), "{choice} {pass:?}");
     }
     let trials =
         tuning.iter().flat_map(|tuning| choices_of(tuning, TuningSubject::Recording)).filter(|choice| choice.is_trial);
