@@ -35,22 +35,19 @@ fn choices_come_with_the_costs_that_they_were_made_by() {
     let (tuning, _) = record(40, 2, Granularity::Adaptive);
     let view_count = choices_of(&tuning[0], TuningSubject::OcclusionTest).len();
     assert!(view_count > 0);
-    let mut known_before = vec![[false; 2]; view_count];
-    let mut restarts = 0;
+    let mut is_measured_anew = vec![false; view_count];
     for (frame, tuning) in tuning.iter().enumerate() {
         let tests = choices_of(tuning, TuningSubject::OcclusionTest);
         assert_eq!((tests.len(), choices_of(tuning, TuningSubject::RunMode).len()), (view_count, 1));
         assert!(tests.iter().all(|choice| choice.labels.view.is_some()));
-        for (TuningChoice { alternatives, .. }, before) in tests.into_iter().zip(&mut known_before) {
+        for (TuningChoice { alternatives, .. }, is_measured_anew) in tests.into_iter().zip(&mut is_measured_anew) {
             let known = [0, 1].map(|alternative| alternatives[alternative].nanoseconds.is_some());
+            // On a busy machine a cost may change much, after eight frames with it at the earliest. Then no cost is known any more.
+            *is_measured_anew |= frame > 8 && known == [false; 2];
             // Frame 0 is cold, 1 to 3 measure the test; 4 is cold again, 5 to 7 measure frames without it.
-            assert!(frame >= 8 || known == [frame >= 2, frame >= 6], "frame {frame}: {alternatives:?}");
-            restarts += usize::from(*before == [true; 2] && known == [false; 2]);
-            *before = known;
+            assert!(*is_measured_anew || known == [frame >= 2, frame >= 6], "frame {frame}: {alternatives:?}");
         }
     }
-    // Later, a cost that has changed much is measured anew, at most once in 256 frames. On a busy machine any may change.
-    assert!(restarts <= view_count, "{restarts} restarts in {view_count} views");
 }
 
 #[test]
