@@ -35,6 +35,7 @@ use crate::unwind::catch;
 pub struct SchedulerBuilder {
     workers: Option<usize>,
     name: Option<Box<dyn Fn(usize) -> String>>,
+    stack_size: Option<usize>,
     affinity: Option<Box<dyn Fn(usize) -> AffinityMask>>,
     on_start: Option<Hook>,
     on_stop: Option<Hook>,
@@ -71,6 +72,12 @@ impl Scheduler {
 }
 
 impl SchedulerBuilder {
+    /// The size of a thread's stack in bytes if [nothing else](Self::stack_size) is set: 16 MiB, room for 4,000 nested scopes even
+    /// without optimisations.
+    pub const DEFAULT_STACK_SIZE: usize = 16 << 20;
+    /// The smallest stack of a thread in bytes: 256 KiB, which the scheduler's own code and a few nested scopes need.
+    pub const MIN_STACK_SIZE: usize = 256 << 10;
+
     /// Sets the number of workers, including the calling thread: 1 starts no thread. There may be more workers than the machine has
     /// cores (L 3.3). The default is the number of threads that the process can run at once.
     pub fn workers(mut self, workers: usize) -> Self {
@@ -81,6 +88,18 @@ impl SchedulerBuilder {
     /// Sets the names of the threads, by the index of the worker, 1 or more. The default is `drawloom-1`, `drawloom-2` and so on.
     pub fn name(mut self, name: impl Fn(usize) -> String + 'static) -> Self {
         self.name = Some(Box::new(name));
+        self
+    }
+
+    /// Sets the size of each thread's stack in bytes. The system rounds it up to whole pages, reserves it as address space, and
+    /// gives it memory only where it is used. The default is [`DEFAULT_STACK_SIZE`](Self::DEFAULT_STACK_SIZE); less than
+    /// [`MIN_STACK_SIZE`](Self::MIN_STACK_SIZE) counts as that. The stack of the thread that calls the scheduler is the engine's own
+    /// choice.
+    ///
+    /// A scope, loop or graph that a job opens runs on top of that job, so scopes that nest need a stack in proportion to their
+    /// depth: 3 to 4 KiB each, beside what the jobs hold.
+    pub fn stack_size(mut self, bytes: usize) -> Self {
+        self.stack_size = Some(bytes);
         self
     }
 
@@ -161,6 +180,7 @@ impl SchedulerBuilder {
         mut spawn: impl FnMut(thread::Builder, Box<dyn FnOnce() + Send>) -> io::Result<thread::JoinHandle<()>>,
     ) -> Result<Scheduler, SchedulerError> {
         let workers = self.checked_workers()?;
+        let stack_size = self.stack_size.map_or(Self::DEFAULT_STACK_SIZE, |bytes| bytes.max(Self::MIN_STACK_SIZE));
         let queues_of = |worker| Box::new(Queues::new(self.shuffle.map(|seed| Shuffle::new(seed, worker))));
         let first = queues_of(0);
         let others: Vec<Box<Queues<_>>> = (1..workers).map(queues_of).collect();
@@ -173,7 +193,7 @@ impl SchedulerBuilder {
         let mut scheduler = Scheduler::without_threads(Arc::clone(&shared));
         let (ready, is_ready) = mpsc::channel();
         for ((index, queues), name) in (1..).zip(others).zip(names) {
-            let builder = thread::Builder::new().name(name);
+            let builder = thread::Builder::new().name(name).stack_size(stack_size);
             let worker_thread = WorkerThread {
                 index,
                 affinity: self.checked_affinity(index)?,

@@ -1,5 +1,6 @@
 //! How schedulers are built and dropped: their threads' names, affinities and hooks, and failures of these.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, ThreadId};
 
@@ -159,5 +160,46 @@ fn a_background_job_may_drop_the_last_reference_to_its_scheduler() {
         // The thread that ran the job ends after it, and nothing joins that thread.
         assert!(eventually(|| stopped.lock().unwrap().len() == 2));
         assert_eq!(sorted(&started), sorted(&stopped));
+    }
+}
+
+/// Opens scopes inside each other's jobs, all on one thread.
+fn nest(scheduler: &Scheduler, depth: usize) -> usize {
+    let below = AtomicUsize::new(0);
+    if depth > 0 {
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(|_scope, _worker| below.store(nest(scheduler, depth - 1) + 1, Ordering::Relaxed));
+        });
+        assert_eq!(outcome, Ok(()));
+    }
+    below.into_inner()
+}
+
+/// On a worker's thread: a background job runs there, and its scopes' jobs on top of it.
+fn nest_on_a_thread(builder: SchedulerBuilder, depth: usize) -> usize {
+    let scheduler = Arc::new(builder.workers(2).build().unwrap());
+    let job = scheduler.background({
+        let scheduler = Arc::clone(&scheduler);
+        move || nest(&scheduler, depth)
+    });
+    assert!(eventually(|| job.is_finished()));
+    job.wait().unwrap()
+}
+
+#[test]
+fn scopes_nest_as_deep_as_the_stack_is_large() {
+    assert_eq!(nest_on_a_thread(Scheduler::builder(), 2_000), 2_000);
+    assert_eq!(nest_on_a_thread(Scheduler::builder().stack_size(80 << 20), 10_000), 10_000);
+}
+
+#[test]
+fn stacks_of_any_size_are_large_enough_or_an_error() {
+    for bytes in [0, 1, 4_095, 16 << 10, SchedulerBuilder::MIN_STACK_SIZE, SchedulerBuilder::MIN_STACK_SIZE + 1] {
+        assert_eq!(nest_on_a_thread(Scheduler::builder().stack_size(bytes), 10), 10, "{bytes} bytes");
+    }
+    for bytes in [usize::MAX, usize::MAX - 4_095, usize::MAX / 2 + 1, usize::MAX / 2] {
+        let error = Scheduler::builder().workers(2).stack_size(bytes).build().unwrap_err();
+        assert!(matches!(error, SchedulerError::Spawn { worker: 1, .. }), "{bytes} bytes: {error}");
+        assert!(Scheduler::builder().workers(1).stack_size(bytes).build().is_ok(), "it starts no thread");
     }
 }
