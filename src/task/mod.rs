@@ -80,8 +80,8 @@
 //! # A job in the background
 //!
 //! Work that may take longer than a frame goes into the [background](Scheduler::background). A thread that calls the scheduler for
-//! a frame never takes a background job, so loading never delays a frame. Other workers run it while they have nothing else to
-//! do.
+//! a frame never takes a background job. Other workers run it while they have nothing else to do, a quarter of all workers
+//! [at once](Scheduler::set_background_workers), so that frames have the rest, however long the jobs are.
 //!
 //! ```
 //! use std::time::Duration;
@@ -128,7 +128,7 @@
 //! A thread that calls the scheduler from outside runs all jobs of the frame until its call returns. A job that waits for a scope,
 //! a loop or a graph of its own runs only jobs of that, on top of its stack. So no foreign job delays it, and no job on top of
 //! it finds a value borrowed that the waiting job did not borrow itself. If scopes nest without bound, the stack grows without
-//! bound, as with any recursion.
+//! bound, as with any recursion: [`SchedulerBuilder::stack_size`] says how deep they may.
 //!
 //! No thread keeps a job that another thread waits for: a thread that waits for a scope, a loop or a graph finds all of its jobs
 //! that have not begun. So a program waits for ever only if a *running* job waits for itself, by way of other running jobs. These
@@ -138,7 +138,8 @@
 //! - A job holds a lock while it waits for a scope or a background job that needs the lock.
 //! - A job waits for a thread that calls the same scheduler from outside, or two threads call two schedulers crosswise
 //!   (see [`Scheduler`]).
-//! - Jobs that are ready wait for each other to run at the same time: one thread may have both.
+//! - Jobs that are ready wait for each other to run at the same time: one thread may have both, and background jobs beyond the
+//!   [limit](Scheduler::set_background_workers) wait until others have run.
 //! - A job calls [`Scheduler::run_background`], which runs the oldest background job on top of it, and that waits for something
 //!   that the first job is part of.
 //!
@@ -185,6 +186,7 @@
 mod affinity;
 mod background_job;
 mod background_queue;
+mod background_slots;
 mod caller_slot;
 mod chunks;
 mod closure;

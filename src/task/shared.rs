@@ -5,14 +5,16 @@ use std::time::Duration;
 use crossbeam_utils::CachePadded;
 
 use super::background_queue::BackgroundQueue;
+use super::background_slots::BackgroundSlots;
 use super::caller_slot::CallerSlot;
 use super::frame_gaps::FrameGaps;
 use super::mailbox::Mailbox;
 use super::placement::Placement;
+use super::priority::Priority;
 use super::queues::{Queues, Stealers};
 use super::region::JobContext;
 use super::sleep::Sleep;
-use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
+use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering, fence};
 use crate::timeline::Timeline;
 
 /// The workers' queues as others see them, their mailboxes, and the state of the scheduler.
@@ -21,6 +23,7 @@ pub(super) struct Shared<W: JobContext> {
     mailboxes: Box<[CachePadded<Mailbox<W>>]>,
     /// Not the model checker's `Arc`, which has no weak references: a thread that waits for a job may outlive the scheduler.
     background: std::sync::Arc<BackgroundQueue>,
+    background_slots: BackgroundSlots,
     sleep: Sleep,
     placement: Placement,
     caller_slot: CallerSlot<W>,
@@ -48,6 +51,7 @@ impl<W: JobContext> Shared<W> {
         Self {
             mailboxes: stealers.iter().map(|_| CachePadded::new(Mailbox::new())).collect(),
             background: std::sync::Arc::new(BackgroundQueue::new()),
+            background_slots: BackgroundSlots::new(stealers.len()),
             sleep: Sleep::new(stealers.len()),
             placement: Placement::new(),
             caller_slot: CallerSlot::new(first),
@@ -85,6 +89,25 @@ impl<W: JobContext> Shared<W> {
     #[inline]
     pub(super) fn background(&self) -> &std::sync::Arc<BackgroundQueue> {
         &self.background
+    }
+
+    #[inline]
+    pub(super) fn background_slots(&self) -> &BackgroundSlots {
+        &self.background_slots
+    }
+
+    /// Wakes a worker for background jobs, if one of them may run any. The job, or the free slot, must have been published.
+    pub(super) fn wake_for_background(&self) {
+        if self.has_background_slot() {
+            self.sleep.wake_despite_searchers(Priority::Background);
+        }
+    }
+
+    /// Whether a worker may take a background job, as seen after all that this thread has published. If it may not, the worker
+    /// that frees a slot sees that.
+    pub(super) fn has_background_slot(&self) -> bool {
+        fence(Ordering::SeqCst);
+        self.background_slots.is_free()
     }
 
     #[inline]

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::{JobPanic, Scheduler};
-use crate::sync::{AtomicUsize, Ordering, check, thread};
+use crate::sync::{AtomicUsize, Condvar, Mutex, Ordering, check, thread};
 
 fn counters(count: usize) -> Vec<AtomicUsize> {
     iter::repeat_with(|| AtomicUsize::new(0)).take(count).collect()
@@ -28,12 +28,19 @@ fn panic_as_planned() -> ! {
     resume_unwind(Box::new("as planned"))
 }
 
+/// A scheduler of `workers` workers, `in_background` of which run background jobs at once.
+fn scheduler(workers: usize, in_background: usize) -> Scheduler {
+    let scheduler = Scheduler::new(workers).unwrap();
+    scheduler.set_background_workers(in_background);
+    scheduler
+}
+
 /// Checks `run` on schedulers of a few workers.
 fn check_on_schedulers(run: impl Fn(&Scheduler) + Send + Sync + 'static) {
     let run = Arc::new(run);
-    for workers in [2, 3] {
+    for (workers, in_background) in [(2, 1), (3, 1), (3, 2)] {
         let run = Arc::clone(&run);
-        check(move || run(&Scheduler::new(workers).unwrap()));
+        check(move || run(&scheduler(workers, in_background)));
     }
 }
 
@@ -203,7 +210,7 @@ fn shuttle_waiting_returns_the_result_of_a_background_job_wherever_it_ran() {
 #[test]
 fn shuttle_a_background_job_has_scopes_of_its_own() {
     check(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = Arc::new(scheduler(3, 2));
         let caller = thread::current().id();
         let job = scheduler.background({
             let scheduler = Arc::clone(&scheduler);
@@ -228,7 +235,7 @@ fn shuttle_a_background_job_has_scopes_of_its_own() {
 fn shuttle_a_scheduler_can_be_dropped_while_its_workers_are_busy() {
     check_on_schedulers(|_scheduler| ());
     check(|| {
-        let scheduler = Scheduler::new(3).unwrap();
+        let scheduler = scheduler(3, 2);
         let ran = Arc::new(AtomicUsize::new(0));
         let jobs = [(); 2].map(|()| {
             let ran = Arc::clone(&ran);
@@ -251,7 +258,7 @@ fn shuttle_a_scheduler_can_be_dropped_while_its_workers_are_busy() {
 #[test]
 fn shuttle_a_frames_nested_job_waits_for_a_background_job() {
     check(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = Arc::new(scheduler(3, 2));
         let background = scheduler.background({
             let scheduler = Arc::clone(&scheduler);
             move || {
@@ -349,7 +356,7 @@ fn shuttle_a_scope_takes_jobs_from_a_thread_that_is_no_worker() {
 #[test]
 fn shuttle_a_background_job_drops_the_last_reference_to_its_scheduler() {
     check(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = Arc::new(scheduler(3, 2));
         let ran = Arc::new(AtomicUsize::new(0));
         let jobs = [(); 2].map(|()| {
             let (owned, ran) = (Arc::clone(&scheduler), Arc::clone(&ran));
@@ -362,5 +369,58 @@ fn shuttle_a_background_job_drops_the_last_reference_to_its_scheduler() {
         // Waiting for a job that has not begun runs it here, so this thread may drop the scheduler.
         assert_eq!(jobs.map(|job| job.wait()), [const { Ok(()) }; 2]);
         assert_eq!(ran.load(Ordering::Relaxed), 4);
+    });
+}
+
+/// Frames take workers from the background and give them back, and the limit changes meanwhile. Nobody waits for the jobs, so a
+/// wake-up that is lost leaves them in the queue for ever.
+#[test]
+fn shuttle_background_jobs_beyond_the_limit_run_when_a_worker_is_free() {
+    for limits in [[1, 1], [1, 2], [2, 1], [0, 1]] {
+        check(move || {
+            let scheduler = Arc::new(scheduler(3, limits[0]));
+            let running = Arc::new(AtomicUsize::new(0));
+            let jobs = [(); 3].map(|()| {
+                let (owned, running) = (Arc::clone(&scheduler), Arc::clone(&running));
+                scheduler.background(move || {
+                    assert!(running.fetch_add(1, Ordering::Relaxed) < limits[0].max(limits[1]));
+                    assert_eq!(owned.parallel_for(2, 1, |_range, _worker| ()), Ok(()));
+                    running.fetch_sub(1, Ordering::Relaxed);
+                })
+            });
+            scheduler.parallel_for(3, 1, |_range, _worker| ()).unwrap();
+            scheduler.set_background_workers(limits[1]);
+            while !jobs.iter().all(|job| job.is_finished()) {
+                thread::yield_now();
+            }
+        });
+    }
+}
+
+/// A frame and one of its jobs wait for the background. A worker that turns to that job must hand the rest of the background over to
+/// the one that sleeps.
+#[test]
+fn shuttle_a_worker_that_turns_to_a_frame_hands_the_background_over() {
+    check(|| {
+        let scheduler = scheduler(3, 1);
+        let left = Arc::new((Mutex::new(2), Condvar::new()));
+        for _job in 0..2 {
+            let left = Arc::clone(&left);
+            drop(scheduler.background(move || {
+                *left.0.lock() -= 1;
+                (0..2).for_each(|_waiting| left.1.notify_one());
+            }));
+        }
+        let wait = || {
+            let mut count = left.0.lock();
+            while *count > 0 {
+                count = left.1.wait(count);
+            }
+        };
+        let outcome = scheduler.scope(|scope| {
+            scope.spawn(|_scope, _worker| wait());
+            wait();
+        });
+        assert_eq!(outcome, Ok(()));
     });
 }

@@ -50,7 +50,14 @@
 //!
 //! *Background jobs.* W3 ignores searchers, because one of them may be worker 0, which does not look for background jobs. The
 //! sleeper that is woken looks for a frame's jobs first, and may find one. Therefore every searcher that has found work looks for
-//! background jobs at F4, and passes the call on.
+//! background jobs at F4, and passes the call on. A worker that turns from background jobs to a frame's passes the call on, too: it frees
+//! its slot.
+//!
+//! *Background slots.* A worker takes a background job only with a slot (`background_slots.rs`). Without a free slot, background jobs
+//! are no work to it, neither at S3 nor at F4, and who queues one wakes nobody. A worker H that frees its slot passes a fence, looks
+//! for background jobs, and wakes a sleeper if there are some. Let P be a thread that has queued a job, or was woken for one, has
+//! passed a fence, and then reads that no slot is free. If H's fence preceded P's, P would read the slot as free. So P's comes
+//! first, and H sees the job. Every slot is freed in the end, and with the last one somebody sees the job.
 //!
 //! *Work with an owner* is in the owner's mailbox, and W3 and W4 happen twice: for the owner, then for others. An owner that
 //! sleeps until this region has work is handled as any sleeper, and woken. An owner that does anything else passes S2, after W2,

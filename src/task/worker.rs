@@ -15,7 +15,7 @@ use super::queues::{Popped, Queues};
 use super::region::{JobContext, Region, RegionKind, RunToken};
 use super::shared::Shared;
 use super::sleep::WakeFor;
-use crate::sync::Arc;
+use crate::sync::{Arc, Ordering, fence};
 use crate::timeline::Timeline;
 use crate::unwind::{AbortOnUnwind, JobPanic, catch, discard};
 
@@ -66,6 +66,14 @@ pub(super) enum ExitCondition {
     /// one, the worker is inside some job, and takes only jobs of the region: a foreign job might take long, or want what the job
     /// has borrowed.
     Finished { region: &'static Region<Worker> },
+}
+
+/// What a worker's thread does for the background.
+enum BackgroundWork {
+    /// A job of a scope, a loop or a graph of a background job.
+    Part(Job<Worker>),
+    /// A background job.
+    Whole(std::sync::Arc<dyn QueuedJob>),
 }
 
 /// The wait inside of which a worker opens a region, and goes on with afterwards.
@@ -176,10 +184,15 @@ impl Worker {
         let (owner, level) = (region.owner(), region.level());
         if !may_keep {
             self.shared.mailbox(owner).put_shared(job);
-            self.shared.sleep().wake_owner_or_other(owner, level, priority);
+            if priority == Priority::Background && !self.shared.has_background_slot() {
+                // Only the owner may run it.
+                self.shared.sleep().wake_worker(owner);
+            } else {
+                self.shared.sleep().wake_owner_or_other(owner, level, priority);
+            }
         } else if priority == Priority::Background {
             self.queues.push(job, priority);
-            self.shared.sleep().wake_despite_searchers(priority);
+            self.shared.wake_for_background();
         } else {
             self.queues.push(job, priority);
             self.shared.sleep().wake_any();
@@ -262,9 +275,12 @@ impl Worker {
     /// Runs jobs, and sleeps while there are none, until the exit condition holds. Does not unwind.
     pub(super) fn work(&self, until: ExitCondition) {
         let mut idle = Idle::default();
+        // Kept from one background job to the next.
+        let mut has_slot = false;
         let sees_more_work = |priorities: &[Priority]| self.sees_jobs(priorities);
         loop {
             if let Some(job) = self.next_job(until) {
+                self.free_background_slot(&mut has_slot);
                 idle.end(self.index, &self.shared, sees_more_work);
                 self.run(job);
                 continue;
@@ -274,15 +290,44 @@ impl Worker {
                 break;
             }
             if matches!(until, ExitCondition::Shutdown)
-                && let Some(job) = self.shared.background().take_oldest()
+                && let Some(work) = self.background_work(&mut has_slot)
             {
                 idle.end(self.index, &self.shared, sees_more_work);
-                self.run_in_background(&*job);
+                match work {
+                    BackgroundWork::Part(job) => self.run(job),
+                    BackgroundWork::Whole(job) => _ = self.run_in_background(&*job),
+                }
                 continue;
             }
+            self.free_background_slot(&mut has_slot);
             idle.pause(self.index, &self.shared, until.wake_for(), || self.sees_work(until));
         }
+        self.free_background_slot(&mut has_slot);
         idle.end(self.index, &self.shared, sees_more_work);
+    }
+
+    /// Work of the background for this thread, if it has a slot or a slot is free. Then it has one from here on.
+    fn background_work(&self, has_slot: &mut bool) -> Option<BackgroundWork> {
+        *has_slot = *has_slot || (self.sees_jobs(&[Priority::Background]) && self.shared.background_slots().try_take());
+        if !*has_slot {
+            return None;
+        }
+        // Parts of jobs come first: a job waits for them.
+        let part = self.mailbox_job(Priority::Background).or_else(|| self.steal(&[Priority::Background]));
+        let whole = || self.shared.background().take_oldest().map(BackgroundWork::Whole);
+        part.map(BackgroundWork::Part).or_else(whole)
+    }
+
+    /// Frees the slot of this thread, if it has one, and wakes another worker if that may go on with the background jobs.
+    fn free_background_slot(&self, has_slot: &mut bool) {
+        if !mem::take(has_slot) {
+            return;
+        }
+        self.shared.background_slots().put_back();
+        fence(Ordering::SeqCst);
+        if self.sees_jobs(&[Priority::Background]) {
+            self.shared.sleep().wake_despite_searchers(Priority::Background);
+        }
     }
 
     /// Runs background jobs one after another until there are none or `stop` returns true. Returns how many have run.
@@ -312,15 +357,19 @@ impl Worker {
             }
     }
 
-    /// Whether there is a job of these priorities that this worker could take, outside of its own queues.
+    /// Whether there is a job of these priorities that this worker could take, outside of its own queues. Without a free slot it
+    /// could take no background job.
     fn sees_jobs(&self, priorities: &[Priority]) -> bool {
         let shared = &self.shared;
-        let takes_background = self.index > 0 && priorities.contains(&Priority::Background);
-        let has_background = takes_background && !shared.background().is_empty();
-        let mut others = shared.stealers().iter().enumerate().filter(|&(victim, _)| victim != self.index);
-        has_background
-            || others.any(|(_, stealers)| priorities.iter().any(|&priority| !stealers.is_empty(priority)))
-            || shared.mailboxes().any(|mailbox| priorities.iter().any(|&priority| mailbox.has_any_shared(priority)))
+        let takes =
+            |priority| priority != Priority::Background || (self.index > 0 && shared.background_slots().is_free());
+        priorities.iter().any(|&priority| {
+            let mut others = shared.stealers().iter().enumerate().filter(|&(victim, _)| victim != self.index);
+            takes(priority)
+                && ((priority == Priority::Background && !shared.background().is_empty())
+                    || others.any(|(_, stealers)| !stealers.is_empty(priority))
+                    || shared.mailboxes().any(|mailbox| mailbox.has_any_shared(priority)))
+        })
     }
 
     #[inline]
@@ -369,10 +418,7 @@ impl Worker {
     /// The next job to run. Pinned jobs come first, because only this worker can run them, while others can steal from its queues.
     fn next_job(&self, until: ExitCondition) -> Option<Job<Self>> {
         match until {
-            ExitCondition::Shutdown => self
-                .frame_job()
-                .or_else(|| self.mailbox_job(Priority::Background))
-                .or_else(|| self.steal(&[Priority::Background])),
+            ExitCondition::Shutdown => self.frame_job(),
             ExitCondition::Finished { region } => {
                 let mailbox = self.shared.mailbox(self.index);
                 let pinned = mailbox.take_pinned(region);

@@ -53,11 +53,18 @@ fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_
     assert_eq!(outcome, Ok(()));
 }
 
+/// A scheduler with two threads, both of which run background jobs at the same time.
+fn two_in_background() -> Arc<Scheduler> {
+    let scheduler = Scheduler::new(3).unwrap();
+    scheduler.set_background_workers(2);
+    Arc::new(scheduler)
+}
+
 /// A worker runs a job of a background job's scope, and then a frame's job that waits for that background job.
 #[test]
 fn a_worker_that_has_helped_a_background_job_may_wait_for_it() {
     assert_ends(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = two_in_background();
         let [helped, may_go_on] = [(); 2].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
             let (scheduler, helped, may_go_on) = (Arc::clone(&scheduler), Arc::clone(&helped), Arc::clone(&may_go_on));
@@ -83,7 +90,7 @@ fn a_worker_that_has_helped_a_background_job_may_wait_for_it() {
 #[test]
 fn a_worker_that_holds_a_background_loops_token_may_wait_for_that_loop() {
     assert_ends(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = two_in_background();
         let [joined, may_go_on, has_left] = [(); 3].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
             let flags = [&joined, &may_go_on, &has_left].map(Arc::clone);
@@ -138,7 +145,7 @@ fn a_lock_may_be_held_over_a_wait() {
 #[test]
 fn a_worker_that_has_helped_a_background_job_may_wait_for_a_job_that_waits_for_it() {
     assert_ends(|| {
-        let scheduler = Arc::new(Scheduler::new(3).unwrap());
+        let scheduler = two_in_background();
         let [helped, may_spawn, has_spawned] = [(); 3].map(|()| Arc::new(Flag::default()));
         let background = scheduler.background({
             let flags = [&helped, &may_spawn, &has_spawned].map(Arc::clone);
