@@ -5,15 +5,18 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use drawloom::backend::{BackendError, WgpuBackend};
-use drawloom::process::{Declare, Deferred, Draws, FullScreen, RenderProcess};
+use drawloom::backend::{BackendError, StreamingBudget, WgpuBackend};
+use drawloom::helper::{Bloom, HelperLayer, PostHelper};
+use drawloom::process::{Declare, Deferred, Draws, FullScreen, RenderProcess, ToneMapping};
 use drawloom::quality::Quality;
+use drawloom::scene::SceneRef;
 use drawloom::task::Scheduler;
 use drawloom::{Buffering, FinishedFrame, FrameError, FrameLoop, FrameLoopError, Renderer};
 use drawloom_testing::adapter;
 use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
 use drawloom_testing::random::Random;
 
+use crate::nodes::{Movement, Sparks};
 use crate::world::World;
 
 /// For the watchdog.
@@ -49,6 +52,10 @@ pub struct Totals {
     pub resizes: u64,
     pub qualities: u64,
     pub bufferings: u64,
+    /// The frames in which a view draws a static group as a whole.
+    pub static_groups: u64,
+    /// The frames that show a result of asynchronous post-processing.
+    pub results: u64,
 }
 
 /// Draws nothing into a picture, or panics.
@@ -81,14 +88,19 @@ type SoakLoop = FrameLoop<FaultyBackend<WgpuBackend>>;
 pub struct Engine {
     frames: SoakLoop,
     world: World,
+    /// Computes a bloom on the workers, while the device draws.
+    bloom: PostHelper,
+    sparks: Sparks,
     panics: Arc<AtomicBool>,
     in_flight: usize,
     totals: Totals,
 }
 
+/// Streams meshes and textures, with less room for textures than the largest world needs.
 fn open() -> FaultyBackend<WgpuBackend> {
     let (device, queue) = adapter::noop_device().unwrap();
-    FaultyBackend::new(WgpuBackend::new(device, queue).unwrap())
+    let budget = StreamingBudget { mesh_bytes: 1 << 20, texture_bytes: 1 << 20, ..StreamingBudget::default() };
+    FaultyBackend::new(WgpuBackend::new(device, queue).unwrap().stream_resources(budget).unwrap())
 }
 
 impl Engine {
@@ -96,10 +108,15 @@ impl Engine {
         let panics = Arc::new(AtomicBool::new(false));
         let process = MayPanic { panics: Arc::clone(&panics) };
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let (renderer, submitter) =
-            Renderer::builder(open()).deferred(Deferred::to_picture()).process(process).build(scheduler).unwrap();
+        let glow = Bloom::default();
+        let bloom = PostHelper::new(Arc::clone(&scheduler), glow.on_cpu(), glow.source());
+        let deferred = Deferred::new().post(bloom.layer(HelperLayer::default())).post(ToneMapping::default());
+        let builder = Renderer::builder(open()).deferred(deferred).process(process);
+        let builder = builder.process(bloom.downsample().unwrap()).output(bloom.source_target());
+        let (renderer, submitter) = builder.build(scheduler).unwrap();
         let frames = FrameLoop::new(renderer, submitter, Buffering::Double).unwrap();
-        Self { frames, world: World::new(), panics, in_flight: 0, totals: Totals::default() }
+        let (world, sparks) = (World::new(), Sparks::new());
+        Self { frames, world, bloom, sparks, panics, in_flight: 0, totals: Totals::default() }
     }
 
     /// Changes the world or a setting, and draws a frame; now and then one in which something fails.
@@ -136,7 +153,19 @@ impl Engine {
         for frame in finished {
             frame.outcome.unwrap();
         }
-        let recorded = self.frames.renderer().record(self.world.scene.as_scene_ref())?;
+        let mut positions = self.world.scene.as_scene_ref().positions.to_vec();
+        let moving = self.world.moving_objects();
+        let movement = Movement::new(&mut positions, &moving, self.totals.frames);
+        let scene = SceneRef { written: movement.columns(), ..self.world.report(&moving) };
+        self.bloom.begin_frame(self.frames.renderer(), scene.cameras);
+        let recorded = self.frames.renderer().record_with_nodes(scene, &[&movement, &self.sparks]);
+        drop(movement);
+        // A frame that fails was told of them too, and the next one need not be told again.
+        self.world.forget_changes();
+        let mut recorded = recorded?;
+        self.bloom.read_back(&mut recorded);
+        self.totals.static_groups += u64::from(recorded.statistics().views.iter().any(|view| view.pieces > 0));
+        self.totals.results += u64::from(recorded.statistics().helpers.iter().any(|view| view.result.is_some()));
         slot.submit(recorded);
         self.in_flight += 1;
         self.totals.frames += 1;

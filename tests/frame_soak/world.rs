@@ -2,7 +2,9 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::handle::Handle;
-use drawloom::scene::{Blend, Camera, Light, Material, Mesh, ObjectHandle, RenderObject, Scene, Texture};
+use drawloom::scene::{
+    Blend, Camera, Changes, Light, Material, Mesh, ObjectHandle, Piece, RenderObject, Scene, SceneRef, Texture,
+};
 use drawloom_testing::random::Random;
 
 /// A world, and what of it may go.
@@ -12,6 +14,10 @@ pub struct World {
     /// Each with its own texture.
     materials: Vec<(Handle<Material>, Handle<Texture>)>,
     meshes: Vec<Handle<Mesh>>,
+    /// Objects that stand still for ever, as one static group.
+    room: Vec<ObjectHandle>,
+    /// The indices of the objects that changed since the last frame; `None` if that may be any.
+    changed: Option<Vec<u32>>,
 }
 
 /// The most of each.
@@ -23,13 +29,60 @@ const MAX_CAMERAS: usize = 3;
 
 impl World {
     pub fn new() -> Self {
-        let mut world = Self { scene: Scene::new(), objects: Vec::new(), materials: Vec::new(), meshes: Vec::new() };
+        let mut world = Self {
+            scene: Scene::new(),
+            objects: Vec::new(),
+            materials: Vec::new(),
+            meshes: Vec::new(),
+            room: Vec::new(),
+            changed: None,
+        };
+        world.furnish();
         world.reset();
         world
     }
 
+    fn furnish(&mut self) {
+        let mesh = self.scene.add(Mesh::cuboid("shelf", Vec3::splat(0.4)).unwrap()).unwrap();
+        let material = self.scene.add(Material::default()).unwrap();
+        for shelf in 0..12 {
+            let object = RenderObject::new(mesh, material, DVec3::new(f64::from(shelf) - 6.0, -2.0, -3.0));
+            self.room.push(self.scene.add_object(object).unwrap());
+        }
+    }
+
+    /// The objects that a node moves, by index, in ascending order: every third one that does not stand still.
+    pub fn moving_objects(&self) -> Vec<u32> {
+        (0..)
+            .zip(self.scene.objects())
+            .filter(|(index, object)| index % 3 == 0 && !self.room.contains(object))
+            .map(|(index, _)| index)
+            .collect()
+    }
+
+    /// The scene, and what changed in it since the last frame: what the world knows of, and what moves.
+    pub fn report<'a>(&'a mut self, moving: &'a [u32]) -> SceneRef<'a> {
+        // Objects that are removed move others to their index.
+        let room = self.scene.object_set(self.room.iter().copied()).unwrap();
+        self.scene.pieces = vec![Piece::new("room", room)];
+        let changes = match &mut self.changed {
+            None => Changes::Unknown,
+            Some(changed) => {
+                changed.extend(moving);
+                Changes::Objects(changed)
+            }
+        };
+        SceneRef { changes, ..self.scene.as_scene_ref() }
+    }
+
+    /// The next frame is not told of the changes so far.
+    pub fn forget_changes(&mut self) {
+        self.changed = Some(Vec::new());
+    }
+
     /// Makes the world what it was at first, without making a new one.
     pub fn reset(&mut self) {
+        self.changed = None;
         for object in self.objects.drain(..) {
             self.scene.remove_object(object).unwrap();
         }
@@ -52,7 +105,12 @@ impl World {
 
     /// Something comes, goes or changes. Returns whether it was the size of a picture.
     pub fn change(&mut self, random: &mut Random) -> bool {
-        match random.below(12) {
+        let change = random.below(12);
+        // What comes, goes or gets another material may move other objects to other indices. The others change no object but one.
+        if matches!(change, 0..=4) {
+            self.changed = None;
+        }
+        match change {
             0 | 1 if self.objects.len() < MAX_OBJECTS => self.add_object(random),
             0..=2 if self.objects.len() > 1 => {
                 let object = self.objects.swap_remove(random.below(self.objects.len()));
@@ -83,6 +141,11 @@ impl World {
                 let handle = self.objects[random.below(self.objects.len())];
                 let object = self.scene.object(handle).unwrap();
                 self.scene.replace_object(handle, RenderObject { position: position(random), ..object }).unwrap();
+                if let Some(changed) = &mut self.changed {
+                    changed.extend(
+                        (0..).zip(self.scene.objects()).find(|(_, other)| *other == handle).map(|(index, _)| index),
+                    );
+                }
             }
         }
         false
