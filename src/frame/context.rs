@@ -34,7 +34,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) pass_runs: &'a PassRuns,
     /// The engine's own nodes.
     pub(super) nodes: LentNodes<'a>,
-    pub(super) clock: &'a StageClock,
+    pub(super) clock: &'a StageClock<'a>,
     pub(super) costs: &'a CostModel,
     /// One for each view.
     pub(super) occlusion: &'a [OcclusionControl],

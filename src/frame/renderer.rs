@@ -296,7 +296,7 @@ impl<B: Backend> Renderer<B> {
         let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
-        let clock = StageClock::default();
+        let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, separate_shadowed_lights));
         let request = FrameRequest {

@@ -1,9 +1,10 @@
 //! The thread time of each group of stages.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::statistics::StageTimes;
+use crate::timeline::{Stopwatch, Timeline};
 
 /// A group of stages in [`StageTimes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,15 +18,25 @@ pub(super) enum StageGroup {
 }
 
 /// Sums up thread time by group while jobs run.
-#[derive(Debug, Default)]
-pub(super) struct StageClock {
+pub(super) struct StageClock<'a> {
     nanoseconds: [AtomicU64; 6],
+    timeline: &'a Timeline,
 }
 
-impl StageClock {
+impl<'a> StageClock<'a> {
+    /// A clock that measures as this timeline does.
+    pub(super) fn new(timeline: &'a Timeline) -> Self {
+        Self { nanoseconds: Default::default(), timeline }
+    }
+
+    /// A stopwatch that starts now.
+    pub(super) fn stopwatch(&self) -> Stopwatch<'a> {
+        self.timeline.stopwatch()
+    }
+
     /// Runs `work`, adds its time to `group`, and returns its result and its time.
     pub(super) fn measure<R>(&self, group: StageGroup, work: impl FnOnce() -> R) -> (R, Duration) {
-        let start = Instant::now();
+        let start = self.stopwatch();
         let result = work();
         let took = start.elapsed();
         // Relaxed: a sum, read after the run.

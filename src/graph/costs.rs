@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use crate::sync::{AtomicU32, AtomicUsize, Instant, Ordering};
+use crate::sync::{AtomicU32, AtomicUsize, Ordering};
+use crate::timeline::Stopwatch;
 use crate::tuning::{Estimate, Filter};
 
 /// The measured costs, in nanoseconds.
@@ -60,12 +61,13 @@ impl NodeCosts {
 /// Measures the nodes of one run; does nothing in a run that is not measured.
 #[derive(Clone, Copy)]
 pub(super) struct CostTimer<'run> {
-    start: Option<(Instant, &'run NodeCosts)>,
+    start: Option<(Stopwatch<'run>, &'run NodeCosts)>,
 }
 
 impl<'run> CostTimer<'run> {
-    pub(super) fn new(costs: Option<&'run NodeCosts>) -> Self {
-        Self { start: costs.map(|costs| (Instant::now(), costs)) }
+    /// With a stopwatch that started with the run.
+    pub(super) fn new(start: Stopwatch<'run>, costs: Option<&'run NodeCosts>) -> Self {
+        Self { start: costs.map(|costs| (start, costs)) }
     }
 
     /// A node starts.
@@ -87,8 +89,8 @@ impl<'run> CostTimer<'run> {
 
     /// Makes a call that counts as work of the run.
     pub(super) fn work<R>(self, call: impl FnOnce() -> R) -> R {
-        let Some((_, costs)) = self.start else { return call() };
-        let start = Instant::now();
+        let Some((start, costs)) = self.start else { return call() };
+        let start = start.restarted();
         let result = call();
         costs.work.fetch_add(start.elapsed().as_nanos() as usize, Ordering::Relaxed);
         result
@@ -96,7 +98,7 @@ impl<'run> CostTimer<'run> {
 }
 
 /// Saturates after about four seconds.
-fn nanoseconds(since: Instant) -> u32 {
+fn nanoseconds(since: Stopwatch<'_>) -> u32 {
     since.elapsed().as_nanos().try_into().unwrap_or(u32::MAX)
 }
 

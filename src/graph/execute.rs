@@ -12,7 +12,7 @@ use super::execution_policy::RunMode;
 use super::instrument::{Instrument, NoInstrument, NodeSpan};
 use super::node::Node;
 use super::schedule::Schedule;
-use crate::sync::{AtomicBool, Instant, Mutex, Ordering};
+use crate::sync::{AtomicBool, Mutex, Ordering};
 use crate::task::{Chunks, Scheduler, Worker};
 use crate::timeline::{Graph, NodeInfo, RunEnd};
 use crate::unwind::{JobPanic, catch, discard};
@@ -85,11 +85,11 @@ impl<P> Schedule<P> {
         P: Node<C>,
         I: Instrument,
     {
-        let start = Instant::now();
+        let start = worker.timeline().stopwatch();
         let run = Run {
             schedule: self,
             context,
-            timer: CostTimer::new((mode == RunMode::Parallel { is_measured: true }).then_some(&self.costs)),
+            timer: CostTimer::new(start, (mode == RunMode::Parallel { is_measured: true }).then_some(&self.costs)),
             instrument,
             is_stopped: AtomicBool::new(false),
             failure: Mutex::new(None),

@@ -7,8 +7,8 @@ use super::error::NodeError;
 use super::execute::{Location, Run};
 use super::instrument::{Instrument, NodeSpan};
 use super::node::Node;
-use crate::sync::Instant;
 use crate::task::{Chunks, Worker};
+use crate::timeline::Stopwatch;
 
 /// Where a serial run stopped because it exceeded its limit. All nodes before this one are complete.
 pub(super) struct Suspended<S> {
@@ -20,11 +20,11 @@ pub(super) struct Suspended<S> {
 }
 
 impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
-    /// Runs all nodes. If that takes longer than the limit, measured from the given instant, it returns where it stopped.
+    /// Runs all nodes. If that takes longer than the limit, measured by the given stopwatch, it returns where it stopped.
     pub(super) fn run_serial(
         &self,
         worker: &Worker,
-        limit: Option<(Instant, Duration)>,
+        limit: Option<(Stopwatch<'_>, Duration)>,
     ) -> Option<Suspended<I::Span<'_>>> {
         let mut span = self.instrument.start_serial(worker);
         let mut deadline = limit.map(|(start, limit)| Deadline { start, limit, chunks: 0, next_check: 1 });
@@ -49,7 +49,7 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         &self,
         location: &mut Location,
         worker: &Worker,
-        mut deadline: Option<&mut Deadline>,
+        mut deadline: Option<&mut Deadline<'_>>,
         span: &mut impl NodeSpan,
     ) -> Result<Option<(Chunks, usize)>, NodeError> {
         let node = location.node;
@@ -72,14 +72,14 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
 }
 
 /// The end of a serial run's time limit. It does not read the clock at every chunk.
-struct Deadline {
-    start: Instant,
+struct Deadline<'run> {
+    start: Stopwatch<'run>,
     limit: Duration,
     chunks: u32,
     next_check: u32,
 }
 
-impl Deadline {
+impl Deadline<'_> {
     /// The largest number of chunks between two readings of the clock. A frame that suddenly takes longer than its limit
     /// overruns it by at most this many chunks.
     const MAX_CHUNKS: u32 = 16;
@@ -103,11 +103,13 @@ impl Deadline {
 #[cfg(all(test, not(drawloom_model_check)))]
 mod tests {
     use super::*;
+    use crate::timeline::{Timeline, TimelineSettings};
 
     #[test]
     fn the_clock_is_read_at_intervals_that_double_up_to_sixteen_chunks() {
+        let timeline = Timeline::new(Vec::new(), TimelineSettings::default());
         let mut deadline =
-            Deadline { start: Instant::now(), limit: Duration::from_secs(3_600), chunks: 0, next_check: 1 };
+            Deadline { start: timeline.stopwatch(), limit: Duration::from_secs(3_600), chunks: 0, next_check: 1 };
         let mut read_at = Vec::new();
         for chunk in 1..=64 {
             assert!(!deadline.has_passed());

@@ -154,7 +154,8 @@ impl SchedulerBuilder {
     }
 
     /// Sets the clock that the [timeline](Scheduler::timeline) reads instead of the system's: the time since some moment, which
-    /// never decreases, on whichever thread it is read.
+    /// never decreases, on whichever thread it is read. What nodes and stages cost is measured by it too, so a simulated clock makes
+    /// what is chosen by these costs the same in each run.
     ///
     /// If the clock panics, it is not called again: time stands still at its latest reading. That is reported to [`tracing`] as an
     /// error, and in [`clock_panic`](crate::timeline::Log::clock_panic) of every log from then on. Jobs are not affected.

@@ -108,7 +108,7 @@ impl EngineClock {
         Self { call, latest: AtomicU64::new(0), panic: OnceLock::new() }
     }
 
-    fn read(&self) -> u64 {
+    pub(super) fn read(&self) -> u64 {
         if self.panic.get().is_none() {
             match catch(&self.call) {
                 Ok(time) => {

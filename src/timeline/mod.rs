@@ -41,11 +41,13 @@ mod labels;
 mod log;
 mod recorder;
 mod ring;
+mod stopwatch;
 mod ticks;
 mod track;
 
 pub(crate) use chunk_timer::ChunkTimer;
 pub(crate) use recorder::{OpenRun, RunEnd, TimelineSettings};
+pub(crate) use stopwatch::Stopwatch;
 
 pub use frame_tuning::{FrameTuning, JobSize, TuningAlternative, TuningChoice, TuningSubject};
 pub use labels::Labels;

@@ -14,6 +14,7 @@ use super::clock::{Clock, ClockReader, EngineClock};
 use super::event_store::{EventStore, Events, FrameSource, frames_of};
 use super::frame_tuning::FrameTuning;
 use super::log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog};
+use super::stopwatch::Stopwatch;
 use super::track::{Entry, Track};
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
@@ -150,6 +151,12 @@ impl Timeline {
     }
 
     /// Records what was chosen by measurement in a frame: none if the timeline was off when the frame began.
+    /// A stopwatch that starts now, for the cost of some work.
+    #[inline]
+    pub(crate) fn stopwatch(&self) -> Stopwatch<'_> {
+        Stopwatch::of(&self.clock)
+    }
+
     pub(crate) fn add_tuning(&self, frame: Option<u64>, tuning: &FrameTuning) {
         if let Some(frame) = frame.filter(|_| self.is_on()) {
             let tuning = tuning.clone();

@@ -4,7 +4,7 @@ use std::array;
 use std::mem;
 use std::ops::Range;
 use std::panic::resume_unwind;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::super::context::FrameContext;
 use super::super::pass_runs::{PassFailure, PassRuns};
@@ -453,7 +453,7 @@ fn finish_together<B: Backend>(
         finished += 1;
     };
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
-    let start = Instant::now();
+    let start = frame.clock.stopwatch();
     let result = catch(|| frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit));
     let result = result.unwrap_or_else(|JobPanic { message }| {
         fail(finished);
