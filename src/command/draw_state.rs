@@ -2,12 +2,12 @@
 
 use crate::scene::{Blend, LevelOfDetail, Topology};
 
-/// Topology, culling, blending, subdivision level and level of detail in two bytes (M listing 10.1). With the process that draws, it
+/// Topology, culling, blending, mask, subdivision level and level of detail in two bytes (M listing 10.1). With the process that draws, it
 /// determines a command's pipeline; with the mesh, its triangles.
 ///
 /// ```text
-/// bit   10  9  8        | 7  6  5     | 4  3 | 2  1 | 0
-///       level of detail | subdivision | blend| cull | topology
+/// bit   11 10  9        | 8  7  6     | 5    | 4  3 | 2  1 | 0
+///       level of detail | subdivision | mask | blend| cull | topology
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DrawState(u16);
@@ -17,7 +17,7 @@ impl DrawState {
     pub const PLAIN: Self = Self(0);
 
     /// The number of states: [`DrawState::index`] is less.
-    pub const COUNT: usize = 1 << 11;
+    pub const COUNT: usize = 1 << 12;
 
     /// The highest subdivision level: a mesh's edges can be halved 7 times.
     pub const MAX_SUBDIVISION_LEVEL: u32 = 7;
@@ -25,7 +25,7 @@ impl DrawState {
     /// The coarsest level of detail: see [`Mesh::levels`](crate::scene::Mesh::levels).
     pub const MAX_LEVEL_OF_DETAIL: u32 = LevelOfDetail::MAX_COUNT as u32;
 
-    /// A state of subdivision level 0 and level of detail 0.
+    /// A state without a mask, of subdivision level 0 and level of detail 0.
     pub fn new(topology: Topology, cull: Cull, blend: Blend) -> Self {
         Self(topology as u16 | (cull as u16) << 1 | (blend as u16) << 3)
     }
@@ -35,31 +35,41 @@ impl DrawState {
         Self(self.0 & !1 | topology as u16)
     }
 
+    /// The same state of an object whose material [is a mask](crate::scene::Material::is_masked), or is not.
+    pub fn with_mask(self, is_masked: bool) -> Self {
+        Self(self.0 & !(1 << 5) | u16::from(is_masked) << 5)
+    }
+
+    /// Whether the object's material is a mask.
+    pub fn is_masked(self) -> bool {
+        self.0 & 1 << 5 != 0
+    }
+
     /// The same state with another subdivision level, at most [`DrawState::MAX_SUBDIVISION_LEVEL`].
     pub fn with_subdivision_level(self, level: u32) -> Self {
-        Self(self.0 & !(0b111 << 5) | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u16) << 5)
+        Self(self.0 & !(0b111 << 6) | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u16) << 6)
     }
 
     /// How often the mesh's edges are halved.
     pub fn subdivision_level(self) -> u32 {
-        u32::from(self.0 >> 5 & 0b111)
+        u32::from(self.0 >> 6 & 0b111)
     }
 
     /// The same state with another level of detail, at most [`DrawState::MAX_LEVEL_OF_DETAIL`].
     pub fn with_level_of_detail(self, level: u32) -> Self {
-        Self(self.0 & !(0b111 << 8) | (level.min(Self::MAX_LEVEL_OF_DETAIL) as u16) << 8)
+        Self(self.0 & !(0b111 << 9) | (level.min(Self::MAX_LEVEL_OF_DETAIL) as u16) << 9)
     }
 
     /// Which of the mesh's levels is drawn: 0 for the mesh itself.
     pub fn level_of_detail(self) -> u32 {
-        u32::from(self.0 >> 8)
+        u32::from(self.0 >> 9)
     }
 
     /// The part of the state that selects the pipeline, on which the level of detail has no influence. A subdivided mesh is a triangle list, whatever its own topology is.
     pub fn pipeline_state(self) -> Self {
         match self.subdivision_level() {
             0 => self.with_level_of_detail(0),
-            _ => Self::new(Topology::TriangleList, self.cull(), self.blend()),
+            _ => Self::new(Topology::TriangleList, self.cull(), self.blend()).with_mask(self.is_masked()),
         }
     }
 
@@ -126,26 +136,30 @@ mod tests {
         for topology in [Topology::TriangleList, Topology::TriangleStrip] {
             for cull in [Cull::Back, Cull::Front, Cull::Nothing] {
                 for blend in [Blend::None, Blend::Alpha, Blend::Additive, Blend::Subtractive] {
-                    let state = DrawState::new(topology, cull, blend);
-                    assert_eq!((state.topology(), state.cull(), state.blend()), (topology, cull, blend));
-                    assert!(state.index() < DrawState::COUNT);
-                    assert_eq!(DrawState::from_bits(state.bits()), Some(state));
-                    let subdivided = state.with_subdivision_level(9);
-                    assert_eq!(
-                        (state.subdivision_level(), subdivided.subdivision_level()),
-                        (0, DrawState::MAX_SUBDIVISION_LEVEL)
-                    );
-                    assert_eq!(subdivided.with_subdivision_level(0), state);
-                    assert_eq!(state.pipeline_state(), state);
-                    assert_eq!(subdivided.pipeline_state(), DrawState::new(Topology::TriangleList, cull, blend));
-                    let coarse = subdivided.with_level_of_detail(9);
-                    assert_eq!(
-                        (state.level_of_detail(), coarse.level_of_detail(), coarse.subdivision_level()),
-                        (0, DrawState::MAX_LEVEL_OF_DETAIL, DrawState::MAX_SUBDIVISION_LEVEL)
-                    );
-                    assert_eq!(coarse.with_level_of_detail(0), subdivided);
-                    assert_eq!(state.with_level_of_detail(3).pipeline_state(), state);
-                    assert!(seen.insert(state));
+                    for is_masked in [false, true] {
+                        let state = DrawState::new(topology, cull, blend).with_mask(is_masked);
+                        assert_eq!((state.topology(), state.cull(), state.blend()), (topology, cull, blend));
+                        assert_eq!((state.is_masked(), state.with_mask(false).is_masked()), (is_masked, false));
+                        assert!(state.index() < DrawState::COUNT);
+                        assert_eq!(DrawState::from_bits(state.bits()), Some(state));
+                        let subdivided = state.with_subdivision_level(9);
+                        assert_eq!(
+                            (state.subdivision_level(), subdivided.subdivision_level()),
+                            (0, DrawState::MAX_SUBDIVISION_LEVEL)
+                        );
+                        assert_eq!(subdivided.with_subdivision_level(0), state);
+                        assert_eq!(state.pipeline_state(), state);
+                        let list = DrawState::new(Topology::TriangleList, cull, blend).with_mask(is_masked);
+                        assert_eq!(subdivided.pipeline_state(), list);
+                        let coarse = subdivided.with_level_of_detail(9);
+                        assert_eq!(
+                            (state.level_of_detail(), coarse.level_of_detail(), coarse.subdivision_level()),
+                            (0, DrawState::MAX_LEVEL_OF_DETAIL, DrawState::MAX_SUBDIVISION_LEVEL)
+                        );
+                        assert_eq!(coarse.with_level_of_detail(0), subdivided);
+                        assert_eq!(state.with_level_of_detail(3).pipeline_state(), state);
+                        assert!(seen.insert(state));
+                    }
                 }
             }
         }

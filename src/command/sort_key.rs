@@ -6,8 +6,8 @@ use super::DrawState;
 /// with equal keys are ordered by object index.
 ///
 /// ```text
-/// bit    63 62 | 61 … 56 | 55 … 24 | 23 … 21         | 20 | 19 … 0
-/// opaque  0  0 | state   | mesh    | level of detail | 0  | depth, near to far
+/// bit    63 62 | 61 … 55 | 54 … 23 | 22 … 20         | 19 … 0
+/// opaque  0  0 | state   | mesh    | level of detail | depth, near to far
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
@@ -38,9 +38,9 @@ impl SortKey {
     /// [quantised](crate::quality::DepthKey::quantize) depth.
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
         let (bits, level) = (u64::from(state.bits()), u64::from(state.level_of_detail()));
-        // Subdivision level, culling and topology.
-        let state = (bits >> 5 & 0b111) << 3 | bits & 0b111;
-        Self(state << 56 | u64::from(mesh) << 24 | level << 21 | u64::from(depth >> 12))
+        // Subdivision level, mask, culling and topology.
+        let state = (bits >> 5 & 0b1111) << 3 | bits & 0b111;
+        Self(state << 55 | u64::from(mesh) << 23 | level << 20 | u64::from(depth >> 12))
     }
 
     /// The key of a blended command: back to front, exact to the last bit of `depth`, a
@@ -66,9 +66,9 @@ impl SortKey {
 
     /// The state and the mesh slot in the key of an opaque command; `None` for other keys.
     pub(super) fn state_and_mesh(self) -> Option<(DrawState, u32)> {
-        let field = |shift: u32| (self.0 >> shift) as u16 & 0b111;
-        let state = DrawState::from_bits(field(56) | field(59) << 5 | field(21) << 8);
-        state.filter(|_| self.0 >> 62 == 0).map(|state| (state, (self.0 >> 24) as u32))
+        let field = |shift: u32, bits: u32| (self.0 >> shift) as u16 & ((1 << bits) - 1);
+        let state = DrawState::from_bits(field(55, 3) | field(58, 4) << 5 | field(20, 3) << 9);
+        state.filter(|_| self.0 >> 62 == 0).map(|state| (state, (self.0 >> 23) as u32))
     }
 }
 

@@ -38,6 +38,12 @@ pub struct CommandDraws<'a> {
     pub shader: &'a str,
     /// The fragment entry point; `None` draws only depth.
     pub fragment: Option<&'a str>,
+    /// The entry points for objects whose material [is a mask](crate::scene::Material::is_masked), in place of `vertex` and `fragment`;
+    /// `None` draws these objects like others.
+    pub masked: Option<MaskedEntryPoints<'a>>,
+    /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides what is behind it
+    /// from culling. [Masked](crate::scene::Material::is_masked) objects never do.
+    pub discards: bool,
     /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
     /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped
     /// processes and [`SURFACE_SHADER`](super::SURFACE_SHADER) call. [`Deferred::deformation`](super::Deferred::deformation) sets it for
@@ -68,6 +74,8 @@ impl Default for CommandDraws<'_> {
         Self {
             shader: "",
             fragment: Some("fragment"),
+            masked: None,
+            discards: false,
             deformation: None,
             selection: Selection::OPAQUE,
             face_culling: FaceCulling::ByMaterial,
@@ -78,6 +86,51 @@ impl Default for CommandDraws<'_> {
             resources: Vec::new(),
         }
     }
+}
+
+/// The entry points of a process's shader for masked objects.
+///
+/// ```
+/// use drawloom::process::{CommandDraws, MaskedEntryPoints};
+///
+/// // Draws depth alone: opaque objects without a fragment shader, masked ones with their holes.
+/// let draws = CommandDraws {
+///     shader: "
+///         @vertex
+///         fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
+///             return clip_position(relative_position(drawn_object(in.instance), in.position));
+///         }
+///
+///         struct Corner {
+///             @builtin(position) position: vec4<f32>,
+///             @location(0) uv: vec2<f32>,
+///             @location(1) @interpolate(flat) material: u32,
+///         }
+///
+///         @vertex
+///         fn masked_vertex(in: VertexInput) -> Corner {
+///             return Corner(vertex(in), bounded_uv(in.uv), drawn_object(in.instance).material);
+///         }
+///
+///         @fragment
+///         fn masked_fragment(in: Corner) {
+///             if is_cut_out(materials[in.material], in.uv) {
+///                 discard;
+///             }
+///         }
+///     ",
+///     fragment: None,
+///     masked: Some(MaskedEntryPoints { vertex: "masked_vertex", fragment: "masked_fragment" }),
+///     ..CommandDraws::default()
+/// };
+/// # assert!(!draws.discards);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaskedEntryPoints<'a> {
+    /// The vertex entry point, which hands on the texture coordinates and the material.
+    pub vertex: &'a str,
+    /// The fragment entry point, which discards pixels where the prelude's `is_cut_out` says so.
+    pub fragment: &'a str,
 }
 
 /// Every pixel of the view, once, by one triangle infinitely far away: if the process tests depth, only pixels where
@@ -133,12 +186,13 @@ impl Draws<'_> {
     }
 
     /// Whether it draws objects that write depth all over the shape of their meshes, and so hide what is behind them: opaque ones, neither
-    /// deformed nor inside out, and whatever the stencil.
+    /// deformed nor inside out, without discarding pixels, and whatever the stencil. Those with a mask do not.
     pub fn hides(&self) -> bool {
         let Self::Commands(draws) = self else { return false };
         let writes_all = draws.writes_depth && draws.stencil.is_none_or(|stencil| stencil.always_passes());
         let shows_fronts = draws.face_culling != FaceCulling::Reversed;
-        writes_all && shows_fronts && draws.deformation.is_none() && draws.blend_equations.is_empty()
+        let covers = !draws.discards && shows_fronts;
+        writes_all && covers && draws.deformation.is_none() && draws.blend_equations.is_empty()
     }
 
     /// Whether objects that are hidden behind others change the stencil, so that they must be drawn.

@@ -46,7 +46,7 @@ pub use compute_dispatch::{ComputeDispatch, Workgroups};
 pub use cpu_shader::{
     CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials,
     ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject,
-    ShaderView, VARYINGS, VertexInput, VertexOutput, direction_from_octahedral, octahedral_from_direction,
+    ShaderView, VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
 };
 use declaration::source_of_previous;
 pub use declaration::{Declaration, Declare, DeclaredAttribute, previous_name};
@@ -54,7 +54,7 @@ pub use deferred::{
     COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
     LightVolumes, Place, Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
 };
-pub use draws::{CommandDraws, Draws, FullScreen, LightDraws};
+pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;

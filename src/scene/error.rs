@@ -90,8 +90,10 @@ pub enum SceneError {
         /// Its name.
         mesh: String,
     },
-    /// Colours that are negative or not finite, or an opacity outside 0 to 1.
-    #[error("material `{material}` has a colour that is negative or not finite, or an opacity outside 0 to 1")]
+    /// Colours that are negative or not finite, or an opacity or alpha cutoff outside 0 to 1.
+    #[error(
+        "material `{material}` has a colour that is negative or not finite, or an opacity or alpha cutoff outside 0 to 1"
+    )]
     InvalidMaterial {
         /// Its name.
         material: String,

@@ -18,14 +18,25 @@ pub struct Material {
     pub texture: Option<Handle<Texture>>,
     /// Emitted radiance, linear.
     pub emission: Vec3,
-    /// 0 is transparent, 1 is opaque. Only blended materials use it.
+    /// 0 is transparent, 1 is opaque. Only blended and masked materials use it.
     pub opacity: f32,
     /// How the surface is blended with what is behind it.
     pub blend: Blend,
+    /// Makes a material without blending a mask, from 0 to 1: where its alpha, which is `opacity` times that of the `texture`, is less,
+    /// there is no surface, in pictures and in shadows; elsewhere the surface is opaque. `None` for no holes. Blended materials do not
+    /// use it. It is glTF's `alphaCutoff` for `alphaMode: MASK`.
+    ///
+    /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling.
+    ///
+    /// The mask is read at the texture's full resolution, however far away it is: what is left covers as large a share of distant pixels
+    /// as of near ones, where averaged alpha would be below the cutoff everywhere, or nowhere. As with triangles of that size, each pixel
+    /// is covered or not. Devices round when they filter, so an alpha that is less by up to 1/4096 of the cutoff counts as equal.
+    pub alpha_cutoff: Option<f32>,
     /// Whether back faces are drawn too.
     pub double_sided: bool,
-    /// Its values, if it has a [`MaterialType`](super::MaterialType): then the engine's own processes draw it, and of the other fields the
-    /// shipped ones use `blend`, `double_sided`, and what their shadow casters read.
+    /// Its values, if it has a [`MaterialType`](super::MaterialType): then the engine's own processes draw it. Of the other fields the
+    /// shipped ones use `blend` and `double_sided`, and the [shadow casters](crate::process::ShadowCasters) use the mask: `alpha_cutoff`,
+    /// `opacity` and `texture`.
     pub values: Option<MaterialValues>,
 }
 
@@ -38,6 +49,7 @@ impl Default for Material {
             emission: Vec3::ZERO,
             opacity: 1.0,
             blend: Blend::None,
+            alpha_cutoff: None,
             double_sided: false,
             values: None,
         }
@@ -45,11 +57,23 @@ impl Default for Material {
 }
 
 impl Material {
-    /// Whether its colours are finite and not negative, and its opacity is from 0 to 1.
+    /// Whether it is a mask: it does not blend, and has an [`alpha_cutoff`](Self::alpha_cutoff).
+    pub fn is_masked(&self) -> bool {
+        self.blend == Blend::None && self.alpha_cutoff.is_some()
+    }
+
+    /// The alpha below which shaders leave out a pixel: less than the cutoff by what filtering may round off. 0 without a mask.
+    pub(crate) fn least_alpha(&self) -> f32 {
+        const ROUNDING: f32 = 1.0 / 4096.0;
+        self.alpha_cutoff.filter(|_| self.is_masked()).map_or(0.0, |cutoff| cutoff * (1.0 - ROUNDING))
+    }
+
+    /// Whether its colours are finite and not negative, and its opacity and alpha cutoff are from 0 to 1.
     pub(super) fn is_valid(&self) -> bool {
-        let finite = self.diffuse.is_finite() && self.emission.is_finite() && self.opacity.is_finite();
+        let finite = self.diffuse.is_finite() && self.emission.is_finite();
         let positive = self.diffuse.min_element() >= 0.0 && self.emission.min_element() >= 0.0;
-        finite && positive && (0.0..=1.0).contains(&self.opacity)
+        let is_fraction = |value: f32| (0.0..=1.0).contains(&value);
+        finite && positive && is_fraction(self.opacity) && self.alpha_cutoff.is_none_or(is_fraction)
     }
 }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
-use crate::scene::{Assets, Blend, Material, MaterialLayout, MaterialValues, Mesh, Topology};
+use crate::scene::{Assets, Material, MaterialLayout, MaterialValues, Mesh, Topology};
 
 /// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache lines; the assets
 /// themselves are much larger.
@@ -60,9 +60,9 @@ impl DrawStates {
         }
         let mut new_materials = vec![None; materials.slot_count()];
         let mut types = Vec::new();
-        for (handle, Material { double_sided, blend, values, .. }) in materials.iter() {
-            new_materials[handle.index() as usize] = Some((handle, states_of(*double_sided, *blend)));
-            if let Some(values) = values {
+        for (handle, material) in materials.iter() {
+            new_materials[handle.index() as usize] = Some((handle, states_of(material)));
+            if let Some(values) = &material.values {
                 types.resize(materials.slot_count(), None);
                 types[handle.index() as usize] = Some(values.layout());
             }
@@ -115,9 +115,9 @@ impl DrawStates {
 }
 
 /// The states of objects with triangle lists and such a material, as they are and mirrored.
-fn states_of(double_sided: bool, blend: Blend) -> [DrawState; 2] {
-    let culls = if double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
-    culls.map(|cull| DrawState::new(Topology::TriangleList, cull, blend))
+fn states_of(material: &Material) -> [DrawState; 2] {
+    let culls = if material.double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
+    culls.map(|cull| DrawState::new(Topology::TriangleList, cull, material.blend).with_mask(material.is_masked()))
 }
 
 /// The states that selected objects with these meshes and materials may have, each once: without subdivision, at level of detail 0, and not mirrored.
@@ -125,10 +125,10 @@ pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec
     let mut states = Vec::new();
     let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();
     topologies.retain(|topology| assets.meshes.iter().any(|(_, mesh)| mesh.topology() == *topology));
-    for (handle, Material { double_sided, blend, values, .. }) in assets.materials.iter() {
-        let is_of_type = selection.material_types.contains(values.as_ref().map(MaterialValues::layout));
-        if is_of_type && selection.contains(*blend, handle.index()) {
-            let [state, _] = states_of(*double_sided, *blend);
+    for (handle, material) in assets.materials.iter() {
+        let is_of_type = selection.material_types.contains(material.values.as_ref().map(MaterialValues::layout));
+        if is_of_type && selection.contains(material.blend, handle.index()) {
+            let [state, _] = states_of(material);
             states.extend(topologies.iter().map(|topology| state.with_topology(*topology)));
         }
     }
@@ -145,7 +145,7 @@ fn has_changed<T: PartialEq>(before: &[Option<T>], now: &[Option<T>]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{MaterialType, Scene, Vertex};
+    use crate::scene::{Blend, MaterialType, Scene, Vertex};
 
     #[test]
     fn states_of_selected_materials_and_present_topologies_are_possible() {
@@ -158,19 +158,25 @@ mod tests {
         scene.add(Material::default()).unwrap();
         scene.add(Material { double_sided: true, blend: Blend::Alpha, ..Material::default() }).unwrap();
         scene.add(Material { double_sided: true, values: Some(GLOW.values([0.0; 4])), ..Material::default() }).unwrap();
-        let [plain, blended, glowing] =
-            [(Cull::Back, Blend::None), (Cull::Nothing, Blend::Alpha), (Cull::Nothing, Blend::None)];
-        let state = |topology| move |(cull, blend)| DrawState::new(topology, cull, blend);
+        scene.add(Material { alpha_cutoff: Some(0.5), ..Material::default() }).unwrap();
+        // Blending comes before the mask.
+        let blend = Blend::Alpha;
+        scene.add(Material { double_sided: true, blend, alpha_cutoff: Some(0.5), ..Material::default() }).unwrap();
+        let plain = (Cull::Back, Blend::None, false);
+        let [blended, glowing] = [(Cull::Nothing, blend, false), (Cull::Nothing, Blend::None, false)];
+        let masked = (Cull::Back, Blend::None, true);
+        let state =
+            |topology| move |(cull, blend, is_masked)| DrawState::new(topology, cull, blend).with_mask(is_masked);
         let (list, strip) = (state(Topology::TriangleList), state(Topology::TriangleStrip));
         let of = |scene: &Scene, selection| possible_draw_states(selection, scene.assets());
         assert_eq!(of(&scene, Selection::ALL), [], "there is no mesh");
         add_mesh(&mut scene, Topology::TriangleStrip);
         assert_eq!(of(&scene, Selection::BLENDED), [blended].map(strip));
-        assert_eq!(of(&scene, Selection::OPAQUE.of_shipped_materials()), [plain].map(strip));
+        assert_eq!(of(&scene, Selection::OPAQUE.of_shipped_materials()), [plain, masked].map(strip));
         assert_eq!(of(&scene, Selection::OPAQUE.of_material_type(GLOW)), [glowing].map(strip));
         add_mesh(&mut scene, Topology::TriangleList);
         let mut all: Vec<_> =
-            [plain, blended, glowing].into_iter().flat_map(|state| [list(state), strip(state)]).collect();
+            [plain, blended, glowing, masked].into_iter().flat_map(|state| [list(state), strip(state)]).collect();
         all.sort_unstable();
         assert_eq!(of(&scene, Selection::ALL), all);
     }

@@ -2,8 +2,7 @@
 
 use drawloom::command::Selection;
 use drawloom::process::{
-    BlendEquation, CommandDraws, Declare, Deformation, Draws, ILLUMINATION_SHADER, Place, RenderProcess,
-    ShaderResource, ShadowCasters,
+    CommandDraws, Declare, Deformation, Draws, ILLUMINATION_SHADER, Place, RenderProcess, ShaderResource, ShadowCasters,
 };
 use drawloom::scene::ViewKind;
 
@@ -99,13 +98,11 @@ impl RenderProcess for Surfaces {
             SurfaceKind::Masked => Selection::OPAQUE.of_material_type(MASKED_SURFACE),
             SurfaceKind::Blended => Selection::BLENDED.of_material_type(SURFACE),
         };
-        // With an equation of its own, what has holes hides nothing behind it from culling.
-        let is_masked = self.kind == SurfaceKind::Masked;
         Draws::Commands(CommandDraws {
             shader: &self.shader,
             deformation: self.deformation.as_ref().map(Deformation::shader),
             selection: selection.in_layers(if self.deformation.is_some() { DEFORMED } else { RIGID }),
-            blend_equations: if is_masked { vec![BlendEquation::REPLACE] } else { Vec::new() },
+            discards: self.kind == SurfaceKind::Masked,
             writes_depth: self.kind != SurfaceKind::Blended,
             resources: self.resources.clone(),
             ..CommandDraws::default()

@@ -90,6 +90,7 @@ pub(super) struct MaterialTable {
 struct TableEntry {
     diffuse: Vec3,
     opacity: f32,
+    alpha_cutoff: f32,
     emission: Vec3,
     double_sided: bool,
     blend: Blend,
@@ -100,7 +101,8 @@ struct TableEntry {
 impl TableEntry {
     fn new(material: &Material, chain: Option<Arc<MipChain>>) -> Self {
         let Material { diffuse, opacity, emission, double_sided, blend, .. } = *material;
-        Self { diffuse, opacity, emission, double_sided, blend, values: material.values.clone(), chain }
+        let (alpha_cutoff, values) = (material.least_alpha(), material.values.clone());
+        Self { diffuse, opacity, alpha_cutoff, emission, double_sided, blend, values, chain }
     }
 }
 
@@ -108,12 +110,15 @@ impl<R: Real> Materials<R> for MaterialTable {
     /// Black if the slot is free: an object that refers to it is not drawn.
     fn get(&self, slot: u32) -> ShaderMaterial<R> {
         let Some(Some(entry)) = self.slots.get(slot as usize) else {
-            let (diffuse, emission) = (Vector3::zero(), Vector3::zero());
-            return ShaderMaterial { diffuse, opacity: R::zero(), emission, double_sided: false, blend: Blend::None };
+            let (black, zero) = (Vector3::zero(), R::zero());
+            let (diffuse, emission, opacity, alpha_cutoff) = (black, black, zero, zero);
+            let (double_sided, blend) = (false, Blend::None);
+            return ShaderMaterial { diffuse, opacity, alpha_cutoff, emission, double_sided, blend };
         };
         ShaderMaterial {
             diffuse: Vector3::of_single(entry.diffuse),
             opacity: R::of(f64::from(entry.opacity)),
+            alpha_cutoff: R::of(f64::from(entry.alpha_cutoff)),
             emission: Vector3::of_single(entry.emission),
             double_sided: entry.double_sided,
             blend: entry.blend,

@@ -38,8 +38,10 @@ impl<R: Precision> ObjectPass<'_, R> {
     /// If the CPU shader panics.
     pub(super) fn draw(&self) -> Result<(), JobPanic> {
         self.context.attachments.open(|open| {
+            let has_masks = || self.chunks.iter().flatten().any(TriangleRange::is_masked);
+            let draws_pixels = self.shader.draws_pixels() || self.shader.draws_masked_pixels() && has_masks();
             // Without a fragment shader no varyings are kept.
-            if self.shader.draws_pixels() { self.draw_tiles::<VARYINGS>(open) } else { self.draw_tiles::<0>(open) }
+            if draws_pixels { self.draw_tiles::<VARYINGS>(open) } else { self.draw_tiles::<0>(open) }
         })
     }
 
@@ -79,7 +81,8 @@ impl<R: Precision> ObjectPass<'_, R> {
             DepthWrites::WhereOpaque => state.blend == Blend::None,
             DepthWrites::Always => true,
         };
-        let (draws_pixels, colors) = (self.shader.draws_pixels(), tile.color_count());
+        let draws_pixels = if state.is_masked { self.shader.draws_masked_pixels() } else { self.shader.draws_pixels() };
+        let colors = tile.color_count();
         let mut targets = [Vector4::zero(); MAX_COLOR_ATTACHMENTS];
         triangle.rasterize(tile.bounds, |pixel, depth| {
             // Depth is reversed: nearer is greater.

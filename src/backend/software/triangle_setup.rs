@@ -26,6 +26,11 @@ pub(super) struct TriangleRange {
 }
 
 impl TriangleRange {
+    /// Whether the object's material is a mask.
+    pub(super) fn is_masked(&self) -> bool {
+        self.batch.state.is_masked()
+    }
+
     /// The level of detail of the mesh that is drawn.
     fn level(&self) -> u32 {
         self.batch.state.level_of_detail()
@@ -99,6 +104,7 @@ pub(super) struct TriangleSetup<R: Real, const V: usize> {
 pub(super) struct TriangleState {
     pub(super) material: u32,
     pub(super) blend: Blend,
+    pub(super) is_masked: bool,
     /// The object's index in the scene.
     pub(super) object: u32,
 }
@@ -117,8 +123,12 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
         for range in chunk {
             // Every object that is drawn was uploaded.
             let Some(object) = object_of(range.object) else { continue };
-            let state =
-                TriangleState { material: object.material, blend: range.batch.state.blend(), object: object.index };
+            let state = TriangleState {
+                material: object.material,
+                blend: range.batch.state.blend(),
+                is_masked: range.is_masked(),
+                object: object.index,
+            };
             let culled = culled_winding(face_culling.applied_to(range.batch.state.cull()));
             let mut cache = PostTransformCache::new(shader, pass, &object, &range.mesh, attributes);
             range.each_triangle(|indices| {

@@ -111,8 +111,9 @@ impl<B: Backend> Stage<B> for Occluders {
                     selection.contains(blend, draw.material)
                         && SelectionFilter::new(&tables.objects, scene, *selection).passes(object)
                 };
-                // Only the mesh itself is known to cover its convex parts.
-                let is_whole = frame.levels_of_detail(self.view).is_none_or(|levels| levels.get(object) == 0);
+                // Only the mesh itself is known to cover its convex parts, and a mask has holes.
+                let is_whole = !draw.state.is_masked()
+                    && frame.levels_of_detail(self.view).is_none_or(|levels| levels.get(object) == 0);
                 blend == Blend::None && is_whole && selections.iter().any(is_drawn)
             },
         );

@@ -46,6 +46,10 @@ impl<R: Real> ObjectCpuShader<R> for Deformed<R> {
         self.process.draws_pixels()
     }
 
+    fn draws_masked_pixels(&self) -> bool {
+        self.process.draws_masked_pixels()
+    }
+
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         self.process.fragment(pass, pixel, targets)
     }

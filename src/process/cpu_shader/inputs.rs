@@ -234,8 +234,10 @@ pub struct VertexInput<R> {
 pub struct ShaderMaterial<R> {
     /// The fraction of light that is reflected.
     pub diffuse: Vector3<R>,
-    /// Used by blended materials only.
+    /// Used by blended and masked materials only.
     pub opacity: R,
+    /// Where a mask's alpha is less, there is no surface; 0 for a material without a mask.
+    pub alpha_cutoff: R,
     /// Emitted radiance.
     pub emission: Vector3<R>,
     /// Whether triangles that face away are drawn too.

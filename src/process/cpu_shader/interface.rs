@@ -54,6 +54,12 @@ pub trait ObjectCpuShader<R: Real>: Send + Sync {
         true
     }
 
+    /// Whether `fragment` runs for objects whose material [is a mask](crate::scene::Material::is_masked), which
+    /// [have entry points of their own](crate::process::CommandDraws::masked) in WGSL. By default it does if it runs for others.
+    fn draws_masked_pixels(&self) -> bool {
+        self.draws_pixels()
+    }
+
     /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool;
 }

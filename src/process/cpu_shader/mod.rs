@@ -19,6 +19,6 @@ pub use inputs::{
     ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
 pub use interface::{CpuShader, FullScreenCpuShader, LightCpuShader, ObjectCpuShader};
-pub use prelude::{direction_from_octahedral, octahedral_from_direction};
+pub use prelude::{bounded_uv, direction_from_octahedral, octahedral_from_direction};
 
 pub(crate) use interface::TypedCpuShader;

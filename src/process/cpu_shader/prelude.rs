@@ -90,7 +90,22 @@ impl<R: Real> PassInputs<'_, R> {
     ) -> Vector4<R> {
         with_alpha(material.diffuse, material.opacity) * self.materials.sample(slot, uv, dpdx, dpdy)
     }
+
+    /// Whether the material in a slot is a mask that has a hole at texture coordinates: `is_cut_out`.
+    pub fn is_cut_out(&self, slot: u32, material: &ShaderMaterial<R>, uv: Vector2<R>) -> bool {
+        let alpha = || material.opacity * self.materials.sample(slot, uv, Vector::zero(), Vector::zero())[3];
+        material.alpha_cutoff > R::zero() && alpha() < material.alpha_cutoff
+    }
 }
+
+/// Texture coordinates of a vertex that can be interpolated: `bounded_uv`.
+pub fn bounded_uv<R: Real>(uv: Vector2<R>) -> Vector2<R> {
+    let farthest = R::of(MAX_UV);
+    uv.map(|value| value.max(-farthest).min(farthest))
+}
+
+/// From here on all f32 are integers, so the fraction of a texture coordinate is 0.
+const MAX_UV: f64 = 8_388_608.0;
 
 /// A direction as a point of the unfolded octahedron, each coordinate from -1 to 1 (Cigolle et al. 2014).
 pub fn octahedral_from_direction<R: Real>(direction: Vector3<R>) -> Vector2<R> {

@@ -129,6 +129,7 @@ pub(in crate::process) fn material<R: Real>(blend: Blend) -> OneMaterial<R> {
     OneMaterial(ShaderMaterial {
         diffuse: Vector([0.5, 0.25, 1.0].map(R::of)),
         opacity: R::of(0.5),
+        alpha_cutoff: R::zero(),
         emission: Vector([0.0, 0.5, 0.125].map(R::of)),
         double_sided: false,
         blend,

@@ -4,7 +4,7 @@
 mod cpu_shader;
 
 use crate::command::Selection;
-use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess};
 
 /// Draws the depth of every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType) into `depth` before the geometry buffer, which then stores each pixel once
 /// instead of once for each surface that is nearer than those drawn before it. It is worth it where pixels cost more
@@ -36,7 +36,8 @@ impl RenderProcess for DepthPrePass {
         let shader = include_str!("depth_pre_pass/depth_pre_pass.wgsl");
         // The geometry buffer draws the same objects, so each pixel that has depth gets a surface.
         let selection = Selection::OPAQUE.of_shipped_materials();
-        Draws::Commands(CommandDraws { shader, fragment: None, selection, ..CommandDraws::default() })
+        let masked = Some(MaskedEntryPoints { vertex: "masked_vertex", fragment: "masked_fragment" });
+        Draws::Commands(CommandDraws { shader, fragment: None, masked, selection, ..CommandDraws::default() })
     }
 
     #[cfg(feature = "software")]

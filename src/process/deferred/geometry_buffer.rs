@@ -6,7 +6,7 @@ mod cpu_shader;
 use super::GeometryFormats;
 use super::shading::{COLORED_SURFACE_SHADER, SURFACE_SHADER};
 use crate::command::{MaterialShare, Selection};
-use crate::process::{ClearColor, CommandDraws, Declare, Draws, RenderProcess};
+use crate::process::{ClearColor, CommandDraws, Declare, Draws, MaskedEntryPoints, RenderProcess};
 use crate::scene::VERTEX_COLOR;
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
@@ -100,6 +100,7 @@ impl RenderProcess for GeometryBuffer {
             shader: &self.shader,
             selection: Selection { materials: self.share, ..Selection::OPAQUE.of_shipped_materials() },
             writes_depth: !self.has_depth,
+            masked: Some(MaskedEntryPoints { vertex: "vertex", fragment: "masked_fragment" }),
             ..CommandDraws::default()
         })
     }

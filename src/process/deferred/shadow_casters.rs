@@ -3,11 +3,16 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use crate::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess};
 use crate::scene::ViewKind;
 
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
 /// [`ViewKind::Shadow`], which has a layer for each light.
+///
+/// Objects whose material [is a mask](crate::scene::Material::is_masked) cast shadows of the mask's shape, also if the material has a
+/// [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its `texture` at the vertices' first
+/// texture coordinates decide. If a type finds its holes in another way, its materials have an `alpha_cutoff` and an `opacity` of 0, so
+/// that they cast no shadow here, and a process of the engine draws them into [`TARGET`](Self::TARGET) after this one.
 ///
 /// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same
 /// time (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the
@@ -20,7 +25,7 @@ use crate::scene::ViewKind;
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowCasters {
     /// Whether there are hemispherical lights, whose maps must not show what is behind the light. They need a fragment
-    /// shader, and other maps do not.
+    /// shader for all objects, and other maps only for masked ones.
     pub hemispheres: bool,
 }
 
@@ -46,6 +51,7 @@ impl RenderProcess for ShadowCasters {
         Draws::Commands(CommandDraws {
             shader,
             fragment: self.hemispheres.then_some("fragment"),
+            masked: Some(MaskedEntryPoints { vertex: "masked_vertex", fragment: "masked_fragment" }),
             ..CommandDraws::default()
         })
     }

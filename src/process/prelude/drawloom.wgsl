@@ -91,7 +91,8 @@ struct Material {
     double_sided: u32,
     // 0 for none, 1 alpha, 2 additive, 3 subtractive.
     blend: u32,
-    padding: u32,
+    // Where a mask's alpha is less, there is no surface; 0 for a material without a mask.
+    alpha_cutoff: f32,
 }
 
 const ALPHA: u32 = 1u;
@@ -252,6 +253,30 @@ fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f
     }
     return vec4<f32>(material.diffuse, material.opacity) * texel;
 }
+
+// Whether a mask has a hole at texture coordinates. It is read at the texture's full resolution, because an averaged alpha may be below
+// the cutoff everywhere: leaves would vanish in the distance.
+fn is_cut_out(material: Material, uv: vec2<f32>) -> bool {
+    var alpha = material.opacity;
+    let layer = material.texture_layer;
+    switch material.texture_array {
+        case 0u: { alpha *= textureSampleLevel(textures_256, texture_sampler, uv, layer, 0.0).a; }
+        case 1u: { alpha *= textureSampleLevel(textures_512, texture_sampler, uv, layer, 0.0).a; }
+        case 2u: { alpha *= textureSampleLevel(textures_1024, texture_sampler, uv, layer, 0.0).a; }
+        case 3u: { alpha *= textureSampleLevel(textures_2048, texture_sampler, uv, layer, 0.0).a; }
+        default: {}
+    }
+    return alpha < material.alpha_cutoff;
+}
+
+// Texture coordinates of a vertex that can be interpolated.
+fn bounded_uv(uv: vec2<f32>) -> vec2<f32> {
+    return clamp(uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
+}
+
+// From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,
+// interpolation and filtering would lead to NaN.
+const MAX_UV: f32 = 0x1p23;
 
 // A direction as a point of the unfolded octahedron, each coordinate from -1 to 1 (Cigolle et al. 2014).
 fn octahedral_from_direction(direction: vec3<f32>) -> vec2<f32> {

@@ -134,8 +134,31 @@ struct CombinedTexture {
     handle: Option<Handle<Texture>>,
     /// Whether it has the colours of `map_Kd`.
     has_colors: bool,
-    /// The greatest opacity, from 0 to 255, if a part of `map_d` is less than opaque.
-    max_mask_opacity: Option<u8>,
+    /// `None` if there is no `map_d`, or it hides nothing.
+    mask: Option<Mask>,
+}
+
+/// What a `map_d` is.
+#[derive(Clone, Copy)]
+struct Mask {
+    /// Whether it [cuts holes](Pixels::cuts_holes), so that the material need not be blended.
+    cuts_holes: bool,
+    /// The greatest opacity, from 0 to 255.
+    max_opacity: u8,
+}
+
+impl Mask {
+    /// The alpha below which there is a hole.
+    const CUTOFF: f32 = 0.5;
+
+    fn new(pixels: &Pixels) -> Self {
+        Self { cuts_holes: pixels.cuts_holes(), max_opacity: pixels.opacities().1 }
+    }
+
+    /// Whether nothing is visible of a material that it makes masked, or else blended.
+    fn hides_all(self, is_masked: bool) -> bool {
+        self.max_opacity == 0 || is_masked && f32::from(self.max_opacity) < Self::CUTOFF * 255.0
+    }
 }
 
 /// The texture of a material.
@@ -176,10 +199,12 @@ impl<'a> TextureCache<'a> {
             None => Material::default().diffuse,
         };
         let opacity = definition.opacity.unwrap_or(1.0);
-        if opacity == 0.0 || texture.max_mask_opacity == Some(0) {
+        // A mask of a material that is transparent everywhere is part of its transparency.
+        let is_masked = opacity == 1.0 && texture.mask.is_some_and(|mask| mask.cuts_holes);
+        let is_blended = !is_masked && (opacity < 1.0 || texture.mask.is_some());
+        if opacity == 0.0 || texture.mask.is_some_and(|mask| mask.hides_all(is_masked)) {
             warnings.push(ObjWarning::InvisibleMaterial { material: definition.name.clone() });
         }
-        let is_blended = opacity < 1.0 || texture.max_mask_opacity.is_some();
         Ok(Material {
             name: definition.name.clone(),
             diffuse,
@@ -187,6 +212,7 @@ impl<'a> TextureCache<'a> {
             emission: definition.emission,
             opacity,
             blend: if is_blended { Blend::Alpha } else { Blend::None },
+            alpha_cutoff: is_masked.then_some(Mask::CUTOFF),
             double_sided: true,
             values: None,
         })
@@ -300,7 +326,7 @@ impl<'a> TextureCache<'a> {
         });
         let mask = mask.map(|(name, pixels)| (name, pixels.into_mask()));
         // One that hides nothing makes no other texture than the colours alone.
-        let mask = mask.filter(|(_, pixels)| pixels.opacities().0 < 255);
+        let mask = mask.filter(|(_, pixels)| !pixels.hides_nothing());
         let used_names = [&colors, &mask].map(|used| used.as_ref().map(|(name, _)| name.clone()));
         let texture = match self.by_files.get(&used_names) {
             Some(known) => *known,
@@ -325,7 +351,7 @@ impl<'a> TextureCache<'a> {
         let mut texture = CombinedTexture {
             handle: None,
             has_colors: colors.is_some(),
-            max_mask_opacity: mask.as_ref().map(|(_, pixels)| pixels.opacities().1),
+            mask: mask.as_ref().map(|(_, pixels)| Mask::new(pixels)),
         };
         let (name, pixels) = match (colors, mask) {
             (None, None) => return Ok(texture),

@@ -187,6 +187,24 @@ fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [scaled_width, sca
     bytes.shrink_to_fit();
 }
 
+/// By how much JPEG changes texels of a mask that are far from its edges.
+const NOISE: u8 = 16;
+
+/// A texel is near an edge if a clear one and a solid one are at most so many texels away along each axis: as far as the filters of
+/// common programs blur an edge.
+const EDGE_DISTANCE: usize = 2;
+
+/// One in so many texels of a mask may be neither clear nor solid, nor near an edge.
+const STRAYS: usize = 64;
+
+fn is_clear(alpha: u8) -> bool {
+    alpha < NOISE
+}
+
+fn is_solid(alpha: u8) -> bool {
+    alpha > u8::MAX - NOISE
+}
+
 impl Pixels {
     /// White pixels of the same opacity.
     pub(super) fn into_white(mut self) -> Self {
@@ -233,6 +251,45 @@ impl Pixels {
         }
         *self = Self { width, height, bytes: enlarged, scaled_from: self.scaled_from };
         true
+    }
+
+    /// Whether a mask cuts holes: part of it is clear, and nearly all the rest is solid. Between them, texels may be anything where an edge is
+    /// near, as filters and JPEG leave them there. A smooth transition, or glass, is wider.
+    pub(super) fn cuts_holes(&self) -> bool {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let alpha = |x: usize, y: usize| self.bytes[(y * width + x) * 4 + 3];
+        // Textures repeat.
+        let around = |center: usize, side: usize| {
+            (0..=2 * EDGE_DISTANCE).map(move |step| (center + side * EDGE_DISTANCE + step - EDGE_DISTANCE) % side)
+        };
+        let is_at_edge = |x: usize, y: usize| {
+            let (mut clear, mut solid) = (false, false);
+            for alpha in around(y, height).flat_map(|y| around(x, width).map(move |x| alpha(x, y))) {
+                (clear, solid) = (clear || is_clear(alpha), solid || is_solid(alpha));
+                if clear && solid {
+                    return true;
+                }
+            }
+            false
+        };
+        let max_strays = width * height / STRAYS;
+        let (mut strays, mut has_holes) = (0, false);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let alpha = alpha(x, y);
+            has_holes |= is_clear(alpha);
+            if !is_clear(alpha) && !is_solid(alpha) && !is_at_edge(x, y) {
+                strays += 1;
+                if strays > max_strays {
+                    return false;
+                }
+            }
+        }
+        has_holes
+    }
+
+    /// Whether a mask hides nothing: it is white, perhaps with the noise of JPEG.
+    pub(super) fn hides_nothing(&self) -> bool {
+        self.opacities().0 > u8::MAX - NOISE
     }
 
     /// The least and the greatest opacity.

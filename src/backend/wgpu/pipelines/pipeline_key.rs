@@ -14,6 +14,8 @@ pub(crate) struct PipelineKey<'a> {
     deformation: Option<Cow<'a, str>>,
     pub(crate) vertices: VertexSource,
     pub(crate) fragment: Option<Cow<'a, str>>,
+    /// The vertex and the fragment entry point of masked objects, if they have their own.
+    pub(crate) masked: Option<[Cow<'a, str>; 2]>,
     pub(crate) parameter_bytes: usize,
     pub(crate) writes_depth: bool,
     pub(crate) face_culling: FaceCulling,
@@ -56,6 +58,7 @@ impl<'a> PipelineKey<'a> {
                 deformation,
                 vertices,
                 fragment,
+                masked: None,
                 parameter_bytes,
                 writes_depth,
                 face_culling,
@@ -68,7 +71,9 @@ impl<'a> PipelineKey<'a> {
         match draws {
             Draws::Commands(draws) => {
                 let key = with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth);
-                Self { deformation: draws.deformation.map(Cow::Borrowed), face_culling: draws.face_culling, ..key }
+                let masked = draws.masked.map(|masked| [masked.vertex, masked.fragment].map(Cow::Borrowed));
+                let deformation = draws.deformation.map(Cow::Borrowed);
+                Self { deformation, masked, face_culling: draws.face_culling, ..key }
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
@@ -89,8 +94,9 @@ impl<'a> PipelineKey<'a> {
     pub(crate) fn into_owned(self) -> PipelineKey<'static> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
         let [deformation, fragment] = [self.deformation, self.fragment].map(|text| text.map(owned));
+        let masked = self.masked.map(|entry_points| entry_points.map(owned));
         let blend_equations = Cow::Owned(self.blend_equations.into_owned());
-        PipelineKey { shader: owned(self.shader), deformation, fragment, blend_equations, ..self }
+        PipelineKey { shader: owned(self.shader), deformation, fragment, masked, blend_equations, ..self }
     }
 
     /// What goes before the process's own WGSL, which reads these attributes.

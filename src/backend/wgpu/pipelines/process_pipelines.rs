@@ -201,11 +201,14 @@ impl ProcessPipelines {
         if let Some(pipeline) = shared {
             return Ok(Some((variant, pipeline)));
         }
-        let entry_point = match key.vertices {
-            VertexSource::Meshes(_) | VertexSource::Procedural(_) => "vertex",
-            VertexSource::LightVolumes => "light_volume",
-            VertexSource::FullScreen | VertexSource::Compute | VertexSource::None => "full_screen",
+        let masked = key.masked.as_ref().filter(|_| state.is_masked());
+        let entry_point = match (key.vertices, masked) {
+            (VertexSource::Meshes(_), Some([vertex, _])) => &**vertex,
+            (VertexSource::Meshes(_) | VertexSource::Procedural(_), _) => "vertex",
+            (VertexSource::LightVolumes, _) => "light_volume",
+            (VertexSource::FullScreen | VertexSource::Compute | VertexSource::None, _) => "full_screen",
         };
+        let fragment = masked.map(|[_, fragment]| fragment).or(key.fragment.as_ref());
         let (topology, strip_index_format) = match (key.vertices, state.topology()) {
             (VertexSource::Procedural(primitive), _) => (primitive_topology(primitive), None),
             (_, Topology::TriangleList) => (wgpu::PrimitiveTopology::TriangleList, None),
@@ -242,7 +245,7 @@ impl ProcessPipelines {
                 depth.pipeline_state_of(writes_depth, self.depth_compare(depth), key.stencil)
             }),
             multisample: wgpu::MultisampleState { count: attachments.samples, ..wgpu::MultisampleState::default() },
-            fragment: key.fragment.as_ref().map(|entry_point| wgpu::FragmentState {
+            fragment: fragment.map(|entry_point| wgpu::FragmentState {
                 module: &shader.module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),

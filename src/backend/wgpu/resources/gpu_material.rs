@@ -14,7 +14,7 @@ pub(crate) struct GpuMaterial {
     texture_layer: u32,
     double_sided: u32,
     blend: u32,
-    padding: u32,
+    alpha_cutoff: f32,
 }
 
 impl GpuMaterial {
@@ -28,7 +28,7 @@ impl GpuMaterial {
             texture_layer: texture.layer,
             double_sided: u32::from(material.double_sided),
             blend: material.blend as u32,
-            padding: 0,
+            alpha_cutoff: material.least_alpha(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `depth_pre_pass.wgsl` on the CPU.
 
-use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS, VertexInput, VertexOutput};
+use crate::process::deferred::shading::cpu_shader::surface::{is_hole, uv_varyings};
+use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
 
 /// Draws only depth.
@@ -11,7 +12,7 @@ impl<R: Real> ObjectCpuShader<R> for DepthPrePassCpuShader {
     fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         VertexOutput {
             clip: pass.view.clip_position(object.relative_position(vertex.position)),
-            varyings: [R::zero(); VARYINGS],
+            varyings: uv_varyings(vertex),
         }
     }
 
@@ -19,8 +20,12 @@ impl<R: Real> ObjectCpuShader<R> for DepthPrePassCpuShader {
         false
     }
 
-    fn fragment(&self, _pass: &PassInputs<'_, R>, _pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
+    fn draws_masked_pixels(&self) -> bool {
         true
+    }
+
+    fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
+        !is_hole(pass, pixel, &pass.materials.get(pixel.material))
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
 use crate::process::deferred::shading::cpu_shader::illumination::MAX_STORED_RADIANCE;
-use crate::process::deferred::shading::cpu_shader::surface::{shading_normal, surface_diffuse, surface_vertex};
+use crate::process::deferred::shading::cpu_shader::surface::{
+    is_hole, shading_normal, surface_diffuse, surface_vertex,
+};
 use crate::process::{
     GeometryFormats, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VertexInput, VertexOutput,
 };
@@ -24,6 +26,9 @@ impl<R: Real> ObjectCpuShader<R> for GeometryBufferCpuShader {
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
         let material = pass.materials.get(pixel.material);
+        if is_hole(pass, pixel, &material) {
+            return false;
+        }
         let normal = shading_normal(pass.view, pixel, &material);
         let diffuse = rgb(surface_diffuse(pass, pixel, &material, self.has_colors));
         let radiance = material.emission + diffuse * pass.view.ambient;

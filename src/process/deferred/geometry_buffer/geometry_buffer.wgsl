@@ -6,6 +6,20 @@ struct Targets {
 
 @fragment
 fn fragment(in: Surface) -> Targets {
+    return surface_targets(in);
+}
+
+@fragment
+fn masked_fragment(in: Surface) -> Targets {
+    let targets = surface_targets(in);
+    if is_cut_out(materials[in.material], in.uv) {
+        discard;
+    }
+    return targets;
+}
+
+// Needs uniform control flow.
+fn surface_targets(in: Surface) -> Targets {
     let material = materials[in.material];
     let normal = shading_normal(in, material);
     let diffuse = surface_diffuse(in, material).rgb;

@@ -6,16 +6,12 @@ fn vertex(in: VertexInput) -> Surface {
     surface.relative = relative_position(object, deformed.position);
     surface.clip = clip_position(surface.relative);
     surface.normal = world_normal(object, deformed.normal);
-    surface.uv = clamp(deformed.uv, vec2<f32>(-MAX_UV), vec2<f32>(MAX_UV));
+    surface.uv = bounded_uv(deformed.uv);
     surface.material = object.material;
     surface.object = object.index;
     set_color(&surface, deformed);
     return surface;
 }
-
-// From here on all f32 are integers, so the fraction of a texture coordinate is 0. Near the end of the range of f32,
-// interpolation and filtering would lead to NaN.
-const MAX_UV: f32 = 0x1p23;
 
 // The normal of the visible side. Needs uniform control flow.
 fn shading_normal(in: Surface, material: Material) -> vec3<f32> {

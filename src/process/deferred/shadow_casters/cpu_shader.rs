@@ -1,7 +1,9 @@
 //! `shadow_casters.wgsl` on the CPU.
 
-use crate::process::{ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS, VertexInput, VertexOutput};
-use crate::raster::{Real, Vector4};
+use crate::process::{
+    ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VARYINGS, VertexInput, VertexOutput, bounded_uv,
+};
+use crate::raster::{Real, Vector, Vector4};
 use crate::scene::Projection;
 
 /// Draws the depth of shadow casters.
@@ -18,7 +20,8 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
     fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         let relative = object.relative_position(vertex.position);
         let mut varyings = [R::zero(); VARYINGS];
-        varyings[0] = match pass.view.projection {
+        varyings[UV..UV + 2].copy_from_slice(&bounded_uv(vertex.uv).0);
+        varyings[FORWARD] = match pass.view.projection {
             Projection::Paraboloid => pass.view.forward.dot(relative) / relative.length().max(R::of(1e-30)),
             _ => R::one(),
         };
@@ -29,13 +32,22 @@ impl<R: Real> ObjectCpuShader<R> for ShadowCastersCpuShader {
         self.hemispheres
     }
 
+    fn draws_masked_pixels(&self) -> bool {
+        true
+    }
+
     /// Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized
-    /// across the picture.
-    fn fragment(&self, _pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
-        let is_behind = pixel.varyings[0] < R::of(-RIM_MARGIN);
-        !is_behind
+    /// across the picture. Discards those in the holes of masks, too.
+    fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, _targets: &mut [Vector4<R>]) -> bool {
+        let is_behind = pixel.varyings[FORWARD] < R::of(-RIM_MARGIN);
+        let uv = Vector([pixel.varyings[UV], pixel.varyings[UV + 1]]);
+        !is_behind && !pass.is_cut_out(pixel.material, &pass.materials.get(pixel.material), uv)
     }
 }
+
+// The index of each varying.
+const FORWARD: usize = 0;
+const UV: usize = 1;
 
 #[cfg(test)]
 mod tests {
@@ -43,7 +55,7 @@ mod tests {
     use crate::process::MAX_ATTRIBUTES;
     use crate::process::ShaderView;
     use crate::process::cpu_shader::test_inputs::{material, paraboloid, pass, view_values, views};
-    use crate::raster::{Quaternion, Vector, Vector3};
+    use crate::raster::{Quaternion, Vector3};
     use crate::scene::Blend;
     use crate::view::RenderView;
 

@@ -2,7 +2,7 @@
 
 use crate::process::cpu_shader::built_in::{inverse_square_root, rgb, sign, with_alpha};
 use crate::process::{
-    ObjectPixel, PassInputs, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+    ObjectPixel, PassInputs, ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput, bounded_uv,
 };
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 
@@ -14,17 +14,19 @@ pub(in crate::process::deferred) fn surface_vertex<R: Real>(
 ) -> VertexOutput<R> {
     let relative = object.relative_position(vertex.position);
     let normal = object.world_normal(vertex.normal);
-    let mut varyings = [R::zero(); VARYINGS];
+    let mut varyings = uv_varyings(vertex);
     varyings[RELATIVE..RELATIVE + 3].copy_from_slice(&relative.0);
     varyings[NORMAL..NORMAL + 3].copy_from_slice(&normal.0);
-    let farthest = R::of(MAX_UV);
-    varyings[UV..UV + 2].copy_from_slice(&vertex.uv.map(|value| value.max(-farthest).min(farthest)).0);
     varyings[COLOR..COLOR + 3].copy_from_slice(&vertex.color.0);
     VertexOutput { clip: view.clip_position(relative), varyings }
 }
 
-/// From here on all f32 are integers, so the fraction of a texture coordinate is 0.
-const MAX_UV: f64 = 8_388_608.0;
+/// The texture coordinates alone: what [`is_hole`] reads.
+pub(in crate::process::deferred) fn uv_varyings<R: Real>(vertex: &VertexInput<R>) -> [R; VARYINGS] {
+    let mut varyings = [R::zero(); VARYINGS];
+    varyings[UV..UV + 2].copy_from_slice(&bounded_uv(vertex.uv).0);
+    varyings
+}
 
 /// A pixel's position relative to the camera, along the world's axes.
 pub(in crate::process::deferred) fn relative_of<R: Real>(pixel: &ObjectPixel<R>) -> Vector3<R> {
@@ -56,6 +58,15 @@ pub(in crate::process::deferred) fn surface_diffuse<R: Real>(
     let [uv, dpdx, dpdy] = [&pixel.varyings, &pixel.dpdx, &pixel.dpdy].map(uv_of);
     let diffuse = pass.diffuse_at(pixel.material, material, uv, dpdx, dpdy);
     if has_colors { with_alpha(rgb(diffuse) * three(&pixel.varyings, COLOR), diffuse[3]) } else { diffuse }
+}
+
+/// Whether a pixel is in a hole of its material's mask.
+pub(in crate::process::deferred) fn is_hole<R: Real>(
+    pass: &PassInputs<'_, R>,
+    pixel: &ObjectPixel<R>,
+    material: &ShaderMaterial<R>,
+) -> bool {
+    pass.is_cut_out(pixel.material, material, uv_of(&pixel.varyings))
 }
 
 // The index of each varying.
