@@ -440,12 +440,13 @@ fn surroundings(harness: &mut Harness) -> Result<(), Failed> {
 type SetMaterial = fn(&mut Material, f32);
 
 fn materials(harness: &mut Harness) -> Result<(), Failed> {
-    let setters: [(&str, SetMaterial); 5] = [
+    let setters: [(&str, SetMaterial); 6] = [
         ("diffuse.x", |material, number| material.diffuse.x = number),
         ("diffuse", |material, number| material.diffuse = Vec3::splat(number)),
         ("emission.y", |material, number| material.emission.y = number),
         ("emission", |material, number| material.emission = Vec3::splat(number)),
         ("opacity", |material, number| material.opacity = number),
+        ("alpha cutoff", |material, number| material.alpha_cutoff = Some(number)),
     ];
     for (name, set) in setters {
         for blend in [
@@ -458,7 +459,7 @@ fn materials(harness: &mut Harness) -> Result<(), Failed> {
                 let context = format!("{name} = {number:e}, {blend:?}");
                 let mut material = Material { blend, ..Material::default() };
                 set(&mut material, number);
-                let max = if name == "opacity" { 1.0 } else { f32::MAX };
+                let max = if ["opacity", "alpha cutoff"].contains(&name) { 1.0 } else { f32::MAX };
                 let is_valid = (0.0..=max).contains(&number);
                 let test = TestScene::with(square(Topology::TriangleList), material.clone(), None);
                 match (test, is_valid) {

@@ -274,6 +274,66 @@ impl RenderProcess for Glass {
     }
 }
 
+/// Draws all objects, perhaps with holes that only its shader knows.
+struct Cutouts {
+    discards: bool,
+}
+
+impl RenderProcess for Cutouts {
+    fn name(&self) -> &str {
+        "cutouts"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_color("picture", Format::Rgba8Srgb, drawloom::process::ClearColor::Background);
+        declare.clears_depth("depth", Format::Depth32Float);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let discards = self.discards;
+        Draws::Commands(CommandDraws { selection: Selection::ALL, discards, ..CommandDraws::default() })
+    }
+}
+
+#[test]
+fn objects_of_a_process_that_discards_pixels_occlude_nothing() {
+    let occluded = |discards| {
+        let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
+        let builder = Renderer::builder(NullBackend).process(Cutouts { discards }).output("picture").quality(quality);
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        renderer.record(wall_and_cubes().as_scene_ref()).unwrap().statistics().views[0].occluded
+    };
+    assert!(occluded(false) > 0);
+    assert_eq!(occluded(true), 0);
+}
+
+#[test]
+fn masked_objects_occlude_nothing_and_are_occluded() {
+    let mut scene = wall_and_cubes();
+    let occluded = |scene: &Scene, deferred: Deferred| {
+        let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
+        let builder = Renderer::builder(NullBackend).deferred(deferred).quality(quality);
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        renderer.record(scene.as_scene_ref()).unwrap().statistics().views[0].occluded
+    };
+    let opaque = occluded(&scene, Deferred::to_picture());
+    // The cubes alone, then the wall with them.
+    let objects: Vec<_> = scene.objects().collect();
+    let mask = scene.add(Material { alpha_cutoff: Some(0.5), ..Material::default() }).unwrap();
+    let masked = |scene: &mut Scene, objects: &[drawloom::scene::ObjectHandle]| {
+        for &object in objects {
+            let before = scene.object(object).unwrap();
+            scene.replace_object(object, RenderObject { material: mask, ..before }).unwrap();
+        }
+    };
+    masked(&mut scene, &objects[1..]);
+    assert_eq!(occluded(&scene, Deferred::to_picture()), opaque);
+    masked(&mut scene, &objects[..1]);
+    for deferred in [Deferred::to_picture(), Deferred::to_picture().depth_pre_pass(true)] {
+        assert_eq!(occluded(&scene, deferred), 0);
+    }
+}
+
 #[test]
 fn objects_that_are_not_drawn_occlude_nothing() {
     let quality = Quality { occlusion: Some(4), culling: CullingVolume::Sphere, ..Quality::balanced() };

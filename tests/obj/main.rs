@@ -9,6 +9,7 @@ mod folder;
 mod generated;
 mod geometry;
 mod large;
+mod masks;
 mod materials;
 mod mutants;
 mod shared;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         shared::trials(),
         geometry::trials(),
         large::trials(),
+        masks::trials(),
         materials::trials(),
         files::trials(),
         damaged::trials(),

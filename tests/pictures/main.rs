@@ -35,6 +35,8 @@ mod levels_of_detail;
 mod light_cut_off;
 mod light_volumes;
 mod lighting;
+mod mask_shadows;
+mod masks;
 mod materials;
 mod mip_levels;
 mod multisampling;
@@ -115,6 +117,8 @@ fn main() {
         (cpu_nodes::CASES, Needs::Adapter),
         (cube_shadows::CASES, Needs::Adapter),
         (deformation::CASES, Needs::Adapter),
+        (mask_shadows::CASES, Needs::Adapter),
+        (masks::CASES, Needs::Adapter),
         (materials::CASES, Needs::Adapter),
         (mip_levels::CASES, Needs::Adapter),
         (multisampling::CASES, Needs::Adapter),
