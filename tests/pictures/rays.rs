@@ -332,9 +332,7 @@ impl Rays<'_> {
             })
         };
         let [mut least, mut most] = [1.0, 0.0];
-        // The corners of many panels reach between fewer points.
-        let corners = if self.faces.len() > 8 { 96 } else { 24 };
-        for point in ring(corners, width * 1.02).chain(ring(6, width * 0.5)).chain([point]) {
+        for point in ring(24, width * 1.02).chain(ring(6, width * 0.5)).chain([point]) {
             match self.distance_behind(light, index, point) {
                 None => most = 1.0,
                 Some(distance) if distance < width * 1.5 => (least, most) = (0.0, 1.0),
