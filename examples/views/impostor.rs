@@ -104,7 +104,7 @@ impl RenderProcess for Impostor {
 
     fn draws(&self) -> Draws<'_> {
         let (shader, selection) = (include_str!("impostor.wgsl"), Selection::OPAQUE.of_material_type(IMPOSTOR));
-        Draws::Commands(CommandDraws { shader, selection, ..CommandDraws::default() })
+        Draws::Commands(CommandDraws { shader, selection, discards: true, ..CommandDraws::default() })
     }
 
     fn cpu_shader(&self) -> Option<CpuShader> {

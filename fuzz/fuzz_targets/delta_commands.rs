@@ -67,6 +67,7 @@ impl State {
         let cull = [Cull::Nothing, Cull::Back, Cull::Front][usize::from(self.cull) % 3];
         let blend = [Blend::None, Blend::Alpha, Blend::Additive][usize::from(self.blend) % 3];
         DrawState::new(topology, cull, blend)
+            .with_mask(self.cull >> 7 == 1)
             .with_subdivision_level(u32::from(self.subdivision) % (DrawState::MAX_SUBDIVISION_LEVEL + 1))
             .with_level_of_detail(u32::from(self.level) % (DrawState::MAX_LEVEL_OF_DETAIL + 1))
     }

@@ -42,7 +42,7 @@ pub struct CommandDraws<'a> {
     /// `None` draws these objects like others.
     pub masked: Option<MaskedEntryPoints<'a>>,
     /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides what is behind it
-    /// from culling. [Masked](crate::scene::Material::is_masked) objects never do.
+    /// from culling. [Masked](crate::scene::Material::is_masked) objects never do. A shader that does so unsaid is warned of.
     pub discards: bool,
     /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
     /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped

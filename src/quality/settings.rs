@@ -51,8 +51,10 @@ pub struct Quality {
     ///
     /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
     /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
-    /// a while. It requires that an engine's own shaders draw opaque objects exactly as their meshes are; objects that
-    /// they move, or discard parts of, must have bounds other than their mesh's.
+    /// a while. It requires that an engine's own shaders draw opaque objects exactly as their meshes are, or say that
+    /// they [discard](crate::process::CommandDraws::discards) parts of them or
+    /// [deform](crate::process::CommandDraws::deformation) them; objects that they move in another way must have bounds
+    /// other than their mesh's.
     pub occlusion: Option<u32>,
     /// The format of normals in the geometry buffer.
     ///

@@ -29,8 +29,8 @@ pub struct ShadowQuality {
     pub interval: u32,
     /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight
     /// line, above 0 and up to 90: longer edges are subdivided. The error of a straight edge is 39 pixels of a map of
-    /// 1024 at 45°, 7.8 at 20°, 1.95 at 10°, 0.49 at 5° and 0.08 at 2° (Brabec et al. 2002). Cost: each subdivision
-    /// level multiplies triangles by four.
+    /// 1024 at 45°, 7.8 at 20°, 1.95 at 10°, 0.49 at 5° and 0.08 at 2° (Brabec et al. 2002); that of a mask's holes, which lie
+    /// between edges, is up to a third larger. Cost: each subdivision level multiplies triangles by four.
     pub widest_edge: f32,
 }
 

@@ -26,7 +26,8 @@ pub struct Material {
     /// there is no surface, in pictures and in shadows; elsewhere the surface is opaque. `None` for no holes. Blended materials do not
     /// use it. It is glTF's `alphaCutoff` for `alphaMode: MASK`.
     ///
-    /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling.
+    /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling. A mask has no holes while its texture
+    /// is not on the device.
     ///
     /// The mask is read at the texture's full resolution, however far away it is: what is left covers as large a share of distant pixels
     /// as of near ones, where averaged alpha would be below the cutoff everywhere, or nowhere. As with triangles of that size, each pixel

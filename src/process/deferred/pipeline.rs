@@ -122,7 +122,8 @@ impl Deferred {
     }
 
     /// Replaces the process called `name`, in the frames that have it, with a process of the engine. A later
-    /// replacement of the same process overrides an earlier one.
+    /// replacement of the same process overrides an earlier one. It draws masked objects too, with holes if it has
+    /// [entry points](crate::process::CommandDraws::masked) for them.
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
         let name = name.into();
         self.replaced.retain(|(other, _)| *other != name);

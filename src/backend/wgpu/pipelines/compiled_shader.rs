@@ -3,10 +3,11 @@
 use super::compile_shader::compile_shader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_key::VertexSource;
+use super::unsaid_discards::warn_of_unsaid_discards;
 use super::unused_bindings::warn_of_unused_bindings;
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::BindGroupLayouts;
-use crate::process::Declaration;
+use crate::process::{Declaration, Draws};
 
 /// The compiled shader of a process, and what all its pipelines have in common. Clones are the same on the device.
 #[derive(Clone)]
@@ -28,11 +29,13 @@ impl CompiledShader {
         own: [Option<&wgpu::BindGroupLayout>; 2],
         declaration: &Declaration,
         inputs: &PipelineInputs,
+        draws: &Draws<'_>,
     ) -> Result<Self, BackendError> {
         let PipelineInputs { name, key, attributes, .. } = inputs;
         let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
         let module = compile_shader(device, name, &before, &key.own_shaders())?;
         warn_of_unused_bindings(name, declaration, &before, &key.own_shaders());
+        warn_of_unsaid_discards(name, draws, &before, &key.own_shaders());
         let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
         let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

@@ -9,6 +9,7 @@ mod pipeline_key;
 mod pipeline_variant;
 mod process_pipelines;
 mod shared_pipelines;
+mod unsaid_discards;
 mod unused_bindings;
 mod vertex_buffers;
 

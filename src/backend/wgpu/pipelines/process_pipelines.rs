@@ -65,7 +65,7 @@ impl ProcessPipelines {
             Some(compiled) => Some(compiled),
             None => {
                 let own = [process_layout.as_ref(), engine_layout.as_ref()];
-                Some(CompiledShader::new(device, layouts, own, &planned.declaration, &inputs)?)
+                Some(CompiledShader::new(device, layouts, own, &planned.declaration, &inputs, draws)?)
             }
         };
         let pipelines = Self {

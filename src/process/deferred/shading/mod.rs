@@ -14,7 +14,8 @@ pub(super) use shadow::shadow_shader;
 /// Fragment shaders get a `Surface`: the position `relative` to the camera along the world's axes, the interpolated `normal`, `uv`,
 /// and the indices of the `material` and the `object`. `shading_normal(surface, material)` is the normal of the visible side;
 /// `surface_diffuse(surface, material)` is the diffuse colour with the material's texture, and the opacity. Both need uniform control
-/// flow.
+/// flow. The prelude's `is_cut_out(material, uv)` says where a mask has a hole; see
+/// [`CommandDraws::masked`](crate::process::CommandDraws::masked).
 pub const SURFACE_SHADER: &str = concat!(include_str!("uncolored_surface.wgsl"), "\n", include_str!("surface.wgsl"));
 
 /// [`SURFACE_SHADER`] for processes that [read](crate::process::Declare::reads_attribute)
