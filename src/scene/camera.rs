@@ -1,6 +1,6 @@
 //! Cameras.
 
-use glam::{DVec3, Quat, Vec2, Vec3};
+use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
 use super::transform::is_unit;
 use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Redraw, SceneError};
@@ -120,14 +120,17 @@ impl Camera {
     /// A camera at `position` that looks at `target`, upright (+Y), with a vertical field of view of 60°, a near plane
     /// at 5 cm and a picture of 960 × 540 pixels.
     pub fn looking_at(name: impl Into<String>, position: DVec3, target: DVec3) -> Self {
-        let forward = (target - position).normalize_or(DVec3::NEG_Z).as_vec3();
+        let offset = target - position;
+        // Squares of the offset itself could leave the range of f64. If it is 0 or not finite, the quotient is NaN.
+        let forward = (offset / offset.abs().max_element()).normalize_or(DVec3::NEG_Z);
+        let aside = forward.cross(DVec3::Y);
         // Looking straight up or down, any perpendicular serves as the right vector.
-        let right = forward.cross(Vec3::Y).try_normalize().unwrap_or(Vec3::X);
-        let axes = glam::Mat3::from_cols(right, right.cross(forward), -forward);
+        let right = if aside.length_squared() > MIN_ASIDE_SQUARED { aside.normalize() } else { DVec3::X };
+        let axes = DMat3::from_cols(right, right.cross(forward), -forward);
         Self {
             name: name.into(),
             position,
-            orientation: Quat::from_mat3(&axes).normalize(),
+            orientation: DQuat::from_mat3(&axes).normalize().as_quat(),
             projection: Projection::Perspective { field_of_view: 60_f32.to_radians() },
             shift: Vec2::ZERO,
             clip_plane: None,
@@ -246,4 +249,8 @@ const MIN_HEIGHT: f32 = 1e-6;
 
 /// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of
 /// f32.
-const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;
+pub(super) const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;
+
+/// The square of the smallest angle in radians, between the view direction and the vertical, at which the right vector is that of the angle.
+/// The axes are perpendicular and of unit length up to the rounding of f64, also where the fallback is used.
+const MIN_ASIDE_SQUARED: f64 = 1e-32;

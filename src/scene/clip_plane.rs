@@ -4,13 +4,14 @@ use glam::{DVec3, Vec3};
 
 use super::transform::is_unit;
 
-/// A plane in the world, such as a mirror's. A camera behind it draws only what is in front of it; for a camera in front of it, it clips
-/// nothing.
+/// A plane in the world, such as a mirror's. A camera behind it, or in it, draws only what is in front of it; for a camera in front of it, it
+/// clips nothing.
 ///
 /// It becomes the near plane of the camera's frustum (Lengyel 2005, for a reversed depth without a far plane), in place of
 /// [`Camera::near`](super::Camera::near). That costs depth precision: for a camera D metres behind the plane, depth distinguishes surfaces
-/// t metres away that are some t² ÷ (16.8 million · D) apart, where an ordinary near plane distinguishes a 16.8 millionth of t. Objects that
-/// are entirely behind the plane are clipped by the device, and not culled before.
+/// t metres away that are some t² ÷ (16.8 million · D) apart, where an ordinary near plane distinguishes a 16.8 millionth of t. So D is a 64th
+/// of [`Camera::near`](super::Camera::near) at least: a camera that is nearer to the plane, as one that goes through a portal, draws only what
+/// is farther than that in front of itself. Objects that are entirely behind the plane are clipped by the device, and not culled before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlane {
     /// A point of the plane, in the world, in metres.

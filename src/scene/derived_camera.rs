@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{DQuat, DVec3, Mat3, Quat, Vec2, Vec3};
+use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec2, Vec3};
 
 use super::camera::child_name;
 use super::{Camera, ClipPlane, Projection, ViewKind};
@@ -61,7 +61,7 @@ impl Camera {
 
     /// Moves the camera to the right and up, in metres.
     fn move_aside(&mut self, metres: Vec2) {
-        self.position += (self.orientation.normalize() * metres.extend(0.0)).as_dvec3();
+        self.position += self.orientation.as_dquat().normalize() * metres.as_dvec2().extend(0.0);
         self.late_latch = self.late_latch.map(|motion| motion.at_distance(metres.length()));
     }
 
@@ -90,11 +90,12 @@ impl Camera {
         let normal = plane.normal.as_dvec3().normalize();
         let reflect = |direction: DVec3| direction - normal * (2.0 * normal.dot(direction));
         let orientation = self.orientation.as_dquat().normalize();
-        let [up, forward] = [DVec3::Y, DVec3::NEG_Z].map(|axis| reflect(orientation * axis).as_vec3());
+        let [up, forward] = [DVec3::Y, DVec3::NEG_Z].map(|axis| reflect(orientation * axis));
+        let axes = DMat3::from_cols(forward.cross(up), up, -forward);
         Self {
             name: self.child_name(mirror),
             position: self.position - normal * (2.0 * plane.distance(self.position)),
-            orientation: Quat::from_mat3(&Mat3::from_cols(forward.cross(up), up, -forward)).normalize(),
+            orientation: DQuat::from_mat3(&axes).normalize().as_quat(),
             shift: self.shift * Vec2::new(-1.0, 1.0),
             clip_plane: self.clips().then_some(plane),
             kind: ViewKind::Reflection,

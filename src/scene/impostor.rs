@@ -1,7 +1,10 @@
 //! The cameras of impostors, and when their pictures are wrong by too much.
 
+use std::f32::consts::PI;
+
 use glam::DVec3;
 
+use super::camera::MIN_FIELD_OF_VIEW;
 use super::{Camera, Projection, ViewKind};
 
 /// The error of a picture is known up to the rounding of its camera's f32, in radii.
@@ -38,7 +41,7 @@ impl Camera {
         if let Some(before) = before.filter(is_close) {
             return Some(before.clone());
         }
-        let field_of_view = (2.0 * (radius / distance).asin()) as f32;
+        let field_of_view = sphere_field_of_view(distance, radius);
         Some(Self {
             projection: Projection::Perspective { field_of_view },
             near: (0.5 * (distance - radius)) as f32,
@@ -65,12 +68,26 @@ impl Camera {
         }
         let forward = before.orientation.as_dquat().normalize() * DVec3::NEG_Z;
         let turn = forward.angle_between(center - self.position);
-        let size = (drawn_from * (0.5 * f64::from(field_of_view)).sin() / radius - 1.0).abs();
+        let [half_width, needed] = [field_of_view, sphere_field_of_view(drawn_from, radius)].map(half_sine);
+        let size = (half_width / needed - 1.0).abs();
         // What lies x metres beside the centre and z metres before it is drawn at x · d / (d − z) on the square, seen from a distance of d.
         // Of two distances this differs by at most radius² / 2 · |d − d'| / ((d − radius) · (d' − radius)), as x · z is at most radius² / 2.
         let perspective = 0.5 * radius * (distance - drawn_from).abs() / ((distance - radius) * (drawn_from - radius));
         turn + size + perspective
     }
+}
+
+/// The field of view, in radians, of the picture of a sphere from outside of it. Within the limits of a camera: the picture of a very small or
+/// far sphere shows more than the sphere, and one from very close to it slightly less.
+fn sphere_field_of_view(distance: f64, radius: f64) -> f32 {
+    let exact = (2.0 * (radius / distance).asin()) as f32;
+    // A radius that is negative or NaN leads to a field of view that no camera may have, of which the frame's error tells.
+    if exact >= 0.0 { exact.clamp(MIN_FIELD_OF_VIEW, PI.next_down()) } else { exact }
+}
+
+/// The sine of half an angle.
+fn half_sine(angle: f32) -> f64 {
+    (0.5 * f64::from(angle)).sin()
 }
 
 #[cfg(test)]

@@ -101,28 +101,35 @@ impl RenderView {
         self.oblique_depth().is_some()
     }
 
-    /// The row of the matrix that makes the clip plane the near plane, if there is one and the camera is behind it.
+    /// The row of the matrix that makes the clip plane the near plane, if there is one and the camera is behind it or in it.
     ///
     /// For a position p relative to the camera, let w = forward · p, and π = normal · p + offset its distance in front of the plane. The
     /// row is w − a π: it equals w, for a depth of 1, on the plane. The depth of a position at distance t along the ray r is
     /// 1 − a normal · r − a offset ÷ t. It falls with t, as the offset is negative, towards 1 − a normal · r, which is 0 or more
-    /// everywhere in the picture if a is 1 ÷ (the largest normal · r of its corners).
+    /// everywhere in the picture if a is at most 1 ÷ (the largest normal · r of its corners). In f32 the sum of the row's products is off by up
+    /// to 8u (1 + a) |r|, so that a is less by so much that depth stays positive: what is far away is not clipped.
+    ///
+    /// With the offset, depth loses what tells positions apart: from a camera in the plane, all positions of a ray have the same depth. So the
+    /// plane is as far away as [`MIN_CLIP_DISTANCE`] at least.
     fn oblique_depth(&self) -> Option<DVec4> {
         let plane = self.camera.clip_plane?;
         if !matches!(self.camera.projection, Projection::Perspective { .. }) {
             return None;
         }
         let offset = plane.distance(self.camera.position);
-        if offset >= 0.0 {
+        if offset > 0.0 {
             return None;
         }
+        let distance = (-offset).max(f64::from(self.camera.near) * MIN_CLIP_DISTANCE);
         let [right, up, center] = self.precise_picture_axes();
         let forward = self.camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
         let normal = plane.normal.as_dvec3().normalize();
-        let corners =
-            [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| normal.dot(right * x + up * y + center));
-        let largest = corners.into_iter().fold(MIN_OBLIQUE_SLOPE, f64::max);
-        Some((forward - normal / largest).extend(-offset / largest))
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| right * x + up * y + center);
+        let largest = corners.into_iter().map(|ray| normal.dot(ray)).fold(MIN_OBLIQUE_SLOPE, f64::max);
+        let longest = corners.into_iter().map(DVec3::length).fold(0.0, f64::max);
+        let rounding = 8.0 * UNIT_ROUNDOFF * (1.0 + 1.0 / largest) * longest;
+        let slope = (1.0 - rounding.min(MAX_DEPTH_MARGIN)) / largest;
+        Some((forward - normal * slope).extend(distance * slope))
     }
 
     /// [`RenderView::picture_axes`] in f64.
@@ -153,6 +160,15 @@ impl RenderView {
         [right, up, if shift == Vec2::ZERO { forward } else { forward + right * shift.x + up * shift.y }]
     }
 }
+
+/// The least distance of a clip plane from the camera, as a share of [`Camera::near`](Camera::near).
+const MIN_CLIP_DISTANCE: f64 = 1.0 / 64.0;
+
+/// At most this share of the range of depth is left unused.
+const MAX_DEPTH_MARGIN: f64 = 0.5;
+
+/// Half a unit in the last place of the f32 from 0.5 to 1.
+const UNIT_ROUNDOFF: f64 = 1.0 / (1_u32 << 24) as f64;
 
 /// Where no ray of the picture comes closer to the clip plane's normal than this, nothing in front of the plane is visible, and the row
 /// stays finite.
@@ -227,14 +243,15 @@ mod tests {
                 }
                 assert!((depth_at(on_plane) - 1.0).abs() < 1e-5);
                 assert!(depth_at(on_plane * 0.99) > 1.0 && depth_at(on_plane * 1.01) < 1.0);
-                assert!(depth_at(on_plane * 1e6) > -1e-6);
+                assert!(depth_at(on_plane * 1e6) > 0.0);
             }
         }
     }
 
-    /// At infinity, depth is 0 in a corner of the picture whose ray is nearest to the plane's normal, and nowhere less.
+    /// At infinity, depth is least in a corner of the picture whose ray is nearest to the plane's normal, and there it is 0 but for a margin
+    /// for the rounding of f32.
     #[test]
-    fn the_least_depth_of_an_oblique_picture_is_zero() {
+    fn the_least_depth_of_an_oblique_picture_is_hardly_more_than_zero() {
         for normal in [[0.3, 0.5, -0.8], [-0.3, 0.5, -0.8], [0.3, -0.5, -0.8], [-0.3, -0.5, -0.8], [0.0, 0.0, -1.0]] {
             for (shift, size) in [(Vec2::ZERO, [640, 360]), (Vec2::new(0.5, -1.0), [300, 400])] {
                 let normal = Vec3::from(normal).normalize();
@@ -247,9 +264,62 @@ mod tests {
                     let ray: Vec3 = right * x + up * y + center;
                     (view.clip_from_relative() * ray.extend(0.0)).z
                 };
-                let depths = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(depth_at_infinity);
+                let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+                let rays: Vec<Vec3> = corners.iter().map(|(x, y)| right * *x + up * *y + center).collect();
+                let largest = rays.iter().map(|ray| normal.dot(*ray)).fold(0.0, f32::max);
+                let longest = rays.iter().map(|ray| ray.length()).fold(0.0, f32::max);
+                let depths = corners.map(depth_at_infinity);
                 let least = depths.into_iter().fold(f32::INFINITY, f32::min);
-                assert!(least.abs() < 1e-6, "{normal} {shift}: {depths:?}");
+                // The margin, and the rounding that it is for.
+                let most = 16.0 * UNIT_ROUNDOFF as f32 * (1.0 + 1.0 / largest) * longest;
+                assert!(least >= 0.0 && least <= most, "{normal} {shift}: {depths:?}, at most {most}");
+            }
+        }
+    }
+
+    /// Where the camera touches the plane, what is behind the plane is clipped, what is in front of it is not, however far away, and nearer
+    /// positions have the greater depth.
+    #[test]
+    fn a_clip_plane_clips_as_exactly_for_a_camera_that_touches_it() {
+        for away in [0.0, 1e-300, 1e-12, 1e-9, 1e-6, 1e-3, 0.05 / 64.0, 0.01, 1.0, 1e3] {
+            for (normal, world) in
+                [([0.0, 0.0, -1.0], 0.0), ([0.6, 0.0, -0.8], 1e9), ([0.0, 0.8, -0.6], 1e6), ([0.0, 1.0, -0.05], 0.0)]
+            {
+                let normal = Vec3::from(normal).normalize();
+                let position = DVec3::splat(world);
+                let clip_plane = Some(ClipPlane { point: position + normal.as_dvec3() * away, normal });
+                let camera = Camera {
+                    clip_plane,
+                    ..Camera::looking_at("portal", position, position + DVec3::new(0.2, -0.1, -0.9))
+                };
+                let view = RenderView::new(&camera);
+                let [right, up, center] = view.picture_axes();
+                // From the camera as the plane sees it: rounding a point in the world moves it.
+                let away = -clip_plane.map_or(0.0, |plane| plane.distance(position));
+                if away < 0.0 {
+                    assert!(!view.has_oblique_near_plane());
+                    continue;
+                }
+                for (x, y) in [(0.0, 0.0), (0.9, 0.9), (-0.9, 0.9), (0.9, -0.9), (-0.9, -0.9)] {
+                    let ray = right * x + up * y + center;
+                    let slope = f64::from(normal.dot(ray));
+                    let depth_at = |distance: f64| {
+                        let clip = view.clip_from_relative() * (ray * distance as f32).extend(1.0);
+                        clip.z / clip.w
+                    };
+                    if slope < 1e-3 {
+                        assert!([0.1, 1.0, 1e6].iter().all(|distance| depth_at(*distance) > 1.0), "{normal} {away}");
+                        continue;
+                    }
+                    // The plane, or a 64th of the near plane's distance.
+                    let begin = away.max(0.05 / 64.0) / slope;
+                    // The sums of the matrix and the ray are off by some u of the distance.
+                    let depths = [0.5, 0.99, 1.01, 2.0, 8.0, 64.0].map(|times| depth_at(begin * times));
+                    let context = format!("{normal}, {away:e} m: {depths:?}");
+                    assert!(depths.is_sorted_by(|near, far| near > far), "{context}");
+                    assert!(depths[1] > 1.0 && depths[2] < 1.0, "{context}");
+                    assert!([1e6, 1e9, 1e12, 1e20].iter().all(|far| depth_at(*far) > 0.0), "{context}");
+                }
             }
         }
     }
