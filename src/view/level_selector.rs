@@ -54,7 +54,7 @@ impl LevelSelector {
         Self {
             eye: camera.position,
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
-            near: if view.has_oblique_near_plane() { 0.0 } else { f64::from(camera.near) },
+            near: if may_have_oblique_near_plane(view) { 0.0 } else { f64::from(camera.near) },
             magnification,
             largest_error: f64::from(quality.level_of_detail) * f64::from(camera.level_of_detail_scale) * of_kind,
         }
@@ -87,6 +87,11 @@ impl LevelSelector {
             Magnification::Paraboloid(pixels) => pixels / (offset.length() - radius).max(self.near),
         }
     }
+}
+
+/// Whether a clip plane replaces the near plane, or may when the camera is replaced.
+fn may_have_oblique_near_plane(view: &RenderView) -> bool {
+    view.has_oblique_near_plane() || (view.camera.clip_plane.is_some() && view.may_be_replaced())
 }
 
 #[cfg(test)]
@@ -154,7 +159,8 @@ mod tests {
                 (local.truncate() / (distance - local.z), if local.z < 0.0 { distance } else { 0.0 })
             }
         };
-        let is_clipped = match camera.clip_plane {
+        let is_oblique = RenderView::new(camera).has_oblique_near_plane();
+        let is_clipped = match camera.clip_plane.filter(|_| is_oblique) {
             Some(plane) => plane.distance(point) < 0.0 || depth <= 0.0,
             None => depth < f64::from(camera.near),
         };
@@ -256,7 +262,8 @@ mod tests {
     #[test]
     fn what_a_clip_plane_lets_nearer_than_the_near_plane_is_as_fine_as_with_that_near_plane() {
         let camera = Camera { near: 1.0, ..Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z) };
-        let plane = ClipPlane { point: DVec3::NEG_Z * 0.02, normal: Vec3::NEG_Z };
+        // Beyond the near plane at the lower edge of the picture.
+        let plane = ClipPlane { point: DVec3::NEG_Z * 0.02, normal: Vec3::new(0.0, 0.9, -0.43).normalize() };
         let bounds = BoundingSphere { center: DVec3::NEG_Z * 0.06, radius: 0.01 };
         let level = |camera: Camera| {
             let selector = LevelSelector::new(&RenderView::new(&camera), &Quality::balanced());

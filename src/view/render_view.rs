@@ -96,18 +96,19 @@ impl RenderView {
         }
     }
 
-    /// Whether depth is measured from the camera's clip plane.
+    /// Whether depth is measured from the camera's clip plane: not if that is nearer than the near plane wherever it is in the picture.
     pub fn has_oblique_near_plane(&self) -> bool {
         self.oblique_depth().is_some()
     }
 
-    /// The row of the matrix that makes the clip plane the near plane, if there is one and the camera is behind it or in it.
+    /// The row of the matrix that makes the clip plane the near plane, if there is one that the camera is behind, or in, and if some of it is
+    /// beyond the near plane in the picture.
     ///
     /// For a position p relative to the camera, let w = forward · p, and π = normal · p + offset its distance in front of the plane. The
     /// row is w − a π: it equals w, for a depth of 1, on the plane. The depth of a position at distance t along the ray r is
     /// 1 − a normal · r − a offset ÷ t. It falls with t, as the offset is negative, towards 1 − a normal · r, which is 0 or more
     /// everywhere in the picture if a is at most 1 ÷ (the largest normal · r of its corners). In f32 the sum of the row's products is off by up
-    /// to 8u (1 + a) |r|, so that a is less by so much that depth stays positive: what is far away is not clipped.
+    /// to 8u (1 + a) |r|, so a is less by so much that depth stays positive: what is far away is not clipped.
     ///
     /// With the offset, depth loses what tells positions apart: from a camera in the plane, all positions of a ray have the same depth. So the
     /// plane is as far away as [`MIN_CLIP_DISTANCE`] at least.
@@ -116,20 +117,26 @@ impl RenderView {
         if !matches!(self.camera.projection, Projection::Perspective { .. }) {
             return None;
         }
-        let offset = plane.distance(self.camera.position);
-        if offset > 0.0 {
+        let behind = -plane.distance(self.camera.position);
+        if behind < 0.0 {
             return None;
         }
-        let distance = (-offset).max(f64::from(self.camera.near) * MIN_CLIP_DISTANCE);
         let [right, up, center] = self.precise_picture_axes();
         let forward = self.camera.orientation.as_dquat().normalize() * DVec3::NEG_Z;
         let normal = plane.normal.as_dvec3().normalize();
         let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| right * x + up * y + center);
-        let largest = corners.into_iter().map(|ray| normal.dot(ray)).fold(MIN_OBLIQUE_SLOPE, f64::max);
+        let slopes = corners.map(|ray| normal.dot(ray));
+        let near = f64::from(self.camera.near);
+        // A ray of a corner is in front of the plane from a distance of behind ÷ slope on.
+        if slopes.iter().all(|slope| slope * near >= behind) {
+            return None;
+        }
+        let distance = behind.max(near * MIN_CLIP_DISTANCE);
+        let largest = slopes.into_iter().fold(MIN_OBLIQUE_SLOPE, f64::max);
         let longest = corners.into_iter().map(DVec3::length).fold(0.0, f64::max);
         let rounding = 8.0 * UNIT_ROUNDOFF * (1.0 + 1.0 / largest) * longest;
-        let slope = (1.0 - rounding.min(MAX_DEPTH_MARGIN)) / largest;
-        Some((forward - normal * slope).extend(distance * slope))
+        let scale = (1.0 - rounding.min(MAX_DEPTH_MARGIN)) / largest;
+        Some((forward - normal * scale).extend(distance * scale))
     }
 
     /// [`RenderView::picture_axes`] in f64.
@@ -162,7 +169,7 @@ impl RenderView {
 }
 
 /// The least distance of a clip plane from the camera, as a share of [`Camera::near`](Camera::near).
-const MIN_CLIP_DISTANCE: f64 = 1.0 / 64.0;
+const MIN_CLIP_DISTANCE: f64 = 1.0 / 16.0;
 
 /// At most this share of the range of depth is left unused.
 const MAX_DEPTH_MARGIN: f64 = 0.5;
@@ -281,7 +288,7 @@ mod tests {
     /// positions have the greater depth.
     #[test]
     fn a_clip_plane_clips_as_exactly_for_a_camera_that_touches_it() {
-        for away in [0.0, 1e-300, 1e-12, 1e-9, 1e-6, 1e-3, 0.05 / 64.0, 0.01, 1.0, 1e3] {
+        for away in [0.0, 1e-300, 1e-12, 1e-9, 1e-6, 1e-3, 0.05 / 16.0, 0.01, 1.0, 1e3] {
             for (normal, world) in
                 [([0.0, 0.0, -1.0], 0.0), ([0.6, 0.0, -0.8], 1e9), ([0.0, 0.8, -0.6], 1e6), ([0.0, 1.0, -0.05], 0.0)]
             {
@@ -296,8 +303,11 @@ mod tests {
                 let [right, up, center] = view.picture_axes();
                 // From the camera as the plane sees it: rounding a point in the world moves it.
                 let away = -clip_plane.map_or(0.0, |plane| plane.distance(position));
-                if away < 0.0 {
-                    assert!(!view.has_oblique_near_plane());
+                if !view.has_oblique_near_plane() {
+                    let in_front =
+                        |(x, y): (f32, f32)| f64::from(normal.dot(right * x + up * y + center)) * 0.05 >= away - 1e-9;
+                    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+                    assert!(away < 0.0 || corners.into_iter().all(in_front), "{normal}, {away:e} m");
                     continue;
                 }
                 for (x, y) in [(0.0, 0.0), (0.9, 0.9), (-0.9, 0.9), (0.9, -0.9), (-0.9, -0.9)] {
@@ -311,8 +321,8 @@ mod tests {
                         assert!([0.1, 1.0, 1e6].iter().all(|distance| depth_at(*distance) > 1.0), "{normal} {away}");
                         continue;
                     }
-                    // The plane, or a 64th of the near plane's distance.
-                    let begin = away.max(0.05 / 64.0) / slope;
+                    // The plane, or a 16th of the near plane's distance.
+                    let begin = away.max(0.05 / 16.0) / slope;
                     // The sums of the matrix and the ray are off by some u of the distance.
                     let depths = [0.5, 0.99, 1.01, 2.0, 8.0, 64.0].map(|times| depth_at(begin * times));
                     let context = format!("{normal}, {away:e} m: {depths:?}");

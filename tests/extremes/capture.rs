@@ -37,6 +37,15 @@ impl Capture {
         self.radiance[y * self.size[0] + x]
     }
 
+    /// A part of it, whose upper left pixel is in column and row `corner`.
+    pub fn part(&self, corner: [u32; 2], size: [u32; 2]) -> Self {
+        let ([left, top], size) = (corner.map(|index| index as usize), size.map(|side| side as usize));
+        let rows = (top..top + size[1]).map(|y| y * self.size[0] + left..y * self.size[0] + left + size[0]);
+        let radiance = rows.clone().flat_map(|row| self.radiance[row].iter().copied()).collect();
+        let picture = rows.flat_map(|row| self.picture[row.start * 4..row.end * 4].iter().copied()).collect();
+        Self { size, radiance, picture }
+    }
+
     /// The radiance of the middle pixel.
     pub fn middle(&self) -> [f64; 3] {
         self.radiance(self.size[0] / 2, self.size[1] / 2)

@@ -9,6 +9,10 @@
 
 mod counts;
 mod cameras;
+mod derived;
+mod error_table;
+mod placement;
+mod surroundings;
 mod timeout;
 mod lights;
 mod capture;
@@ -43,7 +47,16 @@ fn main() {
     let mut trials = Vec::new();
     for backend in BackendName::ALL {
         let lacks_adapter = backend == BackendName::Wgpu && no_adapter;
-        let cases = [cameras::CASES, positions::CASES, numbers::CASES, lights::CASES, counts::CASES, qualities::CASES];
+        let cases = [
+            cameras::CASES,
+            positions::CASES,
+            numbers::CASES,
+            lights::CASES,
+            counts::CASES,
+            qualities::CASES,
+            derived::CASES,
+            surroundings::CASES,
+        ];
         for &(name, case) in cases.into_iter().flatten() {
             let case = move || {
                 if lacks_adapter {
@@ -56,5 +69,7 @@ fn main() {
             trials.push(trial.with_ignored_flag((lacks_adapter && !required) || is_too_slow));
         }
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    let conclusion = libtest_mimic::run(&arguments, trials);
+    error_table::print();
+    conclusion.exit();
 }

@@ -7,7 +7,7 @@ use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::harness::{Drawn, Harness};
-use crate::oracle::{Oracle, Prediction};
+use crate::oracle::{Oracle, Prediction, View};
 
 /// A square of 2 m before scaling that faces its own +Z.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +42,13 @@ impl Marker {
     pub fn colored(self, color: Vec3) -> Self {
         Self { color, ..self }
     }
+
+    /// A corner of its mesh, relative to a point in the world: subtracted first, as both may be far from the origin.
+    pub fn corner(&self, reference: DVec3, mesh: &Mesh, corner: u32) -> DVec3 {
+        let vertex = Vec3::from(mesh.vertices()[corner as usize].position);
+        let turn = self.orientation.as_dquat().normalize();
+        (self.position - reference) + turn * (self.scale.as_dvec3() * vertex.as_dvec3())
+    }
 }
 
 pub const GREEN: Vec3 = Vec3::new(0.0, 0.75, 0.125);
@@ -53,6 +60,10 @@ const BACKGROUND: Vec3 = Vec3::new(0.25, 0.125, 0.0625);
 pub struct MarkerScene {
     pub scene: Scene,
     pub markers: Vec<Marker>,
+    /// What its camera is to show, if it has a lens shift or a clip plane, or was derived from another one.
+    pub view: Option<View>,
+    /// Pixels that are nearer to an edge are not compared, in pixels.
+    pub margin: f64,
     mesh: Handle<Mesh>,
 }
 
@@ -72,7 +83,7 @@ impl MarkerScene {
         scene.cameras = vec![camera];
         scene.background = BACKGROUND;
         let mesh = scene.add(mesh)?;
-        let mut all = Self { scene, markers: Vec::new(), mesh };
+        let mut all = Self { scene, markers: Vec::new(), view: None, margin: 1.0, mesh };
         for marker in markers {
             all.add(marker)?;
         }
@@ -89,6 +100,16 @@ impl MarkerScene {
         Ok(())
     }
 
+    /// The mesh of all markers.
+    pub fn mesh(&self) -> Result<&Mesh, Failed> {
+        Ok(self.scene.assets().get(self.mesh)?)
+    }
+
+    /// Draws the scene, of which nothing may be left out.
+    pub fn draw(&self, harness: &mut Harness) -> Result<Drawn, Failed> {
+        harness.draw_whole(&self.scene)
+    }
+
     /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and unless at
     /// least `min_visible` markers have such pixels.
     pub fn expect(&self, harness: &mut Harness, context: &str, min_visible: usize) -> Result<(), Failed> {
@@ -99,8 +120,8 @@ impl MarkerScene {
     /// Checks the same of a frame that has been drawn already.
     pub fn compare(&self, drawn: &Drawn, min_visible: usize) -> Result<(), Failed> {
         let camera = &self.scene.cameras[0];
-        let mesh = self.scene.assets().get(self.mesh)?;
-        let oracle = Oracle::new(camera, mesh, &self.markers);
+        let view = self.view.unwrap_or_else(|| View::of(camera));
+        let oracle = Oracle::new(view, self.mesh()?, &self.markers, self.margin);
         let [width, height] = camera.size.map(|side| side as usize);
         let mut visible_pixels = vec![0; self.markers.len()];
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
