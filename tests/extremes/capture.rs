@@ -64,6 +64,13 @@ impl Capture {
         bright as f64 / self.radiance.len() as f64
     }
 
+    /// The number of bytes of the tone-mapped picture that differ, or of numbers of the radiance.
+    pub fn different_bytes(&self, other: &Self) -> usize {
+        let bytes = self.picture.iter().zip(&other.picture).filter(|(one, other)| one != other).count();
+        let numbers = self.radiance.iter().flatten().zip(other.radiance.iter().flatten());
+        bytes + numbers.filter(|(one, other)| one != other).count()
+    }
+
     /// Whether each pixel, row by row, differs from that of another capture of the same size by more than rounding.
     pub fn differs_from(&self, other: &Self) -> Vec<bool> {
         let channels = self.picture.as_chunks::<4>().0.iter().zip(other.picture.as_chunks::<4>().0);

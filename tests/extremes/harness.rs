@@ -10,11 +10,12 @@ use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::Rejection;
-use drawloom::{BuildError, FrameError, Renderer, SubmitError, Submitter};
+use drawloom::{BuildError, CpuNode, FrameError, Renderer, SubmitError, Submitter};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
 use crate::capture::{Capture, capture};
+use crate::columns::Numbers;
 
 /// A backend that cases are run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,17 +54,31 @@ impl BackendName {
     }
 
     /// Creates a renderer on this backend.
-    fn open(self, quality: Quality) -> Result<Box<dyn Runner>, OpenError> {
+    fn open(self, setup: Setup) -> Result<Box<dyn Runner>, OpenError> {
         let scheduler = Arc::new(Scheduler::new(2).map_err(|error| error.to_string())?);
         match self {
-            Self::Null => RendererOn::open(NullBackend, scheduler, quality),
-            Self::Software => RendererOn::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, quality),
-            Self::Reference => RendererOn::open(SoftwareBackend::reference(), scheduler, quality),
+            Self::Null => RendererOn::open(NullBackend, scheduler, setup),
+            Self::Software => RendererOn::open(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, setup),
+            Self::Reference => RendererOn::open(SoftwareBackend::reference(), scheduler, setup),
             Self::Wgpu => {
                 let backend = adapter::shared_backend().map_err(|error| error.to_string())?;
-                RendererOn::open(backend, scheduler, quality)
+                RendererOn::open(backend, scheduler, setup)
             }
         }
+    }
+}
+
+/// What a renderer is built with.
+pub struct Setup {
+    pub quality: Quality,
+    pub deferred: Deferred,
+    /// A process of the test's own, and the targets of it that are read back.
+    pub numbers: Option<(Numbers, &'static [&'static str])>,
+}
+
+impl From<Quality> for Setup {
+    fn from(quality: Quality) -> Self {
+        Self { quality, deferred: Deferred::to_picture(), numbers: None }
     }
 }
 
@@ -92,6 +107,17 @@ pub enum Outcome {
     NotSubmitted(SubmitError),
 }
 
+impl Outcome {
+    /// The frame, which must have been drawn.
+    pub fn drawn(self) -> Result<Drawn, Failed> {
+        match self {
+            Self::Drawn(drawn) => Ok(drawn),
+            Self::Refused(error) => Err(format!("it was refused: {error}").into()),
+            Self::NotSubmitted(error) => Err(format!("it was not submitted: {error}").into()),
+        }
+    }
+}
+
 /// A frame that was drawn.
 pub struct Drawn {
     /// The pictures of the first view. `None` if the backend draws nothing.
@@ -100,13 +126,19 @@ pub struct Drawn {
     pub rejections: Vec<Rejection>,
     /// The number of visible objects of the first view.
     pub visible: usize,
+    /// The triangles of the levels of detail that it draws, if there are any.
+    pub triangles: Option<usize>,
+    /// The pieces that it executes.
+    pub pieces: usize,
+    /// The targets of the process of the test's own; none if the backend draws nothing.
+    pub own_targets: Vec<Picture>,
 }
 
 /// Draws scenes on a backend.
 pub trait Runner {
     /// # Errors
     /// If a picture cannot be read back, or contains NaN.
-    fn draw(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed>;
+    fn draw(&mut self, scene: &SceneRef<'_>, nodes: &[&dyn CpuNode]) -> Result<Outcome, Failed>;
 }
 
 /// One renderer on a backend, for all frames of a case: a failed frame must not affect the next one.
@@ -117,15 +149,15 @@ pub struct Harness {
 
 impl Harness {
     pub fn new(name: BackendName) -> Result<Self, Failed> {
-        Ok(Self { name, runner: name.open(name.affordable(Quality::balanced()))? })
+        Ok(Self { name, runner: name.open(name.affordable(Quality::balanced()).into())? })
     }
 
     /// Another renderer on the same backend.
     ///
     /// # Errors
     /// If the quality is invalid.
-    pub fn with_quality(&self, quality: Quality) -> Result<Self, OpenError> {
-        Ok(Self { name: self.name, runner: self.name.open(quality)? })
+    pub fn with(&self, setup: impl Into<Setup>) -> Result<Self, OpenError> {
+        Ok(Self { name: self.name, runner: self.name.open(setup.into())? })
     }
 
     pub fn name(&self) -> BackendName {
@@ -133,16 +165,17 @@ impl Harness {
     }
 
     pub fn outcome(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed> {
-        self.runner.draw(scene)
+        self.runner.draw(scene, &[])
+    }
+
+    /// The same, with nodes that make some of the scene.
+    pub fn outcome_with(&mut self, scene: &SceneRef<'_>, nodes: &[&dyn CpuNode]) -> Result<Outcome, Failed> {
+        self.runner.draw(scene, nodes)
     }
 
     /// Draws a scene, which must succeed.
     pub fn draw(&mut self, scene: &Scene) -> Result<Drawn, Failed> {
-        match self.outcome(&scene.as_scene_ref())? {
-            Outcome::Drawn(drawn) => Ok(drawn),
-            Outcome::Refused(error) => Err(format!("it was refused: {error}").into()),
-            Outcome::NotSubmitted(error) => Err(format!("it was not submitted: {error}").into()),
-        }
+        self.outcome(&scene.as_scene_ref())?.drawn()
     }
 
     /// The same; nothing may be left out.
@@ -189,19 +222,26 @@ impl Pictures for WgpuSubmission {
 struct RendererOn<B: Backend> {
     renderer: Renderer<B>,
     submitter: Submitter<B>,
+    own_targets: &'static [&'static str],
 }
 
 impl<B: Backend<Submission: Pictures>> RendererOn<B> {
-    fn open(backend: B, scheduler: Arc<Scheduler>, quality: Quality) -> Result<Box<dyn Runner>, OpenError> {
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    fn open(backend: B, scheduler: Arc<Scheduler>, setup: Setup) -> Result<Box<dyn Runner>, OpenError> {
+        let Setup { quality, deferred, numbers } = setup;
+        let mut builder = Renderer::builder(backend).deferred(deferred).quality(quality);
+        let mut own_targets: &[&str] = &[];
+        if let Some((process, targets)) = numbers {
+            own_targets = targets;
+            builder = targets.iter().fold(builder.process(process), |builder, target| builder.output(*target));
+        }
         let (renderer, submitter) = builder.build(scheduler)?;
-        Ok(Box::new(Self { renderer, submitter }))
+        Ok(Box::new(Self { renderer, submitter, own_targets }))
     }
 }
 
 impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
-    fn draw(&mut self, scene: &SceneRef<'_>) -> Result<Outcome, Failed> {
-        let recorded = match self.renderer.record(*scene) {
+    fn draw(&mut self, scene: &SceneRef<'_>, nodes: &[&dyn CpuNode]) -> Result<Outcome, Failed> {
+        let recorded = match self.renderer.record_with_nodes(*scene, nodes) {
             Ok(recorded) => recorded,
             Err(FrameError::Panicked { stage, message }) => return Err(format!("{stage} panicked: {message}").into()),
             Err(FrameError::Scheduler(panic)) => return Err(format!("a job panicked: {panic}").into()),
@@ -216,9 +256,14 @@ impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
             (Some(radiance), Some(picture)) => Some(capture(&radiance, picture)?),
             _ => None,
         };
+        let own_targets = self.own_targets.iter().filter_map(|name| target(name).transpose());
+        let view = submitted.statistics.views.first();
         Ok(Outcome::Drawn(Drawn {
             capture,
-            visible: submitted.statistics.views.first().map_or(0, |view| view.visible),
+            visible: view.map_or(0, |view| view.visible),
+            triangles: view.and_then(|view| view.levels_of_detail).map(|levels| levels.triangles),
+            pieces: view.map_or(0, |view| view.pieces),
+            own_targets: own_targets.collect::<Result<_, _>>()?,
             rejections: submitted.statistics.rejections,
         }))
     }

@@ -9,11 +9,17 @@
 
 mod counts;
 mod cameras;
+mod cascades;
+mod columns;
+mod degenerate;
 mod derived;
 mod error_table;
+mod levels_and_pieces;
+mod moved_scenes;
 mod placement;
 mod surroundings;
 mod timeout;
+mod vertices;
 mod lights;
 mod capture;
 mod numbers;
@@ -47,17 +53,12 @@ fn main() {
     let mut trials = Vec::new();
     for backend in BackendName::ALL {
         let lacks_adapter = backend == BackendName::Wgpu && no_adapter;
-        let cases = [
-            cameras::CASES,
-            positions::CASES,
-            numbers::CASES,
-            lights::CASES,
-            counts::CASES,
-            qualities::CASES,
-            derived::CASES,
-            surroundings::CASES,
-        ];
-        for &(name, case) in cases.into_iter().flatten() {
+        let earlier =
+            [cameras::CASES, positions::CASES, numbers::CASES, lights::CASES, counts::CASES, qualities::CASES];
+        let views = [derived::CASES, surroundings::CASES, degenerate::CASES, cascades::CASES];
+        let geometry = [columns::CASES, levels_and_pieces::CASES, vertices::CASES];
+        let cases = earlier.into_iter().chain(views).chain(geometry).flatten();
+        for &(name, case) in cases {
             let case = move || {
                 if lacks_adapter {
                     return Err("there is no graphics adapter".into());

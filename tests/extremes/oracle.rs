@@ -73,7 +73,7 @@ impl View {
 
     /// The origin and the direction of the ray through a point of the picture, in pixels from its upper left corner. The direction has length 1
     /// along the axis.
-    fn ray(&self, x: f64, y: f64) -> [DVec3; 2] {
+    pub fn ray(&self, x: f64, y: f64) -> [DVec3; 2] {
         let [x, y] = [x + self.corner[0], y + self.corner[1]];
         let aside = self.right * (x / self.whole[0] * 2.0 - 1.0) + self.up * (1.0 - y / self.whole[1] * 2.0);
         if self.is_perspective { [self.origin, aside + self.forward] } else { [self.origin + aside, self.forward] }

@@ -13,6 +13,7 @@ use crate::Case;
 use crate::capture::{Capture, PRECISION, assert_alike, assert_alike_except};
 use crate::harness::Harness;
 use crate::markers::{BLUE, GREEN, Marker, MarkerScene, RED, camera, with_context};
+use crate::moved_scenes::{scale_scene, shift_scene};
 
 pub const CASES: &[Case] = &[
     ("a_scene_looks_the_same_anywhere_up_to_four_million_kilometres", anywhere),
@@ -28,33 +29,6 @@ pub const CASES: &[Case] = &[
 ];
 
 const SIZE: [u32; 2] = [48, 32];
-
-/// Moves the whole scene.
-fn shift_scene(scene: &mut Scene, by: DVec3) -> Result<(), Failed> {
-    for camera in &mut scene.cameras {
-        camera.position += by;
-    }
-    for light in &mut scene.lights {
-        if let Some(position) = position_of(light) {
-            *position += by;
-        }
-    }
-    for handle in scene.objects().collect::<Vec<_>>() {
-        let mut object = scene.object(handle)?;
-        object.position += by;
-        scene.replace_object(handle, object)?;
-    }
-    Ok(())
-}
-
-fn position_of(light: &mut Light) -> Option<&mut DVec3> {
-    match light {
-        Light::Point { position, .. } | Light::Spot { position, .. } | Light::Hemispherical { position, .. } => {
-            Some(position)
-        }
-        _ => None,
-    }
-}
 
 /// Shadow maps of directional lights are aligned to a grid in the world, so moving the scene moves shadow edges by up to a
 /// texel: see [`is_at_shadow_edge`].
@@ -161,34 +135,11 @@ fn out_of_reach(harness: &mut Harness) -> Result<(), Failed> {
     MarkerScene::new(within, [marker])?.expect(harness, "just within reach", 1)
 }
 
-/// The same scene, scaled by `factor`, with the same illuminance.
+/// The scene, scaled by `factor`, without a sun's shadow: the range of its shadow map is in metres, and is not scaled.
 fn enlarged(factor: f64) -> Result<Scene, Failed> {
     let mut scene = everything();
-    let (single, square) = (factor as f32, (factor * factor) as f32);
-    // The range of its shadow map is in metres, and is not scaled.
     scene.lights.retain(|light| !matches!(light, Light::Directional { casts_shadow: true, .. }));
-    for camera in &mut scene.cameras {
-        camera.position *= factor;
-        camera.near *= single;
-    }
-    for light in &mut scene.lights {
-        match light {
-            Light::Point { position, intensity, range, .. }
-            | Light::Spot { position, intensity, range, .. }
-            | Light::Hemispherical { position, intensity, range, .. } => {
-                *position *= factor;
-                *intensity *= square;
-                *range *= single;
-            }
-            _ => {}
-        }
-    }
-    for handle in scene.objects().collect::<Vec<_>>() {
-        let mut object = scene.object(handle)?;
-        object.position *= factor;
-        object.scale *= single;
-        scene.replace_object(handle, object)?;
-    }
+    scale_scene(&mut scene, factor)?;
     Ok(scene)
 }
 

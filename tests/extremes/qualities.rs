@@ -64,7 +64,7 @@ fn expect_all(harness: &mut Harness, context: &str) -> Result<(), Failed> {
 fn presets(harness: &mut Harness) -> Result<(), Failed> {
     for (name, quality) in [("fast", Quality::fast()), ("balanced", Quality::balanced()), ("exact", Quality::exact())] {
         let quality = harness.name().affordable(quality);
-        let mut harness = harness.with_quality(quality).map_err(|error| error.to_string())?;
+        let mut harness = harness.with(quality).map_err(|error| error.to_string())?;
         // Twice, since caches persist from frame to frame.
         for _ in 0..2 {
             expect_all(&mut harness, name)?;
@@ -111,7 +111,7 @@ fn limits(harness: &mut Harness) -> Result<(), Failed> {
         Quality { transforms: TransformPrecision::Absolute, ..usual },
     ] {
         let changed = format!("{quality:?}");
-        let mut harness = harness.with_quality(quality).map_err(|error| error.to_string())?;
+        let mut harness = harness.with(quality).map_err(|error| error.to_string())?;
         expect_all(&mut harness, &changed)?;
     }
     Ok(())
@@ -136,7 +136,7 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
         (Quality { shadows: ShadowQuality { interval: 0, ..shadows }, ..usual }, "shadows.interval"),
         (Quality { shadows: ShadowQuality { widest_edge: f32::NAN, ..shadows }, ..usual }, "shadows.widest_edge"),
     ] {
-        match harness.with_quality(wrong).err() {
+        match harness.with(wrong).err() {
             Some(OpenError::Build(BuildError::Quality(QualityError::OutOfRange { setting: named, .. })))
                 if named == setting => {}
             Some(error) => return Err(format!("{setting}: {error}").into()),
@@ -144,7 +144,7 @@ fn invalid(harness: &mut Harness) -> Result<(), Failed> {
         }
     }
     let without_volume = Quality { occlusion: Some(8), culling: CullingVolume::None, ..usual };
-    match harness.with_quality(without_volume).err() {
+    match harness.with(without_volume).err() {
         Some(OpenError::Build(BuildError::Quality(QualityError::OcclusionWithoutVolume))) => Ok(()),
         Some(error) => Err(error.to_string().into()),
         None => Err("occlusion without a volume was accepted".into()),
