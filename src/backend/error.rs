@@ -41,6 +41,21 @@ pub enum BackendError {
         /// The layers that the device allows.
         allowed: u64,
     },
+    /// A target is larger than the backend's textures can be: of a view with a picture that is too large, or with a
+    /// size of its own.
+    #[error(
+        "the target {target:?} has {width} x {height} pixels, and the largest width and height of a texture is {allowed}"
+    )]
+    TargetTooLarge {
+        /// The target.
+        target: String,
+        /// Its width in pixels.
+        width: u32,
+        /// Its height in pixels.
+        height: u32,
+        /// The largest width and height: the device limit `max_texture_dimension_2d`, or that of the software backend.
+        allowed: u32,
+    },
     /// A process's WGSL does not compile.
     #[error("the {part} of {process:?} is wrong in line {line}, column {column}: {message}\n  {text}")]
     Shader {

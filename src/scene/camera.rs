@@ -251,6 +251,7 @@ const MIN_HEIGHT: f32 = 1e-6;
 /// f32.
 pub(super) const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;
 
-/// The square of the smallest angle in radians, between the view direction and the vertical, at which the right vector is that of the angle.
-/// The axes are perpendicular and of unit length up to the rounding of f64, also where the fallback is used.
+/// The square of the smallest angle in radians, between the view direction and the vertical, at which the right vector
+/// is that of the angle. The axes are perpendicular and of unit length up to the rounding of f64, also where the
+/// fallback is used.
 const MIN_ASIDE_SQUARED: f64 = 1e-32;

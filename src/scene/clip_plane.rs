@@ -4,16 +4,17 @@ use glam::{DVec3, Vec3};
 
 use super::transform::is_unit;
 
-/// A plane in the world, such as a mirror's. A camera behind it, or in it, draws only what is in front of it; for a camera in front of it, it
-/// clips nothing.
+/// A plane in the world, such as a mirror's. A camera behind it, or in it, draws only what is in front of it; for a
+/// camera in front of it, it clips nothing.
 ///
-/// It becomes the near plane of the camera's frustum (Lengyel 2005, for a reversed depth without a far plane), in place of
-/// [`Camera::near`](super::Camera::near), unless all of it in the picture is nearer than that. It costs depth precision: depth then changes
-/// across the picture, and devices move corners to multiples of 1/256 of a pixel. For a camera D metres behind the plane, with a focal length
-/// of f pixels, depth distinguishes surfaces t metres away that are up to t² ÷ (180 · f · D) apart, which is t² ÷ (170,000 · D) at 1080p and 60°,
-/// where an ordinary near plane distinguishes some millionths of t.
-/// So D is a 16th of [`Camera::near`](super::Camera::near) at least: a camera that is nearer to the plane, as one that goes through a portal,
-/// draws only what is so far in front of itself. Objects that are entirely behind the plane are clipped by the device, and not culled before.
+/// It becomes the near plane of the camera's frustum (Lengyel 2005, for a reversed depth without a far plane), in place
+/// of [`Camera::near`](super::Camera::near), unless all of it in the picture is nearer than that. It costs depth
+/// precision: depth then changes across the picture, and devices move corners to multiples of 1/256 of a pixel. For a
+/// camera D metres behind the plane, with a focal length of f pixels, depth distinguishes surfaces t metres away that
+/// are up to t² ÷ (180 · f · D) apart, which is t² ÷ (170,000 · D) at 1080p and 60°, where an ordinary near plane
+/// distinguishes some millionths of t. So D is a 16th of [`Camera::near`](super::Camera::near) at least: a camera that
+/// is nearer to the plane, as one that goes through a portal, draws only what is so far in front of itself. Objects
+/// that are entirely behind the plane are clipped by the device, and not culled before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlane {
     /// A point of the plane, in the world, in metres.

@@ -77,11 +77,12 @@ impl Camera {
     }
 }
 
-/// The field of view, in radians, of the picture of a sphere from outside of it. Within the limits of a camera: the picture of a very small or
-/// far sphere shows more than the sphere, and one from very close to it slightly less.
+/// The field of view, in radians, of the picture of a sphere from outside of it. Within the limits of a camera: the
+/// picture of a very small or far sphere shows more than the sphere, and one from very close to it slightly less.
 fn sphere_field_of_view(distance: f64, radius: f64) -> f32 {
     let exact = (2.0 * (radius / distance).asin()) as f32;
-    // A radius that is negative or NaN leads to a field of view that no camera may have, of which the frame's error tells.
+    // A radius that is negative or NaN leads to a field of view that no camera may have, of which the frame's error
+    // tells.
     if exact >= 0.0 { exact.clamp(MIN_FIELD_OF_VIEW, PI.next_down()) } else { exact }
 }
 

@@ -96,22 +96,24 @@ impl RenderView {
         }
     }
 
-    /// Whether depth is measured from the camera's clip plane: not if that is nearer than the near plane wherever it is in the picture.
+    /// Whether depth is measured from the camera's clip plane: not if that is nearer than the near plane wherever it is
+    /// in the picture.
     pub fn has_oblique_near_plane(&self) -> bool {
         self.oblique_depth().is_some()
     }
 
-    /// The row of the matrix that makes the clip plane the near plane, if there is one that the camera is behind, or in, and if some of it is
-    /// beyond the near plane in the picture.
+    /// The row of the matrix that makes the clip plane the near plane, if there is one that the camera is behind, or
+    /// in, and if some of it is beyond the near plane in the picture.
     ///
-    /// For a position p relative to the camera, let w = forward · p, and π = normal · p + offset its distance in front of the plane. The
-    /// row is w − a π: it equals w, for a depth of 1, on the plane. The depth of a position at distance t along the ray r is
-    /// 1 − a normal · r − a offset ÷ t. It falls with t, as the offset is negative, towards 1 − a normal · r, which is 0 or more
-    /// everywhere in the picture if a is at most 1 ÷ (the largest normal · r of its corners). In f32 the sum of the row's products is off by up
-    /// to 8u (1 + a) |r|, so a is less by so much that depth stays positive: what is far away is not clipped.
+    /// For a position p relative to the camera, let w = forward · p, and π = normal · p + offset its distance in front
+    /// of the plane. The row is w − a π: it equals w, for a depth of 1, on the plane. The depth of a position at
+    /// distance t along the ray r is 1 − a normal · r − a offset ÷ t. It falls with t, as the offset is negative,
+    /// towards 1 − a normal · r, which is 0 or more everywhere in the picture if a is at most 1 ÷ (the largest normal ·
+    /// r of its corners). In f32 the sum of the row's products is off by up to 8u (1 + a) |r|, so a is less by so much
+    /// that depth stays positive: what is far away is not clipped.
     ///
-    /// With the offset, depth loses what tells positions apart: from a camera in the plane, all positions of a ray have the same depth. So the
-    /// plane is as far away as [`MIN_CLIP_DISTANCE`] at least.
+    /// With the offset, depth loses what tells positions apart: from a camera in the plane, all positions of a ray have
+    /// the same depth. So the plane is as far away as [`MIN_CLIP_DISTANCE`] at least.
     fn oblique_depth(&self) -> Option<DVec4> {
         let plane = self.camera.clip_plane?;
         if !matches!(self.camera.projection, Projection::Perspective { .. }) {
@@ -255,8 +257,8 @@ mod tests {
         }
     }
 
-    /// At infinity, depth is least in a corner of the picture whose ray is nearest to the plane's normal, and there it is 0 but for a margin
-    /// for the rounding of f32.
+    /// At infinity, depth is least in a corner of the picture whose ray is nearest to the plane's normal, and there it
+    /// is 0 but for a margin for the rounding of f32.
     #[test]
     fn the_least_depth_of_an_oblique_picture_is_hardly_more_than_zero() {
         for normal in [[0.3, 0.5, -0.8], [-0.3, 0.5, -0.8], [0.3, -0.5, -0.8], [-0.3, -0.5, -0.8], [0.0, 0.0, -1.0]] {
@@ -284,8 +286,8 @@ mod tests {
         }
     }
 
-    /// Where the camera touches the plane, what is behind the plane is clipped, what is in front of it is not, however far away, and nearer
-    /// positions have the greater depth.
+    /// Where the camera touches the plane, what is behind the plane is clipped, what is in front of it is not, however
+    /// far away, and nearer positions have the greater depth.
     #[test]
     fn a_clip_plane_clips_as_exactly_for_a_camera_that_touches_it() {
         for away in [0.0, 1e-300, 1e-12, 1e-9, 1e-6, 1e-3, 0.05 / 16.0, 0.01, 1.0, 1e3] {

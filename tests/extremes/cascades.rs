@@ -83,14 +83,15 @@ impl ShadowScene {
         let hit = point + towards * ((self.blocker.y - point.y) / towards.y) - self.blocker;
         let inside = DVec2::new(self.half - hit.x.abs(), self.half - hit.z.abs());
         let is_inside = inside.min_element() > 0.0;
-        // In the plane across the light, where maps have their pixels, a distance in the floor's plane is shorter by no more than this.
+        // In the plane across the light, where maps have their pixels, a distance in the floor's plane is shorter by no
+        // more than this.
         let beside = DVec3::new((-inside.x).max(0.0), 0.0, (-inside.y).max(0.0)).length();
         (is_inside, if is_inside { inside.min_element() } else { beside } * towards.y.abs())
     }
 }
 
-/// The width of a pixel of the finest map that has what is seen at some depth, at most: the sphere of a slice around the camera would be so large.
-/// Slices end as the practical split scheme says.
+/// The width of a pixel of the finest map that has what is seen at some depth, at most: the sphere of a slice around
+/// the camera would be so large. Slices end as the practical split scheme says.
 fn texel(camera: &Camera, maps: &ShadowMaps, depth: f64) -> Option<f64> {
     let Projection::Perspective { field_of_view } = camera.projection else { return None };
     let far = f64::from(maps.max_distance);

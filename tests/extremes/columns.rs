@@ -1,10 +1,12 @@
 //! Columns of the engine's own, and targets of its own, in which shaders find and leave extreme numbers.
 
-use drawloom::backend::Picture;
+use drawloom::FrameError;
+use drawloom::backend::{BackendError, Picture};
 use drawloom::command::Selection;
+use drawloom::glam::DVec3;
 use drawloom::process::{
     ClearColor, CommandDraws, CpuShader, Declare, Deferred, Draws, Format, ObjectCpuShader, ObjectPixel, PassInputs,
-    RenderProcess, ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    RenderProcess, ShaderObject, TargetSize, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::quality::Quality;
 use drawloom::raster::{Real, Vector, Vector4};
@@ -14,18 +16,21 @@ use libtest_mimic::Failed;
 use crate::Case;
 use crate::derived::camera_at;
 use crate::error_table::{EXTREMES, Extreme, TOUCHING, UNIT_ROUNDOFF, expect_within};
-use crate::harness::{BackendName, Harness, Setup};
+use crate::harness::{BackendName, Harness, Outcome, Setup};
 use crate::markers::{Marker, MarkerScene};
 
-pub const CASES: &[Case] = &[("targets_hold_what_columns_say", columns)];
+pub const CASES: &[Case] =
+    &[("targets_hold_what_columns_say", columns), ("targets_of_any_size_are_drawn_or_refused_by_name", sizes)];
 
 const NUMBERS: ObjectColumn<[f32; 4]> = ObjectColumn::new("numbers");
 const WORDS: ObjectColumn<u32> = ObjectColumn::new("words");
 const TARGETS: [&str; 2] = ["numbers of objects", "words of objects"];
 
 /// Draws what columns say of an object into targets that round nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct Numbers;
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Numbers {
+    size: TargetSize,
+}
 
 impl RenderProcess for Numbers {
     fn name(&self) -> &str {
@@ -36,6 +41,7 @@ impl RenderProcess for Numbers {
         declare.clears_color(TARGETS[0], Format::Rgba32Float, ClearColor::Value([0.0; 4]));
         declare.clears_color(TARGETS[1], Format::R32Uint, ClearColor::Value([0.0; 4]));
         declare.clears_depth("depth of numbers", Format::Depth32Float);
+        TARGETS.into_iter().chain(["depth of numbers"]).for_each(|target| declare.size(target, self.size));
         declare.reads_column(NUMBERS);
         declare.reads_column(WORDS);
     }
@@ -130,10 +136,52 @@ fn channel(picture: &Picture, square: usize, channel: usize) -> [u8; 4] {
     [0, 1, 2, 3].map(|byte| picture.bytes[first + byte])
 }
 
-fn columns(harness: &mut Harness) -> Result<(), Failed> {
+fn harness_with_targets(harness: &Harness, size: TargetSize) -> Result<Harness, Failed> {
     let quality = harness.name().affordable(Quality::balanced());
-    let setup = Setup { quality, deferred: Deferred::to_picture(), numbers: Some((Numbers, &TARGETS)) };
-    let (name, mut harness) = (harness.name(), harness.with(setup)?);
+    let setup = Setup { quality, deferred: Deferred::to_picture(), numbers: Some((Numbers { size }, &TARGETS)) };
+    harness.with(setup).map_err(|error| error.to_string().into())
+}
+
+/// The sizes of targets, and those that devices and the CPU must draw. Others may be refused.
+const SIZES: [(TargetSize, Option<[u32; 2]>); 9] = [
+    (TargetSize::Divided(u32::MAX), Some([1, 1])),
+    (TargetSize::Divided(7), Some([13, 2])),
+    (TargetSize::Fixed([1, 1]), Some([1, 1])),
+    (TargetSize::Fixed([8192, 1]), Some([8192, 1])),
+    (TargetSize::Fixed([1, 8192]), Some([1, 8192])),
+    (TargetSize::Fixed([65_536, 1]), None),
+    (TargetSize::Fixed([u32::MAX, 1]), None),
+    (TargetSize::Fixed([1, u32::MAX]), None),
+    (TargetSize::Fixed([u32::MAX; 2]), None),
+];
+
+fn sizes(harness: &mut Harness) -> Result<(), Failed> {
+    let scene = squares(&Extreme { position: DVec3::ZERO, ..EXTREMES[0] })?;
+    let columns = [NUMBERS.values(&VALUES), WORDS.values(&VALUES_OF_WORDS)];
+    let frame = SceneRef { columns: &columns, ..scene.scene.as_scene_ref() };
+    for (size, must_be) in SIZES {
+        match harness_with_targets(harness, size)?.outcome(&frame)? {
+            Outcome::Drawn(drawn) => {
+                scene.compare(&drawn, SQUARES)?;
+                for target in &drawn.own_targets {
+                    let found = Some([target.width, target.height]);
+                    if must_be.is_none() || found != must_be {
+                        return Err(format!("{size:?}: {found:?}").into());
+                    }
+                }
+            }
+            Outcome::Refused(FrameError::Backend(BackendError::TargetTooLarge { target, width, height, .. }))
+                if must_be.is_none() && TargetSize::Fixed([width, height]) == size && target.contains("numbers") => {}
+            Outcome::Refused(error) => return Err(format!("{size:?}: {error}").into()),
+            Outcome::NotSubmitted(error) => return Err(format!("{size:?}: {error}").into()),
+        }
+        scene.compare(&harness.draw_whole(&scene.scene)?, SQUARES)?;
+    }
+    Ok(())
+}
+
+fn columns(harness: &mut Harness) -> Result<(), Failed> {
+    let (name, mut harness) = (harness.name(), harness_with_targets(harness, TargetSize::Picture)?);
     let touching = Extreme { name: TOUCHING, ..EXTREMES[0] };
     for extreme in EXTREMES.into_iter().chain([touching]) {
         let scene = squares(&extreme)?;

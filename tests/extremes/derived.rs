@@ -16,6 +16,7 @@ pub const CASES: &[Case] = &[
     ("mirrors_show_what_a_reflected_ray_hits", mirrors),
     ("mirrors_that_the_camera_touches_show_what_a_reflected_ray_hits", touched_mirrors),
     ("portals_show_what_a_ray_through_them_hits", portals),
+    ("portals_in_portals_show_what_a_ray_through_all_of_them_hits", portals_in_portals),
     ("portals_that_the_camera_touches_show_what_a_ray_through_them_hits", touched_portals),
     ("tiles_are_the_parts_of_the_whole_picture", tiles),
 ];
@@ -34,7 +35,7 @@ pub fn as_main(camera: Camera) -> Camera {
 }
 
 /// Right, up and forward.
-fn axes(camera: &Camera) -> [DVec3; 3] {
+pub fn axes(camera: &Camera) -> [DVec3; 3] {
     let turn = camera.orientation.as_dquat().normalize();
     [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(|axis| turn * axis)
 }
@@ -56,8 +57,9 @@ fn mirrored(camera: &Camera, plane: ClipPlane) -> View {
     View { origin, right: -view.right, near: 0.0, clip_plane: Some([on_plane, normal]), ..view }
 }
 
-/// Markers in front of the clip plane of a camera and across it, and one behind it that hides all if it is drawn. Those in front are so far
-/// apart that depth distinguishes them, by t² ÷ (180 · f · D): at 3 m 0.6 m, from 3.1 mm before the plane and with a focal length of 27.7 pixels.
+/// Markers in front of the clip plane of a camera and across it, and one behind it that hides all if it is drawn. Those
+/// in front are so far apart that depth distinguishes them, by t² ÷ (180 · f · D): at 3 m 0.6 m, from 3.1 mm before the
+/// plane and with a focal length of 27.7 pixels.
 fn markers_at_plane(seen_by: &Camera, plane: ClipPlane, scale: f64) -> Vec<Marker> {
     let [right, up, forward] = axes(seen_by);
     let normal = plane.normal.as_dvec3().normalize();
@@ -140,13 +142,18 @@ fn touched_mirrors(harness: &mut Harness) -> Result<(), Failed> {
 /// What leads out of a portal is its +Z.
 type Portal = (DVec3, Quat);
 
-/// What a ray of the camera hits that enters one portal and leaves another.
-fn through(camera: &Camera, entry: Portal, exit: Portal) -> View {
+/// How directions are turned from one portal to another.
+fn turn_through(entry: Portal, exit: Portal) -> DMat3 {
     let [of_entry, of_exit] = [entry.1, exit.1].map(|turn| DMat3::from_quat(turn.as_dquat().normalize()));
     // To the right of the entry is to the left of the exit, and into the one is out of the other.
-    let turn = of_exit * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)) * of_entry.transpose();
+    of_exit * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)) * of_entry.transpose()
+}
+
+/// What a ray of the camera hits that enters one portal and leaves another.
+fn through(camera: &Camera, entry: Portal, exit: Portal) -> View {
+    let turn = turn_through(entry, exit);
     let view = View::of(camera).turned(|direction| turn * direction);
-    let clip_plane = Some([DVec3::ZERO, of_exit.z_axis]);
+    let clip_plane = Some([DVec3::ZERO, DMat3::from_quat(exit.1.as_dquat().normalize()).z_axis]);
     View { reference: exit.0, origin: turn * (camera.position - entry.0), near: 0.0, clip_plane, ..view }
 }
 
@@ -187,6 +194,33 @@ fn portals(harness: &mut Harness) -> Result<(), Failed> {
                 check_portal(harness, name, &camera, [entry, (left, EXIT.normalize())], scale)?;
             }
         }
+    }
+    Ok(())
+}
+
+/// A camera that looks through portals many times over: each adds what it rounds.
+fn portals_in_portals(harness: &mut Harness) -> Result<(), Failed> {
+    const DEPTH: usize = 4;
+    for Extreme { name, position, scale } in EXTREMES {
+        let main = camera_at(&Extreme { name, position, scale });
+        // The exit is behind the camera, almost parallel: each portal shows the next one.
+        let entry = portal_before(&main, 0.7 * scale, [0.1, 0.05]);
+        let orientation = entry.1 * Quat::from_rotation_y(std::f32::consts::PI) * Quat::from_rotation_x(0.03);
+        let exit = (entry.0 + entry.1.as_dquat().normalize() * DVec3::Z * scale, orientation.normalize());
+        let (mut camera, mut view) = (main.clone(), View::of(&main));
+        let turn = turn_through(entry, exit);
+        for _ in 0..DEPTH {
+            let origin = turn * (view.origin + (view.reference - entry.0));
+            view = View { reference: exit.0, origin, ..view.turned(|axis| turn * axis) };
+            camera = camera.through_portal("window", entry, exit);
+        }
+        view = View { near: 0.0, clip_plane: through(&main, entry, exit).clip_plane, ..view };
+        let plane = ClipPlane { point: exit.0, normal: (exit.1.as_dquat() * DVec3::Z).as_vec3().normalize() };
+        let markers = markers_at_plane(&camera, plane, 3.0 * scale);
+        let mut scene = MarkerScene::new(as_main(camera), markers)?;
+        scene.view = Some(view);
+        // Each of the cameras is rounded: by far less than the pixel that the oracle leaves out.
+        scene.expect(harness, &format!("{name}, {DEPTH} portals deep"), 2)?;
     }
     Ok(())
 }
@@ -253,7 +287,8 @@ fn tiles(harness: &mut Harness) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Compares a tile with what rays of the whole picture hit. Returns it, and the largest bound of a corner's error, in pixels.
+/// Compares a tile with what rays of the whole picture hit. Returns it, and the largest bound of a corner's error, in
+/// pixels.
 fn draw_tile(
     harness: &mut Harness,
     column: &str,

@@ -1,4 +1,5 @@
-//! The extremes that every feature is tried at, and what is measured there: with `DRAWLOOM_ERROR_TABLE=1` the program ends with a table.
+//! The extremes that every feature is tried at, and what is measured there: with `DRAWLOOM_ERROR_TABLE=1` the program
+//! ends with a table.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -15,6 +15,7 @@ mod degenerate;
 mod derived;
 mod error_table;
 mod levels_and_pieces;
+mod lit_mirrors;
 mod moved_scenes;
 mod placement;
 mod surroundings;
@@ -55,7 +56,7 @@ fn main() {
         let lacks_adapter = backend == BackendName::Wgpu && no_adapter;
         let earlier =
             [cameras::CASES, positions::CASES, numbers::CASES, lights::CASES, counts::CASES, qualities::CASES];
-        let views = [derived::CASES, surroundings::CASES, degenerate::CASES, cascades::CASES];
+        let views = [derived::CASES, surroundings::CASES, degenerate::CASES, cascades::CASES, lit_mirrors::CASES];
         let geometry = [columns::CASES, levels_and_pieces::CASES, vertices::CASES];
         let cases = earlier.into_iter().chain(views).chain(geometry).flatten();
         for &(name, case) in cases {

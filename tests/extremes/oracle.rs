@@ -18,11 +18,12 @@ pub enum Prediction {
     Unsure,
 }
 
-/// What a picture shows, by the definition of a pinhole camera or of a parallel projection: in f64, and without a [`Camera`] where a test derives
-/// one from another.
+/// What a picture shows, by the definition of a pinhole camera or of a parallel projection: in f64, and without a
+/// [`Camera`] where a test derives one from another.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// The point in the world that everything below is relative to: near what the view shows, which may be far from the world's origin.
+    /// The point in the world that everything below is relative to: near what the view shows, which may be far from the
+    /// world's origin.
     pub reference: DVec3,
     /// Where the eye is; without perspective, the centre of the picture.
     pub origin: DVec3,
@@ -71,8 +72,8 @@ impl View {
         Self { right, up, forward, ..self }
     }
 
-    /// The origin and the direction of the ray through a point of the picture, in pixels from its upper left corner. The direction has length 1
-    /// along the axis.
+    /// The origin and the direction of the ray through a point of the picture, in pixels from its upper left corner.
+    /// The direction has length 1 along the axis.
     pub fn ray(&self, x: f64, y: f64) -> [DVec3; 2] {
         let [x, y] = [x + self.corner[0], y + self.corner[1]];
         let aside = self.right * (x / self.whole[0] * 2.0 - 1.0) + self.up * (1.0 - y / self.whole[1] * 2.0);
@@ -98,7 +99,8 @@ pub struct Oracle {
     /// Front-facing triangles: corners relative to the view's reference, and the index of the marker.
     triangles: Vec<([DVec3; 3], usize)>,
     margin: f64,
-    /// What rays hit, by the bits of their points in the picture: with a margin of a pixel, those of neighbouring pixels are the same.
+    /// What rays hit, by the bits of their points in the picture: with a margin of a pixel, those of neighbouring
+    /// pixels are the same.
     hits: RefCell<HashMap<[u64; 2], Option<usize>>>,
 }
 

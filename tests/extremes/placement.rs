@@ -15,8 +15,8 @@ use crate::harness::{BackendName, Harness};
 use crate::markers::{MarkerScene, with_context};
 use crate::oracle::View;
 
-/// Draws markers and compares the picture with what the scene's view predicts, and measures where the shader places their visible corners.
-/// Returns the largest bound of a corner's error, in pixels.
+/// Draws markers and compares the picture with what the scene's view predicts, and measures where the shader places
+/// their visible corners. Returns the largest bound of a corner's error, in pixels.
 pub fn expect_placed(
     harness: &mut Harness,
     (feature, column, context): (&'static str, &str, &str),
@@ -71,13 +71,17 @@ fn placement_errors(shader: &mut dyn VertexShader, scene: &MarkerScene, view: &V
 
 /// How far a vertex may be from its place, in pixels, for a mesh whose origin is `radius` metres from it.
 ///
-/// - The shader turns the ray of a vertex that is at least as far as that by up to 30u: see [`GpuView`](drawloom::view::GpuView).
-/// - The derived camera's quaternion is rounded, each number by u of it at most, which turns the camera by 2u; its axes are normalised.
-/// - Object and camera are rounded to steps of 2⁻³⁰ m, half a step on each axis. A derived camera's position was computed in f64, in which
-///   some three roundings move it by half a unit in the last place each.
-/// - The tangent of half the field of view, and the lens shift, are rounded to f32: by some 4u of the distance from the axis.
+/// - The shader turns the ray of a vertex that is at least as far as that by up to 30u: see
+///   [`GpuView`](drawloom::view::GpuView).
+/// - The derived camera's quaternion is rounded, each number by u of it at most, which turns the camera by 2u; its axes
+///   are normalised.
+/// - Object and camera are rounded to steps of 2⁻³⁰ m, half a step on each axis. A derived camera's position was
+///   computed in f64, in which some three roundings move it by half a unit in the last place each.
+/// - The tangent of half the field of view, and the lens shift, are rounded to f32: by some 4u of the distance from the
+///   axis.
 ///
-/// See [`pixels_per_radian`](drawloom_testing::precision::vertex::pixels_per_radian) for what an angle is in the picture.
+/// See [`pixels_per_radian`](drawloom_testing::precision::vertex::pixels_per_radian) for what an angle is in the
+/// picture.
 fn placement_bound(camera: &Camera, pixel: DVec2, offset: DVec3, radius: f64) -> f64 {
     let size = DVec2::from(camera.size.map(f64::from));
     let from_axis = pixel - size * 0.5 + camera.shift.as_dvec2() * DVec2::new(0.5, -0.5) * size;

@@ -19,8 +19,8 @@ pub const CASES: &[Case] = &[
     ("impostors_that_are_kept_displace_no_more_than_was_allowed", kept_impostors),
 ];
 
-/// For each face of a cube map, the direction of its middle, and those in which columns and rows follow each other, by the table of WebGPU; of
-/// the world, whose Z is mirrored.
+/// For each face of a cube map, the direction of its middle, and those in which columns and rows follow each other, by
+/// the table of WebGPU; of the world, whose Z is mirrored.
 const FACES: [[DVec3; 3]; 6] = [
     [DVec3::X, DVec3::Z, DVec3::NEG_Y],
     [DVec3::NEG_X, DVec3::NEG_Z, DVec3::NEG_Y],
@@ -32,8 +32,8 @@ const FACES: [[DVec3; 3]; 6] = [
 
 const SIDE: u32 = 32;
 
-/// Markers in all directions around a position: in the middle of each face, and across the edges and corners between them. They do not hide
-/// each other.
+/// Markers in all directions around a position: in the middle of each face, and across the edges and corners between
+/// them. They do not hide each other.
 fn all_around(position: DVec3, scale: f64) -> Vec<Marker> {
     let mut markers = Vec::new();
     for (index, direction) in
@@ -125,7 +125,8 @@ fn impostors(harness: &mut Harness) -> Result<(), Failed> {
 }
 
 fn far_and_near_impostors(harness: &mut Harness) -> Result<(), Failed> {
-    // Objects of a millimetre to a hundred metres, a metre to 10⁹ m away: the picture of a very far one shows more than its sphere.
+    // Objects of a millimetre to a hundred metres, a metre to 10⁹ m away: the picture of a very far one shows more than
+    // its sphere.
     for distance in [1.0, 1e3, 1e6, 1e9] {
         for radius in [1e-3, 1.0, 100.0] {
             if distance <= radius {

@@ -1,5 +1,5 @@
-//! Vertices that are not those of a mesh on the CPU: moved by a deformation, made by nodes, and in the engine's own buffers. Each looks like a
-//! mesh that has these vertices.
+//! Vertices that are not those of a mesh on the CPU: moved by a deformation, made by nodes, and in the engine's own
+//! buffers. Each looks like a mesh that has these vertices.
 
 use std::ops::Range;
 

@@ -111,7 +111,7 @@ fn large_picture() -> Result<(), Failed> {
     let mut scene = field(10);
     scene.cameras[0].size = [5000, 10];
     match renderer.record(scene.as_scene_ref()).err() {
-        Some(FrameError::Backend(BackendError::Limit { needed: 5000, .. })) => Ok(()),
+        Some(FrameError::Backend(BackendError::TargetTooLarge { width: 5000, height: 10, .. })) => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }

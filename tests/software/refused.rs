@@ -162,7 +162,9 @@ fn picture_sizes_and_camera_positions_have_limits() {
     let mut large = field(10);
     large.cameras[1].size = [16_385, 1];
     match fixture.renderer.record(large.as_scene_ref()) {
-        Err(FrameError::Backend(BackendError::Limit { allowed: 16_384, needed: 16_385, .. })) => {}
+        Err(FrameError::Backend(BackendError::TargetTooLarge {
+            allowed: 16_384, width: 16_385, height: 1, ..
+        })) => {}
         other => panic!("{:?}", other.err()),
     }
     let mut far = field(10);

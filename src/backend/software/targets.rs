@@ -189,10 +189,10 @@ impl<R: Precision> TargetCache<R> {
 
 impl<R: Precision> TiledTexture<R> {
     fn new(planned: &PlannedTarget, size: [u32; 2], layers: usize) -> Result<Self, BackendError> {
-        let (allowed, needed) = (MAX_PICTURE_SIZE, size[0].max(size[1]));
-        if needed > allowed {
-            let (allowed, needed) = (u64::from(allowed), u64::from(needed));
-            return Err(BackendError::Limit { limit: "largest width and height of a picture", allowed, needed });
+        let [width, height] = size;
+        if width.max(height) > MAX_PICTURE_SIZE {
+            let target = planned.name.clone();
+            return Err(BackendError::TargetTooLarge { target, width, height, allowed: MAX_PICTURE_SIZE });
         }
         let tiling = Tiling::new(size.map(|pixels| pixels as usize));
         let out_of_memory = || BackendError::OutOfMemory { label: format!("the target {:?}", planned.name) };

@@ -75,13 +75,14 @@ pub(super) fn new_texture(
         return Err(BackendError::MissingFeature { missing: missing.to_string() });
     }
     let limits = device.limits();
-    for (limit, allowed, needed) in [
-        ("max_texture_dimension_2d", limits.max_texture_dimension_2d, width.max(height)),
-        ("max_texture_array_layers", limits.max_texture_array_layers, layers),
-    ] {
-        if needed > allowed {
-            return Err(BackendError::Limit { limit, allowed: u64::from(allowed), needed: u64::from(needed) });
-        }
+    let allowed = limits.max_texture_dimension_2d;
+    if width.max(height) > allowed {
+        return Err(BackendError::TargetTooLarge { target: label.to_owned(), width, height, allowed });
+    }
+    let allowed = limits.max_texture_array_layers;
+    if layers > allowed {
+        let (limit, allowed, needed) = ("max_texture_array_layers", u64::from(allowed), u64::from(layers));
+        return Err(BackendError::Limit { limit, allowed, needed });
     }
     let sampled = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
     let copied = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST;
