@@ -47,7 +47,7 @@ impl ShadowScene {
             (scene.add(square(Topology::TriangleList))?, Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2));
         let material = scene.add(Material { diffuse: Vec3::ONE, double_sided: true, ..Material::default() })?;
         // A camera that touches the floor is under the square, and sees the shadow at its feet.
-        let ahead = if extreme.name == TOUCHING { -0.6 } else { 4.0 };
+        let ahead = if extreme.name == TOUCHING { -0.75 } else { 4.0 };
         let (floor, blocker, half) = (-eye * scale, (DVec3::new(0.2, 1.5, -ahead) - eye) * scale, 1.3 * scale);
         for (offset, half) in [(floor, 60.0 * scale), (blocker, half)] {
             let object = RenderObject::new(mesh, material, position + offset);

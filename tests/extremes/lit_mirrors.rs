@@ -95,7 +95,8 @@ fn lamp(harness: &mut Harness) -> Result<(), Failed> {
 
 /// Nothing fails, no pixel is NaN, and what is behind the plane is not drawn.
 fn everything_lit(harness: &mut Harness) -> Result<(), Failed> {
-    for distance in DISTANCES {
+    // Its shadow maps take long on the CPU.
+    for distance in DISTANCES.into_iter().step_by(if harness.name().is_slow() { 3 } else { 1 }) {
         let mut scene = everything();
         let camera = scene.cameras[0].clone();
         let plane = grazed_plane(&camera, distance);
