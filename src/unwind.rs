@@ -1,13 +1,44 @@
-//! Handles panics in code of the engine: jobs, hooks, clocks, and subscribers of `tracing`.
+//! The boundary to code of the engine's, which may panic: its backend, nodes, processes, hooks, destructors, clocks, and subscriber of
+//! `tracing`.
 //!
-//! A panic is caught where the engine's code is called, and becomes an error there. Where an unwind would free memory that another
-//! thread still uses, an [`AbortOnUnwind`] guards the code as well. So soundness does not depend on every call being caught.
+//! A panic is caught where the engine's code is called, and becomes an error that names the call. Behind these catches stand others around the
+//! recording of a frame, its submission, and the work of each thread on it, for a call that was forgotten. Where an unwind would free memory
+//! that another thread still uses, an [`AbortOnUnwind`] guards the code as well. So soundness does not depend on every call being caught.
+//!
+//! These are all places where such code is called. `tests/boundary` makes each of them panic in turn.
+//!
+//! | code | called in | its panic |
+//! | --- | --- | --- |
+//! | `Backend` beside a frame's jobs: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs`, and nowhere else | `FrameError::Panicked` with the call; of `replace_view`, `read_back` and `upload_picture` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` an event |
+//! | `Backend` in jobs: `upload_objects`, `prepare`, `record`, `finish` and others; `RenderProcess` and `RawPass` there | `frame/stages`, caught by `graph/execute.rs` | `FrameError::Panicked` with process, view and stage |
+//! | `Backend::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
+//! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `ProcessError::Panicked`, or `PlanError::Panicked` |
+//! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
+//! | `PostStep`, `HelperStep` | `frame/plan_cache.rs`; `frame/helper/shared.rs` | `PlanError::Panicked`; `HelperErrorReason::Panicked` |
+//! | `CpuNode`: `name`, `declare` | `frame/lent_nodes.rs` | `FrameError::Panicked` with the node |
+//! | `CpuNode` and nodes of graphs: `width`, `run` and others | `graph/execute.rs` | `RunError::Panicked` with the node |
+//! | predicates of materials | `view/object_set.rs` | `FrameError::FilterPanicked` |
+//! | what follows a submission | `frame/frame_loop.rs` | `FrameLoopError::Panicked` |
+//! | callbacks of fences | `fence/state.rs` | an event |
+//! | `DeviceProgress` | `fence/device_progress.rs` | `FenceError::Device` |
+//! | jobs, loops, scopes | `task/job.rs`, `task/worker.rs`, `task/parallel_loop.rs` | [`JobPanic`] |
+//! | background jobs, loads | `task/background_job.rs`, `scene/asset_loader.rs` | [`JobPanic`]; `LoadError` |
+//! | hooks of the scheduler's threads | `task/builder.rs`, `task/worker_thread.rs` | `SchedulerError`, or an event |
+//! | clocks | `timeline/clock.rs` | an event; the time stands still |
+//! | subscribers of `tracing` | [`emit`], [`CaughtSpan`], and nowhere else: `tests/architecture` checks that | the event or span is lost |
+//! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`] | nothing |
+
+mod caught_span;
+mod contained;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::{mem, process};
 
 use thiserror::Error;
+
+pub(crate) use self::caught_span::{CaughtSpan, EnteredSpan};
+pub(crate) use self::contained::Contained;
 
 /// A job panicked. Its scheduler works as before.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -55,6 +86,11 @@ pub(crate) fn discard<T>(value: T) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(value))) {
         mem::forget(payload);
     }
+}
+
+/// [Discards](discard) values one by one, so that a panic of one destructor does not meet that of another, which would end the process.
+pub(crate) fn discard_all<T>(values: impl IntoIterator<Item = T>) {
+    values.into_iter().for_each(discard);
 }
 
 /// Calls `event`, which sends an event to the engine's `tracing` subscriber. If the subscriber panics, the event is lost, the panic

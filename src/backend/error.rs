@@ -247,6 +247,14 @@ pub enum BackendError {
         /// The least possible one.
         least: u64,
     },
+    /// A method of the backend panicked. Where the program is built with `panic = "abort"` the program ends instead.
+    #[error("the backend's {call} panicked: {message}")]
+    Panicked {
+        /// The name of the method.
+        call: &'static str,
+        /// What the panic said.
+        message: String,
+    },
     /// Drawloom broke a rule between frame and backend. This is a bug in Drawloom.
     #[error("broken rule: {rule}")]
     BrokenRule {

@@ -3,6 +3,7 @@
 mod backend_trait;
 mod error;
 mod frame_fence;
+mod guarded_backend;
 mod kept_views;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
@@ -30,6 +31,7 @@ pub use self::wgpu::{
 pub use backend_trait::Backend;
 pub use error::BackendError;
 pub use frame_fence::FrameFence;
+pub(crate) use guarded_backend::{CallPanic, GuardedBackend, guarded};
 pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;

@@ -28,6 +28,7 @@ pub use device_progress::DeviceProgress;
 pub use error::{FenceError, FenceWait};
 pub use setter::FenceSetter;
 
+use self::device_progress::advance;
 use self::state::{FenceState, Outcome};
 pub(crate) use self::waits::list_wait;
 
@@ -85,7 +86,7 @@ impl Fence {
             && let Some(progress) = self.state.progress()
         {
             // A lost device sets nothing. Who waits is told why.
-            let _ = progress.advance(Duration::ZERO);
+            let _ = advance(progress, Duration::ZERO);
         }
         match self.state.outcome() {
             Some(Outcome::Set(time)) => Some(time),
@@ -117,7 +118,7 @@ impl Fence {
             let left = limit.saturating_sub(start.elapsed());
             let outcome = match self.state.progress() {
                 Some(progress) => {
-                    let advanced = progress.advance(left);
+                    let advanced = advance(progress, left);
                     // Another thread may be about to call back for what this one waited for.
                     let outcome = self.state.wait(left.min(CALLBACK_TIME), true);
                     if let (None, Err(message)) = (&outcome, advanced) {

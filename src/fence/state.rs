@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use parking_lot::{Condvar, Mutex};
 
 use super::device_progress::DeviceProgress;
-use crate::unwind::catch;
+use crate::unwind::{Contained, catch, emit};
 
 /// How a fence ended.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ pub(super) struct FenceState {
     /// Notified when the fence has an outcome, and when it has a device.
     changed: Condvar,
     /// The device that sets the fence, once the frame is submitted.
-    progress: OnceLock<Arc<dyn DeviceProgress>>,
+    progress: OnceLock<Contained<Arc<dyn DeviceProgress>>>,
 }
 
 #[derive(Default)]
@@ -49,7 +49,7 @@ impl FenceState {
     }
 
     pub(super) fn progress(&self) -> Option<&dyn DeviceProgress> {
-        self.progress.get().map(|progress| &**progress)
+        self.progress.get().map(|progress| &***progress)
     }
 
     /// Ends the fence, unless it has ended, and calls back.
@@ -69,7 +69,7 @@ impl FenceState {
     }
 
     pub(super) fn set_progress(&self, progress: Arc<dyn DeviceProgress>) {
-        if self.progress.set(progress).is_ok() {
+        if self.progress.set(Contained::new(progress)).is_ok() {
             // Taken so that no one who has found no device is between that and waiting.
             drop(self.current.lock());
             self.changed.notify_all();
@@ -104,7 +104,7 @@ impl FenceState {
     fn call(&self, callback: Callback, outcome: Outcome) {
         if let Err(panic) = catch(|| callback(outcome)) {
             let message = panic.message;
-            crate::unwind::emit(
+            emit(
                 || tracing::error!(target: "drawloom", fence = self.name, message, "the callback of a fence panicked"),
             );
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::plan_cache::{PlanCache, with_quality};
 use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
-use crate::backend::Backend;
+use crate::backend::{Backend, GuardedBackend};
 use crate::process::{Deferred, RenderProcess};
 use crate::quality::Quality;
 use crate::task::Scheduler;
@@ -105,8 +105,8 @@ impl<B: Backend> RendererBuilder<B> {
             (deferred, _) => deferred,
         };
         let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
-        let backend = Arc::new(self.backend);
-        let submitter = Submitter::new(Arc::clone(&backend), Arc::clone(scheduler.timeline()));
+        let backend = GuardedBackend::new(Arc::new(self.backend));
+        let submitter = Submitter::new(backend.clone(), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))
     }
 }

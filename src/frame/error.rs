@@ -1,6 +1,6 @@
 //! Errors of building a renderer, recording a frame and submitting it.
 
-use crate::backend::BackendError;
+use crate::backend::{BackendError, CallPanic};
 use crate::fence::FenceError;
 use crate::graph::{GraphProblem, NodeError, RunError};
 use crate::process::{PlanError, ProcessError};
@@ -108,11 +108,12 @@ pub enum FrameError {
         /// Why.
         source: NodeError,
     },
-    /// A stage panicked, in the code of a process, of a node, of a backend, or in Drawloom's own. Where the program is built with `panic =
-    /// "abort"` the program ends instead, as no panic can be caught.
+    /// A stage panicked, in the code of a process, of a node, of a backend, or in Drawloom's own; or a call of the backend beside the stages.
+    /// Where the program is built with `panic = "abort"` the program ends instead, as no panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
-        /// The process, the view and the stage; the stage alone where it is the whole frame's; or the name of the node.
+        /// The process, the view and the stage; the stage alone where it is the whole frame's; the name of the node; or the call, such as
+        /// "the backend's begin".
         stage: String,
         /// What the panic said.
         message: String,
@@ -164,6 +165,12 @@ impl FrameError {
             Self::Failed { source, .. } => source.downcast_ref(),
             _ => None,
         }
+    }
+}
+
+impl From<CallPanic> for FrameError {
+    fn from(CallPanic { call, message }: CallPanic) -> Self {
+        Self::Panicked { stage: format!("the backend's {call}"), message }
     }
 }
 
@@ -290,6 +297,13 @@ pub enum SubmitError {
     /// since.
     #[error("the frame was recorded by another renderer, or for another backend")]
     ForeignFrame,
+    /// The frame keeps a [view](crate::scene::Redraw) that an earlier frame was to draw, and that one was dropped, refused, or not submitted before
+    /// this one. A frame that is recorded later draws the view anew.
+    #[error("the frame shows view {view:?} as an earlier frame draws it, and that frame was not submitted")]
+    LostView {
+        /// The view.
+        view: String,
+    },
     /// A fence that it waits for was not set.
     #[error("the frame could not be submitted: {0}")]
     Fence(#[from] FenceError),
@@ -309,7 +323,7 @@ impl SubmitError {
     pub fn backend_error(&self) -> Option<&BackendError> {
         match self {
             Self::Backend(error) => Some(error),
-            Self::ForeignFrame | Self::Fence(_) | Self::Panicked { .. } => None,
+            Self::ForeignFrame | Self::LostView { .. } | Self::Fence(_) | Self::Panicked { .. } => None,
         }
     }
 }

@@ -15,11 +15,12 @@ pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
 pub use slot::FrameSlot;
 
 use self::queues::LoopQueues;
-use self::slot::{AwaitedFrame, DeviceTask, FrameQueues, Submission};
-use super::{FramePlace, Renderer, Submitter};
+use self::slot::{AfterSubmission, AwaitedFrame, DeviceTask, FrameQueues, RecordedFrame, Submission};
+use super::{FramePlace, Recorded, Renderer, Submitter};
 use crate::backend::{Backend, BackendError};
-use crate::fence::FenceError;
+use crate::fence::{Fence, FenceError};
 use crate::task::{JobPanic, catch};
+use crate::unwind::{Contained, discard, discard_all};
 
 /// Keeps a few frames in flight: it owns the device thread, which submits recorded frames, and keeps the engine from running further ahead of
 /// the device than its [`Buffering`] says (S figures 9.1 and 9.2). An engine may use it, or call [`Submitter::submit`] where it likes.
@@ -107,10 +108,11 @@ where
     /// finished since the last call, in their order. A frame that is dropped instead of submitted frees its slot.
     ///
     /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of the device, allow. A slot
-    /// that the engine holds counts as a frame in flight: to begin another frame while it holds all of them is to wait for itself.
+    /// that the engine holds counts as a frame in flight: to begin another frame while it holds all of them is to wait for itself. A thread of
+    /// the loop, which calls [what follows a submission](FrameSlot::submit_then) and callbacks of fences, never waits here.
     pub fn begin(&mut self) -> (FrameSlot<B>, Vec<FinishedFrame<B>>) {
         let start = Instant::now();
-        let finished = self.queues.take_slot();
+        let finished = self.queues.take_slot(!self.is_on_own_thread());
         let begun = Instant::now();
         self.begun += 1;
         (FrameSlot::new(Arc::clone(&self.queues), self.begun, begun, begun - start), finished)
@@ -149,17 +151,30 @@ where
 
     /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since the last
     /// [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is dropped.
+    ///
+    /// A thread of the loop cannot wait for itself: if it calls this, or drops the loop, it goes on with the frames in flight afterwards, and
+    /// nobody is told of those.
     pub fn finish(mut self) -> (Renderer<B>, Vec<FinishedFrame<B>>) {
         self.end_threads();
         let renderer = self.renderer.take().expect("nothing takes it before");
         (renderer, self.queues.take_finished())
     }
 
+    fn is_on_own_thread(&self) -> bool {
+        self.threads.iter().any(|thread| thread.thread().id() == thread::current().id())
+    }
+
     fn end_threads(&mut self) {
         self.queues.close();
+        if self.is_on_own_thread() {
+            // The other thread may wait for this one. Both end by themselves, when the frames in flight are done.
+            return self.threads.clear();
+        }
         for thread in self.threads.drain(..) {
-            // What the engine's code can panic in is caught on these threads.
-            let _ = thread.join();
+            // What the engine's code can panic in is caught on these threads, but for the destructors of thread-locals.
+            if let Err(payload) = thread.join() {
+                discard(payload);
+            }
         }
     }
 }
@@ -170,6 +185,8 @@ where
 {
     fn drop(&mut self) {
         self.end_threads();
+        discard(self.renderer.take());
+        discard_all(self.queues.take_finished());
     }
 }
 
@@ -179,27 +196,39 @@ where
     B::Submission: Send,
 {
     while let Some(task) = queues.next_task() {
-        let frame = match task {
-            DeviceTask::Submit(frame) => frame,
+        let RecordedFrame { slot, recorded, after, recorded_at } = match task {
+            DeviceTask::Submit(frame) => *frame,
             DeviceTask::ReplaceBackend(backend, timeline) => {
                 submitter = Submitter::new(backend, timeline);
                 continue;
             }
         };
-        let (slot, mut recorded, after) = (frame.slot, frame.recorded, frame.after);
         let start = Instant::now();
-        let submit = || {
-            let drawn = recorded.fence_at(FramePlace::End)?;
-            let submitted = submitter.submit(recorded)?;
-            // The device draws the frame, whatever the engine's code does.
-            let called =
-                catch(|| after(&submitted)).map_err(|JobPanic { message }| FrameLoopError::Panicked { message });
-            Ok((submitted, drawn, called))
-        };
-        let outcome = submit();
-        queues.add_awaited(AwaitedFrame { slot, recorded_at: frame.recorded_at, start, end: Instant::now(), outcome });
+        let outcome = caught(|| submit_then(&submitter, recorded, after));
+        queues.add_awaited(AwaitedFrame { slot, recorded_at, start, end: Instant::now(), outcome });
     }
     queues.end_submission();
+}
+
+/// Submits a frame, and calls what the engine does afterwards. If the submission fails, that is dropped, and not called.
+fn submit_then<B: Backend>(
+    submitter: &Submitter<B>,
+    mut recorded: Recorded<B>,
+    after: Contained<AfterSubmission<B>>,
+) -> Result<Submission<B>, FrameLoopError> {
+    let drawn = recorded.fence_at(FramePlace::End)?;
+    let submitted = submitter.submit(recorded)?;
+    // The device draws the frame, whatever the engine's code does.
+    let called = caught(|| {
+        after.into_inner()(&submitted);
+        Ok(())
+    });
+    Ok((submitted, drawn, called))
+}
+
+/// Does a part of a frame's work on a thread of the loop, where a panic would leave all frames behind this one waiting for ever.
+fn caught<R>(work: impl FnOnce() -> Result<R, FrameLoopError>) -> Result<R, FrameLoopError> {
+    catch(work).unwrap_or_else(|JobPanic { message }| Err(FrameLoopError::Panicked { message }))
 }
 
 /// The completion thread: waits until the device has drawn the frames, one after the other.
@@ -209,17 +238,24 @@ where
 {
     while let Some(AwaitedFrame { slot, recorded_at, start, end, outcome }) = queues.next_to_await() {
         let mut drawn_at = end;
-        let mut wait = |(submitted, drawn, called): Submission<B>| {
+        let mut wait = |drawn: &Fence| {
             match drawn.wait(queues.device_limit()) {
                 Err(FenceError::Device { message, .. }) => return Err(BackendError::DeviceLost { message }.into()),
                 other => other?,
             }
             drawn_at = drawn.set_at().unwrap_or(end).max(end);
-            called.map(|()| submitted)
+            Ok(())
         };
-        // A backend's code runs here, and no other frame may wait for ever because of it.
-        let outcome = outcome.and_then(|submission| {
-            catch(|| wait(submission)).unwrap_or_else(|JobPanic { message }| Err(FrameLoopError::Panicked { message }))
+        let outcome = outcome.and_then(|(submitted, drawn, called)| {
+            let waited = caught(|| wait(&drawn)).and(called);
+            // Of a frame that is reported as failed, nobody gets the submission.
+            match waited {
+                Ok(()) => Ok(submitted),
+                Err(error) => {
+                    discard(submitted);
+                    Err(error)
+                }
+            }
         });
         let times = FrameTimes {
             waited: slot.waited(),

@@ -12,6 +12,7 @@ mod cpu_node;
 mod error;
 mod frame_loop;
 mod frame_node;
+mod frame_outcome;
 mod frame_place;
 mod granularity;
 pub mod helper;

@@ -3,6 +3,7 @@
 use parking_lot::{Mutex, MutexGuard};
 
 use crate::backend::{Backend, BackendError};
+use crate::unwind::{discard, discard_all};
 
 /// What the jobs of one pass record: its parts in any order, then the finished pass. It keeps its memory from frame to frame.
 pub(super) struct PassRecording<B: Backend> {
@@ -29,7 +30,13 @@ impl<B: Backend> PassRecording<B> {
     pub(super) fn put_parts_from(&self, first: usize) -> impl FnMut(B::Part) {
         let mut index = first;
         move |part| {
-            self.parts.lock()[index] = Some(part);
+            let mut parts = self.parts.lock();
+            if index >= parts.len() {
+                drop(parts);
+                discard(part);
+                panic!("the backend emits more parts than it has");
+            }
+            discard(parts[index].replace(part));
             index += 1;
         }
     }
@@ -52,25 +59,37 @@ impl<B: Backend> PassRecording<B> {
 
     /// Keeps the memory of parts that were taken out, for the next frame.
     pub(super) fn keep_memory(&self, mut parts: Vec<B::Part>) {
-        parts.clear();
+        discard_all(parts.drain(..));
         *self.ordered_parts.lock() = parts;
     }
 
     /// Stores the finished pass.
     pub(super) fn put_finished(&self, commands: B::Commands) {
-        *self.finished.lock() = Some(commands);
+        let before = self.finished.lock().replace(commands);
+        discard(before);
     }
 
     /// Takes the finished pass, if there is one, and drops what an unfinished frame has left.
     pub(super) fn take(&mut self) -> Option<B::Commands> {
-        self.parts.get_mut().clear();
-        self.ordered_parts.get_mut().clear();
+        discard_all(self.parts.get_mut().drain(..));
+        discard_all(self.ordered_parts.get_mut().drain(..));
         self.finished.get_mut().take()
+    }
+
+    /// Drops everything. It keeps the memory.
+    pub(super) fn clear(&mut self) {
+        discard(self.take());
+    }
+}
+
+impl<B: Backend> Drop for PassRecording<B> {
+    fn drop(&mut self) {
+        self.clear();
     }
 }
 
 /// Makes `recordings` one for each pass, empty.
 pub(super) fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
     recordings.resize_with(passes, PassRecording::default);
-    recordings.iter_mut().for_each(|recording| drop(recording.take()));
+    recordings.iter_mut().for_each(PassRecording::clear);
 }

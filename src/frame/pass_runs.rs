@@ -35,13 +35,20 @@ impl PassRuns {
 
     /// Begins a frame of so many passes. `continues` says of a pass, by its index in submission order, whether it is finished together with
     /// the one before it; the first one is not, nor one that would make its run too long.
-    pub(super) fn begin_frame(&mut self, passes: usize, continues: impl Fn(usize) -> bool) {
+    ///
+    /// # Errors
+    /// Those of `continues`.
+    pub(super) fn begin_frame<E>(
+        &mut self,
+        passes: usize,
+        continues: impl Fn(usize) -> Result<bool, E>,
+    ) -> Result<(), E> {
         self.runs.clear();
         self.run_of_pass.clear();
         self.failures.get_mut().clear();
         for index in 0..passes {
             match self.runs.last_mut() {
-                Some(run) if run.passes.len() < Self::MAX_PASSES && continues(index) => {
+                Some(run) if run.passes.len() < Self::MAX_PASSES && continues(index)? => {
                     run.passes.end = index + 1;
                     *run.pending.get_mut() += 1;
                 }
@@ -49,6 +56,7 @@ impl PassRuns {
             }
             self.run_of_pass.push(self.runs.len() - 1);
         }
+        Ok(())
     }
 
     /// A pass, by index, has all of its parts. Returns the passes to finish if it is the last of its run.
@@ -73,12 +81,18 @@ impl PassRuns {
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
     use super::*;
+
+    fn begin(runs: &mut PassRuns, passes: usize, continues: impl Fn(usize) -> bool) {
+        let Ok(()) = runs.begin_frame(passes, |pass| Ok::<_, Infallible>(continues(pass)));
+    }
 
     #[test]
     fn the_last_pass_of_a_run_is_told_all_of_it() {
         let mut runs = PassRuns::default();
-        runs.begin_frame(4, |pass| pass != 2);
+        begin(&mut runs, 4, |pass| pass != 2);
         assert_eq!(runs.complete(3), None);
         assert_eq!(runs.complete(0), None);
         assert_eq!(runs.complete(1), Some(0..2));
@@ -88,7 +102,7 @@ mod tests {
     #[test]
     fn no_run_is_longer_than_the_longest() {
         let mut runs = PassRuns::default();
-        runs.begin_frame(PassRuns::MAX_PASSES + 1, |_| true);
+        begin(&mut runs, PassRuns::MAX_PASSES + 1, |_| true);
         assert_eq!(runs.complete(PassRuns::MAX_PASSES), Some(PassRuns::MAX_PASSES..PassRuns::MAX_PASSES + 1));
         let last = (0..PassRuns::MAX_PASSES).filter_map(|pass| runs.complete(pass)).collect::<Vec<_>>();
         assert_eq!((last.len(), last.first()), (1, Some(&(0..PassRuns::MAX_PASSES))));
@@ -97,9 +111,9 @@ mod tests {
     #[test]
     fn an_abandoned_frame_leaves_nothing_behind() {
         let mut runs = PassRuns::default();
-        runs.begin_frame(3, |_| true);
+        begin(&mut runs, 3, |_| true);
         assert_eq!(runs.complete(0), None);
-        runs.begin_frame(2, |_| true);
+        begin(&mut runs, 2, |_| true);
         assert_eq!(runs.complete(0), None);
         assert_eq!(runs.complete(1), Some(0..2));
     }

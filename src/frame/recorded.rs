@@ -6,13 +6,16 @@ use std::time::{Duration, Instant};
 
 use super::latched_views::LatchedViews;
 use super::view_cache::InFlight;
+use super::view_queues::ViewQueues;
 use super::{FrameError, FramePlace, FrameStatistics, LatchError, SubmitError};
-use crate::backend::{Backend, BackendError, FrameFence, ReadBack, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameFence, GuardedBackend, ReadBack, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
 use crate::scene::Camera;
 use crate::task::{JobPanic, catch};
 use crate::timeline::Timeline;
+use crate::unwind::{CaughtSpan, Contained};
+use crate::view::RenderView;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
 /// dropped without being submitted, the next frame draws all of its views, also those that it would have [cached](crate::scene::Redraw).
@@ -21,13 +24,13 @@ use crate::timeline::Timeline;
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.
-    pub(super) queues: Vec<ViewQueue<B::Commands>>,
+    pub(super) queues: ViewQueues<B::Commands>,
     /// The passes of all queues in the order of the plan.
     pub(super) submission_order: Vec<Pass>,
     pub(super) plan: Arc<FramePlan>,
-    pub(super) frame: B::Frame,
+    pub(super) frame: Contained<B::Frame>,
     pub(super) statistics: FrameStatistics,
-    pub(super) backend: Arc<B>,
+    pub(super) backend: GuardedBackend<B>,
     /// The number of its frame in the timeline, if that was on.
     pub(super) frame_number: Option<u64>,
     pub(super) in_flight: InFlight,
@@ -178,7 +181,7 @@ impl<B: Backend> Recorded<B> {
 
     /// The queue of each view.
     pub fn queues(&self) -> &[ViewQueue<B::Commands>] {
-        &self.queues
+        self.queues.as_slice()
     }
 }
 
@@ -213,7 +216,7 @@ impl Recorded<crate::backend::WgpuBackend> {
         origin: [u32; 2],
         size: [u32; 2],
     ) -> Result<crate::backend::WgpuReadBack, BackendError> {
-        self.frame.read_back(self.backend.device(), view, target, [origin, size])
+        self.frame.read_back(self.backend.unguarded().device(), view, target, [origin, size])
     }
 }
 
@@ -225,13 +228,13 @@ impl Recorded<crate::backend::WgpuBackend> {
 /// }
 /// ```
 pub struct Submitter<B> {
-    backend: Arc<B>,
+    backend: GuardedBackend<B>,
     timeline: Arc<Timeline>,
     not_send: PhantomData<*const ()>,
 }
 
 impl<B: Backend> Submitter<B> {
-    pub(super) fn new(backend: Arc<B>, timeline: Arc<Timeline>) -> Self {
+    pub(super) fn new(backend: GuardedBackend<B>, timeline: Arc<Timeline>) -> Self {
         Self { backend, timeline, not_send: PhantomData }
     }
 
@@ -243,21 +246,28 @@ impl<B: Backend> Submitter<B> {
     /// If the frame is another renderer's, or another backend's, if the device refuses it, or if a fence that it
     /// [waits for](Recorded::submit_after) is not set. If the device is lost, that is the error.
     pub fn submit(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
-        let span = tracing::debug_span!(target: "drawloom", "submit");
-        let _entered = span.enter();
-        if !Arc::ptr_eq(&self.backend, &recorded.backend) {
+        // Calls of the engine's code are caught one by one. Should one have been forgotten, the frame fails all the same.
+        let submitted = catch(|| self.submit_frame(recorded));
+        submitted.unwrap_or_else(|JobPanic { message }| Err(SubmitError::Panicked { message }))
+    }
+
+    fn submit_frame(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
+        let _span = CaughtSpan::new(|| tracing::debug_span!(target: "drawloom", "submit")).enter();
+        if !self.backend.is(&recorded.backend) {
             return Err(SubmitError::ForeignFrame);
         }
+        let missing_view = || recorded.in_flight.missing_view().and_then(|view| recorded.views.recorded().get(view));
+        let lost_view = |view: &RenderView| SubmitError::LostView { view: view.name().to_owned() };
+        missing_view().map_or(Ok(()), |view| Err(lost_view(view)))?;
         for (fence, limit) in &recorded.fences.awaited {
             fence.wait_as(*limit, || format!("the submission of {}", recorded.name()))?;
         }
         let _timeline_span = recorded.frame_number.map(|number| self.timeline.span_of(Some(number), "submit"));
         let start = Instant::now();
         let Recorded { queues, submission_order, frame, mut statistics, in_flight, fences, .. } = recorded;
-        let queues = in_submission_order(queues, &submission_order);
-        // No scheduler would catch a panic of this thread.
-        let submission = catch(|| self.backend.submit(frame, queues, fences.set))
-            .map_err(|JobPanic { message }| SubmitError::Panicked { message })??;
+        let queues = queues.in_submission_order(&submission_order);
+        let submission = self.backend.submit(frame.into_inner(), queues, fences.set);
+        let submission = submission.map_err(|panic| SubmitError::Panicked { message: panic.message })??;
         in_flight.submitted();
         statistics.stages.submit = start.elapsed();
         Ok(Submitted { submission, statistics })
@@ -265,31 +275,18 @@ impl<B: Backend> Submitter<B> {
 
     /// The backend.
     pub fn backend(&self) -> &B {
-        &self.backend
+        self.backend.unguarded()
     }
 
     /// Whether it submits to this backend.
     pub(super) fn submits_to(&self, backend: &B) -> bool {
-        std::ptr::eq(&raw const *self.backend, backend)
+        std::ptr::eq(Arc::as_ptr(self.backend.unguarded()), backend)
     }
 
     /// What a submitter on another thread is made of, in place of this one.
-    pub(super) fn into_parts(self) -> (Arc<B>, Arc<Timeline>) {
+    pub(super) fn into_parts(self) -> (GuardedBackend<B>, Arc<Timeline>) {
         (self.backend, self.timeline)
     }
-}
-
-/// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes
-/// alternate with those of other views.
-fn in_submission_order<T>(mut queues: Vec<ViewQueue<T>>, order: &[Pass]) -> Vec<ViewQueue<T>> {
-    let passes_by_view = order.chunk_by(|one, next| one.view_index == next.view_index);
-    let take = |passes: &[Pass]| {
-        let view = passes[0].view_index;
-        // A whole queue is moved, not copied: nothing is left to split off.
-        let later = queues[view].passes.split_off(passes.len());
-        ViewQueue { view, passes: std::mem::replace(&mut queues[view].passes, later) }
-    };
-    passes_by_view.map(take).collect()
 }
 
 /// A frame that was submitted.

@@ -25,13 +25,14 @@ use super::view_queues::view_queues;
 use super::views::FrameViews;
 use super::warnings::Warnings;
 use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
-use crate::backend::{Backend, FrameRequest};
+use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
+use crate::unwind::{CaughtSpan, emit};
 use crate::view::{RenderView, possible_draw_states};
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
@@ -64,7 +65,7 @@ use crate::view::{RenderView, possible_draw_states};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Renderer<B: Backend> {
-    backend: Arc<B>,
+    backend: GuardedBackend<B>,
     plans: PlanCache,
     granularity: Granularity,
     instancing: bool,
@@ -84,12 +85,14 @@ pub struct Renderer<B: Backend> {
     warnings: Warnings,
     column_check: ColumnCheck,
     /// The latest job of the backend, if there was any.
-    background_work: Option<BackgroundJob<()>>,
+    background_work: Option<BackgroundJob<Result<(), CallPanic>>>,
+    /// Whether the histories of the next frame are empty.
+    forgets_histories: bool,
 }
 
 impl<B: Backend> Renderer<B> {
     pub(super) fn new(
-        backend: Arc<B>,
+        backend: GuardedBackend<B>,
         plans: PlanCache,
         granularity: Granularity,
         instancing: bool,
@@ -114,6 +117,7 @@ impl<B: Backend> Renderer<B> {
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
             background_work: None,
+            forgets_histories: false,
         }
     }
 
@@ -146,18 +150,30 @@ impl<B: Backend> Renderer<B> {
         transparency: bool,
     ) -> Result<Recorded<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
-        let recorded = self.record_frame(scene, nodes, choices, transparency);
+        // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned all the same.
+        let recorded = catch(|| {
+            let recorded = self.record_frame(scene, nodes, choices, transparency)?;
+            self.start_background_work()?;
+            Ok(recorded)
+        });
+        let recorded = recorded.unwrap_or_else(|JobPanic { message }| {
+            Err(FrameError::Panicked { stage: String::from("the recording of the frame"), message })
+        });
         match recorded {
-            Ok(_) => {
-                self.tables.end_frame();
-                self.start_background_work();
-            }
-            Err(_) => {
-                self.tables.abandon_frame();
-                self.backend.discard_frame();
-            }
+            Ok(_) => self.tables.end_frame(),
+            Err(_) => self.abandon_frame(),
         }
         recorded
+    }
+
+    /// Ends a frame that failed, at whatever point: the next one relies on nothing that this one was told or has derived.
+    fn abandon_frame(&mut self) {
+        self.tables.abandon_frame();
+        self.graphs.discard_costs();
+        self.recordings.iter_mut().for_each(PassRecording::clear);
+        if let Err(CallPanic { call, message }) = self.backend.discard_frame() {
+            emit(|| tracing::error!(target: "drawloom", message, "the backend's {call} panicked"));
+        }
     }
 
     /// Makes the next frame be drawn as if it were the first: [histories](crate::process::Declare::samples_previous) are empty, every view is
@@ -166,7 +182,7 @@ impl<B: Backend> Renderer<B> {
     pub fn forget_previous_frames(&mut self) {
         self.view_cache = ViewCache::default();
         self.tables.levels.clear();
-        self.backend.forget_histories();
+        self.forgets_histories = true;
     }
 
     /// Adds choices that the engine made by measured cost for the next frame, such as those of a
@@ -229,28 +245,35 @@ impl<B: Backend> Renderer<B> {
             };
             states_of_plans.push(plan.draws()?.iter().map(states_of).collect::<Vec<_>>());
         }
-        let (backend, quality) = (Arc::clone(&self.backend), self.quality);
+        let (backend, quality) = (self.backend.clone(), self.quality);
         Ok(move || {
             for (plan, states) in plans.iter().zip(&states_of_plans) {
                 let draws = plan.draws()?;
-                catch_panics("prepare pipelines", || backend.prepare_pipelines(plan, &draws, states, &quality))??;
+                backend.prepare_pipelines(plan, &draws, states, &quality)??;
             }
             Ok(())
         })
     }
 
     /// Starts a job for what the backend does between frames, if there is something and the last one has ended.
-    fn start_background_work(&mut self) {
-        if !self.backend.has_background_work() {
-            return;
+    ///
+    /// # Errors
+    /// If the backend panics, in the job of an earlier frame too.
+    fn start_background_work(&mut self) -> Result<(), FrameError> {
+        if !self.backend.has_background_work()? {
+            return Ok(());
         }
         if self.scheduler.workers() == 1 {
-            return self.backend.work_in_background();
+            return Ok(self.backend.work_in_background()?);
         }
-        if self.background_work.as_ref().is_none_or(BackgroundJob::is_finished) {
-            let backend = Arc::clone(&self.backend);
+        if let Some(ended) = self.background_work.take_if(|job| job.is_finished()) {
+            ended.wait()??;
+        }
+        if self.background_work.is_none() {
+            let backend = self.backend.clone();
             self.background_work = Some(self.scheduler.background(move || backend.work_in_background()));
         }
+        Ok(())
     }
 
     fn record_frame(
@@ -262,8 +285,12 @@ impl<B: Backend> Renderer<B> {
     ) -> Result<Recorded<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
-        let span = tracing::debug_span!(target: "drawloom", "record", objects = scene.object_count());
-        let _entered = span.enter();
+        let objects = scene.object_count();
+        let _span = CaughtSpan::new(|| tracing::debug_span!(target: "drawloom", "record", objects)).enter();
+        if self.forgets_histories {
+            self.backend.forget_histories()?;
+            self.forgets_histories = false;
+        }
         check_scene(scene)?;
 
         // Scene → views: one for each camera, and one for each shadow map.
@@ -276,7 +303,7 @@ impl<B: Backend> Renderer<B> {
         let interval = self.quality.shadows.interval;
         let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
-        let FrameViews { views, lights, arrays } = self.view_cache.resolve(&plan, requested, is_imported);
+        let FrameViews { views, lights, arrays } = self.view_cache.resolve(&plan, requested, is_imported)?;
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
@@ -314,11 +341,11 @@ impl<B: Backend> Renderer<B> {
             quality: &self.quality,
             rejections: self.tables.objects.rejections(),
         };
-        let uploaded_before = self.backend.uploaded_bytes();
-        let begin = || catch_panics("begin", || self.backend.begin(&request));
-        let frame = clock.measure(StageGroup::Record, begin).0??;
+        let uploaded_before = self.backend.uploaded_bytes()?;
+        let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0??;
         reset_recordings(&mut self.recordings, request.passes.len());
-        self.pass_runs.begin_frame(request.passes.len(), |pass| self.backend.continues_previous_pass(&frame, pass));
+        let continues = |pass| self.backend.continues_previous_pass(&frame, pass);
+        self.pass_runs.begin_frame(request.passes.len(), continues)?;
 
         // Objects → visibility → fill → sort → instance → record, on all workers: `stages.rs` lists the stages.
         let context = FrameContext {
@@ -326,7 +353,7 @@ impl<B: Backend> Renderer<B> {
             tables: &self.tables,
             granularity: self.granularity,
             instancing: self.instancing,
-            backend: &*self.backend,
+            backend: &**self.backend.unguarded(),
             backend_frame: &frame,
             recordings: &self.recordings,
             pass_runs: &self.pass_runs,
@@ -339,7 +366,6 @@ impl<B: Backend> Renderer<B> {
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
         };
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
-            graph.tuning.costs.discard_frame();
             return Err(error_of_pass(error, graph, self.pass_runs.failures(), &views).into());
         }
         if cfg!(debug_assertions) {
@@ -348,12 +374,9 @@ impl<B: Backend> Renderer<B> {
             columns.extend(draws.iter().filter_map(Draws::order_column));
             let unreported = objects.unreported_change(scene).map(|object| SceneError::UnreportedChange { object });
             let in_columns = self.column_check.check(scene, &columns, objects);
-            if let Err(error) = unreported.map_or(in_columns, Err) {
-                graph.tuning.costs.discard_frame();
-                return Err(error.into());
-            }
+            unreported.map_or(in_columns, Err)?;
         }
-        let mut tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &*self.backend, &frame);
+        let mut tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &self.backend, &frame)?;
         choices.append(&mut tuning.choices);
         tuning.choices = choices;
         self.scheduler.timeline().add_tuning(frame_number, &tuning);
@@ -361,10 +384,10 @@ impl<B: Backend> Renderer<B> {
         nodes.declarations.check_filled()?;
         // Record → per-camera queues, for the submitter.
         let queues = view_queues(&request, &mut self.recordings)?;
-        let uploaded = self.backend.uploaded_bytes().saturating_sub(uploaded_before);
+        let uploaded = self.backend.uploaded_bytes()?.saturating_sub(uploaded_before);
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
-        self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value));
-        let memory = (uploaded, self.backend.target_memory(&frame));
+        self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value))?;
+        let memory = (uploaded, self.backend.target_memory(&frame)?);
         let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
         statistics.count_pieces(self.scheduler.timeline());
         self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
@@ -374,7 +397,7 @@ impl<B: Backend> Renderer<B> {
         let views = Arc::new(FrameViews { views, lights, arrays });
         let in_flight = self.view_cache.store(&plan, &views);
         let views = LatchedViews::new(views, &self.tables.lights, scene.ambient);
-        let backend = Arc::clone(&self.backend);
+        let backend = self.backend.clone();
         let fences = FrameFences::default();
         let recorded = Recorded {
             queues,
@@ -392,9 +415,8 @@ impl<B: Backend> Renderer<B> {
     }
 
     /// Puts a backend in the place of the one before, and drops what belongs to that one.
-    pub(super) fn set_backend(&mut self, backend: Arc<B>) {
+    pub(super) fn set_backend(&mut self, backend: GuardedBackend<B>) {
         self.backend = backend;
-        // A frame that failed may have left commands of its device.
         self.recordings.clear();
         self.view_cache.forget_frames_in_flight();
     }
@@ -471,18 +493,10 @@ impl<B: Backend> Renderer<B> {
 
     /// The backend.
     pub fn backend(&self) -> &B {
-        &self.backend
+        self.backend.unguarded()
     }
 
-    pub(super) fn shared_backend(&self) -> &Arc<B> {
+    pub(super) fn guarded_backend(&self) -> &GuardedBackend<B> {
         &self.backend
     }
-}
-
-/// Calls a backend on a thread whose panics no scheduler catches.
-///
-/// # Errors
-/// If it panics.
-fn catch_panics<R>(stage: &str, call: impl FnOnce() -> R) -> Result<R, FrameError> {
-    catch(call).map_err(|JobPanic { message }| FrameError::Panicked { stage: stage.to_owned(), message })
 }

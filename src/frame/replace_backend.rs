@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Renderer, Submitter};
-use crate::backend::Backend;
+use crate::backend::{Backend, GuardedBackend};
 
 impl<B: Backend> Renderer<B> {
     /// Puts another backend in the place of this one, from the next frame on: one on a new device, after the device was lost. The renderer
@@ -54,8 +54,8 @@ impl<B: Backend> Renderer<B> {
     /// }
     /// ```
     pub fn replace_backend(&mut self, backend: B) -> Submitter<B> {
-        let backend = Arc::new(backend);
-        self.set_backend(Arc::clone(&backend));
+        let backend = GuardedBackend::new(Arc::new(backend));
+        self.set_backend(backend.clone());
         Submitter::new(backend, Arc::clone(self.scheduler().timeline()))
     }
 }

@@ -52,6 +52,13 @@ impl<B: Backend> StageGraphCache<B> {
         Ok(&mut self.latest_first[0])
     }
 
+    /// Discards what was measured in a frame that failed.
+    pub(super) fn discard_costs(&mut self) {
+        if let Some(graph) = self.latest_first.first_mut() {
+            graph.tuning.costs.discard_frame();
+        }
+    }
+
     /// The graph of the latest frame; `None` before the first one.
     pub(super) fn latest(&self) -> Option<&StageGraph<B>> {
         self.latest_first.first()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::cost_model::CostModel;
 use super::occlusion_control::{OcclusionControl, occlusion_choices, update_occlusion};
 use super::tables::FrameTables;
-use crate::backend::Backend;
+use crate::backend::{Backend, CallPanic, GuardedBackend};
 use crate::graph::ModeChoice;
 use crate::process::{FramePlan, Pass};
 use crate::timeline::{FrameTuning, Labels, TuningAlternative, TuningChoice, TuningSubject};
@@ -50,21 +50,26 @@ impl StageTuning {
     }
 
     /// What was chosen for the frame that has run. Chooses for the next frame by what was measured.
+    ///
+    /// # Errors
+    /// If the backend panics.
     pub(super) fn update<B: Backend>(
         &mut self,
         run_mode: Option<ModeChoice>,
         tables: &FrameTables,
-        backend: &B,
+        backend: &GuardedBackend<B>,
         frame: &B::Frame,
-    ) -> FrameTuning {
+    ) -> Result<FrameTuning, CallPanic> {
         let occlusion = occlusion_choices(&self.occlusion, tables, &self.labels.views);
-        let recording = |(pass, labels)| backend.recording_choice(frame, pass, labels);
-        let recording = self.labels.passes.iter().enumerate().filter_map(recording);
+        let mut recording = Vec::new();
+        for (pass, labels) in self.labels.passes.iter().enumerate() {
+            recording.extend(backend.recording_choice(frame, pass, labels)?);
+        }
         let choices = run_mode.map(run_mode_choice).into_iter().chain(occlusion).chain(recording).collect();
         let job_sizes = self.costs.take_sizes(&self.labels.nodes).collect();
         update_occlusion(&mut self.occlusion, tables);
         self.costs.update();
-        FrameTuning { choices, job_sizes }
+        Ok(FrameTuning { choices, job_sizes })
     }
 }
 

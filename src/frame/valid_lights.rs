@@ -1,6 +1,7 @@
 //! The lights of a scene that can be drawn.
 
 use crate::scene::{Light, SceneRef};
+use crate::unwind::emit;
 use crate::view::{FixedPosition, RejectionReason, Rejections};
 
 /// The lights of a scene that can be drawn, in the scene's order, each with its range cut off: see
@@ -18,7 +19,7 @@ impl ValidLights {
         let mut valid = Self { lights: Vec::with_capacity(capacity), scene_indices: Vec::with_capacity(capacity) };
         for (index, light) in scene.lights.iter().enumerate() {
             if let Err(error) = light.check(index) {
-                tracing::debug!(target: "drawloom", %error, "light left out");
+                emit(|| tracing::debug!(target: "drawloom", %error, "light left out"));
                 rejections.count(RejectionReason::InvalidLight, index);
             } else if light.bounding_sphere().is_some_and(|(position, _)| FixedPosition::new(position).is_none()) {
                 rejections.count(RejectionReason::LightOutOfReach, index);

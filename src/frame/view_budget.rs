@@ -32,6 +32,7 @@ use crate::backend::DevicePassTimes;
 use crate::scene::Camera;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::tuning::{Estimate, Filter, Hysteresis};
+use crate::unwind::emit;
 
 /// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best again when there is
 /// room (M 10.4: reflections are left out on slow hardware).
@@ -256,7 +257,8 @@ impl ViewBudget {
     pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
         self.incomplete = continued(self.incomplete, times.skipped > 0);
         if self.incomplete == WARNING_FRAMES {
-            tracing::warn!(target: "drawloom", "the device's times lack passes, so that a view budget learns nothing of them");
+            let message = "the device's times lack passes, so that a view budget learns nothing of them";
+            emit(|| tracing::warn!(target: "drawloom", "{message}"));
         }
         if self.incomplete > 0 {
             return;
@@ -308,10 +310,9 @@ impl ViewBudget {
         let is_missing = with_ladder().count() > 0 && !with_ladder().any(|view| rungs.contains_key(view.name()));
         self.without_rungs = continued(self.without_rungs, is_missing);
         if self.without_rungs == WARNING_FRAMES {
-            tracing::warn!(
-                target: "drawloom",
-                "frames report no rung of a view budget: give ViewBudget::choices to Renderer::add_choices before each"
-            );
+            let message =
+                "frames report no rung of a view budget: give ViewBudget::choices to Renderer::add_choices before each";
+            emit(|| tracing::warn!(target: "drawloom", "{message}"));
         }
     }
 

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::frame_outcome::FrameOutcome;
 use super::light_maps::{covers, have_same_maps, with_brightness_of};
 use super::views::FrameViews;
 use crate::backend::{KeptView, kept_views};
@@ -18,6 +19,8 @@ pub(super) struct ViewCache {
     latest: Option<DrawnViews>,
     /// Whether a recorded frame was dropped before it was submitted, so that its views were never drawn.
     lost: Arc<AtomicBool>,
+    /// By view of the frame that is being recorded: the earlier frame that draws it, if it is cached.
+    kept_from: Vec<Option<Arc<FrameOutcome>>>,
     /// The number of frames so far.
     frames: u64,
 }
@@ -27,11 +30,16 @@ struct DrawnViews {
     /// The plan's identity.
     plan: u64,
     views: Arc<FrameViews>,
+    /// By view: the frame that draws it.
+    drawn_by: Vec<Arc<FrameOutcome>>,
 }
 
 /// A recorded frame that is not submitted yet. If it is dropped, the views that it draws are lost.
 pub(super) struct InFlight {
-    lost: Option<Arc<AtomicBool>>,
+    /// `None` once it is submitted, and where no later frame keeps its views.
+    frame: Option<(Arc<FrameOutcome>, Arc<AtomicBool>)>,
+    /// The views that it keeps, by index, each with the frame that draws it.
+    kept: Vec<(usize, Arc<FrameOutcome>)>,
 }
 
 impl ViewCache {
@@ -39,25 +47,29 @@ impl ViewCache {
     /// because the map is valid only with that one. The brightness of a light is always the requested one.
     ///
     /// `is_imported` says whether the frame draws a view of this name into a texture of the engine's own.
-    pub(super) fn resolve(
+    ///
+    /// # Errors
+    /// Those of `is_imported`.
+    pub(super) fn resolve<E>(
         &mut self,
         plan: &FramePlan,
         mut requested: FrameViews,
-        is_imported: impl Fn(&str) -> bool,
-    ) -> FrameViews {
+        is_imported: impl Fn(&str) -> Result<bool, E>,
+    ) -> Result<FrameViews, E> {
         let latest = self.latest.take().filter(|latest| latest.plan == plan.identity());
         let was_lost = self.lost.swap(false, Ordering::Relaxed);
         let mut turns = Turns { frame: self.frames, counts: Vec::new(), latest_light: None };
         self.frames += 1;
         for view in requested.views.iter_mut().filter(|view| !view.camera.redraw.is_every_frame()) {
             // The texture is only one frame's.
-            if is_imported(view.name()) {
+            if is_imported(view.name())? {
                 view.camera.redraw = Redraw::EveryFrame;
             }
         }
-        let Some(DrawnViews { views: drawn, .. }) = latest.filter(|_| !was_lost && requested.may_be_cached()) else {
-            return requested;
-        };
+        self.kept_from.clear();
+        self.kept_from.resize(requested.views.len(), None);
+        let latest = latest.filter(|_| !was_lost && requested.may_be_cached());
+        let Some(DrawnViews { views: drawn, drawn_by, .. }) = latest else { return Ok(requested) };
         let keeps_layers = kinds_with_same_layers(plan, &drawn.views, &requested.views);
         let keeps_light_maps = have_same_maps(&drawn, &requested);
         let names = drawn.views.iter().map(|view| (view.kind(), view.name()));
@@ -80,7 +92,8 @@ impl ViewCache {
             let keeps_targets = !before.camera.redraw.is_every_frame()
                 && before.camera.size == view.camera.size
                 && keeps_layers[view.kind() as usize]
-                && !loses_layer.contains(&index);
+                && !loses_layer.contains(&index)
+                && !drawn_by[kept].is_lost();
             let is_light_map = view.valid_light.is_some();
             let is_valid = !is_light_map || keeps_light_maps && covers(before, view);
             cached.push((!is_needed && keeps_targets && is_valid).then_some(kept));
@@ -88,7 +101,7 @@ impl ViewCache {
         // The maps of a light are drawn together: where faces or cascades meet, different ages would show.
         let is_drawn = |(view, cached): (&RenderView, &Option<usize>)| view.valid_light.filter(|_| cached.is_none());
         let drawn_lights: HashSet<usize> = views.iter().zip(&cached).filter_map(is_drawn).collect();
-        for (view, cached) in views.iter_mut().zip(cached) {
+        for ((view, cached), kept_from) in views.iter_mut().zip(cached).zip(&mut self.kept_from) {
             let Some(index) = cached.filter(|_| !view.valid_light.is_some_and(|light| drawn_lights.contains(&light)))
             else {
                 continue;
@@ -100,14 +113,25 @@ impl ViewCache {
             let camera = Camera { redraw: view.camera.redraw, ..before.camera.clone() };
             let (valid_light, layer, age) = (view.valid_light, view.layer, before.age.saturating_add(1));
             *view = RenderView { camera, frustum: before.frustum.clone(), valid_light, layer, age };
+            *kept_from = Some(Arc::clone(&drawn_by[index]));
         }
-        requested
+        Ok(requested)
     }
 
     /// Stores the views of a frame that was recorded.
     pub(super) fn store(&mut self, plan: &FramePlan, views: &Arc<FrameViews>) -> InFlight {
-        self.latest = views.may_be_cached().then(|| DrawnViews { plan: plan.identity(), views: Arc::clone(views) });
-        InFlight { lost: self.latest.is_some().then(|| Arc::clone(&self.lost)) }
+        if !views.may_be_cached() {
+            self.latest = None;
+            return InFlight { frame: None, kept: Vec::new() };
+        }
+        let frame = Arc::new(FrameOutcome::in_flight(self.kept_from.iter().flatten()));
+        let drawn_by = |kept: &Option<Arc<FrameOutcome>>| kept.clone().unwrap_or_else(|| Arc::clone(&frame));
+        let drawn_by = self.kept_from.iter().map(drawn_by).collect();
+        self.latest = Some(DrawnViews { plan: plan.identity(), views: Arc::clone(views), drawn_by });
+        let kept = self.kept_from.drain(..).enumerate();
+        let kept = kept.filter_map(|(view, frame)| Some((view, frame.filter(|frame| !frame.is_submitted())?)));
+        let kept = kept.collect();
+        InFlight { frame: Some((frame, Arc::clone(&self.lost))), kept }
     }
 
     /// Makes the next frame draw all of its views.
@@ -122,15 +146,23 @@ impl ViewCache {
 }
 
 impl InFlight {
+    /// A view, by index, that the frame keeps although the frame that was to draw it is not submitted.
+    pub(super) fn missing_view(&self) -> Option<usize> {
+        self.kept.iter().find(|(_, frame)| !frame.is_submitted()).map(|(view, _)| *view)
+    }
+
     /// The frame was submitted.
     pub(super) fn submitted(mut self) {
-        self.lost = None;
+        if let Some((frame, _)) = self.frame.take() {
+            frame.submit();
+        }
     }
 }
 
 impl Drop for InFlight {
     fn drop(&mut self) {
-        if let Some(lost) = &self.lost {
+        if let Some((frame, lost)) = &self.frame {
+            frame.lose();
             lost.store(true, Ordering::Relaxed);
         }
     }

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "wgpu")]
 use crate::process::{Draws, FramePlan, RequestLog};
+use crate::unwind::emit;
 use crate::view::{Rejection, RejectionReason};
 
 /// What warnings were about: each is reported when it changes, not in every frame.
@@ -33,7 +34,7 @@ impl Warnings {
                 continue;
             }
             let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-            tracing::warn!(target: "drawloom", count, first, "not drawn as requested: {reason}");
+            emit(|| tracing::warn!(target: "drawloom", count, first, "not drawn as requested: {reason}"));
         }
         let before = self.reported.iter().copied().find(|known| is_partial(known.reason));
         self.reported.clear();
@@ -60,11 +61,13 @@ impl Warnings {
                 }
                 if !is_requested {
                     let ((process, resource), frames) = (&declared, RequestLog::OBSERVED_FRAMES);
-                    tracing::warn!(
-                        target: "drawloom",
-                        %process,
-                        "declares {resource}, which its raw pass has not asked for in {frames} frames"
-                    );
+                    emit(|| {
+                        tracing::warn!(
+                            target: "drawloom",
+                            %process,
+                            "declares {resource}, which its raw pass has not asked for in {frames} frames"
+                        );
+                    });
                 }
                 self.observed.push(declared);
             }

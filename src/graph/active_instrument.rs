@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use tracing::level_filters::{LevelFilter, STATIC_MAX_LEVEL};
-use tracing::span::EnteredSpan;
 use tracing::{Level, Span};
 
 use super::instrument::{Instrument, NodeSpan};
@@ -12,6 +11,7 @@ use super::shared_span::{Opened, SharedSpan};
 use crate::sync::{AtomicUsize, Ordering};
 use crate::task::Worker;
 use crate::timeline::{ChunkTimer, Graph, NodeInfo, OpenRun, RunEnd};
+use crate::unwind::{CaughtSpan, EnteredSpan, emit};
 
 /// The target of all spans and events of runs.
 const TARGET: &str = "drawloom::graph";
@@ -26,7 +26,7 @@ pub(super) struct ActiveInstrument<'run> {
 struct Tracing<'run> {
     graph: &'run Graph,
     /// The span in which the run was started.
-    parent: Span,
+    parent: CaughtSpan,
     /// Whether subscribers want chunks and counters, too.
     is_detailed: bool,
     /// How many nodes are ready and not yet open.
@@ -49,11 +49,10 @@ impl<'run> ActiveInstrument<'run> {
         let (graph, level) = (graph?, level());
         let tracing = (level >= Level::DEBUG).then(|| Tracing {
             graph,
-            parent: Span::current(),
+            parent: CaughtSpan::new(Span::current),
             is_detailed: level >= Level::TRACE,
             ready: AtomicUsize::new(0),
         });
-        // Last, because a subscriber may panic, and a run that was opened in the timeline must be ended.
         let timeline = worker.timeline().open_run(worker.is_in_background(), || Arc::clone(graph));
         // Builds with this flag have no instrumentation; the cost of instrumentation is measured against them.
         let is_active = (timeline.is_some() || tracing.is_some()) && !cfg!(drawloom_without_timeline);
@@ -65,11 +64,13 @@ impl<'run> ActiveInstrument<'run> {
     }
 
     /// The tracing span of a node.
-    fn tracing_span(&self, node: u32) -> Span {
-        let Some(tracing) = &self.tracing else { return Span::none() };
+    fn tracing_span(&self, node: u32) -> CaughtSpan {
+        let Some(tracing) = &self.tracing else { return CaughtSpan::none() };
         let NodeInfo { name, labels, .. } = &tracing.graph.nodes[node as usize];
         let [process, stage, view] = [&labels.process, &labels.stage, &labels.view].map(Option::as_deref);
-        tracing::debug_span!(target: TARGET, parent: &tracing.parent, "node", name, process, stage, view)
+        CaughtSpan::new(
+            || tracing::debug_span!(target: TARGET, parent: tracing.parent.id(), "node", name, process, stage, view),
+        )
     }
 }
 
@@ -81,18 +82,18 @@ impl Instrument for ActiveInstrument<'_> {
 
     fn open(&self, worker: &Worker, node: u32) -> ActiveSpan<'_> {
         let timer = self.timeline.as_ref().map(|run| run.open(worker.index(), node, worker.has_stolen()));
-        ActiveSpan { instrument: self, timer, tracing: self.tracing_span(node).entered() }
+        ActiveSpan { instrument: self, timer, tracing: self.tracing_span(node).enter() }
     }
 
     fn join(&self, worker: &Worker, node: u32, shared: &SharedSpan) -> ActiveSpan<'_> {
         let Opened { at, span } = shared.get();
         let timer = self.timeline.as_ref().map(|run| run.join(worker.index(), node, worker.has_stolen(), at));
-        ActiveSpan { instrument: self, timer, tracing: span.entered() }
+        ActiveSpan { instrument: self, timer, tracing: span.enter() }
     }
 
     fn start_serial(&self, worker: &Worker) -> ActiveSpan<'_> {
         let timer = self.timeline.as_ref().map(|run| run.open(worker.index(), 0, false));
-        ActiveSpan { instrument: self, timer, tracing: Span::none().entered() }
+        ActiveSpan { instrument: self, timer, tracing: CaughtSpan::none().enter() }
     }
 
     fn close(&self, shared: &SharedSpan) {
@@ -109,7 +110,7 @@ impl Instrument for ActiveInstrument<'_> {
     fn count_taken(&self, worker: &Worker) {
         if let Some(tracing) = self.detailed_tracing() {
             let ready = tracing.ready.fetch_sub(1, Ordering::Relaxed).saturating_sub(1);
-            tracing::trace!(name: "taken", target: TARGET, ready, queued = worker.queued());
+            emit(|| tracing::trace!(name: "taken", target: TARGET, ready, queued = worker.queued()));
         }
     }
 
@@ -141,7 +142,7 @@ impl NodeSpan for ActiveSpan<'_> {
     fn chunk<R>(&mut self, items: Range<usize>, run: impl FnOnce(Range<usize>) -> R) -> R {
         let span = self.instrument.detailed_tracing().map(|_| {
             let (start, end) = (items.start, items.end);
-            tracing::trace_span!(target: TARGET, "chunk", start, end).entered()
+            CaughtSpan::new(|| tracing::trace_span!(target: TARGET, "chunk", start, end)).enter()
         });
         let result = run(items.clone());
         drop(span);
@@ -160,8 +161,8 @@ impl NodeSpan for ActiveSpan<'_> {
     fn switch_to(&mut self, node: u32) {
         if self.instrument.tracing.is_some() {
             // Exit the old span before entering the new one.
-            self.tracing = Span::none().entered();
-            self.tracing = self.instrument.tracing_span(node).entered();
+            self.tracing = CaughtSpan::none().enter();
+            self.tracing = self.instrument.tracing_span(node).enter();
         }
         if let Some(timer) = &mut self.timer {
             timer.switch_to(node);

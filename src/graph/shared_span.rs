@@ -2,9 +2,8 @@
 
 use std::mem;
 
-use tracing::Span;
-
 use crate::sync::Mutex;
+use crate::unwind::CaughtSpan;
 
 /// What the worker that opens a node hands to those that join it. Only used if the run is instrumented.
 pub(super) struct SharedSpan(Mutex<Opened>);
@@ -14,16 +13,18 @@ pub(super) struct SharedSpan(Mutex<Opened>);
 pub(super) struct Opened {
     /// A timestamp of the timeline's clock.
     pub(super) at: u64,
-    pub(super) span: Span,
+    pub(super) span: CaughtSpan,
 }
 
 impl SharedSpan {
     pub(super) fn new() -> Self {
-        Self(Mutex::new(Opened { at: 0, span: Span::none() }))
+        Self(Mutex::new(Opened { at: 0, span: CaughtSpan::none() }))
     }
 
     pub(super) fn set(&self, opened: Opened) {
-        *self.0.lock() = opened;
+        let before = mem::replace(&mut *self.0.lock(), opened);
+        // Not while it is locked, as this may call the subscriber.
+        drop(before);
     }
 
     pub(super) fn get(&self) -> Opened {
@@ -31,7 +32,7 @@ impl SharedSpan {
     }
 
     /// Takes the tracing span out. It closes when it is dropped, if all workers have left it.
-    pub(super) fn take(&self) -> Span {
-        mem::replace(&mut self.0.lock().span, Span::none())
+    pub(super) fn take(&self) -> CaughtSpan {
+        mem::replace(&mut self.0.lock().span, CaughtSpan::none())
     }
 }

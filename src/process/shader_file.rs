@@ -8,6 +8,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 use parking_lot::Mutex;
 
+use crate::unwind::emit;
+
 /// WGSL in a file, which is read again when the file changes. With
 /// [`WgpuBackend::keep_working_shaders`](crate::backend::WgpuBackend::keep_working_shaders), a mistake in it is reported with its line,
 /// and frames are drawn with the shader before it until it is mended.
@@ -96,7 +98,8 @@ impl ShaderFile {
             // Only the thread with the lock adds one.
             Ok(next) => &latest.next.get_or_init(|| Box::new(next)).text,
             Err(error) => {
-                tracing::warn!(target: "drawloom", path = %self.path.display(), %error, "a shader cannot be read again");
+                let path = self.path.display();
+                emit(|| tracing::warn!(target: "drawloom", %path, %error, "a shader cannot be read again"));
                 &latest.text
             }
         }

@@ -13,6 +13,7 @@ use super::assets::AssetReservers;
 use super::{Asset, Assets, Mesh};
 use crate::handle::Handle;
 use crate::task::{Scheduler, catch};
+use crate::unwind::{Contained, discard};
 
 /// Loads meshes, materials and textures by [background jobs](Scheduler::background). A handle can be made on any thread and used at once; its
 /// content arrives with [`Assets::receive`]. Clones load for the same assets.
@@ -77,11 +78,11 @@ struct Waiting {
 struct Load {
     /// The oldest of equal priorities first.
     order: (i32, Reverse<u64>),
-    run: Box<dyn FnOnce() -> Arrival + Send>,
+    run: Contained<Box<dyn FnOnce() -> Arrival + Send>>,
 }
 
 /// Adds what was loaded to the assets.
-type Arrival = Box<dyn FnOnce(&mut Assets, &mut Arrivals) + Send>;
+type Arrival = Contained<Box<dyn FnOnce(&mut Assets, &mut Arrivals) + Send>>;
 
 /// Any error.
 type BoxedError = Box<dyn Error + Send + Sync>;
@@ -137,13 +138,16 @@ impl AssetLoader {
                 Ok(loaded) => loaded,
                 Err(panic) => Err(panic.into()),
             };
-            Box::new(move |assets, arrivals| arrivals.add(assets, handle, (name, priority), loaded))
+            let loaded = Contained::new(loaded);
+            Contained::new(Box::new(move |assets: &mut Assets, arrivals: &mut Arrivals| {
+                arrivals.add(assets, handle, (name, priority), loaded.into_inner());
+            }))
         };
         {
             let mut waiting = self.shared.waiting.lock();
             let order = (priority, Reverse(waiting.count));
             waiting.count += 1;
-            waiting.loads.push(Load { order, run: Box::new(run) });
+            waiting.loads.push(Load { order, run: Contained::new(Box::new(run)) });
         }
         match self.shared.scheduler.upgrade() {
             Some(scheduler) => Shared::queue_job(&self.shared, &scheduler),
@@ -165,7 +169,7 @@ impl AssetLoader {
         }
         let mut arrivals = Arrivals::default();
         for arrival in mem::take(&mut *self.shared.arrived.lock()) {
-            arrival(assets, &mut arrivals);
+            arrival.into_inner()(assets, &mut arrivals);
         }
         arrivals
     }
@@ -219,7 +223,7 @@ impl Shared {
     fn load_next(&self) {
         let next = self.waiting.lock().loads.pop();
         if let Some(Load { run, .. }) = next {
-            let arrival = run();
+            let arrival = run.into_inner()();
             self.arrived.lock().push(arrival);
         }
     }
@@ -235,7 +239,8 @@ impl Arrivals {
         loaded: Result<T, BoxedError>,
     ) {
         if !assets.is_pending(handle) {
-            return;
+            // The engine's error may panic when it is dropped, and others have yet to arrive.
+            return discard(loaded);
         }
         let checked = loaded.and_then(|asset| asset.check(assets).map(|()| asset).map_err(BoxedError::from));
         let added = match checked {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 
 use super::background_queue::{BackgroundQueue, QueuedJob};
 use crate::sync::{Condvar, Mutex};
-use crate::unwind::{JobPanic, catch, discard, emit};
+use crate::unwind::{Contained, JobPanic, catch, discard, emit};
 
 /// A job that runs when no frame needs its worker, and its result.
 /// [`Scheduler::background`](super::Scheduler::background) makes it.
@@ -24,7 +24,7 @@ impl<T: Send + 'static> BackgroundJob<T> {
     /// Queues a job.
     pub(super) fn queued(queue: &Arc<BackgroundQueue>, job: impl FnOnce() -> T + Send + 'static) -> Self {
         let state = Arc::new(JobState {
-            job: Mutex::new(Some(Box::new(job))),
+            job: Mutex::new(Some(Contained::new(Box::new(job)))),
             outcome: Mutex::new(Outcome { result: None, is_abandoned: false }),
             finished: Condvar::new(),
         });
@@ -79,10 +79,12 @@ impl<T> fmt::Debug for BackgroundJob<T> {
     }
 }
 
+type Job<T> = Box<dyn FnOnce() -> T + Send>;
+
 /// What the queue and the handle share of a job.
 struct JobState<T> {
     /// The thread that runs the job takes it.
-    job: Mutex<Option<Box<dyn FnOnce() -> T + Send>>>,
+    job: Mutex<Option<Contained<Job<T>>>>,
     outcome: Mutex<Outcome<T>>,
     finished: Condvar,
 }
@@ -96,7 +98,7 @@ struct Outcome<T> {
 impl<T: Send> QueuedJob for JobState<T> {
     fn run(&self) -> bool {
         let Some(job) = self.job.lock().take() else { return false };
-        let result = catch(job);
+        let result = catch(job.into_inner());
         let mut outcome = self.outcome.lock();
         if outcome.is_abandoned {
             drop(outcome);

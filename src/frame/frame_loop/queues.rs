@@ -45,10 +45,10 @@ impl<Task, Awaited, Finished> LoopQueues<Task, Awaited, Finished> {
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Waits for a free slot and takes it, with the frames that have finished.
-    pub(super) fn take_slot(&self) -> Vec<Finished> {
+    /// Waits for a free slot, if it may, and takes one, with the frames that have finished.
+    pub(super) fn take_slot(&self, may_wait: bool) -> Vec<Finished> {
         let mut state = self.state.lock();
-        if state.in_flight >= state.buffering.frames_in_flight() {
+        if may_wait && state.in_flight >= state.buffering.frames_in_flight() {
             // Whoever waits too long for what comes after this is told of this wait, too.
             let _listed = list_wait(current_thread(), "a slot of the frame loop");
             while state.in_flight >= state.buffering.frames_in_flight() {

@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 
 use super::finished_frame::{FinishedFrame, FrameLoopError};
 use super::queues::LoopQueues;
-use crate::backend::Backend;
+use crate::backend::{Backend, GuardedBackend};
 use crate::fence::Fence;
 use crate::frame::{Recorded, Submitted};
 use crate::timeline::Timeline;
+use crate::unwind::Contained;
 
 /// The queues of a loop.
 pub(super) type FrameQueues<B> = LoopQueues<DeviceTask<B>, AwaitedFrame<B>, FinishedFrame<B>>;
@@ -57,7 +58,9 @@ where
     /// panics, the frame is [reported](super::FrameLoopError::Panicked) as failed.
     pub fn submit_then(self, recorded: Recorded<B>, after: impl FnOnce(&Submitted<B>) + Send + 'static) {
         let queues = Arc::clone(&self.queues);
-        let frame = RecordedFrame { slot: self, recorded, after: Box::new(after), recorded_at: Instant::now() };
+        let after: AfterSubmission<B> = Box::new(after);
+        let after = Contained::new(after);
+        let frame = RecordedFrame { slot: self, recorded, after, recorded_at: Instant::now() };
         queues.add_task(DeviceTask::Submit(Box::new(frame)));
     }
 }
@@ -72,7 +75,7 @@ where
 }
 
 /// What the engine does when a frame is submitted.
-type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
+pub(super) type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
 
 /// What the device thread does next.
 pub(super) enum DeviceTask<B: Backend>
@@ -81,7 +84,7 @@ where
 {
     Submit(Box<RecordedFrame<B>>),
     /// Go on with another backend: what a submitter on that thread is made of.
-    ReplaceBackend(Arc<B>, Arc<Timeline>),
+    ReplaceBackend(GuardedBackend<B>, Arc<Timeline>),
 }
 
 /// A frame on its way to the device thread.
@@ -91,7 +94,7 @@ where
 {
     pub(super) slot: FrameSlot<B>,
     pub(super) recorded: Recorded<B>,
-    pub(super) after: AfterSubmission<B>,
+    pub(super) after: Contained<AfterSubmission<B>>,
     pub(super) recorded_at: Instant,
 }
 

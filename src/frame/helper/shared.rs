@@ -13,12 +13,13 @@ use super::source::HelperSource;
 use super::statistics::HelperStatistics;
 use super::step::{HelperFrame, HelperStep};
 use super::view_work::{HelperResult, LayerTextures, Source, ViewWork};
-use crate::backend::{Backend, BackendError, Picture};
+use crate::backend::{Backend, BackendError, CallPanic, Picture, guarded};
 use crate::fence::{Fence, FenceError};
 use crate::frame::{FramePlace, Recorded};
 use crate::process::{Format, ShaderResource};
 use crate::scene::{Camera, ViewKind};
 use crate::task::{JobPanic, Scheduler, catch};
+use crate::unwind::{Contained, emit};
 
 /// The maximum number of errors that are kept until the engine takes them.
 pub(super) const MAX_ERRORS: usize = 16;
@@ -84,7 +85,8 @@ pub(super) trait UploadPicture: Send + Sync {
 
 impl<B: Backend> UploadPicture for B {
     fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
-        Backend::upload_picture(self, picture)
+        let uploaded = guarded("upload_picture", || Backend::upload_picture(self, picture));
+        uploaded.map_err(CallPanic::into_backend_error)?
     }
 }
 
@@ -145,8 +147,9 @@ impl Shared {
         self.add_statistics(recorded);
         let number = {
             let state = self.state.lock();
-            let is_same =
-                |backend: &Weak<dyn UploadPicture>| std::ptr::addr_eq(backend.as_ptr(), Arc::as_ptr(&recorded.backend));
+            let is_same = |backend: &Weak<dyn UploadPicture>| {
+                std::ptr::addr_eq(backend.as_ptr(), Arc::as_ptr(recorded.backend.unguarded()))
+            };
             if !state.backend.as_ref().is_some_and(is_same) {
                 drop(state);
                 return self.report_foreign_frame();
@@ -165,6 +168,7 @@ impl Shared {
             let Some(camera) = recorded.camera(index).cloned() else { continue };
             match recorded.read_back_whole(index, &self.target) {
                 Ok(read_back) => {
+                    let read_back = Contained::new(read_back);
                     let identity = self.state.lock().view(&view).identity;
                     sources.push((identity, Source { number, camera, read_back }));
                 }
@@ -384,7 +388,7 @@ impl Shared {
 /// Tells of an error through `tracing`, whose subscriber is code of the engine's.
 fn log(message: Option<String>) {
     if let Some(message) = message {
-        crate::unwind::emit(|| tracing::warn!(target: "drawloom", message));
+        emit(|| tracing::warn!(target: "drawloom", message));
     }
 }
 

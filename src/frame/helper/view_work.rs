@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crate::backend::{Picture, ReadBack};
 use crate::process::ShaderResource;
 use crate::scene::Camera;
+use crate::unwind::Contained;
 
 /// A picture and the words of its view on the device.
 pub(super) type LayerTextures = [ShaderResource<'static>; 2];
@@ -16,7 +17,7 @@ pub(super) struct Source {
     pub(super) number: u64,
     /// The camera that it was drawn with.
     pub(super) camera: Camera,
-    pub(super) read_back: Box<dyn ReadBack>,
+    pub(super) read_back: Contained<Box<dyn ReadBack>>,
 }
 
 /// What a step computed of a frame.

@@ -7,6 +7,7 @@ use std::panic::resume_unwind;
 use std::time::Duration;
 
 use super::super::context::FrameContext;
+use super::super::pass_recording::PassRecording;
 use super::super::pass_runs::{PassFailure, PassRuns};
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
 use super::super::stage_clock::StageGroup;
@@ -440,7 +441,8 @@ fn finish_together<B: Backend>(
         None => frame.pass_request(first, &empty),
     });
     let recordings = &frame.recordings[passes];
-    let mut parts: [Vec<B::Part>; PassRuns::MAX_PASSES] = array::from_fn(|_| Vec::new());
+    let mut taken = TakenParts { parts: array::from_fn(|_| Vec::new()), recordings };
+    let parts = &mut taken.parts;
     let fail = |index: usize| frame.pass_runs.add_failure(PassFailure { failed: first + index.min(count - 1), job_of });
     for (index, (parts, recording)) in parts.iter_mut().zip(recordings).enumerate() {
         *parts = mem::take(&mut *recording.ordered_parts().inspect_err(|_| fail(index))?);
@@ -464,10 +466,22 @@ fn finish_together<B: Backend>(
     if result.is_err() {
         fail(finished);
     }
-    for (parts, recording) in parts.iter_mut().zip(recordings) {
-        recording.keep_memory(mem::take(parts));
-    }
     result
+}
+
+/// The parts of passes that are finished together. When this is dropped, on every path, those that the backend leaves are dropped, and their
+/// memory goes back to the recordings.
+struct TakenParts<'a, B: Backend> {
+    parts: [Vec<B::Part>; PassRuns::MAX_PASSES],
+    recordings: &'a [PassRecording<B>],
+}
+
+impl<B: Backend> Drop for TakenParts<'_, B> {
+    fn drop(&mut self) {
+        for (parts, recording) in self.parts.iter_mut().zip(self.recordings) {
+            recording.keep_memory(mem::take(parts));
+        }
+    }
 }
 
 /// Divides the time of passes that one job finished among their views, by their batches. When the job ends, its whole time is added to the

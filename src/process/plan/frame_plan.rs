@@ -22,6 +22,7 @@ use crate::process::{
     Access, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
 };
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
+use crate::unwind::{discard_all, emit};
 use crate::view::RenderView;
 
 /// What every frame does: its processes in the order they are submitted, and the targets that they use.
@@ -94,7 +95,8 @@ impl FramePlan {
         let shipped = added.iter().filter(|(_, planned)| slot_names.contains(&planned.name));
         let shipped: Vec<_> = shipped.map(|(_, planned)| node_name(&added, planned)).collect();
         for process in schedule.dropped().iter().filter(|name| !shipped.contains(name)) {
-            tracing::warn!(target: "drawloom", %process, "no output depends on this process, so it is not drawn");
+            let message = "no output depends on this process, so it is not drawn";
+            emit(|| tracing::warn!(target: "drawloom", %process, "{message}"));
         }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
@@ -280,6 +282,13 @@ fn reads_shadow_map(planned: &PlannedProcess) -> bool {
         target == ShadowCasters::TARGET
             && matches!(access, Access::SampleLayers(ViewKind::Shadow) | Access::SampleView(ViewKind::Shadow, _))
     })
+}
+
+/// The last plan with a process drops it, on whatever thread that is.
+impl Drop for FramePlan {
+    fn drop(&mut self) {
+        discard_all(self.processes.drain(..));
+    }
 }
 
 #[cfg(test)]

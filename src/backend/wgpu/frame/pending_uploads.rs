@@ -1,6 +1,7 @@
 //! The uploads of a frame that is not submitted yet.
 
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
+use crate::unwind::emit;
 
 /// The uploads of a frame, which wgpu keeps in memory until something is submitted. If the frame never is, an empty submission takes
 /// its place when this is dropped, so that frames that are recorded and dropped leave no memory behind.
@@ -30,7 +31,8 @@ impl Drop for PendingUploads {
         let submit = || with_error_scope(&device, label, || queue.submit(None));
         if let Err(error) = catch_wgpu_panic(label, submit).flatten() {
             // The next frame meets the same, and returns it.
-            tracing::warn!(target: "drawloom", %error, "uploads of a frame that was dropped stay in memory");
+            let message = "uploads of a frame that was dropped stay in memory";
+            emit(|| tracing::warn!(target: "drawloom", %error, "{message}"));
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
 use crate::process::{Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
+use crate::unwind::emit;
 
 /// Keeps the pipelines of all plans. Plans share pipelines where they can.
 #[derive(Default)]
@@ -100,7 +101,8 @@ impl PipelineCache {
                                 Arc::new(created)
                             }
                             (Err(error), Some(working)) => {
-                                tracing::error!(target: "drawloom", %error, "a shader does not compile; the one before it stays in use");
+                                let message = "a shader does not compile; the one before it stays in use";
+                                emit(|| tracing::error!(target: "drawloom", %error, "{message}"));
                                 let key = PipelineKey::new(draws, quality).into_owned();
                                 self.failed.insert(planned.name.clone(), (key, error));
                                 Arc::clone(working)

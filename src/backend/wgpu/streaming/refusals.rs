@@ -6,6 +6,7 @@ use super::request::Requested;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::backend::wgpu::resources::Unplaced;
 use crate::scene::{Assets, Mesh, Texture};
+use crate::unwind::emit;
 
 /// The meshes that had no room in a frame, and how much looking for it has cost.
 ///
@@ -132,7 +133,8 @@ impl TooLarge {
             }
         };
         if told.insert(slot, revision) != Some(revision) {
-            tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed: what it replaces stays, or nothing is drawn");
+            let message = "it is too large to be streamed: what it replaces stays, or nothing is drawn";
+            emit(|| tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "{message}"));
         }
     }
 

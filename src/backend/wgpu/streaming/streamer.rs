@@ -21,6 +21,7 @@ use crate::backend::wgpu::resources::{
 };
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
+use crate::unwind::emit;
 use crate::view::{RejectionReason, Rejections, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
@@ -239,7 +240,8 @@ impl BudgetWarning {
         self.frames_within = 0;
         if !mem::replace(&mut self.was_told, true) {
             let count = over_budget;
-            tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
+            let message = "what frames draw exceeds the streaming budget: meshes or textures are left out";
+            emit(|| tracing::warn!(target: "drawloom", count, "{message}"));
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{poll, with_error_scope};
 use crate::backend::wgpu::resources::GrowingBuffer;
 use crate::timeline::{DeviceLog, DevicePass, Timeline};
+use crate::unwind::emit;
 
 /// A calibration of the device's clock against a timeline, which converts the device's times to the timeline's axis.
 ///
@@ -130,7 +131,8 @@ impl DeviceClock {
             }
         }
         if skipped > 0 {
-            tracing::warn!(target: "drawloom", skipped, "the device's timestamps of some passes are invalid");
+            let message = "the device's timestamps of some passes are invalid";
+            emit(|| tracing::warn!(target: "drawloom", skipped, "{message}"));
         }
         // A stable sort: passes that began at the same time stay in submission order.
         passes.sort_by_key(|pass| pass.began);

@@ -1,0 +1,157 @@
+//! A backend whose panics are errors.
+
+use std::sync::Arc;
+
+use super::{Backend, BackendError, FrameFence, FrameRequest, ReadBack, TargetMemory, ViewQueue, ViewRequest};
+use crate::command::DrawState;
+use crate::process::{Draws, FramePlan};
+use crate::quality::Quality;
+use crate::timeline::{Labels, TuningChoice};
+use crate::unwind::{Contained, JobPanic, catch};
+
+/// A call of a backend's method panicked.
+#[derive(Debug)]
+pub(crate) struct CallPanic {
+    /// The name of the method.
+    pub(crate) call: &'static str,
+    pub(crate) message: String,
+}
+
+impl CallPanic {
+    /// For calls whose other errors are the backend's.
+    pub(crate) fn into_backend_error(self) -> BackendError {
+        BackendError::Panicked { call: self.call, message: self.message }
+    }
+}
+
+/// Calls a method of a backend.
+///
+/// # Errors
+/// If it panics.
+pub(crate) fn guarded<R>(call: &'static str, method: impl FnOnce() -> R) -> Result<R, CallPanic> {
+    catch(method).map_err(|JobPanic { message }| CallPanic { call, message })
+}
+
+/// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's code. The rest of the
+/// crate has no other way to a backend, so no call of it can unwind.
+///
+/// The methods are those of [`Backend`]. Those that can fail already return the panic as a [`BackendError`] where the caller cannot tell it
+/// from other errors, and as a [`CallPanic`] elsewhere.
+pub(crate) struct GuardedBackend<B> {
+    // Whoever drops the last reference may be a thread of a frame loop.
+    backend: Contained<Arc<B>>,
+}
+
+impl<B> Clone for GuardedBackend<B> {
+    fn clone(&self) -> Self {
+        Self::new(Arc::clone(&self.backend))
+    }
+}
+
+impl<B> GuardedBackend<B> {
+    pub(crate) fn new(backend: Arc<B>) -> Self {
+        Self { backend: Contained::new(backend) }
+    }
+
+    /// The backend itself, for the engine, and for calls in jobs of the frame: their run catches panics, and its error names the node.
+    pub(crate) fn unguarded(&self) -> &Arc<B> {
+        &self.backend
+    }
+
+    /// Whether both are the same backend.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.backend, &other.backend)
+    }
+
+    fn call<R>(&self, call: &'static str, method: impl FnOnce(&B) -> R) -> Result<R, CallPanic> {
+        guarded(call, || method(&self.backend))
+    }
+}
+
+impl<B: Backend> GuardedBackend<B> {
+    pub(crate) fn uploaded_bytes(&self) -> Result<u64, CallPanic> {
+        self.call("uploaded_bytes", B::uploaded_bytes)
+    }
+
+    pub(crate) fn prepare_pipelines(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        states: &[Vec<DrawState>],
+        quality: &Quality,
+    ) -> Result<Result<(), BackendError>, CallPanic> {
+        self.call("prepare_pipelines", |backend| backend.prepare_pipelines(plan, draws, states, quality))
+    }
+
+    pub(crate) fn has_background_work(&self) -> Result<bool, CallPanic> {
+        self.call("has_background_work", B::has_background_work)
+    }
+
+    pub(crate) fn work_in_background(&self) -> Result<(), CallPanic> {
+        self.call("work_in_background", B::work_in_background)
+    }
+
+    pub(crate) fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) -> Result<(), CallPanic> {
+        self.call("counters", |backend| backend.counters(count))
+    }
+
+    pub(crate) fn begin(
+        &self,
+        request: &FrameRequest<'_>,
+    ) -> Result<Result<Contained<B::Frame>, BackendError>, CallPanic> {
+        self.call("begin", |backend| backend.begin(request).map(Contained::new))
+    }
+
+    pub(crate) fn discard_frame(&self) -> Result<(), CallPanic> {
+        self.call("discard_frame", B::discard_frame)
+    }
+
+    pub(crate) fn forget_histories(&self) -> Result<(), CallPanic> {
+        self.call("forget_histories", B::forget_histories)
+    }
+
+    pub(crate) fn imports_targets_of(&self, view: &str) -> Result<bool, CallPanic> {
+        self.call("imports_targets_of", |backend| backend.imports_targets_of(view))
+    }
+
+    pub(crate) fn target_memory(&self, frame: &B::Frame) -> Result<TargetMemory, CallPanic> {
+        self.call("target_memory", |backend| backend.target_memory(frame))
+    }
+
+    pub(crate) fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> Result<bool, CallPanic> {
+        self.call("continues_previous_pass", |backend| backend.continues_previous_pass(frame, pass))
+    }
+
+    pub(crate) fn recording_choice(
+        &self,
+        frame: &B::Frame,
+        pass: usize,
+        labels: &Arc<Labels>,
+    ) -> Result<Option<TuningChoice>, CallPanic> {
+        self.call("recording_choice", |backend| backend.recording_choice(frame, pass, labels))
+    }
+
+    pub(crate) fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        let replaced = self.call("replace_view", |backend| backend.replace_view(frame, request));
+        replaced.map_err(CallPanic::into_backend_error)?
+    }
+
+    pub(crate) fn read_back(
+        &self,
+        frame: &mut B::Frame,
+        view: usize,
+        target: &str,
+    ) -> Result<Box<dyn ReadBack>, BackendError> {
+        let begun = self.call("read_back", |backend| backend.read_back(frame, view, target));
+        begun.map_err(CallPanic::into_backend_error)?
+    }
+
+    pub(crate) fn submit(
+        &self,
+        frame: B::Frame,
+        queues: Vec<ViewQueue<B::Commands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<Result<B::Submission, BackendError>, CallPanic> {
+        self.call("submit", |backend| backend.submit(frame, queues, fences))
+    }
+}
