@@ -14,5 +14,5 @@ pub mod task;
 pub mod timeline;
 #[path = "../../src/tuning/mod.rs"]
 mod tuning;
-#[path = "../../src/unwind.rs"]
+#[path = "../../src/unwind/mod.rs"]
 mod unwind;

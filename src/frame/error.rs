@@ -118,6 +118,15 @@ pub enum FrameError {
         /// What the panic said.
         message: String,
     },
+    /// A frame failed, and the backend panicked when it was told to discard what the engine has set for that frame. The next frame may still
+    /// have that.
+    #[error("{error}; then the backend's discard_frame panicked: {message}")]
+    DiscardPanicked {
+        /// Why the frame failed.
+        error: Box<FrameError>,
+        /// What the panic said.
+        message: String,
+    },
     /// What a process declares or draws is invalid.
     #[error(transparent)]
     Process(#[from] ProcessError),
@@ -133,7 +142,7 @@ pub enum FrameError {
     /// The [nodes](super::CpuNode) of the engine's own make no graph with the frame's stages.
     #[error("the nodes of the frame make no graph: {0}")]
     Nodes(GraphProblem),
-    /// A [node](super::CpuNode) declares what no node can.
+    /// A [node](super::CpuNode) declares what no node can, or has the name of a stage.
     #[error("node {node:?} {problem}")]
     InvalidNode {
         /// The node.
@@ -163,6 +172,7 @@ impl FrameError {
         match self {
             Self::Backend(error) => Some(error),
             Self::Failed { source, .. } => source.downcast_ref(),
+            Self::DiscardPanicked { error, .. } => error.backend_error(),
             _ => None,
         }
     }

@@ -95,7 +95,13 @@ impl LentNodes<'_> {
 impl NodeKeys {
     /// What is wrong with a graph of stages and these nodes. The stages alone make one.
     pub(super) fn error_of(&self, problem: GraphProblem) -> FrameError {
-        if self.keys.is_empty() { FrameError::StageGraph(problem) } else { FrameError::Nodes(problem) }
+        match problem {
+            problem if self.keys.is_empty() => FrameError::StageGraph(problem),
+            GraphProblem::DuplicateNode { name } if self.names().filter(|known| ***known == name).count() == 1 => {
+                named_like_a_stage(&name)
+            }
+            problem => FrameError::Nodes(problem),
+        }
     }
 
     /// Whether these are the keys of the nodes of a frame. Allocates nothing.
@@ -124,7 +130,7 @@ impl NodeKeys {
         let find = |wanted: &str| self.keys.iter().position(|key| &*key.name == wanted);
         // Names of views' stages contain the view, so the graph would not find these.
         if let Some(key) = self.keys.iter().find(|key| stages.contains_key(&*key.name)) {
-            return Err(FrameError::Nodes(GraphProblem::DuplicateNode { name: key.name.to_string() }));
+            return Err(named_like_a_stage(&key.name));
         }
         let nodes_of = |stage: &str| stages.get(stage).into_iter().flatten().copied();
         for (key, &id) in self.keys.iter().zip(ids) {
@@ -168,6 +174,10 @@ impl NodeKeys {
         }
         Ok(())
     }
+}
+
+fn named_like_a_stage(node: &str) -> FrameError {
+    FrameError::InvalidNode { node: node.to_owned(), problem: String::from("has the name of a stage of the frame") }
 }
 
 /// The stages that write a resource, and those that read it.

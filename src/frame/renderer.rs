@@ -32,7 +32,7 @@ use crate::quality::{Quality, TransformPrecision};
 use crate::scene::{SceneError, SceneRef};
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
-use crate::unwind::{CaughtSpan, emit};
+use crate::unwind::CaughtSpan;
 use crate::view::{RenderView, possible_draw_states};
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
@@ -160,19 +160,22 @@ impl<B: Backend> Renderer<B> {
             Err(FrameError::Panicked { stage: String::from("the recording of the frame"), message })
         });
         match recorded {
-            Ok(_) => self.tables.end_frame(),
-            Err(_) => self.abandon_frame(),
+            Ok(recorded) => {
+                self.tables.end_frame();
+                Ok(recorded)
+            }
+            Err(error) => Err(self.abandon_frame(error)),
         }
-        recorded
     }
 
     /// Ends a frame that failed, at whatever point: the next one relies on nothing that this one was told or has derived.
-    fn abandon_frame(&mut self) {
+    fn abandon_frame(&mut self, error: FrameError) -> FrameError {
         self.tables.abandon_frame();
         self.graphs.discard_costs();
         self.recordings.iter_mut().for_each(PassRecording::clear);
-        if let Err(CallPanic { call, message }) = self.backend.discard_frame() {
-            emit(|| tracing::error!(target: "drawloom", message, "the backend's {call} panicked"));
+        match self.backend.discard_frame() {
+            Ok(()) => error,
+            Err(CallPanic { message, .. }) => FrameError::DiscardPanicked { error: Box::new(error), message },
         }
     }
 

@@ -52,11 +52,28 @@ fn nodes_that_make_no_graph_are_named() {
     assert!(matches!(problem_of(&writers), GraphProblem::UnorderedWriters { .. }));
     let same = ["one", "one"].map(|name| idle(name, |_| ()));
     assert_eq!(problem_of(&same), GraphProblem::DuplicateNode { name: "one".to_owned() });
-    // Also those that these frames do without.
-    for stage in
-        ["objects", "visibility", "finish", "triangles", "cull list", "levels", "occlusion", "bin", "record pieces"]
-    {
-        assert_eq!(problem_of(&[idle(stage, |_| ())]), GraphProblem::DuplicateNode { name: stage.to_owned() });
+}
+
+#[test]
+fn a_node_that_is_named_like_a_stage_is_told_so() {
+    // Also those that these frames do without, and the names that stages of a view and of a pass have in the graph.
+    for stage in [
+        "objects",
+        "visibility",
+        "finish",
+        "triangles",
+        "cull list",
+        "levels",
+        "occlusion",
+        "bin",
+        "record pieces",
+        "compact, view 0 \"main\"",
+        "geometry buffer, view 0 \"main\", record",
+    ] {
+        let expected = format!("node {stage:?} has the name of a stage of the frame");
+        assert_eq!(error_of(&[idle(stage, |_| ())]).to_string(), expected);
+        // Whatever stands beside it.
+        assert_eq!(error_of(&[idle("other", |_| ()), idle(stage, |_| ())]).to_string(), expected);
     }
 }
 

@@ -9,7 +9,7 @@
 //!
 //! | code | called in | its panic |
 //! | --- | --- | --- |
-//! | `Backend` beside a frame's jobs: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs`, and nowhere else | `FrameError::Panicked` with the call; of `replace_view`, `read_back` and `upload_picture` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` an event |
+//! | `Backend` beside a frame's jobs: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs`, and nowhere else | `FrameError::Panicked` with the call; of `replace_view`, `read_back` and `upload_picture` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` `FrameError::DiscardPanicked` |
 //! | `Backend` in jobs: `upload_objects`, `prepare`, `record`, `finish` and others; `RenderProcess` and `RawPass` there | `frame/stages`, caught by `graph/execute.rs` | `FrameError::Panicked` with process, view and stage |
 //! | `Backend::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
 //! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `ProcessError::Panicked`, or `PlanError::Panicked` |
@@ -17,7 +17,7 @@
 //! | `PostStep`, `HelperStep` | `frame/plan_cache.rs`; `frame/helper/shared.rs` | `PlanError::Panicked`; `HelperErrorReason::Panicked` |
 //! | `CpuNode`: `name`, `declare` | `frame/lent_nodes.rs` | `FrameError::Panicked` with the node |
 //! | `CpuNode` and nodes of graphs: `width`, `run` and others | `graph/execute.rs` | `RunError::Panicked` with the node |
-//! | predicates of materials | `view/object_set.rs` | `FrameError::FilterPanicked` |
+//! | predicates of materials | `frame/view_filter.rs` | `FrameError::FilterPanicked` |
 //! | what follows a submission | `frame/frame_loop.rs` | `FrameLoopError::Panicked` |
 //! | callbacks of fences | `fence/state.rs` | an event |
 //! | `DeviceProgress` | `fence/device_progress.rs` | `FenceError::Device` |

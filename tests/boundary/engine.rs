@@ -1,0 +1,391 @@
+//! An engine whose code panics on request: its backend, process, node, device and subscriber.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use drawloom::backend::{
+    Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, Picture, ReadBack, SoftwareBackend,
+    TargetMemory, ViewQueue, ViewRequest,
+};
+use drawloom::command::DrawState;
+use drawloom::fence::DeviceProgress;
+use drawloom::graph::NodeError;
+use drawloom::process::{
+    CpuShader, Declare, Draws, FramePlan, FullScreen, FullScreenCpuShader, FullScreenPixel, PassInputs, RenderProcess,
+    ShaderResource,
+};
+use drawloom::quality::Quality;
+use drawloom::raster::{Real, Vector4};
+use drawloom::task::{Scheduler, Worker};
+use drawloom::timeline::{Labels, TuningChoice};
+use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use tracing::span::{Attributes, Id, Record};
+use tracing::subscriber::Interest;
+use tracing::{Event, Metadata, Subscriber};
+
+use crate::fuse::{Kind, Owned, call};
+
+/// A backend under test.
+pub trait Subject: Backend + Sized {
+    fn open(scheduler: &Arc<Scheduler>) -> Self;
+
+    /// All that a submission tells of what the main view shows.
+    fn read(submission: &Self::Submission) -> Vec<u8>;
+}
+
+impl Subject for NullBackend {
+    fn open(_: &Arc<Scheduler>) -> Self {
+        Self
+    }
+
+    fn read(submission: &Self::Submission) -> Vec<u8> {
+        let of_main = submission.passes.iter().filter(|pass| pass.view == 0);
+        format!("{:?}", of_main.collect::<Vec<_>>()).into_bytes()
+    }
+}
+
+impl Subject for SoftwareBackend {
+    fn open(scheduler: &Arc<Scheduler>) -> Self {
+        Self::new(Arc::clone(scheduler))
+    }
+
+    fn read(submission: &Self::Submission) -> Vec<u8> {
+        submission.read(0, "picture").unwrap().bytes
+    }
+}
+
+/// The engine's backend: each method may panic before it does what another backend does.
+pub struct OwnBackend<B> {
+    inner: B,
+    joins_passes: bool,
+    _dropped: Owned<()>,
+}
+
+impl<B> OwnBackend<B> {
+    pub fn new(inner: B, joins_passes: bool) -> Self {
+        Self { inner, joins_passes, _dropped: Owned::new("backend", ()) }
+    }
+}
+
+fn backend(name: &'static str) {
+    call(Kind::Backend, name);
+}
+
+impl<B: Backend> Backend for OwnBackend<B> {
+    type Frame = Owned<B::Frame>;
+    type Part = Owned<B::Part>;
+    type Commands = Owned<B::Commands>;
+    type Submission = Owned<B::Submission>;
+
+    fn adapter_name(&self) -> String {
+        self.inner.adapter_name()
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        backend("uploaded_bytes");
+        self.inner.uploaded_bytes()
+    }
+
+    fn prepare_pipelines(
+        &self,
+        plan: &FramePlan,
+        draws: &[Draws<'_>],
+        states: &[Vec<DrawState>],
+        quality: &Quality,
+    ) -> Result<(), BackendError> {
+        backend("prepare_pipelines");
+        self.inner.prepare_pipelines(plan, draws, states, quality)
+    }
+
+    fn has_background_work(&self) -> bool {
+        backend("has_background_work");
+        true
+    }
+
+    fn work_in_background(&self) {
+        backend("work_in_background");
+    }
+
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        backend("counters");
+        self.inner.counters(count);
+    }
+
+    fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError> {
+        backend("begin");
+        self.inner.begin(request).map(|frame| Owned::new("frame", frame))
+    }
+
+    fn discard_frame(&self) {
+        backend("discard_frame");
+        self.inner.discard_frame();
+    }
+
+    fn forget_histories(&self) {
+        backend("forget_histories");
+        self.inner.forget_histories();
+    }
+
+    fn imports_targets_of(&self, view: &str) -> bool {
+        backend("imports_targets_of");
+        self.inner.imports_targets_of(view)
+    }
+
+    fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
+        backend("objects_epoch");
+        self.inner.objects_epoch(frame.get())
+    }
+
+    fn target_memory(&self, frame: &Self::Frame) -> TargetMemory {
+        backend("target_memory");
+        self.inner.target_memory(frame.get())
+    }
+
+    fn upload_objects(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        request: &FrameRequest<'_>,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        backend("upload_objects");
+        self.inner.upload_objects(worker, frame.get(), request, blocks)
+    }
+
+    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        backend("prepare");
+        self.inner.prepare(worker, frame.get(), pass)
+    }
+
+    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize {
+        backend("part_count");
+        self.inner.part_count(frame.get(), pass)
+    }
+
+    fn record(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        emit: &mut dyn FnMut(Self::Part),
+    ) -> Result<(), BackendError> {
+        backend("record");
+        self.inner.record(worker, frame.get(), pass, parts, &mut |part| emit(Owned::new("part", part)))
+    }
+
+    fn finish(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<Self::Part>,
+    ) -> Result<Self::Commands, BackendError> {
+        backend("finish");
+        let mut parts = parts.iter_mut().filter_map(|part| part.value.take()).collect();
+        let commands = self.inner.finish(worker, frame.get(), pass, &mut parts)?;
+        Ok(Owned::new("commands", commands))
+    }
+
+    fn continues_previous_pass(&self, _: &Self::Frame, pass: usize) -> bool {
+        backend("continues_previous_pass");
+        self.joins_passes && pass > 0
+    }
+
+    fn finish_together(
+        &self,
+        worker: &Worker,
+        frame: &Self::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<Self::Part>],
+        emit: &mut dyn FnMut(Self::Commands),
+    ) -> Result<(), BackendError> {
+        backend("finish_together");
+        for (pass, parts) in passes.iter().zip(parts) {
+            emit(self.finish(worker, frame, pass, parts)?);
+        }
+        Ok(())
+    }
+
+    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
+        backend("recording_choice");
+        self.inner.recording_choice(frame.get(), pass, labels)
+    }
+
+    fn replace_view(&self, frame: &mut Self::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
+        backend("replace_view");
+        self.inner.replace_view(frame.get_mut(), request)
+    }
+
+    fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        backend("read_back");
+        self.inner.read_back(frame.get_mut(), view, target)
+    }
+
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        backend("upload_picture");
+        self.inner.upload_picture(picture)
+    }
+
+    fn submit(
+        &self,
+        frame: Self::Frame,
+        queues: Vec<ViewQueue<Self::Commands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<Self::Submission, BackendError> {
+        backend("submit");
+        let passes_of = |queue: ViewQueue<Self::Commands>| {
+            let passes = queue.passes.into_iter().map(|(pass, commands)| (pass, commands.take())).collect();
+            ViewQueue { view: queue.view, passes }
+        };
+        let queues = queues.into_iter().map(passes_of).collect();
+        let submission = self.inner.submit(frame.take(), queues, fences)?;
+        Ok(Owned::new("submission", submission))
+    }
+}
+
+/// A process of the engine's, which leaves the picture as it is.
+pub struct OwnProcess {
+    _dropped: Owned<()>,
+}
+
+impl OwnProcess {
+    pub fn new() -> Self {
+        Self { _dropped: Owned::new("process", ()) }
+    }
+}
+
+impl RenderProcess for OwnProcess {
+    fn name(&self) -> &str {
+        "the engine's process"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(drawloom::process::Place::AfterPostProcessing);
+        declare.draws_over("picture");
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        call(Kind::Process, "draws");
+        Draws::FullScreen(FullScreen::default())
+    }
+
+    fn cpu_shader(&self) -> Option<CpuShader> {
+        call(Kind::Process, "cpu_shader");
+        Some(CpuShader::full_screen(Leaves))
+    }
+}
+
+struct Leaves;
+
+impl<R: Real> FullScreenCpuShader<R> for Leaves {
+    fn fragment(&self, _: &PassInputs<'_, R>, _: &FullScreenPixel<R>, _: &mut [Vector4<R>]) -> bool {
+        call(Kind::Process, "fragment");
+        false
+    }
+}
+
+/// A node of the engine's.
+pub struct OwnNode;
+
+impl CpuNode for OwnNode {
+    fn name(&self) -> &str {
+        "the engine's node"
+    }
+
+    fn declare(&self, _: &mut NodeAccesses) {
+        call(Kind::Node, "declare");
+    }
+
+    fn width(&self, _: &NodeFrame<'_>) -> usize {
+        call(Kind::Node, "width");
+        3
+    }
+
+    fn items_per_job(&self) -> Option<usize> {
+        call(Kind::Node, "items_per_job");
+        None
+    }
+
+    fn run(&self, _: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+        call(Kind::Node, "run");
+        Ok(())
+    }
+}
+
+/// A device that never sets its fence.
+pub struct OwnDevice {
+    _dropped: Owned<()>,
+}
+
+impl OwnDevice {
+    pub fn new() -> Self {
+        Self { _dropped: Owned::new("device", ()) }
+    }
+}
+
+impl DeviceProgress for OwnDevice {
+    fn advance(&self, _: Duration) -> Result<(), String> {
+        call(Kind::Hook, "advance");
+        Err(String::from("it has failed"))
+    }
+}
+
+/// A subscriber of everything.
+#[derive(Default)]
+pub struct OwnSubscriber {
+    spans: AtomicU64,
+}
+
+fn subscriber(name: &'static str) {
+    call(Kind::Subscriber, name);
+}
+
+impl Subscriber for OwnSubscriber {
+    fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
+        Interest::sometimes()
+    }
+
+    fn enabled(&self, _: &Metadata<'_>) -> bool {
+        subscriber("enabled");
+        true
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        subscriber("new_span");
+        Id::from_u64(1 + self.spans.fetch_add(1, Ordering::Relaxed))
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {
+        subscriber("record");
+    }
+
+    fn record_follows_from(&self, _: &Id, _: &Id) {
+        subscriber("record_follows_from");
+    }
+
+    fn event(&self, _: &Event<'_>) {
+        subscriber("event");
+    }
+
+    fn enter(&self, _: &Id) {
+        subscriber("enter");
+    }
+
+    fn exit(&self, _: &Id) {
+        subscriber("exit");
+    }
+
+    fn clone_span(&self, id: &Id) -> Id {
+        subscriber("clone_span");
+        id.clone()
+    }
+
+    fn try_close(&self, _: Id) -> bool {
+        subscriber("try_close");
+        true
+    }
+}
