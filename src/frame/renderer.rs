@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
+use super::background_work::BackgroundWork;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
@@ -84,8 +85,7 @@ pub struct Renderer<B: Backend> {
     node_declarations: NodeDeclarations,
     warnings: Warnings,
     column_check: ColumnCheck,
-    /// The latest job of the backend, if there was any.
-    background_work: Option<BackgroundJob<Result<(), CallPanic>>>,
+    background_work: BackgroundWork,
     /// Whether the histories of the next frame are empty.
     forgets_histories: bool,
 }
@@ -116,7 +116,7 @@ impl<B: Backend> Renderer<B> {
             node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
-            background_work: None,
+            background_work: BackgroundWork::default(),
             forgets_histories: false,
         }
     }
@@ -153,7 +153,7 @@ impl<B: Backend> Renderer<B> {
         // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned all the same.
         let recorded = catch(|| {
             let recorded = self.record_frame(scene, nodes, choices, transparency)?;
-            self.start_background_work()?;
+            self.background_work.start(&self.backend, &self.scheduler)?;
             Ok(recorded)
         });
         let recorded = recorded.unwrap_or_else(|JobPanic { message }| {
@@ -209,7 +209,7 @@ impl<B: Backend> Renderer<B> {
 
     /// Does what [`prepare_pipelines`](Self::prepare_pipelines) does as a [background job](Scheduler::background), while frames go on: before
     /// a light is switched on, or glass comes into sight. Frames do not wait for it; one that needs a pipeline which is not there yet makes
-    /// it itself.
+    /// it itself. On a scheduler of one worker nobody is there to help: then the pipelines are made by this call.
     ///
     /// ```
     /// # use drawloom::{FrameError, Renderer, backend::Backend, scene::SceneRef};
@@ -230,7 +230,12 @@ impl<B: Backend> Renderer<B> {
         scene: SceneRef<'_>,
     ) -> Result<BackgroundJob<Result<(), FrameError>>, FrameError> {
         let preparation = self.preparation(&scene)?;
-        Ok(self.scheduler.background(preparation))
+        let job = self.scheduler.background(preparation);
+        if self.scheduler.workers() == 1 {
+            // Nobody may ever run it: the job and all that it owns would stay in the queue of the scheduler, which it may own as well.
+            job.run();
+        }
+        Ok(job)
     }
 
     /// A closure that makes the pipelines of this scene, and of those that may follow. It owns all that it needs, so that it can run in the
@@ -256,27 +261,6 @@ impl<B: Backend> Renderer<B> {
             }
             Ok(())
         })
-    }
-
-    /// Starts a job for what the backend does between frames, if there is something and the last one has ended.
-    ///
-    /// # Errors
-    /// If the backend panics, in the job of an earlier frame too.
-    fn start_background_work(&mut self) -> Result<(), FrameError> {
-        if !self.backend.has_background_work()? {
-            return Ok(());
-        }
-        if self.scheduler.workers() == 1 {
-            return Ok(self.backend.work_in_background()?);
-        }
-        if let Some(ended) = self.background_work.take_if(|job| job.is_finished()) {
-            ended.wait()??;
-        }
-        if self.background_work.is_none() {
-            let backend = self.backend.clone();
-            self.background_work = Some(self.scheduler.background(move || backend.work_in_background()));
-        }
-        Ok(())
     }
 
     fn record_frame(
@@ -421,6 +405,7 @@ impl<B: Backend> Renderer<B> {
     pub(super) fn set_backend(&mut self, backend: GuardedBackend<B>) {
         self.backend = backend;
         self.recordings.clear();
+        self.background_work = BackgroundWork::default();
         self.view_cache.forget_frames_in_flight();
     }
 

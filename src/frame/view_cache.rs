@@ -37,7 +37,9 @@ struct DrawnViews {
 /// A recorded frame that is not submitted yet. If it is dropped, the views that it draws are lost.
 pub(super) struct InFlight {
     /// `None` once it is submitted, and where no later frame keeps its views.
-    frame: Option<(Arc<FrameOutcome>, Arc<AtomicBool>)>,
+    outcome: Option<Arc<FrameOutcome>>,
+    /// That of the cache.
+    lost: Arc<AtomicBool>,
     /// The views that it keeps, by index, each with the frame that draws it.
     kept: Vec<(usize, Arc<FrameOutcome>)>,
 }
@@ -122,16 +124,16 @@ impl ViewCache {
     pub(super) fn store(&mut self, plan: &FramePlan, views: &Arc<FrameViews>) -> InFlight {
         if !views.may_be_cached() {
             self.latest = None;
-            return InFlight { frame: None, kept: Vec::new() };
+            return InFlight { outcome: None, lost: Arc::clone(&self.lost), kept: Vec::new() };
         }
-        let frame = Arc::new(FrameOutcome::in_flight(self.kept_from.iter().flatten()));
-        let drawn_by = |kept: &Option<Arc<FrameOutcome>>| kept.clone().unwrap_or_else(|| Arc::clone(&frame));
+        let outcome = Arc::new(FrameOutcome::in_flight(self.kept_from.iter().flatten()));
+        let drawn_by = |kept: &Option<Arc<FrameOutcome>>| kept.clone().unwrap_or_else(|| Arc::clone(&outcome));
         let drawn_by = self.kept_from.iter().map(drawn_by).collect();
         self.latest = Some(DrawnViews { plan: plan.identity(), views: Arc::clone(views), drawn_by });
         let kept = self.kept_from.drain(..).enumerate();
         let kept = kept.filter_map(|(view, frame)| Some((view, frame.filter(|frame| !frame.is_submitted())?)));
         let kept = kept.collect();
-        InFlight { frame: Some((frame, Arc::clone(&self.lost))), kept }
+        InFlight { outcome: Some(outcome), lost: Arc::clone(&self.lost), kept }
     }
 
     /// Makes the next frame draw all of its views.
@@ -153,17 +155,17 @@ impl InFlight {
 
     /// The frame was submitted.
     pub(super) fn submitted(mut self) {
-        if let Some((frame, _)) = self.frame.take() {
-            frame.submit();
+        if let Some(outcome) = self.outcome.take() {
+            outcome.submit();
         }
     }
 }
 
 impl Drop for InFlight {
     fn drop(&mut self) {
-        if let Some((frame, lost)) = &self.frame {
-            frame.lose();
-            lost.store(true, Ordering::Relaxed);
+        if let Some(outcome) = &self.outcome {
+            outcome.lose();
+            self.lost.store(true, Ordering::Relaxed);
         }
     }
 }

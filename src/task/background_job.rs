@@ -32,6 +32,13 @@ impl<T: Send + 'static> BackgroundJob<T> {
         Self { state, queue: Arc::downgrade(queue), number }
     }
 
+    /// Runs the job at once, unless it has begun.
+    pub(crate) fn run(&self) {
+        // If the scheduler was dropped, the queue was too.
+        drop(self.queue.upgrade().and_then(|queue| queue.remove(self.number)));
+        self.state.run();
+    }
+
     /// Whether the job has run, so that [`wait`](Self::wait) returns at once.
     pub fn is_finished(&self) -> bool {
         self.state.outcome.lock().result.is_some()
@@ -47,9 +54,7 @@ impl<T: Send + 'static> BackgroundJob<T> {
     /// # Errors
     /// Returns the [`JobPanic`] if the job panicked.
     pub fn wait(self) -> Result<T, JobPanic> {
-        // If the scheduler was dropped, the queue was too.
-        drop(self.queue.upgrade().and_then(|queue| queue.remove(self.number)));
-        self.state.run();
+        self.run();
         let mut outcome = self.state.outcome.lock();
         loop {
             if let Some(result) = outcome.result.take() {

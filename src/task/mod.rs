@@ -119,8 +119,8 @@
 //!
 //! Other code of the engine may panic too. The hooks that name, place or start threads fail the
 //! [build](SchedulerBuilder::build). The panic of the hook that stops a thread is reported to [`tracing`]. A
-//! [clock](SchedulerBuilder::timeline_clock) that panics stands still. If a subscriber of `tracing` panics, its event is lost, or
-//! the run that sent it fails. A panic during the unwinding of another panic, such as that of a destructor, ends the process, as
+//! [clock](SchedulerBuilder::timeline_clock) that panics stands still. If a subscriber of `tracing` panics, its event or span is
+//! lost. A panic during the unwinding of another panic, such as that of a destructor, ends the process, as
 //! in any Rust program.
 //!
 //! # What a thread does while it waits

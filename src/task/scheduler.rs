@@ -149,7 +149,8 @@ impl Scheduler {
     ///
     /// The scopes and loops that it opens on this scheduler are background work as well. If a thread runs the job by
     /// waiting for it, they are part of that thread's work instead. Jobs that have not begun when the scheduler is
-    /// dropped run only if a thread waits for them.
+    /// dropped run only if a thread waits for them. A job that owns its scheduler keeps both in memory until it has run:
+    /// with a single worker for ever, if nobody runs it.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let job = BackgroundJob::queued(self.shared.background(), job);
         self.shared.wake_for_background();

@@ -4,6 +4,7 @@
 //! - `circles`: the files of one module do not import each other in circles.
 //! - `files`: files are short, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files through `drawloom-output`.
+//! - `subscribers`: the library calls subscribers of `tracing` where their panics are caught.
 //! - `unsafe_code`: unsafe code is in modules that Miri and the thread sanitizer run.
 //! - `atomics`: the tables of memory orderings in `ARCHITECTURE.md` list every atomic of `src`.
 
@@ -14,5 +15,6 @@ mod layers;
 mod outputs;
 mod paths;
 mod sources;
+mod subscribers;
 mod tokens;
 mod unsafe_code;

@@ -188,7 +188,7 @@ fn check_refusal(refusal: &Refusal, call: &FailedCall, fault: &Fault) -> Result<
         let of_frame: &[&str] = match call.kind {
             CallKind::UploadObjects => &["objects", "upload"],
             CallKind::Submit => &["submit"],
-            _ => &["begin"],
+            _ => &["the backend's begin", "begin"],
         };
         return require(of_frame.contains(&stage), "it names another stage");
     }
@@ -225,7 +225,7 @@ fn preparation() -> Result<(), Failed> {
             _ => fixture.renderer.prepare_pipelines_in_background(scenes[0].as_scene_ref())?.wait()?,
         };
         let is_told = match (&prepared, &fault) {
-            (Err(FrameError::Panicked { stage, .. }), Fault::Panic) => stage == "prepare pipelines",
+            (Err(FrameError::Panicked { stage, .. }), Fault::Panic) => stage == "the backend's prepare_pipelines",
             (Err(error), _) => error.backend_error().is_some(),
             (Ok(()), _) => false,
         };

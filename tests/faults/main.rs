@@ -8,6 +8,7 @@ mod fixture;
 mod histories;
 #[cfg(feature = "wgpu")]
 mod lost_devices;
+mod lost_frames;
 mod replaced;
 mod subjects;
 mod worlds;
@@ -39,6 +40,7 @@ fn main() {
         [
             calls::CASES_OF_ADAPTERS,
             histories::CASES_OF_ADAPTERS,
+            lost_frames::CASES_OF_ADAPTERS,
             replaced::CASES_OF_ADAPTERS,
             lost_devices::CASES_OF_ADAPTERS,
         ]
@@ -46,7 +48,7 @@ fn main() {
     );
     #[cfg(not(feature = "wgpu"))]
     let (more, of_adapters): (&[Case], Vec<Case>) = Default::default();
-    let cases = [calls::CASES, histories::CASES, replaced::CASES, more].concat().into_iter();
+    let cases = [calls::CASES, histories::CASES, lost_frames::CASES, replaced::CASES, more].concat().into_iter();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let lacks_adapter = !has_adapter() && !required;
     let trial = |lacks_adapter: bool, (name, case): Case| {

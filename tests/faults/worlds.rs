@@ -1,6 +1,8 @@
 //! What frames that fail draw in turn.
 
 use drawloom::scene::{Changes, Piece, RenderObject, Scene, SceneRef};
+use drawloom::{FrameError, Recorded, Renderer};
+use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::hills::GeneratedHills;
 use libtest_mimic::Failed;
 
@@ -43,6 +45,30 @@ impl Worlds {
         self.scenes.iter().any(|scene| !scene.pieces.is_empty())
     }
 
+    /// Records one of the states.
+    pub fn record<S: Subject>(
+        &self,
+        renderer: &mut Renderer<FaultyBackend<S>>,
+        index: usize,
+        changes: Changes<'_>,
+    ) -> Result<Recorded<FaultyBackend<S>>, FrameError> {
+        let scene = self.state(index, changes);
+        match &self.hills {
+            None => renderer.record(scene),
+            Some(hills) => {
+                let (vertices, indices) = hills.nodes(index);
+                renderer.record_with_nodes(scene, &[&vertices, &indices])
+            }
+        }
+    }
+
+    fn state<'a>(&'a self, index: usize, changes: Changes<'a>) -> SceneRef<'a> {
+        let state = self.scenes[index].as_scene_ref();
+        let (positions, scales, bounds, ambient) = (state.positions, state.scales, state.bounds, state.ambient);
+        // Another scene has other meshes and materials.
+        SceneRef { positions, scales, bounds, ambient, changes, ..self.scenes[0].as_scene_ref() }
+    }
+
     /// Draws one of the states. `Err` within `Ok` is a refusal by the renderer or submitter.
     pub fn draw<S: Subject>(
         &self,
@@ -50,10 +76,7 @@ impl Worlds {
         index: usize,
         changes: Changes<'_>,
     ) -> Result<Result<Vec<u8>, Refusal>, Failed> {
-        let state = self.scenes[index].as_scene_ref();
-        let (positions, scales, bounds, ambient) = (state.positions, state.scales, state.bounds, state.ambient);
-        // Another scene has other meshes and materials.
-        let scene = SceneRef { positions, scales, bounds, ambient, changes, ..self.scenes[0].as_scene_ref() };
+        let scene = self.state(index, changes);
         match &self.hills {
             None => fixture.draw_with_nodes(scene, &[]),
             Some(hills) => {

@@ -44,7 +44,7 @@ proptest! {
     }
 
     #[test]
-    fn a_panicking_subscriber_fails_the_run_and_nothing_else(mut schedule in schedules(), at in 1..30_isize) {
+    fn a_panicking_subscriber_fails_no_run(mut schedule in schedules(), at in 1..30_isize) {
         for kind in [ChangeKind::New, ChangeKind::Enter, ChangeKind::Exit, ChangeKind::Close] {
             for workers in [1, 2, 4] {
                 for mode in Mode::ALL {
@@ -66,10 +66,10 @@ proptest! {
                                 record.check_nesting();
                             }
                             let outcome = outcome.expect("no panic reaches the caller");
-                            assert_eq!(outcome.is_ok(), !panicked, "{kind:?}: {outcome:?}");
+                            assert!(outcome.is_ok(), "{kind:?}: {outcome:?}");
                             let done: usize = context.ran_chunks.into_inner().unwrap().iter().map(|chunk| chunk.items.len()).sum();
                             let all: usize = schedule.nodes().map(|(_, work)| work.width).sum();
-                            assert!(panicked || done == all, "{done} items of {all}");
+                            assert_eq!(done, all, "{kind:?}");
                         }
                     });
                 }
