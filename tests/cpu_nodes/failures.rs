@@ -67,8 +67,8 @@ fn a_node_that_is_named_like_a_stage_is_told_so() {
         "occlusion",
         "bin",
         "record pieces",
-        "compact, view 0 \"main\"",
-        "geometry buffer, view 0 \"main\", record",
+        "compact, view 0 \"front\"",
+        "geometry buffer, view 0 \"front\", record",
     ] {
         let expected = format!("node {stage:?} has the name of a stage of the frame");
         assert_eq!(error_of(&[idle(stage, |_| ())]).to_string(), expected);

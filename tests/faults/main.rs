@@ -4,6 +4,8 @@
 //! without `DRAWLOOM_SLOW_CASES=1`.
 
 mod calls;
+#[cfg(feature = "wgpu")]
+mod destroyed;
 mod fixture;
 mod histories;
 #[cfg(feature = "wgpu")]
@@ -39,6 +41,7 @@ fn main() {
         lost_devices::CASES,
         [
             calls::CASES_OF_ADAPTERS,
+            destroyed::CASES_OF_ADAPTERS,
             histories::CASES_OF_ADAPTERS,
             lost_frames::CASES_OF_ADAPTERS,
             replaced::CASES_OF_ADAPTERS,

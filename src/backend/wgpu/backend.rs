@@ -16,7 +16,7 @@ use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::streaming::{Streamer, StreamingBudget, StreamingStatistics};
 use super::timing::{DeviceClock, DeviceTiming};
 use crate::backend::subdivision_cache::SubdivisionCache;
-use crate::backend::{Backend, BackendError, TargetMemory};
+use crate::backend::{Backend, BackendError, FrameRequest, TargetMemory};
 use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
@@ -55,6 +55,9 @@ pub struct WgpuBackend {
     pub(super) workers: AtomicUsize,
     /// How each pass with commands was recorded in the frame that was submitted last.
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
+    /// Whether a frame has failed because a raw pass destroyed a texture or buffer that it was lent, so that those of the frames to come may
+    /// be among them.
+    pub(super) has_destroyed: Mutex<bool>,
     /// `None` if passes are not timed.
     pub(super) device_timing: Option<DeviceTiming>,
     /// Whether targets share textures.
@@ -134,6 +137,7 @@ impl WgpuBackend {
             frames: AtomicU64::new(0),
             workers: AtomicUsize::new(1),
             latest: Mutex::default(),
+            has_destroyed: Mutex::default(),
             device_timing: None,
             transient_targets: false,
             streamer: None,
@@ -328,6 +332,36 @@ impl WgpuBackend {
         self.subdivisions.clear();
         *self.targets.lock() = TargetCache::default();
         self.buffers.clear();
+    }
+
+    /// A frame has failed: its buffers may not hold what they should.
+    pub(super) fn fail_frame(&self, error: &BackendError) {
+        self.buffers.clear();
+        // wgpu has no error type for this either.
+        if matches!(error, BackendError::Validation { message, .. } if message.contains("has been destroyed")) {
+            *self.has_destroyed.lock() = true;
+        }
+    }
+
+    /// Makes anew what an earlier frame may have destroyed.
+    ///
+    /// # Errors
+    /// If a cached view is among the views: what it held is gone, so it has to be drawn.
+    pub(super) fn replace_destroyed(&self, request: &FrameRequest<'_>) -> Result<(), BackendError> {
+        if !std::mem::take(&mut *self.has_destroyed.lock()) {
+            return Ok(());
+        }
+        self.clear();
+        let mut storage_buffers = self.storage_buffers.lock();
+        *storage_buffers = Arc::new(storage_buffers.without_destroyed(&self.device));
+        match request.views.iter().find(|view| view.is_cached()) {
+            None => Ok(()),
+            Some(view) => {
+                let label = format!("view {:?}", view.name());
+                let message = "a raw pass has destroyed what an earlier frame drew of it".to_owned();
+                Err(BackendError::Validation { label, message })
+            }
+        }
     }
 }
 

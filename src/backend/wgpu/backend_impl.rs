@@ -86,10 +86,14 @@ impl Backend for WgpuBackend {
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
         let imports = imports?;
         check_device(&self.device).inspect_err(|_| self.clear())?;
+        self.replace_destroyed(request)?;
         let pipelines = self.update_pipelines(request)?;
         let update = || self.targets.lock().update(&self.device, request, &imports, self.transient_targets);
         let targets = with_error_scope(&self.device, "targets", update).inspect_err(|_| self.clear())??;
-        self.begin_frame(request, pipelines, targets).inspect_err(|_| self.clear())
+        self.begin_frame(request, pipelines, targets).inspect_err(|error| {
+            self.fail_frame(error);
+            self.clear();
+        })
     }
 
     fn discard_frame(&self) {
@@ -122,7 +126,7 @@ impl Backend for WgpuBackend {
         with_error_scope(&self.device, "objects", || frame.buffers.write_objects(&self.uploads, request, blocks))
             .flatten()
             .map_err(|error| loss_or(&self.device, error))
-            .inspect_err(|_| self.buffers.clear())
+            .inspect_err(|error| self.fail_frame(error))
     }
 
     fn prepare(
@@ -153,9 +157,9 @@ impl Backend for WgpuBackend {
         })
         .flatten()
         // Some of the resources just created may be unusable.
-        .inspect_err(|_| {
+        .inspect_err(|error| {
             self.subdivisions.clear();
-            self.buffers.clear();
+            self.fail_frame(error);
         })?;
         if !created.is_empty() {
             pipelines.insert(created);
@@ -201,7 +205,7 @@ impl Backend for WgpuBackend {
             .time_parallel(|| with_error_scope(&self.device, &pass.label, || catch_wgpu_panic(&pass.label, all)))
             .flatten()
             .flatten()
-            .inspect_err(|_| self.buffers.clear())
+            .inspect_err(|error| self.fail_frame(error))
     }
 
     fn finish(
@@ -218,7 +222,7 @@ impl Backend for WgpuBackend {
             if frame.generates_mip_levels(index) {
                 let encode = || encode_after_segments(&self.device, frame, request.frame, index);
                 let last = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, encode)).flatten();
-                parts.push(WgpuPart(last.inspect_err(|_| self.buffers.clear())?));
+                parts.push(WgpuPart(last.inspect_err(|error| self.fail_frame(error))?));
             }
             return Ok(WgpuCommands(PassCommands::Parts(std::mem::take(parts))));
         }
@@ -230,7 +234,7 @@ impl Backend for WgpuBackend {
             })
         };
         let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
-        commands.map(WgpuCommands).inspect_err(|_| self.buffers.clear())
+        commands.map(WgpuCommands).inspect_err(|error| self.fail_frame(error))
     }
 
     fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
@@ -285,7 +289,7 @@ impl Backend for WgpuBackend {
         for (pass, parts) in passes.iter().zip(parts) {
             let label = &frame.pass(pass.index).label;
             let finished = catch_wgpu_panic(label, || self.finish(worker, frame, pass, parts)).flatten();
-            emit(finished.inspect_err(|_| self.buffers.clear())?);
+            emit(finished.inspect_err(|error| self.fail_frame(error))?);
         }
         Ok(())
     }
@@ -319,7 +323,7 @@ impl Backend for WgpuBackend {
         // Not all may have been written.
         with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
             .flatten()
-            .inspect_err(|_| self.buffers.clear())
+            .inspect_err(|error| self.fail_frame(error))
     }
 
     fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
@@ -337,8 +341,8 @@ impl Backend for WgpuBackend {
         fences: Vec<FrameFence>,
     ) -> Result<WgpuSubmission, BackendError> {
         let submission = catch_wgpu_panic("the frame", || self.submit_frame(&mut frame, queues, fences));
-        let submission = submission.flatten().inspect_err(|_| {
-            self.buffers.clear();
+        let submission = submission.flatten().inspect_err(|error| {
+            self.fail_frame(error);
             if let Some(timing) = &self.device_timing {
                 timing.readback_pool.clear();
             }

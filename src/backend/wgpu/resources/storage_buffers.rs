@@ -3,6 +3,7 @@
 use super::buffers::new_buffer;
 use super::growing_buffer::check_storage_binding_size;
 use crate::backend::BackendError;
+use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::process::{BufferLayout, FramePlan};
 
 /// The buffers that processes share. Buffers of other plans stay, because frames with those plans may follow.
@@ -38,6 +39,29 @@ impl StorageBuffers {
             buffers.push((*layout, new_buffer(device, layout.name, layout.bytes, usage)?));
         }
         Ok(Self { buffers })
+    }
+
+    /// These buffers but for those that were destroyed. wgpu tells that only when a buffer is used.
+    pub(crate) fn without_destroyed(&self, device: &wgpu::Device) -> Self {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: None,
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: true },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let bind = |buffer: &wgpu::Buffer| {
+            let entries = &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }];
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries })
+        };
+        let exists = |buffer: &wgpu::Buffer| with_error_scope(device, "a shared buffer", || bind(buffer)).is_ok();
+        Self { buffers: self.buffers.iter().filter(|(_, buffer)| exists(buffer)).cloned().collect() }
     }
 
     /// A buffer of the plan.
