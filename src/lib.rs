@@ -78,6 +78,7 @@
 // Each module uses only modules above it; `tests/architecture` fails otherwise.
 mod sync;
 mod unwind;
+mod leaked_guards;
 pub mod fence;
 pub mod timeline;
 mod tuning;

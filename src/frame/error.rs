@@ -158,6 +158,16 @@ pub enum FrameError {
         /// The first chunk that is not filled.
         chunk: usize,
     },
+    /// There is not enough memory for what a node declares to fill a [buffer](crate::scene::GeneratedBuffer) with.
+    #[error("there is not enough memory for the {capacity} elements of {stride} bytes of buffer {buffer:?}")]
+    GeneratedMemory {
+        /// The buffer.
+        buffer: String,
+        /// The number of elements that it has room for.
+        capacity: usize,
+        /// The size of an element in bytes.
+        stride: usize,
+    },
     /// The frame's stage graph does not compile: a bug in Drawloom.
     #[error("the frame's stage graph does not compile: {0}")]
     StageGraph(GraphProblem),

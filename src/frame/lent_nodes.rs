@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::node_accesses::NodeAccess;
 use super::{CpuNode, FrameData, FrameError, NodeAccesses, NodeResource};
 use crate::graph::{FrameGraph, GraphProblem, NodeId};
-use crate::scene::GeneratedContents;
+use crate::scene::{GeneratedContents, GeneratedLayout};
 use crate::task::{JobPanic, catch};
 
 /// What decides about the graph of a frame with CPU nodes: the declaration of each.
@@ -43,7 +43,7 @@ impl NodeDeclarations {
     /// The nodes of a frame, which are asked what they read and write.
     ///
     /// # Errors
-    /// If one of them panics.
+    /// If one of them panics, or there is not enough memory for what they fill.
     pub(super) fn lend<'a>(&'a mut self, nodes: &'a [&'a dyn CpuNode]) -> Result<LentNodes<'a>, FrameError> {
         self.accesses.accesses.clear();
         self.accesses.filled.clear();
@@ -57,7 +57,11 @@ impl NodeDeclarations {
             })?;
             self.ranges.push(first..self.accesses.accesses.len());
         }
-        self.generated.extend(self.accesses.filled.iter().map(|source| source.begin_frame()));
+        for source in &self.accesses.filled {
+            let GeneratedLayout { name, capacity, stride, .. } = source.layout;
+            let without_memory = || FrameError::GeneratedMemory { buffer: name.to_owned(), capacity, stride };
+            self.generated.push(source.begin_frame().ok_or_else(without_memory)?);
+        }
         Ok(LentNodes { nodes, declarations: self })
     }
 

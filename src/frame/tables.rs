@@ -17,6 +17,7 @@ use crate::chunked_array::ChunkedArray;
 use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version,
 };
+use crate::leaked_guards::unlock;
 use crate::process::Pass;
 use crate::scene::{Light, SceneError, SceneRef};
 use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RenderView};
@@ -168,6 +169,7 @@ impl PassTable {
         culls_triangles: bool,
         orders_by_bin: bool,
     ) {
+        unlock(&mut self.list);
         self.selection = selection;
         self.orders_by_bin = orders_by_bin;
         if selection.is_none() || culls_triangles {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use bytemuck::NoUninit;
-use parking_lot::Mutex;
+use parking_lot::{Mutex, ReentrantMutex};
 
 /// Parameters of a shader that the engine changes between frames, while the renderer has the process that reads them.
 ///
@@ -60,27 +60,41 @@ use parking_lot::Mutex;
 /// assert_eq!(fog.0.get(), 0.05);
 /// ```
 #[derive(Debug, Default)]
-pub struct Parameters<T>(Arc<Mutex<T>>);
+pub struct Parameters<T>(Arc<Shared<T>>);
+
+/// What the clones share.
+#[derive(Debug, Default)]
+struct Shared<T> {
+    /// Held by whoever changes the value, so that no change is lost. A frame that reads the value does not wait for it.
+    updates: ReentrantMutex<()>,
+    value: Mutex<T>,
+}
 
 impl<T: NoUninit> Parameters<T> {
     /// New parameters, which share their value with no others.
     pub fn new(value: T) -> Self {
-        Self(Arc::new(Mutex::new(value)))
+        Self(Arc::new(Shared { updates: ReentrantMutex::new(()), value: Mutex::new(value) }))
     }
 
     /// Changes them, for frames that are recorded from now on.
     pub fn set(&self, value: T) {
-        *self.0.lock() = value;
+        let _updates = self.0.updates.lock();
+        *self.0.value.lock() = value;
     }
 
-    /// Changes them in place, for frames that are recorded from now on.
+    /// Changes them, for frames that are recorded from now on: `change` gets a copy, which takes the place of the value when it returns. Other
+    /// threads that change them wait for that; nobody waits to read them. If `change` panics, they stay.
     pub fn update<R>(&self, change: impl FnOnce(&mut T) -> R) -> R {
-        change(&mut self.0.lock())
+        let _updates = self.0.updates.lock();
+        let mut value = self.get();
+        let result = change(&mut value);
+        *self.0.value.lock() = value;
+        result
     }
 
     /// The current value.
     pub fn get(&self) -> T {
-        *self.0.lock()
+        *self.0.value.lock()
     }
 
     /// The bytes of the current value, such as [`FullScreen::parameters`](super::FullScreen::parameters) has them.

@@ -98,8 +98,11 @@ impl ShaderFile {
             // Only the thread with the lock adds one.
             Ok(next) => &latest.next.get_or_init(|| Box::new(next)).text,
             Err(error) => {
-                let path = self.path.display();
-                emit(|| tracing::warn!(target: "drawloom", %path, %error, "a shader cannot be read again"));
+                drop(checked);
+                // The engine's subscriber may ask for the text.
+                emit(|| {
+                    tracing::warn!(target: "drawloom", path = %self.path.display(), %error, "a shader cannot be read again");
+                });
                 &latest.text
             }
         }

@@ -24,12 +24,12 @@ impl<T: Pod> StorageBuffer<T> {
     /// A buffer of this name with this many elements. Two buffers of one name are the same buffer.
     ///
     /// # Panics
-    /// If its size is 0, or that of `T` not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
+    /// If its size is 0 or no `u64`, or that of `T` not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
     /// the compiler.
     pub const fn new(name: &'static str, count: u32) -> Self {
         assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
         assert!(count > 0, "a buffer has elements");
-        let bytes = size_of::<T>() as u64 * count as u64;
+        let bytes = bytes_of::<T>(count);
         let layout = BufferLayout { name, bytes, is_filled_by_nodes: false };
         Self { layout, element: PhantomData }
     }
@@ -69,9 +69,24 @@ impl<T: Pod> StorageBuffer<T> {
         GeneratedBuffer::of_storage(self.layout.name, self.layout.bytes as usize / size_of::<T>())
     }
 
-    /// The place of an element: of the arguments of an indirect draw or dispatch.
+    /// The place of an element: of the arguments of an indirect draw or dispatch. A frame that draws by it is refused if the buffer has no such
+    /// element.
+    ///
+    /// # Panics
+    /// If its offset in bytes is no `u64`.
     pub const fn at(self, index: u32) -> BufferOffset {
-        BufferOffset { buffer: self.layout, bytes: size_of::<T>() as u64 * index as u64 }
+        BufferOffset { buffer: self.layout, bytes: bytes_of::<T>(index) }
+    }
+}
+
+/// The size of so many elements.
+///
+/// # Panics
+/// If it is no `u64`.
+const fn bytes_of<T>(count: u32) -> u64 {
+    match (size_of::<T>() as u64).checked_mul(count as u64) {
+        Some(bytes) => bytes,
+        None => panic!("the elements have more bytes than a `u64`"),
     }
 }
 

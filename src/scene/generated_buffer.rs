@@ -1,6 +1,7 @@
 //! Memory that CPU nodes fill in a frame, and that this frame draws.
 
 use std::fmt;
+use std::hint::black_box;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 #[cfg(any(feature = "wgpu", feature = "software", test))]
 use super::Topology;
+use crate::leaked_guards::unlock;
 
 /// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
 /// terrain (S 9.5). When the frame is submitted, its content goes to the device, ahead of all passes. Each frame has a content of its own
@@ -71,7 +73,8 @@ impl<T: Pod> GeneratedBuffer<T> {
     /// What a chunk has, in bytes, unless the engine chooses another length.
     const CHUNK_BYTES: usize = 16 << 10;
 
-    /// A buffer with room for this many elements.
+    /// A buffer with room for this many elements. It takes no memory until a frame fills it: a frame for which there is not enough memory fails
+    /// with [`FrameError::GeneratedMemory`](crate::FrameError::GeneratedMemory).
     ///
     /// # Panics
     /// If it has none, or `T` has no bytes, a size that is not a multiple of 4 bytes, or an alignment of more than 16.
@@ -108,7 +111,7 @@ impl<T: Pod> GeneratedBuffer<T> {
         self.source.layout.chunk_count()
     }
 
-    /// The indices of the elements of a chunk.
+    /// The indices of the elements of a chunk: none if there is no such chunk.
     pub fn chunk_range(&self, chunk: usize) -> Range<usize> {
         self.source.layout.chunk_range(chunk)
     }
@@ -148,9 +151,9 @@ pub struct GeneratedLayout {
 }
 
 impl GeneratedLayout {
-    /// Its size in bytes.
+    /// Its size in bytes; `usize::MAX` if that is no `usize`. No frame fills a buffer that is larger than the memory.
     pub fn bytes(&self) -> usize {
-        self.stride * self.capacity
+        self.stride.saturating_mul(self.capacity)
     }
 
     fn chunk_count(&self) -> usize {
@@ -158,7 +161,8 @@ impl GeneratedLayout {
     }
 
     fn chunk_range(&self, chunk: usize) -> Range<usize> {
-        chunk * self.chunk..((chunk + 1) * self.chunk).min(self.capacity)
+        let start = chunk.saturating_mul(self.chunk).min(self.capacity);
+        start..start.saturating_add(self.chunk).min(self.capacity)
     }
 }
 
@@ -187,8 +191,9 @@ impl GeneratedSource {
         Self { layout, contents: Mutex::default() }
     }
 
-    /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled.
-    pub(crate) fn begin_frame(&self) -> Arc<GeneratedContents> {
+    /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled. `None` if there is no memory
+    /// for another one.
+    pub(crate) fn begin_frame(&self) -> Option<Arc<GeneratedContents>> {
         let mut contents = self.contents.lock();
         let mut free_count = 0;
         contents.retain(|contents| {
@@ -199,12 +204,12 @@ impl GeneratedSource {
         for free in &mut *contents {
             if let Some(unused) = Arc::get_mut(free) {
                 unused.reset();
-                return Arc::clone(free);
+                return Some(Arc::clone(free));
             }
         }
-        let new = Arc::new(GeneratedContents::new(self.layout));
+        let new = Arc::new(GeneratedContents::new(self.layout)?);
         contents.push(Arc::clone(&new));
-        new
+        Some(new)
     }
 }
 
@@ -249,19 +254,28 @@ pub(crate) enum ChunkError {
 }
 
 impl GeneratedContents {
-    fn new(layout: GeneratedLayout) -> Self {
-        let words = |elements: usize| vec![0; (elements * layout.stride).div_ceil(size_of::<u128>())].into();
-        let chunk = |index| RwLock::new(Chunk { words: words(layout.chunk_range(index).len()), is_filled: false });
-        Self { layout, chunks: (0..layout.chunk_count()).map(chunk).collect(), count: Mutex::new(layout.capacity) }
+    /// `None` if there is not enough memory.
+    fn new(layout: GeneratedLayout) -> Option<Self> {
+        let mut chunks = Vec::new();
+        chunks.try_reserve_exact(layout.chunk_count()).ok()?;
+        // The system gives memory away that it does not have, but hardly in one piece. What is too large would otherwise end the process
+        // somewhere among the chunks.
+        let mut all = Vec::<u8>::new();
+        all.try_reserve_exact(layout.bytes()).ok()?;
+        // Otherwise the compiler may leave out memory that nobody uses.
+        drop(black_box(all));
+        for index in 0..layout.chunk_count() {
+            // No more than the bytes of all chunks, and the rest of a word.
+            let words = (layout.chunk_range(index).len() * layout.stride).div_ceil(size_of::<u128>());
+            chunks.push(RwLock::new(Chunk { words: vec![0; words].into(), is_filled: false }));
+        }
+        Some(Self { layout, chunks, count: Mutex::new(layout.capacity) })
     }
 
     fn reset(&mut self) {
         *self.count.get_mut() = self.layout.capacity;
         for chunk in &mut self.chunks {
-            if chunk.is_locked() {
-                // A node has leaked what it filled.
-                *chunk = RwLock::new(std::mem::take(chunk.get_mut()));
-            }
+            unlock(chunk);
             chunk.get_mut().is_filled = false;
         }
     }
@@ -386,10 +400,10 @@ mod tests {
                 contents.fill::<[f32; 3]>(chunk).unwrap().fill([value; 3]);
             }
         };
-        let first = buffer.source().begin_frame();
+        let first = buffer.source().begin_frame().unwrap();
         assert_eq!(first.unfilled_chunk(), Some(0));
         fill(&first, 1.0);
-        let second = buffer.source().begin_frame();
+        let second = buffer.source().begin_frame().unwrap();
         fill(&second, 2.0);
         assert_eq!(first.elements::<[f32; 3]>(), [[1.0; 3]; 10]);
         assert_eq!(first.unfilled_chunk(), None);
@@ -397,7 +411,7 @@ mod tests {
         let memory = |contents: &GeneratedContents| std::ptr::from_ref(contents);
         let before = memory(&first);
         drop(first);
-        let third = buffer.source().begin_frame();
+        let third = buffer.source().begin_frame().unwrap();
         assert_eq!((memory(&third), third.unfilled_chunk()), (before, Some(0)));
         assert_eq!(second.elements::<[f32; 3]>(), [[2.0; 3]; 10]);
     }
@@ -405,7 +419,7 @@ mod tests {
     #[test]
     fn only_elements_that_count_are_there() {
         let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 10, 4);
-        let contents = buffer.source().begin_frame();
+        let contents = buffer.source().begin_frame().unwrap();
         contents.fill::<u32>(0).unwrap().fill(7);
         contents.set_count(3);
         assert_eq!((contents.unfilled_chunk(), contents.elements::<u32>()), (None, vec![7; 3]));
@@ -420,7 +434,7 @@ mod tests {
     #[test]
     fn indices_beyond_whole_triangles_repeat_the_last_one() {
         let buffer = GeneratedBuffer::<u32>::with_chunk("indices", 10, 4);
-        let contents = buffer.source().begin_frame();
+        let contents = buffer.source().begin_frame().unwrap();
         for chunk in 0..3 {
             let indices = buffer.chunk_range(chunk);
             contents
@@ -446,23 +460,42 @@ mod tests {
     #[test]
     fn what_nobody_has_filled_is_not_read_and_a_leaked_chunk_costs_one_frame() {
         let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 8, 4);
-        let contents = buffer.source().begin_frame();
+        let contents = buffer.source().begin_frame().unwrap();
         assert_eq!(contents.read::<u32>(0).err(), Some(ChunkError::Unfilled));
         std::mem::forget(contents.fill::<u32>(0).unwrap());
         contents.fill::<u32>(1).unwrap().fill(1);
         assert_eq!((contents.unfilled_chunk(), contents.fill::<u32>(0).err()), (Some(0), Some(ChunkError::Held)));
         drop(contents);
-        let contents = buffer.source().begin_frame();
+        let contents = buffer.source().begin_frame().unwrap();
         contents.fill::<u32>(0).unwrap().fill(2);
         assert_eq!(contents.read::<u32>(0).unwrap()[3], 2);
     }
 
     #[test]
+    fn sizes_that_overflow_have_no_contents_and_chunks_that_are_not_there_no_elements() {
+        for capacity in [usize::MAX, 1 << 62, 1 << 60, isize::MAX as usize / 16 + 1] {
+            for chunk in [1, 1 << 10, 1 << 62, usize::MAX] {
+                let buffer = GeneratedBuffer::<[u32; 4]>::with_chunk("huge", capacity, chunk);
+                let count = buffer.chunk_count();
+                assert_eq!(buffer.chunk_range(count - 1).end, capacity, "{chunk}");
+                assert!(buffer.chunk_range(count).is_empty() && buffer.chunk_range(usize::MAX).is_empty());
+                assert!(buffer.source().begin_frame().is_none(), "{capacity} {chunk}");
+            }
+        }
+        let buffer = GeneratedBuffer::<u32>::with_chunk("small", 8, usize::MAX);
+        let contents = buffer.source().begin_frame().unwrap();
+        contents.fill::<u32>(0).unwrap().fill(3);
+        assert_eq!(contents.elements::<u32>(), [3; 8]);
+        assert_eq!(contents.fill::<u32>(usize::MAX).err(), Some(ChunkError::Unknown));
+        assert_eq!(contents.read::<u32>(usize::MAX).err(), Some(ChunkError::Unknown));
+    }
+
+    #[test]
     fn the_contents_of_many_frames_at_once_are_dropped_again() {
         let buffer = GeneratedBuffer::<u32>::new("numbers", 8);
-        let all: Vec<_> = (0..50).map(|_| buffer.source().begin_frame()).collect();
+        let all: Vec<_> = (0..50).map(|_| buffer.source().begin_frame().unwrap()).collect();
         drop(all);
-        drop(buffer.source().begin_frame());
+        drop(buffer.source().begin_frame().unwrap());
         assert_eq!(buffer.source().contents.lock().len(), MAX_FREE_CONTENTS);
     }
 }

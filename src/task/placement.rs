@@ -103,10 +103,10 @@ mod linux {
         }
 
         fn restore(&self) {
-            for (thread, allowed) in self.threads.lock().iter() {
-                if let Err(error) = sched_setaffinity(Some(*thread), allowed) {
-                    emit(|| tracing::debug!(%error, "the affinity of a worker cannot be restored"));
-                }
+            let restore = |(thread, allowed): &(_, CpuSet)| sched_setaffinity(Some(*thread), allowed).err();
+            let errors: Vec<_> = self.threads.lock().iter().filter_map(restore).collect();
+            for error in errors {
+                emit(|| tracing::debug!(%error, "the affinity of a worker cannot be restored"));
             }
         }
     }

@@ -144,9 +144,9 @@ impl Timeline {
     pub fn count(&self, name: impl Into<Cow<'static, str>>, value: f64) {
         if self.is_on() {
             let at = self.now();
-            self.store
-                .lock()
-                .push(|events| &mut events.counters, Counter { name: name.into().into_owned(), at, value });
+            // The conversion is the engine's code, so it is not called under the lock.
+            let counter = Counter { name: name.into().into_owned(), at, value };
+            self.store.lock().push(|events| &mut events.counters, counter);
         }
     }
 
@@ -169,6 +169,8 @@ impl Timeline {
     /// This may be called at any time, and blocks no worker. It is best called between two frames: chunks of a run in progress are
     /// lost and counted as dropped, and that run is not [complete](Run::complete).
     pub fn take(&self) -> Log {
+        // The clock is the engine's code, so it is not called under a lock.
+        let now = self.now();
         let mut reported = self.reported.lock();
         let Events { frames, runs, spans, counters, tuning, threads, dropped } = self.store.lock().take();
         let mut log = Log { spans, counters, tuning, threads, dropped, ..Log::default() };
@@ -178,8 +180,8 @@ impl Timeline {
             indices.insert(number, log.runs.len());
             log.runs.push(run);
         }
-        for (worker, track) in self.tracks.iter().enumerate() {
-            let drained = self.drain(worker, track, &mut reported[worker], &indices, &mut log.runs, &mut open_runs);
+        for worker in 0..self.tracks.len() {
+            let drained = self.drain((worker, now), &mut reported[worker], &indices, &mut log.runs, &mut open_runs);
             log.workers.push(drained);
         }
         self.store.lock().mark_incomplete(&open_runs);
@@ -192,17 +194,17 @@ impl Timeline {
         log
     }
 
-    /// Takes out one worker's chunks, and its idle intervals since the last log. Chunks of a run without an index are lost, and
+    /// Takes out one worker's chunks, and its idle intervals from the last log until `now`. Chunks of a run without an index are lost, and
     /// the run's number is added to `open_runs`.
     fn drain(
         &self,
-        worker: usize,
-        track: &Track,
+        (worker, now): (usize, Duration),
         reported: &mut Duration,
         indices: &HashMap<u32, usize>,
         runs: &mut [Run],
         open_runs: &mut HashSet<u32>,
     ) -> WorkerLog {
+        let track = &*self.tracks[worker];
         let mut log = WorkerLog { name: self.names[worker].clone(), ..WorkerLog::default() };
         let (mut until, mut lost) = (Duration::ZERO, 0);
         let mut add = |run: u32, chunk: Chunk, list: fn(&mut Run) -> &mut Vec<Chunk>| match indices.get(&run) {
@@ -219,7 +221,7 @@ impl Timeline {
             Idle { began: began.max(*reported).min(idle.ended), ..idle }
         };
         // Read before the ring is drained, so that the open interval overlaps nothing in the ring.
-        let open = track.idle_until(self.now(), &self.clock);
+        let open = track.idle_until(now, &self.clock);
         let dropped = track.drain(worker, &self.clock, |entry| match entry {
             Entry::Idle(idle) => {
                 // The last log has reported the whole interval if it ended while that log was taken.
@@ -237,7 +239,8 @@ impl Timeline {
         });
         let open = open.map(|idle| with_start(idle, until));
         let open = open.filter(|idle| log.idle.last().is_none_or(|last| last.ended <= idle.began));
-        *reported = until.max(open.map_or(*reported, |idle| idle.ended));
+        // Another log may have been taken since `now`.
+        *reported = until.max(open.map_or(*reported, |idle| idle.ended)).max(*reported);
         log.idle.extend(open);
         log.dropped = dropped + lost;
         log
@@ -361,7 +364,10 @@ impl OpenRun<'_> {
 
     /// The run is parallel from now on.
     pub(crate) fn start_parallel(&self) {
-        self.parallel_from.get_or_init(|| self.timeline.now());
+        if self.parallel_from.get().is_none() {
+            // The clock is the engine's code, so it is not called while others wait for this cell.
+            let _ = self.parallel_from.set(self.timeline.now());
+        }
     }
 
     #[inline]

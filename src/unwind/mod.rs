@@ -32,6 +32,7 @@ mod caught_span;
 mod contained;
 
 use std::any::Any;
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::{mem, process};
 
@@ -101,6 +102,49 @@ pub(crate) fn emit(event: impl FnOnce()) {
     }
 }
 
+thread_local! {
+    /// The events that wait until this thread leaves [`hold_events`]; `None` outside it.
+    static HELD_EVENTS: RefCell<Option<Vec<Box<dyn FnOnce()>>>> = const { RefCell::new(None) };
+}
+
+/// Calls `work`, which may hold locks, and only then sends the events of [`emit_unlocked`]: the engine's subscriber may ask for what the locks
+/// guard. `work` must have let go of them when it returns.
+pub(crate) fn hold_events<R>(work: impl FnOnce() -> R) -> R {
+    /// Sends the events when it is dropped, also by an unwind.
+    struct Held {
+        is_outermost: bool,
+    }
+
+    impl Drop for Held {
+        fn drop(&mut self) {
+            if self.is_outermost {
+                let events = HELD_EVENTS.take().unwrap_or_default();
+                events.into_iter().for_each(emit);
+            }
+        }
+    }
+
+    let is_outermost = HELD_EVENTS.with_borrow_mut(|held| {
+        let is_outermost = held.is_none();
+        held.get_or_insert_default();
+        is_outermost
+    });
+    let _held = Held { is_outermost };
+    work()
+}
+
+/// [Emits](emit) an event when this thread leaves [`hold_events`]; at once if it is not there.
+pub(crate) fn emit_unlocked(event: impl FnOnce() + 'static) {
+    let unheld = HELD_EVENTS.with_borrow_mut(|held| match held {
+        Some(events) => {
+            events.push(Box::new(event));
+            None
+        }
+        None => Some(event),
+    });
+    unheld.into_iter().for_each(emit);
+}
+
 /// Aborts the process if it is dropped. Only an unwind drops it: every other path [disarms](Self::disarm) it.
 ///
 /// It guards code that must run to its end because other threads rely on it. Rayon does the same.
@@ -138,7 +182,7 @@ mod tests {
     use std::panic::panic_any;
     use std::process::Command;
 
-    use super::{AbortOnUnwind, catch, emit};
+    use super::{AbortOnUnwind, catch, emit, emit_unlocked, hold_events};
 
     #[test]
     fn a_panic_in_an_event_does_not_leave_emit() {
@@ -150,6 +194,26 @@ mod tests {
             }
         }
         emit(|| panic_any(PanicsAgain));
+    }
+
+    #[test]
+    fn events_are_held_until_the_outermost_call_returns_or_unwinds() {
+        let count = std::rc::Rc::new(std::cell::Cell::new(0));
+        let event = || {
+            let count = count.clone();
+            emit_unlocked(move || count.set(count.get() + 1));
+        };
+        event();
+        assert_eq!(count.get(), 1);
+        hold_events(|| {
+            event();
+            hold_events(event);
+            assert_eq!(count.get(), 1);
+        });
+        assert_eq!(count.get(), 3);
+        assert!(catch(|| hold_events(|| [event()].map(|()| panic!("as planned")))).is_err());
+        event();
+        assert_eq!(count.get(), 5);
     }
 
     #[test]

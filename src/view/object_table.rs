@@ -15,6 +15,7 @@ use super::used_meshes::UsedMeshes;
 use super::{BoundingBoxes, GpuObject, Rejections};
 use crate::chunked_array::block_ranges;
 use crate::command::{BinnedSegment, Bins};
+use crate::leaked_guards::unlock;
 use crate::quality::CullingVolume;
 use crate::scene::{Changes, MaterialLayout, SceneRef};
 
@@ -86,6 +87,8 @@ impl ObjectTable {
     /// Makes room for a scene's objects, and finds out which of them have to be described, those that changed or all, and which meshes
     /// they use.
     pub fn begin_frame(&mut self, scene: &SceneRef<'_>) {
+        unlock(&mut self.bins);
+        self.blocks.iter_mut().for_each(unlock);
         let objects = scene.object_count();
         let assets_changed = self.draw_states.update(scene.assets);
         if assets_changed && self.bins.get_mut().len() > MIN_UNUSED_BINS + 2 * objects {

@@ -328,6 +328,7 @@ impl WgpuBackend {
     pub(super) fn clear(&self) {
         *self.meshes.lock() = MeshCache::default();
         *self.materials.lock() = MaterialCache::default();
+        self.uploads.drop_commands();
         *self.light_meshes.lock() = None;
         self.subdivisions.clear();
         *self.targets.lock() = TargetCache::default();

@@ -16,6 +16,7 @@ use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::Mesh;
+use crate::unwind::hold_events;
 
 impl WgpuBackend {
     /// Begins a frame with these pipelines and targets: creates or reuses the other resources of its passes.
@@ -37,8 +38,7 @@ impl WgpuBackend {
             self.subdivisions.clear();
         }
         let StreamedResources { meshes, materials, frame_use } =
-            with_error_scope(&self.device, "meshes, materials and textures", || self.update_resources(request))
-                .flatten()?;
+            hold_events(|| self.update_resources_in_scope(request))?;
         let storage_buffers = self.storage_buffers(plan)?;
         let generated = GeneratedUploads::new(request, &storage_buffers, &meshes.imported_meshes);
         let mut buffers = self.buffers.take(&self.device)?;
@@ -71,6 +71,20 @@ impl WgpuBackend {
             self.begin_passes(&mut frame, request)?;
             Ok(frame)
         })?
+    }
+
+    /// [Updates](Self::update_resources) them, and submits what belongs to that.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn update_resources_in_scope(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
+        let update = || {
+            let updated = self.update_resources(request)?;
+            // The locks are not held any more.
+            self.uploads.submit_commands();
+            Ok(updated)
+        };
+        with_error_scope(&self.device, "meshes, materials and textures", update).flatten()
     }
 
     /// The meshes, materials and textures of a frame: uploads what is missing or, if they are streamed, takes over what jobs have uploaded.
@@ -116,7 +130,10 @@ impl WgpuBackend {
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let FrameRequest { plan, draws, quality, .. } = *request;
         let library = self.library.as_ref();
-        self.pipelines.lock().update(&self.device, &self.layouts, library, plan, draws, quality)
+        hold_events(|| {
+            let mut pipelines = self.pipelines.lock();
+            pipelines.update(&self.device, &self.layouts, library, plan, draws, quality)
+        })
     }
 
     /// Updates the bind groups of each pass, and chooses its strategy.

@@ -332,7 +332,8 @@ impl Shared {
     }
 
     fn add_statistics<B: Backend>(&self, recorded: &mut Recorded<B>) {
-        let (shown, state) = (self.shown.get(), self.state.lock());
+        let (shown, mut all) = (self.shown.get(), Vec::new());
+        let state = self.state.lock();
         for view in recorded.views.recorded().iter().filter(|view| view.kind() == ViewKind::Main) {
             let work = state.views.iter().find(|work| work.view == view.name());
             let statistics = HelperStatistics {
@@ -344,12 +345,17 @@ impl Shared {
                 skipped: work.map_or(0, |work| work.skipped),
                 latest_took: work.map_or_else(Default::default, |work| work.latest_took),
             };
-            let timeline = self.scheduler.timeline();
-            if let Some(age) = statistics.age().filter(|_| timeline.is_on()) {
-                timeline.count(format!("age of {} in {}, frames", self.name, view.name()), age as f64);
-            }
-            recorded.statistics.helpers.push(statistics);
+            all.push(statistics);
         }
+        drop(state);
+        // The timeline reads the clock, which may be the engine's code.
+        let timeline = self.scheduler.timeline();
+        for statistics in all.iter().filter(|_| timeline.is_on()) {
+            if let Some(age) = statistics.age() {
+                timeline.count(format!("age of {} in {}, frames", self.name, statistics.view), age as f64);
+            }
+        }
+        recorded.statistics.helpers.append(&mut all);
     }
 
     /// A frame is not of the renderer that the helper's frame began with.

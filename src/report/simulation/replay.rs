@@ -94,6 +94,7 @@ impl Replay {
         serial: Duration,
         costs: SchedulerCosts,
     ) -> Result<Self, ReportError> {
+        let costs = costs.bounded();
         let measured = |(run, gaps): (&Run, Vec<Duration>)| match run {
             Run { failed: true, frame, .. } => Err(ReportError::Failed { frame: *frame }),
             Run { complete: false, frame, .. } => Err(ReportError::Incomplete { frame: *frame }),
@@ -107,7 +108,7 @@ impl Replay {
 
     /// Adds time in which the calling thread works before or after the runs, while the other workers have nothing to do.
     pub fn with_serial_time(mut self, time: Duration) -> Self {
-        self.serial += time;
+        self.serial = self.serial.saturating_add(time);
         self
     }
 
@@ -132,7 +133,7 @@ impl Replay {
             let are_awake = are_awake_after(gaps, workers, self.costs.wake);
             let replayed = self.replay(&measured.cut_for(workers), workers, are_awake);
             frame.chunks += replayed.chunks;
-            frame.time += replayed.time;
+            frame.time = frame.time.saturating_add(replayed.time);
             frame.serial &= replayed.serial;
             frame.busy.iter_mut().zip(replayed.busy).for_each(|(sum, busy)| *sum += busy);
         }

@@ -10,7 +10,7 @@ use crate::sync::{Instant, spin_loop};
 use crate::task::{Chunks, MAX_SPIN_BETWEEN_FRAMES, Scheduler, SchedulerError, Tickets, uncounted_pauses};
 use crate::timeline::Run;
 
-/// What the scheduler's own operations cost.
+/// What the scheduler's own operations cost. A [replay](super::Replay) takes each for an hour at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SchedulerCosts {
     /// From waking a worker until it begins: [`Scheduler::wake_up_cost`].
@@ -63,6 +63,22 @@ impl SchedulerCosts {
         node_serial: Duration::ZERO,
         recording: Duration::ZERO,
     };
+
+    /// Costs of which a replay can add as many as fit into memory.
+    pub(super) fn bounded(self) -> Self {
+        let bounded = |cost: Duration| cost.min(Duration::from_secs(3_600));
+        Self {
+            wake: bounded(self.wake),
+            waker: bounded(self.waker),
+            steal: bounded(self.steal),
+            uncounted_search: bounded(self.uncounted_search),
+            ticket: bounded(self.ticket),
+            chunk: bounded(self.chunk),
+            node: bounded(self.node),
+            node_serial: bounded(self.node_serial),
+            recording: bounded(self.recording),
+        }
+    }
 
     /// Measures them on this machine, which takes some 50 ms. It starts schedulers of one and of two workers for that,
     /// and stops it.

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read, Seek};
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::limits::Limit;
 use super::statements::escaped;
@@ -45,7 +45,15 @@ pub(super) fn decode(
     let mut limits = Limits::default();
     limits.max_alloc = Some(while_decoded.bytes);
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(message)?;
+    // A decoder that runs into the limit does not know its name.
+    let refused = |error: ImageError| match error {
+        ImageError::Limits(_) => {
+            let Limit { field, bytes, .. } = while_decoded;
+            format!("to decode it takes more than `ObjLimits::{field}`, which is {bytes}")
+        }
+        other => message(other),
+    };
+    let decoder = reader.into_decoder().map_err(refused)?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
     let rgba_bytes = pixels.saturating_mul(4);
@@ -61,7 +69,7 @@ pub(super) fn decode(
     let mut bytes = if has_bytes {
         decode_bytes(decoder, rgba_bytes)?
     } else {
-        DynamicImage::from_decoder(decoder).map_err(message)?.into_rgba8().into_raw()
+        DynamicImage::from_decoder(decoder).map_err(refused)?.into_rgba8().into_raw()
     };
     let is_scaled = [scaled_width, scaled_height] != [width, height];
     if is_scaled {

@@ -11,7 +11,7 @@ use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
 use crate::process::{Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
-use crate::unwind::emit;
+use crate::unwind::emit_unlocked;
 
 /// Keeps the pipelines of all plans. Plans share pipelines where they can.
 #[derive(Default)]
@@ -101,8 +101,10 @@ impl PipelineCache {
                                 Arc::new(created)
                             }
                             (Err(error), Some(working)) => {
-                                let message = "a shader does not compile; the one before it stays in use";
-                                emit(|| tracing::error!(target: "drawloom", %error, "{message}"));
+                                let message = error.to_string();
+                                emit_unlocked(move || {
+                                    tracing::error!(target: "drawloom", error = message, "a shader does not compile; the one before it stays in use");
+                                });
                                 let key = PipelineKey::new(draws, quality).into_owned();
                                 self.failed.insert(planned.name.clone(), (key, error));
                                 Arc::clone(working)

@@ -4,13 +4,14 @@ use wgpu::naga::ResourceBinding;
 use wgpu::naga::front::wgsl;
 
 use crate::process::Declaration;
-use crate::unwind::emit;
+use crate::unwind::emit_unlocked;
 
 /// Warns of the targets, buffers, columns and material types that a process declares and its shader, which compiles, has no variable for.
 /// A declaration that has no use still orders processes, and keeps or uploads what it names.
 pub(super) fn warn_of_unused_bindings(process: &str, declaration: &Declaration, before: &str, own: &[(&str, &str)]) {
     for (resource, ResourceBinding { group, binding }) in unused_bindings(declaration, before, own) {
-        emit(|| {
+        let process = process.to_owned();
+        emit_unlocked(move || {
             tracing::warn!(
                 target: "drawloom", %process,
                 "declares {resource}, and its shader has no variable with @group({group}) @binding({binding})"

@@ -57,8 +57,8 @@ pub(super) struct ResidentTexture {
 }
 
 impl TextureArrays {
-    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Submits the copies at once, before anything that
-    /// reads the textures.
+    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Adds the copies to what is submitted before anything
+    /// that reads the textures.
     ///
     /// # Errors
     /// If the device has no room, or is lost. What is in the arrays is undefined then, so drop them.
@@ -81,12 +81,7 @@ impl TextureArrays {
             return Ok(());
         }
         for index in 0..ARRAY_SIDES.len() {
-            self.make_room(
-                device,
-                uploads.queue(),
-                index,
-                missing.iter().filter(|(.., other)| *other == index).count(),
-            );
+            self.make_room(device, uploads, index, missing.iter().filter(|(.., other)| *other == index).count());
         }
         let label = Some("new and changed textures");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
@@ -103,7 +98,7 @@ impl TextureArrays {
                 _ => rejected.push((RejectionReason::TextureLimit, slot)),
             }
         }
-        uploads.queue().submit([encoder.finish()]);
+        uploads.add_commands([encoder.finish()]);
         Ok(())
     }
 
@@ -187,7 +182,7 @@ impl TextureArrays {
     }
 
     /// Makes room for so many further textures in an array, if the device allows as many layers.
-    fn make_room(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, index: usize, textures: usize) {
+    fn make_room(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, textures: usize) {
         let array = &self.arrays[index];
         let max_layers = device.limits().max_texture_array_layers as usize;
         let has_retired = self.lifetimes.retired().any(|location| location.array == index as u32);
@@ -196,7 +191,7 @@ impl TextureArrays {
         }
         // Twice the layers, so that a texture that changes every frame does not move the others every frame.
         let layers = ((self.live_layers(index).count() + textures) * 2).max(array.capacity()).min(max_layers);
-        self.move_array(device, queue, index, layers as u32);
+        self.move_array(device, uploads, index, layers as u32);
     }
 
     /// The layers of an array that textures are in.
@@ -206,9 +201,9 @@ impl TextureArrays {
     }
 
     /// Moves the textures of an array to the first layers of a new one, with this many layers, at least as many as textures.
-    pub(super) fn move_array(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, index: usize, layers: u32) {
+    pub(super) fn move_array(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, layers: u32) {
         let live: Vec<_> = self.live_layers(index).collect();
-        self.arrays[index].move_to(device, queue, ARRAY_SIDES[index], layers, &live);
+        self.arrays[index].move_to(device, uploads, ARRAY_SIDES[index], layers, &live);
         let moved = self.textures.iter_mut().flatten().filter(|texture| texture.location.array == index as u32);
         for (texture, layer) in moved.zip(0..) {
             texture.location.layer = layer;

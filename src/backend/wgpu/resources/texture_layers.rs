@@ -1,5 +1,6 @@
 //! One texture array, and which of its layers are in use.
 
+use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::backend::wgpu::error_scope::{loss_or, refused};
@@ -50,8 +51,15 @@ impl TextureLayers {
     }
 
     /// Moves to a texture with this many layers; to none if that is 0. The device copies `live` layers to the first ones, in their order;
-    /// all others are free then. The copy is submitted at once, before anything that reads it.
-    pub(super) fn move_to(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, side: u32, layers: u32, live: &[u32]) {
+    /// all others are free then. The copy is submitted before anything that reads it.
+    pub(super) fn move_to(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &UploadQueue,
+        side: u32,
+        layers: u32,
+        live: &[u32],
+    ) {
         if layers == 0 {
             return self.release();
         }
@@ -64,7 +72,7 @@ impl TextureLayers {
                 copy_layers(&mut encoder, (before, run[0]), (&texture, first), run.len() as u32);
                 first += run.len() as u32;
             }
-            queue.submit([encoder.finish()]);
+            uploads.add_commands([encoder.finish()]);
         }
         let is_used = (0..layers as usize).map(|layer| layer < live.len()).collect();
         *self = Self { texture: Some(texture), is_used, free_count: layers as usize - live.len() };

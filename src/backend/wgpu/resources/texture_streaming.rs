@@ -164,10 +164,10 @@ impl TextureArrays {
         }
         for other in donors {
             let live = self.live_layers(other).count();
-            self.move_array(budget.device, budget.uploads.queue(), other, live as u32);
+            self.move_array(budget.device, budget.uploads, other, live as u32);
         }
         let affordable = capacity + budget.bytes.saturating_sub(self.resident_bytes()) / bytes;
-        self.move_array(budget.device, budget.uploads.queue(), index, wanted.min(affordable) as u32);
+        self.move_array(budget.device, budget.uploads, index, wanted.min(affordable) as u32);
         Ok(())
     }
 

@@ -1,11 +1,12 @@
 //! What may be uploaded from one frame to the next.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// What may be uploaded until the next frame: so many bytes, until a time.
+/// What may be uploaded until the next frame: so many bytes, within a time.
 pub(super) struct Allowance {
     bytes: u64,
-    end: Instant,
+    began: Instant,
+    time: Duration,
     has_begun: bool,
 }
 
@@ -13,8 +14,9 @@ impl Allowance {
     /// The bytes of a portion: so small that a job looks at the time often.
     const PORTION: u64 = 1 << 18;
 
-    pub(super) fn new(bytes: u64, end: Instant) -> Self {
-        Self { bytes, end, has_begun: false }
+    /// So many bytes within a time that begins now.
+    pub(super) fn new(bytes: u64, time: Duration) -> Self {
+        Self { bytes, began: Instant::now(), time, has_begun: false }
     }
 
     /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first portion is allowed at any
@@ -39,19 +41,18 @@ impl Allowance {
     }
 
     fn is_late(&self) -> bool {
-        self.has_begun && Instant::now() >= self.end
+        // The end of the time may be none that an `Instant` can be.
+        self.has_begun && self.began.elapsed() >= self.time
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     #[test]
     fn portions_are_whole_units_and_add_up_to_the_bytes() {
-        let mut allowance = Allowance::new(1_000_003, Instant::now() + Duration::from_secs(1000));
+        let mut allowance = Allowance::new(1_000_003, Duration::MAX);
         let mut sum = 0;
         while !allowance.is_over() {
             let taken = allowance.take(1 << 40, 12);
@@ -67,7 +68,7 @@ mod tests {
 
     #[test]
     fn one_portion_is_allowed_when_the_time_is_over() {
-        let mut allowance = Allowance::new(100, Instant::now());
+        let mut allowance = Allowance::new(100, Duration::ZERO);
         assert_eq!((allowance.take(8, 4), allowance.take(8, 4), allowance.is_over()), (8, 0, true));
     }
 }

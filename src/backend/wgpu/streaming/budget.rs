@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::backend::BackendError;
 
-/// What streaming may take: memory of the device, and a part of each frame. See
+/// What streaming may take: memory of the device, and a part of each frame. `u64::MAX` and `Duration::MAX` are no limit. See
 /// [`WgpuBackend::stream_resources`](crate::backend::WgpuBackend::stream_resources).
 ///
 /// ```
@@ -53,7 +53,7 @@ impl StreamingBudget {
             ("mesh_bytes", mesh_bytes, Self::MIN_BYTES),
             ("texture_bytes", texture_bytes, Self::MIN_BYTES),
             ("upload_bytes_per_frame", upload_bytes_per_frame, Self::MIN_UPLOAD_BYTES),
-            ("upload_time_per_frame", upload_time_per_frame.as_nanos() as u64, 1),
+            ("upload_time_per_frame", upload_time_per_frame.as_nanos().try_into().unwrap_or(u64::MAX), 1),
         ];
         match sizes.into_iter().find(|(_, value, least)| value < least) {
             Some((field, value, least)) => Err(BackendError::InvalidStreamingBudget { field, value, least }),

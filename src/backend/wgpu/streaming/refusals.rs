@@ -6,7 +6,7 @@ use super::request::Requested;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::backend::wgpu::resources::Unplaced;
 use crate::scene::{Assets, Mesh, Texture};
-use crate::unwind::emit;
+use crate::unwind::emit_unlocked;
 
 /// The meshes that had no room in a frame, and how much looking for it has cost.
 ///
@@ -123,7 +123,7 @@ impl TooLarge {
     }
 
     /// Tells that something takes so many bytes, and the limit of a name allows so many, unless it was told already.
-    pub(super) fn tell(&mut self, requested: &Requested<'_>, (bytes, limit, allowed): (u64, &str, u64)) {
+    pub(super) fn tell(&mut self, requested: &Requested<'_>, (bytes, limit, allowed): (u64, &'static str, u64)) {
         let (told, slot, revision, name, kind) = match *requested {
             Requested::Mesh(handle, revision, mesh) => {
                 (&mut self.meshes, handle.index(), revision, mesh.name(), "mesh")
@@ -133,8 +133,10 @@ impl TooLarge {
             }
         };
         if told.insert(slot, revision) != Some(revision) {
-            let message = "it is too large to be streamed: what it replaces stays, or nothing is drawn";
-            emit(|| tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "{message}"));
+            let name = name.to_owned();
+            emit_unlocked(move || {
+                tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed: what it replaces stays, or nothing is drawn");
+            });
         }
     }
 

@@ -21,7 +21,7 @@ use crate::backend::wgpu::resources::{
 };
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
-use crate::unwind::emit;
+use crate::unwind::emit_unlocked;
 use crate::view::{RejectionReason, Rejections, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
@@ -134,7 +134,7 @@ impl Streamer {
     ) -> Result<(), BackendError> {
         let (finished, commands) = self.jobs.take_finished();
         if !commands.is_empty() {
-            on_device.uploads.queue().submit(commands);
+            on_device.uploads.add_commands(commands);
         }
         let mut outcome = Ok(());
         for (upload, result) in finished {
@@ -181,7 +181,7 @@ impl Streamer {
         statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
         statistics.over_budget = 0;
 
-        let max_waiting = self.budget.upload_bytes_per_frame * Self::MAX_WAITING_FRAMES;
+        let max_waiting = self.budget.upload_bytes_per_frame.saturating_mul(Self::MAX_WAITING_FRAMES);
         let mut waiting = self.jobs.waiting_bytes() + held.iter().map(|held| held.upload.bytes()).sum::<u64>();
         let mut placement = Placement::new(on_device, &self.budget, &uses, retries);
         while waiting < max_waiting
@@ -240,8 +240,9 @@ impl BudgetWarning {
         self.frames_within = 0;
         if !mem::replace(&mut self.was_told, true) {
             let count = over_budget;
-            let message = "what frames draw exceeds the streaming budget: meshes or textures are left out";
-            emit(|| tracing::warn!(target: "drawloom", count, "{message}"));
+            emit_unlocked(move || {
+                tracing::warn!(target: "drawloom", count, "what frames draw exceeds the streaming budget: meshes or textures are left out");
+            });
         }
     }
 }

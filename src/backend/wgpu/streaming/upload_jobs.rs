@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::mem;
-use std::time::Instant;
 
 use parking_lot::Mutex;
 
@@ -86,8 +85,7 @@ impl UploadJobs {
 
     /// Uploads what the budget allows between two frames.
     pub(super) fn work(&self, device: &wgpu::Device, uploads: &UploadQueue, budget: &StreamingBudget) {
-        let end = Instant::now() + budget.upload_time_per_frame;
-        let mut allowance = Allowance::new(budget.upload_bytes_per_frame, end);
+        let mut allowance = Allowance::new(budget.upload_bytes_per_frame, budget.upload_time_per_frame);
         loop {
             // The lock is not held meanwhile, so that a frame can begin.
             let next = self.state.lock().waiting.pop_front();

@@ -1,0 +1,310 @@
+//! Numbers of processes: sizes of targets, counts of draws and workgroups, effects.
+
+use std::cell::OnceCell;
+use std::sync::Arc;
+
+use drawloom::Renderer;
+use drawloom::backend::{NullBackend, Picture, PipelineLibrary, SoftwareBackend};
+use drawloom::command::Cull;
+use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStep, PostHelper};
+use drawloom::process::{
+    ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Exposure, Format, FullScreen, Fxaa,
+    PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize, ToneMapping, Workgroups,
+};
+use drawloom::scene::ViewKind;
+use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
+use drawloom_testing::adapter::noop_device;
+use libtest_mimic::Failed;
+
+use super::NumberCase;
+use crate::fixture::{COUNTS, FLOATS, Fixture, ensure, noop_backend, refused, same, scene};
+
+pub const CASES: &[NumberCase] = &[
+    NumberCase {
+        name: "targets_of_any_size",
+        numbers: &[
+            "process::TargetSize::Divided",
+            "process::TargetSize::Fixed",
+            "process::TargetSize::in_view",
+            "process::Declare::samples_view_layers",
+        ],
+        check: targets,
+    },
+    NumberCase {
+        name: "draws_and_workgroups_of_any_number",
+        numbers: &[
+            "process::DrawCount::Count::instances",
+            "process::DrawCount::Count::vertices",
+            "process::Workgroups::Count",
+            "process::Stencil::read_mask",
+            "process::Stencil::reference",
+            "process::Stencil::write_mask",
+            "process::Stencil::mark",
+            "process::Stencil::test",
+        ],
+        check: draws,
+    },
+    NumberCase {
+        name: "bloom_and_sources_of_any_numbers",
+        numbers: &[
+            "helper::Bloom::divisor",
+            "helper::Bloom::radius",
+            "helper::Bloom::threshold",
+            "helper::Bloom::on_device",
+            "helper::HelperLayer::strength",
+            "helper::HelperSource::downsampled",
+        ],
+        check: bloom,
+    },
+    NumberCase {
+        name: "post_processing_of_any_numbers",
+        numbers: &[
+            "process::Exposure::new",
+            "process::Exposure::set",
+            "process::Exposure::from",
+            "process::Fxaa::contrast_threshold",
+            "process::Fxaa::dark_threshold",
+            "process::Fxaa::sub_pixel",
+        ],
+        check: post,
+    },
+    NumberCase {
+        name: "the_geometry_is_shared_among_any_number_of_jobs",
+        numbers: &["process::Deferred::geometry_shares"],
+        check: shares,
+    },
+    NumberCase { name: "shadow_maps_of_any_numbers", numbers: &[], check: shadow_maps },
+];
+
+/// A process that draws into a target of its own.
+struct Process {
+    size: TargetSize,
+    layers: Option<u32>,
+    draws: Draws<'static>,
+}
+
+const COUNTED: StorageBuffer<u32> = StorageBuffer::new("counted", 4).filled_by_nodes();
+
+impl RenderProcess for Process {
+    fn name(&self) -> &str {
+        "a process"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        if let Draws::Compute(_) = self.draws {
+            declare.changes_buffer(COUNTED);
+            declare.keep();
+            return;
+        }
+        if self.draws.arguments().is_some() {
+            declare.reads_arguments(COUNTED);
+        }
+        declare.clears_color("own", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.size("own", self.size);
+        declare.keep();
+        if let Some(layers) = self.layers {
+            declare.samples_view_layers(ViewKind::Main, "team", "picture", layers);
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        self.draws.clone()
+    }
+}
+
+fn draw(process: Process) -> Result<(), Failed> {
+    let builder = Renderer::builder(noop_backend()?).deferred(Deferred::to_picture()).process(process);
+    let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
+    let mut fixture = Fixture { renderer, submitter };
+    fixture.draw(&scene()).map(drop)
+}
+
+const PAINT: &str = "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> { return vec4<f32>(1.0); }";
+
+fn targets() -> Result<(), Failed> {
+    for number in COUNTS {
+        let full_screen = || Draws::FullScreen(FullScreen { shader: PAINT, ..FullScreen::default() });
+        let drawn = draw(Process { size: TargetSize::Divided(number), layers: None, draws: full_screen() });
+        ensure(drawn.is_ok() == (number > 0), format_args!("divided by {number}: {drawn:?}"))?;
+        same(TargetSize::Divided(number).in_view([16, u32::MAX])[0], 16_u32.div_ceil(number.max(1)), "the width")?;
+        for size in [[number, 4], [4, number]] {
+            let drawn = draw(Process { size: TargetSize::Fixed(size), layers: None, draws: full_screen() });
+            ensure(drawn.is_ok() == (number == 1), format_args!("{size:?}: {drawn:?}"))?;
+        }
+        let drawn = draw(Process { size: TargetSize::Picture, layers: Some(number), draws: full_screen() });
+        ensure(drawn.is_ok() == (number == 1), format_args!("{number} layers: {drawn:?}"))?;
+    }
+    Ok(())
+}
+
+fn draws() -> Result<(), Failed> {
+    let shader = "@vertex fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> { return vec4<f32>(f32(index)); }
+        @fragment fn fragment() -> @location(0) vec4<f32> { return vec4<f32>(1.0); }";
+    for number in COUNTS {
+        for (vertices, instances) in [(number, 1), (3, number), (number, number)] {
+            let count = DrawCount::Count { vertices, instances };
+            let draws =
+                Draws::Procedural(ProceduralDraws { shader, count, cull: Cull::Back, ..ProceduralDraws::default() });
+            draw(Process { size: TargetSize::Picture, layers: None, draws })?;
+        }
+        let limit = drawloom::wgpu::Limits::default().max_compute_workgroups_per_dimension;
+        for count in [[number, 1, 1], [1, number, 1], [1, 1, number], [number; 3]] {
+            let shader = "@group(2) @binding(1) var<storage, read_write> counted: array<u32>;
+                @compute @workgroup_size(1) fn compute() { counted[0] = 1u; }";
+            let draws = Draws::Compute(ComputeDispatch {
+                shader,
+                workgroups: Workgroups::Count(count),
+                ..ComputeDispatch::default()
+            });
+            let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws });
+            let is_valid = count.iter().all(|count| *count <= limit);
+            ensure(drawn.is_ok() == is_valid, format_args!("{count:?} workgroups: {drawn:?}"))?;
+        }
+    }
+    for index in [1, u32::MAX] {
+        let count = DrawCount::Indirect(COUNTED.at(index));
+        let draws = Draws::Procedural(ProceduralDraws { shader, count, ..ProceduralDraws::default() });
+        let drawn = draw(Process { size: TargetSize::Picture, layers: None, draws });
+        ensure(drawn.is_err(), format_args!("arguments at {index} lie beyond the buffer"))?;
+    }
+    for mask in [0, 1, u8::MAX] {
+        let stencils = [
+            Stencil::mark(mask),
+            Stencil::test(Comparison::Equal, mask),
+            Stencil { read_mask: mask, write_mask: mask, reference: !mask, ..Stencil::mark(1) },
+        ];
+        for stencil in stencils {
+            let draws =
+                Draws::FullScreen(FullScreen { shader: PAINT, stencil: Some(stencil), ..FullScreen::default() });
+            // The process has no stencil, which is said.
+            refused(
+                draw(Process { size: TargetSize::Picture, layers: None, draws })
+                    .map_err(|failed| failed.message().unwrap_or_default().to_owned()),
+                "stencil",
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// A step that makes a picture of one pixel.
+struct Pixel;
+
+impl HelperStep for Pixel {
+    fn name(&self) -> &str {
+        "pixel"
+    }
+
+    fn compute(&self, _: &HelperFrame<'_>) -> Picture {
+        Picture { width: 1, height: 1, format: Format::Rgba8Unorm, bytes: vec![0; 4] }
+    }
+}
+
+fn bloom() -> Result<(), Failed> {
+    let usual = Bloom::default();
+    let mut all: Vec<_> = COUNTS.iter().map(|divisor| Bloom { divisor: *divisor, ..usual }).collect();
+    all.extend(COUNTS.iter().map(|radius| Bloom { radius: *radius, ..usual }));
+    all.extend(FLOATS.iter().map(|threshold| Bloom { threshold: *threshold, ..usual }));
+    for (bloom, strength) in all.into_iter().map(|bloom| (bloom, 0.5)).chain(FLOATS.map(|number| (usual, number))) {
+        let (processes, step) = bloom.on_device(strength);
+        expect_drawn((&processes, None), step, format_args!("{bloom:?} of {strength}"))?;
+    }
+    let layers = COUNTS.map(|divisor| (divisor, 1.0)).into_iter().chain(FLOATS.map(|strength| (4, strength)));
+    for (divisor, strength) in layers {
+        let source = HelperSource::downsampled("radiance", divisor);
+        let helper = PostHelper::new(Arc::new(Scheduler::new(1)?), Pixel, source);
+        let processes: Vec<_> = helper.downsample().map(|process| Arc::new(process) as _).into_iter().collect();
+        let layer = helper.layer(HelperLayer { strength, ..HelperLayer::default() });
+        let drawn = expect_drawn((&processes, Some(helper.source_target())), layer, divisor);
+        ensure(drawn.is_ok() == (divisor > 0), format_args!("divided by {divisor}, {strength}: {drawn:?}"))?;
+    }
+    Ok(())
+}
+
+/// Makes each pipeline once.
+fn library() -> Result<PipelineLibrary, Failed> {
+    thread_local! {
+        static LIBRARY: OnceCell<PipelineLibrary> = const { OnceCell::new() };
+    }
+    LIBRARY.with(|library| match library.get() {
+        Some(library) => Ok(library.clone()),
+        None => {
+            let (device, queue) = noop_device()?;
+            Ok(library.get_or_init(|| PipelineLibrary::new(device, queue)).clone())
+        }
+    })
+}
+
+/// Draws with processes and a step behind the shipped ones, and with another target that is kept.
+fn expect_drawn(
+    (processes, output): (&[Arc<dyn RenderProcess>], Option<&str>),
+    step: impl PostStep + 'static,
+    what: impl std::fmt::Display,
+) -> Result<(), Failed> {
+    let scheduler = Arc::new(Scheduler::new(1)?);
+    let deferred = Deferred::new().post(step).post(ToneMapping::default());
+    let mut noop = Renderer::builder(library()?.backend()?).deferred(deferred.clone());
+    let mut software = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred);
+    for process in processes {
+        (noop, software) = (noop.process(Arc::clone(process)), software.process(Arc::clone(process)));
+    }
+    if let Some(output) = output {
+        (noop, software) = (noop.output(output), software.output(output));
+    }
+    let (renderer, submitter) = noop.build(Arc::clone(&scheduler))?;
+    Fixture { renderer, submitter }.expect_usual(&what)?;
+    // Its CPU shaders compute in Rust, where numbers may overflow; the device's are checked to compile.
+    let (renderer, submitter) = software.build(scheduler)?;
+    Fixture { renderer, submitter }.expect_usual(&what)
+}
+
+fn post() -> Result<(), Failed> {
+    for number in FLOATS {
+        let set = Exposure::new(1.0);
+        set.set(number);
+        for exposure in [Exposure::new(number), Exposure::from(number), set] {
+            same(exposure.get().to_bits(), number.to_bits(), "the exposure")?;
+            let deferred = Deferred::new().post(ToneMapping::new(exposure));
+            let drawn = Fixture::software(deferred)?.draw(&scene())?;
+            let picture = drawn.submission.read(0, "picture")?;
+            ensure(picture.bytes.chunks(4).all(|pixel| pixel[3] == 255), "a picture of numbers")?;
+        }
+        for fxaa in [
+            Fxaa { contrast_threshold: number, ..Fxaa::default() },
+            Fxaa { dark_threshold: number, ..Fxaa::default() },
+            Fxaa { sub_pixel: number, ..Fxaa::default() },
+        ] {
+            let deferred = Deferred::to_picture().post(fxaa);
+            Fixture::software(deferred)?.expect_usual(format_args!("{number} in FXAA"))?;
+        }
+    }
+    Ok(())
+}
+
+fn shares() -> Result<(), Failed> {
+    for shares in COUNTS {
+        let mut fixture = Fixture::new(NullBackend, 2, Deferred::to_picture().geometry_shares(shares))?;
+        fixture.expect_usual(format_args!("{shares} shares"))?;
+    }
+    Ok(())
+}
+
+fn shadow_maps() -> Result<(), Failed> {
+    let usual = ShadowMaps::default();
+    let mut all: Vec<_> = COUNTS.iter().map(|side| ShadowMaps { side: *side, ..usual.clone() }).collect();
+    all.extend(COUNTS.iter().map(|filter| ShadowMaps { filter: *filter, ..usual.clone() }));
+    all.extend(COUNTS.iter().map(|cascades| ShadowMaps { cascades: *cascades, ..usual.clone() }));
+    all.extend(FLOATS.iter().map(|bias| ShadowMaps { bias: *bias, ..usual.clone() }));
+    all.extend(FLOATS.iter().map(|max_distance| ShadowMaps { max_distance: *max_distance, ..usual.clone() }));
+    all.extend(FLOATS.iter().map(|split_lambda| ShadowMaps { split_lambda: *split_lambda, ..usual.clone() }));
+    for maps in all {
+        let what = format!("{maps:?}");
+        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).shadow_maps(maps);
+        if let Ok((renderer, submitter)) = builder.build(Arc::new(Scheduler::new(1)?)) {
+            let drawn = Fixture { renderer, submitter }.draw(&scene());
+            ensure(drawn.is_ok(), format_args!("{what}: {drawn:?}", drawn = drawn.map(drop)))?;
+        }
+    }
+    Ok(())
+}
