@@ -7,6 +7,7 @@
 //! it copies the picture into a texture in place of a surface's, and finally saves it as `engine_loop.png`.
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -21,13 +22,17 @@ use drawloom::process::{
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
-use drawloom_output::{PictureFile, path_text};
+use drawloom_output::{PictureFile, path_text, print_line};
 use parking_lot::Mutex;
 
 const FRAMES: usize = 60;
 const STEP: Duration = Duration::from_millis(16);
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let file = PictureFile::new("engine_loop.png")?;
     // The engine's own device. WgpuBackend's constants list the features and limits that Drawloom needs.
     let (device, queue) = open_device()?;
@@ -64,8 +69,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     lent_times.sort();
-    println!("{} objects, {FRAMES} frames on {}", world.positions.len(), adapter_name(&device));
-    println!(
+    print_line!("{} objects, {FRAMES} frames on {}", world.positions.len(), adapter_name(&device));
+    print_line!(
         "the world was lent for {:?} per frame (median), {:?} at most",
         lent_times[FRAMES / 2],
         lent_times[FRAMES - 1]
@@ -75,7 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Files have red first.
     picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
     file.write([picture.width, picture.height], &picture.bytes)?;
-    println!("{} written, {}x{} after the resize", path_text(file.path()), picture.width, picture.height);
+    print_line!("{} written, {}x{} after the resize", path_text(file.path()), picture.width, picture.height);
     Ok(())
 }
 

@@ -8,6 +8,7 @@
 //! time of a frame from the 30th frame after each step on, and the rungs after it. `target/drawloom/budget.json` has the same.
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
@@ -49,7 +50,11 @@ struct Row {
     back_after: Option<usize>,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let (few, frames) = if quick { (100, 40) } else { (10_000, 600) };
     let progress = progress_bar("frames");

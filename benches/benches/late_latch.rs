@@ -9,6 +9,7 @@
 
 use std::error::Error;
 use std::f32::consts::{PI, TAU};
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -47,7 +48,11 @@ struct Row {
     replace_microseconds: Option<f64>,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = ExtentArguments::parse();
     let (boxes, rounds) = if arguments.is_quick() { (500, 1) } else { (10_000, 15) };
     let scene = city::new(boxes, [960, 540])?;

@@ -12,6 +12,7 @@
 
 use std::error::Error;
 use std::panic;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -27,6 +28,7 @@ use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use drawloom_testing::adapter;
 use serde::Serialize;
 
@@ -65,10 +67,14 @@ struct Engine {
     scene: Scene,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let Some(adapter) = adapter_name() else {
-        println!("There is no graphics adapter.");
+        print_line!("There is no graphics adapter.");
         return Ok(());
     };
     let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (1, &[[96, 54]]) } else { (9, &[[480, 270], [960, 540]]) };
@@ -92,7 +98,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     drop(panic::take_hook());
     progress.finish_and_clear();
 
-    println!("The colonnade on {adapter}, two workers, ms\n");
+    print_line!("The colonnade on {adapter}, two workers, ms\n");
     let headings = [
         "picture",
         "pipelines",

@@ -8,6 +8,7 @@
 //! have the same bytes. `target/drawloom/software.json` has the same.
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -40,7 +41,11 @@ struct Row {
     ratio: f64,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let (rounds, sizes): (_, &[[u32; 2]]) = match quick {
         true => (Rounds { warm_up: 0, measured: 1 }, &[[96, 54]]),

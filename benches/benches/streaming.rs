@@ -11,6 +11,7 @@
 
 use std::collections::VecDeque;
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -58,7 +59,11 @@ struct Extent {
     rounds: usize,
 }
 
-fn main() -> Result<(), Failure> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Failure> {
     let quick = ExtentArguments::parse().is_quick();
     let extent = match quick {
         true => Extent {

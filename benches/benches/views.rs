@@ -12,6 +12,7 @@ use std::env;
 use std::error::Error;
 use std::fs;
 use std::process::Command;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,6 +32,7 @@ use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::stopwatch::timed_frame;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 use indicatif::ProgressBar;
@@ -54,7 +56,11 @@ struct Row {
     microseconds: [f64; 2],
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = ViewsArguments::parse();
     if let Some(views) = arguments.views {
         return print_memory(views);
@@ -119,7 +125,7 @@ fn print_memory(views: usize) -> Result<(), Box<dyn Error>> {
     for _ in 0..3 {
         submitter.submit(renderer.record(scene.as_scene_ref())?)?;
     }
-    println!("{}", resident_kib()?.saturating_sub(before));
+    print_line!("{}", resident_kib()?.saturating_sub(before));
     Ok(())
 }
 

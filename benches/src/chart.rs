@@ -4,7 +4,7 @@ use std::error::Error;
 use std::ops::Range;
 use std::path::Path;
 
-use drawloom_output::{OutputFile, path_text};
+use drawloom_output::{OutputFile, path_text, print_line};
 use plotters::coord::Shift;
 use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
@@ -91,7 +91,7 @@ pub fn draw(path: &Path, panels: &[Panel]) -> Result<(), Failure> {
         }
         Ok(())
     })?;
-    println!("{} written", path_text(path));
+    print_line!("{} written", path_text(path));
     Ok(())
 }
 

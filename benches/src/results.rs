@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use drawloom_output::{OutputFile, path_text};
+use drawloom_output::{OutputFile, path_text, print_line};
 use serde::Serialize;
 
 /// Writes `value` as the file `name`.
@@ -15,7 +15,7 @@ use serde::Serialize;
 pub fn write_json(name: &str, value: &impl Serialize) -> io::Result<()> {
     let file = OutputFile::new(file(name)?)?;
     file.write_all(serde_json::to_string_pretty(value)? + "\n")?;
-    println!("{} written", path_text(file.path()));
+    print_line!("{} written", path_text(file.path()));
     Ok(())
 }
 

@@ -1,4 +1,5 @@
 //! Tables in Markdown.
+use drawloom_output::print_line;
 
 /// A table. Columns are as wide as their longest cell. Columns of numbers are aligned to the right.
 pub struct Table {
@@ -26,7 +27,7 @@ impl Table {
             let aligned = line.iter().zip(&columns).map(|(cell, &(width, right))| {
                 if right { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
-            println!("| {} |", aligned.collect::<Vec<_>>().join(" | "));
+            print_line!("| {} |", aligned.collect::<Vec<_>>().join(" | "));
             if index == 0 {
                 let ruled =
                     columns.iter().map(
@@ -34,9 +35,9 @@ impl Table {
                             if right { format!("{}:", "-".repeat(width - 1)) } else { "-".repeat(width) }
                         },
                     );
-                println!("| {} |", ruled.collect::<Vec<_>>().join(" | "));
+                print_line!("| {} |", ruled.collect::<Vec<_>>().join(" | "));
             }
         }
-        println!();
+        print_line!();
     }
 }

@@ -39,7 +39,7 @@ use drawloom::process::{Deferred, ToneMapping};
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
-use drawloom_output::{OutputError, PictureFile, create_folder, path_text};
+use drawloom_output::{OutputError, PictureFile, create_folder, path_text, print_line};
 use drawloom_testing::adapter;
 
 use arguments::{Arguments, BackendName};
@@ -54,14 +54,8 @@ const PICTURE: [u32; 2] = [960, 540];
 const RECORDED_FRAMES: u32 = 30;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    drawloom_output::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -98,7 +92,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     times.sort_unstable();
-    println!(
+    print_line!(
         "{} frames on {} workers: recorded in {:.2} ms (median); the last one had {} walkers, {} sparks and {} KiB that nodes made, and a sound \
          of up to {:.2}",
         arguments.frames,
@@ -116,10 +110,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn explain(arguments: &Arguments, log: &Log) -> Result<(), Box<dyn Error>> {
     if let Some(file) = &arguments.timeline {
         file.write(|writer| write_chrome_trace(log, writer))?;
-        println!("{} written", path_text(file.path()));
+        print_line!("{} written", path_text(file.path()));
     }
     if let Some(frame) = log.frames.last().filter(|_| arguments.explain) {
-        println!("\n{}", FrameReport::new(log, frame.number, &SchedulerCosts::measure()?)?);
+        print_line!("\n{}", FrameReport::new(log, frame.number, &SchedulerCosts::measure()?)?);
     }
     Ok(())
 }
@@ -131,6 +125,6 @@ fn milliseconds(time: Duration) -> f64 {
 fn save(path: PathBuf, picture: &Picture) -> Result<(), OutputError> {
     let file = PictureFile::new(path)?;
     file.write([picture.width, picture.height], &picture.bytes)?;
-    println!("{} written", path_text(file.path()));
+    print_line!("{} written", path_text(file.path()));
     Ok(())
 }

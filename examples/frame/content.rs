@@ -29,7 +29,7 @@ impl Content {
             not_listed.entry(warning.kind()).and_modify(|count| *count -= 1);
         }
         for (kind, count) in not_listed.into_iter().filter(|(_, count)| *count > 0) {
-            print_diagnostic(format_args!("warning: {count} more of the kind `{kind}`"));
+            print_diagnostic!("warning: {count} more of the kind `{kind}`");
         }
         Self {
             degenerate_triangles: imported.degenerate_triangles,
@@ -54,6 +54,6 @@ impl Content {
 /// Prints what was left out of a file or replaced.
 pub fn print_warnings(warnings: &[ObjWarning]) {
     for warning in warnings {
-        print_diagnostic(format_args!("warning: {warning}"));
+        print_diagnostic!("warning: {warning}");
     }
 }

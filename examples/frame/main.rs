@@ -40,17 +40,15 @@ use report::Report;
 use sequence::Sequence;
 
 fn main() -> ExitCode {
-    let events = tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false);
-    // That events cannot be printed is no reason to stop.
-    events.log_internal_errors(false).init();
+    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
     let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit());
-    let failed = |error: Box<dyn Error>| print_diagnostic(format_args!("error: {}", with_causes(error.as_ref())));
-    let Ok(input) = Input::load(&arguments).map_err(failed) else {
-        return ExitCode::from(2);
-    };
-    match run(&arguments, input).map_err(failed) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(()) => ExitCode::FAILURE,
+    let with_causes = |error: Box<dyn Error>| with_causes(error.as_ref());
+    match Input::load(&arguments).map_err(with_causes) {
+        Ok(input) => drawloom_output::exit_code(run(&arguments, input).map_err(with_causes)),
+        Err(error) => {
+            print_diagnostic!("error: {error}");
+            ExitCode::from(2)
+        }
     }
 }
 
@@ -77,7 +75,7 @@ impl Input {
 
 fn run(arguments: &Arguments, Input { scene, found, content, sequence }: Input) -> Result<(), Box<dyn Error>> {
     if let Some(sequence) = sequence {
-        found.map_or(Ok(()), print_line)?;
+        found.into_iter().for_each(print_line);
         return sequence.draw(arguments, scene, || pipeline::adapter_backend(arguments));
     }
     let (report, log) = match arguments.backend {
@@ -107,12 +105,12 @@ fn run(arguments: &Arguments, Input { scene, found, content, sequence }: Input) 
         report.write(file)?;
     }
     let of_timeline = timeline::write_outputs(arguments, &log)?;
-    found.map_or(Ok(()), print_line)?;
+    found.into_iter().for_each(print_line);
     if let Some(picture) = &arguments.out {
-        print_line(format_args!("{} written", path_text(picture.path())))?;
+        print_line!("{} written", path_text(picture.path()));
     }
-    print_line(&report)?;
-    of_timeline.into_iter().try_for_each(print_line)?;
+    print_line(&report);
+    of_timeline.into_iter().for_each(print_line);
     Ok(())
 }
 

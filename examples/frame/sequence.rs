@@ -65,7 +65,7 @@ impl Sequence {
         scene: Scene,
         open_adapter: impl FnOnce() -> Result<WgpuBackend, Box<dyn Error>>,
     ) -> Result<(), Box<dyn Error>> {
-        print_line(format_args!("{} of {} frames are there", self.frame_count - self.missing.len(), self.frame_count))?;
+        print_line!("{} of {} frames are there", self.frame_count - self.missing.len(), self.frame_count);
         if self.missing.is_empty() {
             return Ok(());
         }

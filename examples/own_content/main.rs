@@ -28,10 +28,11 @@ mod world;
 
 use std::error::Error;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Parser;
 use drawloom::backend::Picture;
-use drawloom_output::{OutputError, PictureFile, create_folder, path_text};
+use drawloom_output::{OutputError, PictureFile, create_folder, path_text, print_line};
 use indicatif::ProgressBar;
 
 use crate::engine::Engine;
@@ -53,7 +54,11 @@ struct Arguments {
     frames: usize,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     create_folder(&arguments.out)?;
     let engine = Engine::new(device::open()?)?;
@@ -72,8 +77,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     save("smooth.png", &engine.smooth(&mut world, arguments.frames, step)?)?;
     save("characters.png", &engine.characters(SIZE)?)?;
     progress.finish_and_clear();
-    println!("{} objects; in the middle of the first picture is {}", arguments.objects, picking::describe(object));
-    println!("the pictures are written to {}", path_text(&arguments.out));
+    print_line!("{} objects; in the middle of the first picture is {}", arguments.objects, picking::describe(object));
+    print_line!("the pictures are written to {}", path_text(&arguments.out));
     Ok(())
 }
 

@@ -29,7 +29,7 @@ use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::task::Scheduler;
-use drawloom_output::{OutputFile, create_folder};
+use drawloom_output::{OutputFile, create_folder, print_diagnostic};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -44,14 +44,8 @@ use world::World;
 const SKY: Vec3 = Vec3::new(0.55, 0.68, 0.86);
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::checked()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    drawloom_output::exit_code(run(&Arguments::checked()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -90,7 +84,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let begin = Instant::now();
         world.scene.cameras = vec![flight.camera(time)];
         let errors = world.update(&flight, time)?;
-        errors.iter().for_each(|error| eprintln!("warning: {error}"));
+        errors.iter().for_each(|error| print_diagnostic!("warning: {error}"));
         let mut recorded = renderer.record(world.scene.as_scene_ref())?;
         let share = arguments.share_of(time);
         if arguments.backend == BackendName::Wgpu && pictures.is_due(share) {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::time::Duration;
 
 use drawloom::backend::{StreamingBudget, StreamingStatistics};
-use drawloom_output::OutputFile;
+use drawloom_output::{OutputFile, print_line};
 use serde::Serialize;
 
 /// A frame of the flight.
@@ -88,11 +88,11 @@ impl Report {
     pub fn print(&self) {
         let Self { frames, frame_ms: FrameTimes { median, p99, max }, .. } = self;
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
-        println!(
+        print_line!(
             "{frames} frames: median {median:.2} ms, 99% below {p99:.2} ms, longest {max:.2} ms ({:.2} medians)",
             max / median
         );
-        println!(
+        print_line!(
             "{:.0} MB of land through {:.0} MB: at most {:.0} MB on the device, {:.0} MB uploaded, {} evictions, {} frames incomplete",
             megabytes(self.world_bytes),
             megabytes(self.budget_bytes),

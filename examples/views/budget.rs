@@ -6,6 +6,7 @@ use std::error::Error;
 use drawloom::backend::Backend;
 use drawloom::scene::{Camera, SceneRef};
 use drawloom::{BudgetedView, Renderer, Rung, Submitter, ViewBudget, ViewForm};
+use drawloom_output::print_line;
 
 use crate::gallery::Gallery;
 use crate::{contact_sheet, mirror_ball};
@@ -43,7 +44,7 @@ pub fn choose<B: Backend>(
             break;
         }
         less *= 0.5;
-        println!("nothing is given up; with {less} ms:");
+        print_line!("nothing is given up; with {less} ms:");
         is_at_best = keep(less, gallery, renderer, submitter)?.rungs.values().all(|rung| *rung == 0);
     }
     Ok(chosen)
@@ -78,7 +79,7 @@ fn keep<B: Backend>(
         frame += 1;
         if frame == FRAMES {
             let left = if budget.is_exhausted() { ", and every view is on its last rung" } else { "" };
-            println!("frame {frame:>3}: {took:.2} ms of {milliseconds} ms{left}");
+            print_line!("frame {frame:>3}: {took:.2} ms of {milliseconds} ms{left}");
             return Ok(Chosen { cameras, rungs });
         }
         budget.update(&submitted.statistics);
@@ -86,7 +87,7 @@ fn keep<B: Backend>(
         for view in &views {
             let [before, rung] = [&rungs, &after].map(|rungs| rungs.get(&view.cameras[0].name).copied().unwrap_or(0));
             if before != rung {
-                println!("frame {frame:>3}: {took:.2} ms, {} goes from rung {before} to {rung}", view.name);
+                print_line!("frame {frame:>3}: {took:.2} ms, {} goes from rung {before} to {rung}", view.name);
             }
         }
     }

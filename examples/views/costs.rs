@@ -9,7 +9,7 @@ use drawloom::backend::{Backend, TargetMemory};
 use drawloom::scene::{Camera, SceneRef};
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Renderer, Submitter};
-use drawloom_output::OutputFile;
+use drawloom_output::{OutputFile, print_line};
 use serde::Serialize;
 
 use crate::gallery::Gallery;
@@ -144,20 +144,20 @@ pub fn set_rungs(views: &mut [ViewCost], rungs: &HashMap<String, usize>) {
 /// Prints a line for each view, and the memory of all.
 pub fn print(views: &[ViewCost], targets: TargetMemory) {
     let line = format!("{:<28} {:<10} {:>8} {:>9}", "view", "kind", "objects", "commands");
-    println!("{line} {:>8} {:>9} {:>4}", "ms", "saves ms", "rung");
+    print_line!("{line} {:>8} {:>9} {:>4}", "ms", "saves ms", "rung");
     for view in views {
         let saves = view.saves_ms.map_or_else(|| "-".to_owned(), |saves| format!("{saves:.3}"));
         let ViewCost { name, kind, objects, commands, ms, rung, .. } = view;
-        println!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9} {rung:>4}");
+        print_line!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9} {rung:>4}");
     }
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let TargetMemory { textures, bytes, dedicated_bytes, .. } = targets;
     let (bytes, dedicated) = (mebibytes(bytes), mebibytes(dedicated_bytes));
-    println!(
+    print_line!(
         "ms: thread time of a frame with all views. saves ms: wall time of a frame without the view; below 0 is noise."
     );
-    println!("rung: 0 is a view at its best, higher ones are cheaper.");
-    println!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
+    print_line!("rung: 0 is a view at its best, higher ones are cheaper.");
+    print_line!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
 }
 
 /// Writes the table of views as JSON.

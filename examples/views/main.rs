@@ -25,7 +25,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::backend::{Backend, SoftwareBackend, WgpuBackend};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, ViewBudget};
-use drawloom_output::{OutputFile, PictureFile, path_text};
+use drawloom_output::{OutputFile, PictureFile, path_text, print_line};
 use drawloom_testing::adapter;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -58,14 +58,8 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    drawloom_output::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -107,13 +101,13 @@ fn draw(arguments: &Arguments, gallery: &Gallery) -> Result<(), Box<dyn Error>> 
     let mut sheet = match device {
         Ok((device, queue)) => {
             let backend = WgpuBackend::new(device, queue)?;
-            println!("drawn by {}", backend.adapter_name());
+            print_line!("drawn by {}", backend.adapter_name());
             let (mut renderer, submitter) = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
             let submitted = submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?;
             submitted.submission.read(gallery.sheet_view(), contact_sheet::TARGET)?
         }
         Err(reason) => {
-            println!("drawn in software: {reason}");
+            print_line!("drawn in software: {reason}");
             let backend = SoftwareBackend::new(Arc::clone(&scheduler));
             let (mut renderer, submitter) = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
             let submitted = submitter.submit(renderer.record(gallery.scene.as_scene_ref())?)?;
@@ -122,6 +116,6 @@ fn draw(arguments: &Arguments, gallery: &Gallery) -> Result<(), Box<dyn Error>> 
     };
     contact_sheet::draw_labels(&mut sheet);
     arguments.out.write([sheet.width, sheet.height], &sheet.bytes)?;
-    println!("{} written", path_text(arguments.out.path()));
+    print_line!("{} written", path_text(arguments.out.path()));
     Ok(())
 }

@@ -1,36 +1,142 @@
 //! Lines on the console, which may be a pipe or a file.
 
-use std::fmt::Display;
+use std::fmt::{self, Display, Write as _};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+
+/// The first error of the standard output, until it is [taken](check_output).
+static OUTPUT_ERROR: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// A path as text. Control characters are escaped, so that none reaches a terminal.
 pub fn path_text(path: &Path) -> String {
-    let mut text = String::new();
-    for character in path.display().to_string().chars() {
-        if character.is_control() {
-            text.extend(character.escape_unicode());
-        } else {
-            text.push(character);
-        }
-    }
-    text
+    text(path.display())
 }
 
-/// Prints a line on the standard output. That its reader has closed the pipe is no error: it wants no more, and what the program does beside
-/// printing goes on.
+/// What a file holds, such as a name, as text on one line. Control characters are escaped, so that none reaches a terminal.
+pub fn text(text: impl Display) -> String {
+    let mut escaped = String::new();
+    for character in text.to_string().chars() {
+        push_escaped(&mut escaped, character, false);
+    }
+    escaped
+}
+
+fn push_escaped(text: &mut String, character: char, keeps_lines: bool) {
+    let is_layout = keeps_lines && matches!(character, '\n' | '\t');
+    if character.is_control() && !is_layout {
+        text.extend(character.escape_unicode());
+    } else {
+        text.push(character);
+    }
+}
+
+/// Prints a line on the standard output. Control characters in it are escaped, except line feeds and tabs.
+///
+/// That its reader has closed the pipe is no error: it wants no more, and what the program does beside printing goes on. Any other error, of a
+/// full disk for example, is kept until the program ends, so that it first writes its files: [`exit_code`] tells it.
+pub fn print_line(line: impl Display) {
+    let written = io::stdout().write_all(line_of(line).as_bytes());
+    if let Err(error) = or_unread(written) {
+        OUTPUT_ERROR.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
+
+/// Prints a line on the standard error output, escaped as [`print_line`] does. If that fails there is nowhere to say so.
+pub fn print_diagnostic(line: impl Display) {
+    let _ = io::stderr().write_all(line_of(line).as_bytes());
+}
+
+/// Prints a formatted line: see the [function](print_line()) of this name.
+///
+/// ```
+/// drawloom_output::print_line!("{} frames in {:.1} ms", 3, 12.5);
+/// drawloom_output::print_line!();
+/// ```
+#[macro_export]
+macro_rules! print_line {
+    () => {
+        $crate::print_line("")
+    };
+    ($($arguments:tt)*) => {
+        $crate::print_line(::std::format_args!($($arguments)*))
+    };
+}
+
+/// Prints a formatted line: see the [function](print_diagnostic()) of this name.
+#[macro_export]
+macro_rules! print_diagnostic {
+    ($($arguments:tt)*) => {
+        $crate::print_diagnostic(::std::format_args!($($arguments)*))
+    };
+}
+
+/// The standard error output for events, escaped as [`print_diagnostic`] does. Writing never fails: that events cannot be printed is no reason to
+/// stop.
+pub fn diagnostics() -> impl io::Write {
+    Diagnostics
+}
+
+struct Diagnostics;
+
+impl io::Write for Diagnostics {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let _ = io::stderr().write_all(escaped_lines(String::from_utf8_lossy(bytes)).as_bytes());
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Whether everything that was printed has reached the standard output, or had no reader.
 ///
 /// # Errors
-/// If the line cannot be written, on a full disk for example.
-pub fn print_line(line: impl Display) -> io::Result<()> {
+/// The first error since the last call.
+pub fn check_output() -> io::Result<()> {
+    let found = OUTPUT_ERROR.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let flushed = or_unread(io::stdout().flush());
     let named =
         |error: io::Error| io::Error::new(error.kind(), format!("the standard output cannot be written: {error}"));
-    or_unread(writeln!(io::stdout(), "{line}")).map_err(named)
+    found.map_or(flushed, Err).map_err(named)
 }
 
-/// Prints a line on the standard error output. If that fails there is nowhere to say so.
-pub fn print_diagnostic(line: impl Display) {
-    let _ = writeln!(io::stderr(), "{line}");
+/// What a program ends with. Tells why it failed, or that a part of what it printed is lost.
+///
+/// ```no_run
+/// use std::error::Error;
+/// use std::process::ExitCode;
+///
+/// fn main() -> ExitCode {
+///     drawloom_output::exit_code(run())
+/// }
+///
+/// fn run() -> Result<(), Box<dyn Error>> {
+///     drawloom_output::print_line!("done");
+///     Ok(())
+/// }
+/// ```
+pub fn exit_code<E: Display>(outcome: Result<(), E>) -> ExitCode {
+    let failed = |error: &dyn Display| print_diagnostic(format_args!("error: {error}"));
+    let outcomes = [outcome.map_err(|error| failed(&error)), check_output().map_err(|error| failed(&error))];
+    if outcomes.iter().all(Result::is_ok) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// A line with its end.
+fn line_of(line: impl Display) -> String {
+    let mut text = String::new();
+    // Writing to a string does not fail, and a `Display` that does has said nothing.
+    let _: fmt::Result = writeln!(text, "{line}");
+    escaped_lines(text)
+}
+
+/// Lines whose other control characters are escaped.
+fn escaped_lines(text: impl AsRef<str>) -> String {
+    let mut escaped = String::with_capacity(text.as_ref().len());
+    text.as_ref().chars().for_each(|character| push_escaped(&mut escaped, character, true));
+    escaped
 }
 
 fn or_unread(written: io::Result<()>) -> io::Result<()> {
@@ -44,6 +150,12 @@ mod tests {
     #[test]
     fn control_characters_in_paths_are_escaped() {
         assert_eq!(path_text(Path::new("a/été\u{1b}[31m\n.png")), "a/été\\u{1b}[31m\\u{a}.png");
+        assert_eq!(text("\u{7}\u{9b}\r\t\u{7f}"), "\\u{7}\\u{9b}\\u{d}\\u{9}\\u{7f}");
+    }
+
+    #[test]
+    fn lines_keep_their_ends_and_tabs_and_no_other_control_characters() {
+        assert_eq!(line_of("a\tb\n\u{1b}]0;title\u{7}\u{9b}2J\r"), "a\tb\n\\u{1b}]0;title\\u{7}\\u{9b}2J\\u{d}\n");
     }
 
     #[test]

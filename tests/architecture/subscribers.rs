@@ -41,14 +41,15 @@ fn unguarded_calls(sources: &[Source]) -> Vec<String> {
     problems
 }
 
-/// Adds the lines of calls outside of `emit(..)` and `CaughtSpan::new(..)`.
+/// Adds the lines of calls outside of `emit(..)`, `emit_unlocked(..)` and `CaughtSpan::new(..)`.
 fn add_unguarded(trees: &[TokenTree], is_caught: bool, lines: &mut Vec<usize>) {
     let before = |at: usize, back: usize| at.checked_sub(back).and_then(|at| trees.get(at));
     for (at, tree) in trees.iter().enumerate() {
         match tree {
             TokenTree::Group(group) => {
                 let is_span = is(before(at, 1), "new") && is(before(at, 4), "CaughtSpan");
-                let catches = is(before(at, 1), "emit") || is_span;
+                let is_emitted = ["emit", "emit_unlocked"].iter().any(|emits| is(before(at, 1), emits));
+                let catches = is_emitted || is_span;
                 add_unguarded(&trees_of(group.stream()), is_caught || catches, lines);
             }
             TokenTree::Ident(name) if !is_caught => {

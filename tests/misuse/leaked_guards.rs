@@ -29,6 +29,9 @@ pub const CASES: &[Case] = &[
     ("leaked_setters_and_jobs", setters_and_jobs),
 ];
 
+/// The processes that draw objects.
+const PROCESSES: [&str; 3] = ["geometry buffer", "shadow casters", "transparency"];
+
 /// Draws frames whose lists have to be made anew: of another number of objects, another camera, and the usual ones.
 fn expect_frames<B: Backend>(fixture: &mut Fixture<B>, when: &str) -> Result<(), Failed> {
     for round in 0..3 {
@@ -45,10 +48,12 @@ fn expect_frames<B: Backend>(fixture: &mut Fixture<B>, when: &str) -> Result<(),
 fn leak_draw_lists<B: Backend>(mut fixture: Fixture<B>) -> Result<(), Failed> {
     fixture.expect_usual("the first frame")?;
     for _ in 0..3 {
-        for (process, view) in [("geometry", 0), ("shadow casters", 1)] {
-            mem::forget(fixture.renderer.draw_list(process, view));
+        let mut leaked = 0;
+        for (process, view) in PROCESSES.into_iter().flat_map(|process| (0..8).map(move |view| (process, view))) {
+            leaked += usize::from(fixture.renderer.draw_list(process, view).is_some());
             mem::forget(fixture.renderer.draw_list(process, view));
         }
+        ensure(leaked >= 2, format_args!("{leaked} lists"))?;
         expect_frames(&mut fixture, "after a leak")?;
     }
     Ok(())
@@ -93,8 +98,12 @@ fn node_draw_lists() -> Result<(), Failed> {
             accesses.reads(FrameData::DrawLists).reads(FrameData::VisibleObjects);
         };
         let node = Node(declare, |frame: &NodeFrame<'_>| {
-            mem::forget(frame.draw_list("geometry", 0)?);
-            mem::forget(frame.visible_objects(0)?);
+            for view in 0..frame.views().len() {
+                for process in PROCESSES {
+                    mem::forget(frame.draw_list(process, view)?);
+                }
+                mem::forget(frame.visible_objects(view)?);
+            }
             Ok(())
         });
         for _ in 0..3 {

@@ -5,6 +5,7 @@
 
 use std::error::Error;
 use std::num::NonZeroUsize;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -14,6 +15,7 @@ use drawloom::backend::{Backend, WgpuBackend};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, demo, wgpu};
+use drawloom_output::{print_diagnostic, print_line};
 use drawloom_testing::adapter;
 use drawloom_tracy::Zones;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -35,7 +37,11 @@ struct Arguments {
     chunks: bool,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     drawloom_tracy::install(if arguments.chunks { Zones::Chunks } else { Zones::Nodes })?;
     drawloom_tracy::name_worker(0);
@@ -47,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scheduler = Arc::new(scheduler.build()?);
     let (device, queue) = device()?;
     let backend = WgpuBackend::new(device, queue)?;
-    println!("Rendering on {} with {} workers.", backend.adapter_name(), scheduler.workers());
+    print_line!("Rendering on {} with {} workers.", backend.adapter_name(), scheduler.workers());
     let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
     let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
     let scene = demo::colonnade()?;
@@ -65,14 +71,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         progress.inc(1);
     }
     progress.finish_and_clear();
-    println!("{} frames rendered.", arguments.frames);
+    print_line!("{} frames rendered.", arguments.frames);
     Ok(())
 }
 
 /// The machine's adapter, or one that draws nothing: the workers do the same in both cases.
 fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     adapter::device().or_else(|error| {
-        eprintln!("{error}; going on with a device that draws nothing");
+        print_diagnostic!("{error}; going on with a device that draws nothing");
         adapter::noop_device()
     })
 }
@@ -81,7 +87,7 @@ fn wait_for_viewer() -> Result<(), Box<dyn Error>> {
     let spinner = ProgressBar::new_spinner();
     spinner.set_style(ProgressStyle::with_template("{spinner} {msg}")?);
     if spinner.is_hidden() {
-        eprintln!("Waiting for a viewer: start Tracy 0.14 on this machine and press Connect.");
+        print_diagnostic!("Waiting for a viewer: start Tracy 0.14 on this machine and press Connect.");
     }
     spinner.set_message("Waiting for a viewer: start Tracy 0.14 on this machine and press Connect.");
     while !drawloom_tracy::is_connected() {

@@ -18,6 +18,7 @@ mod report;
 mod speed;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
 use clap::Parser;
@@ -50,7 +51,11 @@ impl Extent {
 /// Batches per job.
 const BATCHES_PER_JOB: usize = 50;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("runs");

@@ -4,6 +4,7 @@ use std::io;
 
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use drawloom_testing::culling::boxes::{BoxTallies, VOLUMES};
 use drawloom_testing::culling::spheres::SphereTallies;
 use drawloom_testing::culling::tally::Tallies;
@@ -50,11 +51,11 @@ impl Report {
 
     pub fn print(&self) {
         let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
-        println!("{} run{note}: medians, on one thread\n", self.extent);
+        print_line!("{} run{note}: medians, on one thread\n", self.extent);
         let mut table = Table::new(&["scene", "volume", "objects", "ns per object", "visible"]);
         self.speeds.iter().for_each(|speed| table.row(speed.cells()));
         table.print();
-        println!("false visible: the share of the objects outside according to the oracle that is kept\n");
+        print_line!("false visible: the share of the objects outside according to the oracle that is kept\n");
         let mut table = Table::new(&["test", "cases", "population", "false culls", "outside", "false visible"]);
         for Line { test, tallies, .. } in &self.tests {
             for (population, tally) in [("tangent", &tallies.tangent), ("anywhere", &tallies.anywhere)] {

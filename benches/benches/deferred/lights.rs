@@ -7,6 +7,7 @@ use drawloom::backend::Picture;
 use drawloom::process::Deferred;
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -166,10 +167,10 @@ fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
 const MAX_DIFFERENT: f64 = 2e-4;
 
 pub fn print(rows: &[Row]) {
-    println!(
+    print_line!(
         "Lights over a field of boxes, 1 worker. Draws: batches of objects, and one for each process that draws lights."
     );
-    println!(
+    print_line!(
         "Objects: the number of drawn objects. ns per light: additional CPU time per additional light, against the row above.\n"
     );
     let mut table = Table::new(&[

@@ -31,6 +31,8 @@ use clap::Parser;
 use drawloom_benches::backends;
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
+use drawloom_output::print_diagnostic;
+use std::process::ExitCode;
 
 use report::Report;
 
@@ -86,12 +88,16 @@ impl Extent {
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let extent = Extent::new(&arguments);
     let adapter = backends::adapter_name();
     if adapter.is_none() {
-        eprintln!("no graphics adapter found: device times are left out");
+        print_diagnostic!("no graphics adapter found: device times are left out");
     }
 
     let progress = progress_bar("frames");

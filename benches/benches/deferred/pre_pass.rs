@@ -9,6 +9,7 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -95,7 +96,7 @@ fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
 }
 
 pub fn print(rows: &[Row]) {
-    println!("The depth pre-pass, 1 worker.\n");
+    print_line!("The depth pre-pass, 1 worker.\n");
     let mut table = Table::new(&["backend", "scene", "pre-pass", "draws", "CPU ms", "device ms"]);
     for row in rows {
         table.row([

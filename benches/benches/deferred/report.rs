@@ -4,6 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use drawloom_benches::results;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 use crate::{Extent, lights, pre_pass, shadows};
@@ -38,15 +39,15 @@ impl Report {
 
     pub fn print(&self) {
         let Self { extent, rounds: [noop, adapter_rounds], picture: [width, height], boxes, adapter, .. } = self;
-        println!(
+        print_line!(
             "{extent} run: medians of {noop} frames on noop and {adapter_rounds} on the adapter, {width} × {height} pixels"
         );
-        println!(
+        print_line!(
             "{boxes} boxes in the field{}",
             if *extent == "trial" { "; a trial run: the figures are meaningless" } else { "" }
         );
-        println!("adapter: {}", adapter.as_deref().unwrap_or("none"));
-        println!(
+        print_line!("adapter: {}", adapter.as_deref().unwrap_or("none"));
+        print_line!(
             "CPU ms: from the scene's hand-over to the return of submit; device ms: from the call of submit until drawn\n"
         );
         lights::print(&self.lights);

@@ -7,6 +7,7 @@ use std::thread;
 use drawloom::process::Deferred;
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -62,7 +63,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
 }
 
 pub fn print(rows: &[Row]) {
-    println!(
+    print_line!(
         "Spot lights that cast shadows over the same field. Objects: the number of drawn objects over all views.\n"
     );
     let mut table =

@@ -14,6 +14,7 @@ mod report;
 use std::error::Error;
 use std::hint::black_box;
 use std::mem;
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
@@ -24,6 +25,7 @@ use drawloom::scene::obj;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::statistics::median_duration;
+use drawloom_output::print_diagnostic;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::random::Random;
 use drawloom_testing::shared_scenes;
@@ -31,7 +33,11 @@ use indicatif::ProgressBar;
 
 use report::{Report, Row};
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let rounds = if quick { 15 } else { 1_001 };
     let cases = cases()?;
@@ -68,7 +74,7 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
         scene.duplicate_objects(20);
         cases.push(Case { scene: "sponza x 20", lists: draw_lists(&scene)? });
     } else {
-        eprintln!("sponza is left out: {} does not exist", sponza.display());
+        print_diagnostic!("sponza is left out: {} does not exist", sponza.display());
     }
     Ok(cases)
 }

@@ -5,6 +5,7 @@ use std::io;
 use drawloom::command::RenderCommand;
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 /// A scene, with times in nanoseconds per command.
@@ -53,9 +54,9 @@ impl Report {
 
     pub fn print(&self) {
         let note = if self.quick { "; a quick run with inaccurate figures" } else { "" };
-        println!("ns per command, median of {} rounds{note}", self.rounds);
-        println!("fixed form: {} bytes per command; copy, compare: of the fixed form", size_of::<RenderCommand>());
-        println!(
+        print_line!("ns per command, median of {} rounds{note}", self.rounds);
+        print_line!("fixed form: {} bytes per command; copy, compare: of the fixed form", size_of::<RenderCommand>());
+        print_line!(
             "wins below: the bandwidth in GB/s of a memory or link below which fewer bytes save more time than they cost\n"
         );
         let headings = ["scene", "commands", "bytes", "encode", "check", "decode", "copy", "compare", "wins below"];

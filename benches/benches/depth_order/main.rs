@@ -27,6 +27,7 @@ mod overdraw;
 mod sorting_error;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
@@ -89,7 +90,11 @@ struct Results {
     cost: Vec<cost::Row>,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     sorting_error::print()?;

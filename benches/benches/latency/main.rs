@@ -29,6 +29,7 @@ use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
 use serde::Serialize;
+use std::process::ExitCode;
 
 #[derive(Parser)]
 struct Arguments {
@@ -44,7 +45,11 @@ struct Results {
     fences: Vec<fences::Row>,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse().backend;
     let quick = arguments.is_quick();
     let progress = progress_bar("rounds");

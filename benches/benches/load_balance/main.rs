@@ -26,6 +26,7 @@ mod report;
 mod scenes;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::thread;
 use std::time::Duration;
 
@@ -77,7 +78,11 @@ impl Extent {
         Self { name: "quick", warm_up: [1, 1], rounds: [1, 1], sample: [Duration::ZERO; 2], replays: 1, divisor: 20 };
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let is_requested = |name: &str| arguments.scenes.is_empty() || arguments.scenes.iter().any(|scene| scene == name);

@@ -6,6 +6,7 @@ use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 use crate::block::{Block, Measured, Times};
@@ -147,9 +148,11 @@ impl Report {
     pub fn print(&self) {
         let [noop, adapter] = self.rounds;
         let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
-        println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
-        println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
-        println!("ns: record + submit, per object and view that sees it; best: of the fixed modes, in other rounds\n");
+        print_line!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
+        print_line!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
+        print_line!(
+            "ns: record + submit, per object and view that sees it; best: of the fixed modes, in other rounds\n"
+        );
         self.print_measured();
         self.print_predicted();
         self.print_bounds();
@@ -175,7 +178,7 @@ impl Report {
     }
 
     fn print_predicted(&self) {
-        println!("Predicted speed-up on serial, adaptive and the best fixed mode\n");
+        print_line!("Predicted speed-up on serial, adaptive and the best fixed mode\n");
         let counts = PREDICTED.map(|workers| format!("{workers} workers"));
         let headings: Vec<_> = ["scene", "backend"].into_iter().chain(counts.iter().map(String::as_str)).collect();
         let mut table = Table::new(&headings);
@@ -198,7 +201,7 @@ impl Report {
     }
 
     fn print_bounds(&self) {
-        println!("What adaptive would save on {} predicted workers without one of its parts\n", bounds::WORKERS);
+        print_line!("What adaptive would save on {} predicted workers without one of its parts\n", bounds::WORKERS);
         let mut table = Table::new(&["scene", "backend", "part", "µs", "of the frame, %"]);
         for (scene, backend, bounds) in &self.bounds {
             for (part, seconds, share) in bounds.parts() {
@@ -210,7 +213,7 @@ impl Report {
     }
 
     fn print_errors(&self) {
-        println!("The replay for the actual number of workers\n");
+        print_line!("The replay for the actual number of workers\n");
         let mut table = Table::new(&["scene", "backend", "workers", "mode", "predicted ms", "measured ms", "error %"]);
         for error in &self.errors {
             table.row([
@@ -228,7 +231,7 @@ impl Report {
 
     /// Prints the targets and the results on `noop` with two workers, or with those that are predicted.
     fn print_targets(&self) {
-        println!("Targets and results on noop with two workers\n");
+        print_line!("Targets and results on noop with two workers\n");
         let mut table = Table::new(&["figure", "scene", "target", "reached"]);
         let mut target_row = |what: &str, scene: &str, target: f64, reached: f64| {
             let note = if reached >= target { "" } else { ", short" };

@@ -5,6 +5,7 @@ use std::error::Error;
 use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 use crate::{Extent, charts, growth, scenario};
@@ -35,9 +36,9 @@ impl Report {
     pub fn print(&self) {
         let ([noop, adapter], [many_noop, many_adapter]) = (self.rounds, self.growth_rounds);
         let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
-        println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
-        println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
-        println!(
+        print_line!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
+        print_line!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
+        print_line!(
             "fps: frames of record + submit per second, without the device's time; ratios: of fps, to single; held: the time, and the share of the frame, in which the world is borrowed\n"
         );
         let mut table = Table::new(&[
@@ -73,7 +74,7 @@ impl Report {
             ]);
         }
         table.print();
-        println!("Growth: two workers, no instancing; medians of {many_noop} and {many_adapter} rounds\n");
+        print_line!("Growth: two workers, no instancing; medians of {many_noop} and {many_adapter} rounds\n");
         let mut table = Table::new(&["objects", "backend", "ns per object and view"]);
         for row in &self.growth {
             let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
@@ -85,7 +86,7 @@ impl Report {
 
     /// Prints the targets and the results on `noop`.
     fn print_targets(&self) {
-        println!("Targets and results on noop, without instancing\n");
+        print_line!("Targets and results on noop, without instancing\n");
         let mut table = Table::new(&["figure", "objects", "bound", "reached"]);
         let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
             let note = if is_reached { "" } else { ", short" };

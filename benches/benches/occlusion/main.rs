@@ -21,10 +21,16 @@ use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::city;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
+use drawloom_output::print_line;
+use std::process::ExitCode;
 
 use measure::{CameraCase, Row};
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let (boxes, picture, rounds) = if quick { (1_500, [240, 136], 3) } else { (20_000, [960, 540], 31) };
     let city = city::new(boxes, picture)?;
@@ -44,9 +50,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     progress.finish_and_clear();
     let rows = [Row::totals(&rows), rows].concat();
     let note = if quick { "; a quick run with inaccurate figures" } else { "" };
-    println!(
+    print_line!(
         "a city of {boxes} boxes, {} x {} pixels; times are medians of {rounds} rounds{note}\n",
-        picture[0], picture[1]
+        picture[0],
+        picture[1]
     );
     measure::print(&rows);
     if !quick {

@@ -17,6 +17,7 @@ mod by_hand;
 mod world;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -51,7 +52,11 @@ struct Row {
     microseconds: [f64; 3],
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = ExtentArguments::parse();
     // Trials of recording strategies are over after some hundred frames.
     let (rounds, sizes): (_, &[(usize, usize)]) = if arguments.is_quick() {

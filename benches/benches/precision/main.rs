@@ -19,19 +19,25 @@ use std::error::Error;
 use clap::Parser;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
+use drawloom_output::print_diagnostic;
 use drawloom_testing::adapter;
 use drawloom_testing::precision::cases::Kind;
 use drawloom_testing::precision::device::ShaderOnDevice;
 use drawloom_testing::precision::measure::{BOUNDED, MAGNIFYING, Origin, measure};
 use drawloom_testing::precision::vertex::ShaderInRust;
 use drawloom_testing::random::Random;
+use std::process::ExitCode;
 
 use report::{Report, Row};
 
 /// A typical camera.
 const TYPICAL: Kind = Kind::Perspective { degrees: 60.0, size: Kind::FULL_HD };
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let quick = ExtentArguments::parse().is_quick();
     let [by_distance, by_view] = if quick { [500, 1_000] } else { [200_000, 100_000] };
     let distances: Vec<_> = (0..10).map(|power| 10_f64.powi(power)).collect();
@@ -41,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut shader = match adapter::device() {
         Ok((device, queue)) => Some(ShaderOnDevice::new(device, queue)),
         Err(error) => {
-            eprintln!("Without the shader on an adapter: {error}");
+            print_diagnostic!("Without the shader on an adapter: {error}");
             None
         }
     };

@@ -5,6 +5,7 @@ use std::error::Error;
 use drawloom_benches::chart::{self, Lines, Panel};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use drawloom_testing::precision::cases::Kind;
 use drawloom_testing::precision::measure::{BOUND, Errors, UNIT_ROUNDOFF, WORST_ANGLE};
 use serde::Serialize;
@@ -73,7 +74,7 @@ impl Row {
 
 impl Report {
     pub fn print(&self) {
-        println!("{} vertices; pixels of error\n", self.rows.iter().map(|row| row.cases).sum::<usize>());
+        print_line!("{} vertices; pixels of error\n", self.rows.iter().map(|row| row.cases).sum::<usize>());
         let optional = |pixels: Option<f64>| pixels.map_or_else(|| "-".to_owned(), |pixels| format!("{pixels:.2e}"));
         let mut table = Table::new(&[
             "view",

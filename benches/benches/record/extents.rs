@@ -7,6 +7,7 @@ use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::moving::{Motion, Moving};
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -84,5 +85,5 @@ pub fn print(rows: &[ExtentRow]) {
         ]);
     }
     table.print();
-    println!();
+    print_line!();
 }

@@ -48,6 +48,7 @@ mod report;
 mod technique;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
@@ -95,7 +96,11 @@ impl Extent {
         Self { name: "quick", warm_up: [1, 1], rounds: [1, 1], sample: [Duration::ZERO; 2], objects: 1_000 };
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");

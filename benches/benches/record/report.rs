@@ -9,6 +9,7 @@ use drawloom_benches::table::Table;
 use serde::Serialize;
 
 use drawloom_benches::moving::Motion;
+use drawloom_output::print_line;
 
 use crate::Extent;
 use crate::extents::{self, ExtentRow};
@@ -84,24 +85,24 @@ impl Report {
     pub fn print(&self) {
         let [noop, adapter] = self.rounds;
         let note = if self.extent == "full" { "" } else { " (meaningless figures)" };
-        println!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
-        println!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
-        println!("4 cameras × {} objects; ns: from visibility to submit, per object and view", self.objects);
-        println!("requests: for memory, a frame; own: where the backend does nothing");
-        println!("of naive: the median of rounds, of two turns of one round each\n");
-        println!("Instanced draws: 64 a camera\n");
+        print_line!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
+        print_line!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
+        print_line!("4 cameras × {} objects; ns: from visibility to submit, per object and view", self.objects);
+        print_line!("requests: for memory, a frame; own: where the backend does nothing");
+        print_line!("of naive: the median of rounds, of two turns of one round each\n");
+        print_line!("Instanced draws: 64 a camera\n");
         self.print_rows(|row| row.is_instanced);
-        println!("\nSingle draws: {} a camera\n", self.objects);
+        print_line!("\nSingle draws: {} a camera\n", self.objects);
         self.print_rows(|row| !row.is_instanced);
-        println!();
+        print_line!();
         for Measured { backend, independent, speed_ups, .. } in &self.measured {
-            println!(
+            print_line!(
                 "{}: two threads that draw a frame each, and share nothing, take {independent:.1} ns: {:.2} times as fast as one",
                 backend.name(),
                 speed_ups[1]
             );
         }
-        println!();
+        print_line!();
         if !self.extents.is_empty() {
             extents::print(&self.extents);
         }
@@ -160,7 +161,7 @@ impl Report {
                 per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
             ),
         ];
-        println!("Targets and results on noop\n");
+        print_line!("Targets and results on noop\n");
         let mut table = Table::new(&["figure", "target", "reached"]);
         for target in &targets {
             table.row([target.figure.to_owned(), target.wanted(), format!("{:.2}", target.reached)]);
@@ -168,8 +169,8 @@ impl Report {
         table.print();
         let missed: Vec<_> = targets.iter().filter(|target| !target.is_met()).map(|target| target.figure).collect();
         match &missed[..] {
-            [] => println!("\nAll targets are met."),
-            missed => println!("\nMissed: {}.", missed.join("; ")),
+            [] => print_line!("\nAll targets are met."),
+            missed => print_line!("\nMissed: {}.", missed.join("; ")),
         }
     }
 

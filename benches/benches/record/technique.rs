@@ -8,6 +8,7 @@ use drawloom_benches::backends::BackendName;
 
 use drawloom_benches::clouds::around_one;
 use drawloom_benches::moving::{Motion, Moving};
+use drawloom_output::print_diagnostic;
 
 use crate::CAMERAS;
 use crate::by_mesh::ByMesh;
@@ -91,7 +92,7 @@ impl Contender {
                     Some(strategy) => match opened.recording_strategy(strategy) {
                         Ok(opened) => opened,
                         Err(error) => {
-                            eprintln!("{name} is left out: {error}");
+                            print_diagnostic!("{name} is left out: {error}");
                             continue;
                         }
                     },

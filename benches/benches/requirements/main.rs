@@ -16,6 +16,7 @@ mod unneeded;
 mod world;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -82,7 +83,11 @@ struct Row {
     longest_by_own_median: f64,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse().backend;
     let quick = arguments.is_quick();
     let counts = if quick { [2, 1] } else { [WARM_UP, CHANGES] };

@@ -22,6 +22,7 @@ mod tiny;
 mod wake;
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
@@ -120,7 +121,11 @@ impl Extent {
     }
 }
 
-fn main() -> Result<(), Failure> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Failure> {
     let arguments = Arguments::parse();
     let quick = arguments.extent.is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };

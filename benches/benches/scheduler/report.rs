@@ -4,6 +4,7 @@ use std::io;
 
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 use crate::Extent;
@@ -59,9 +60,9 @@ impl Report {
 
     pub fn print(&self) {
         let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
-        println!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
-        println!("workers: threads that run jobs, the caller's included; ratio: to the best of the peers");
-        println!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
+        print_line!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
+        print_line!("workers: threads that run jobs, the caller's included; ratio: to the best of the peers");
+        print_line!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
         let mut table = Table::new(&["row", "executor", "workers", "median", "p95", "unit", "ratio"]);
         for line in &self.lines {
             let Line { row, executor, workers, median, p95, unit, .. } = line;
@@ -88,12 +89,12 @@ impl Report {
             return;
         };
         let target = ideal + 1.5 * wake;
-        println!("frame_cold: a wake takes {wake:.1} µs (row wake, drawloom); ideal + 1.5 wakes = {target:.1} µs");
+        print_line!("frame_cold: a wake takes {wake:.1} µs (row wake, drawloom); ideal + 1.5 wakes = {target:.1} µs");
         let own_lines = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
         for Line { executor, median, .. } in own_lines {
-            println!("frame_cold: {executor} takes {:+.1} µs against that", median - target);
+            print_line!("frame_cold: {executor} takes {:+.1} µs against that", median - target);
         }
-        println!();
+        print_line!();
     }
 
     fn median(&self, row: &str, executor: &str) -> Option<f64> {

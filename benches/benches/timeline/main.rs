@@ -19,6 +19,7 @@ use std::error::Error;
 use clap::Parser;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::{Harness, Rounds, progress_bar};
+use std::process::ExitCode;
 
 use recording::Timed;
 use report::{Figures, Report};
@@ -36,7 +37,11 @@ struct Arguments {
     frames: Option<usize>,
 }
 
-fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Box<dyn Error + Send + Sync>> {
     let arguments = Arguments::parse();
     if let (Some(shape), Some(frames)) = (arguments.shape, arguments.frames) {
         return shape.run(frames);

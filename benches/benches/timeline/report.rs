@@ -4,6 +4,7 @@ use std::io;
 
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_output::print_line;
 use serde::Serialize;
 
 use crate::shape::Shape;
@@ -57,7 +58,7 @@ impl Report {
     pub fn print(&self, quick: bool) {
         let Figures { rounds, timed, span, counted, ring_bytes } = &self.figures;
         let note = if quick { "; a quick run with inaccurate figures" } else { "" };
-        println!("recording, median of {rounds} rounds{note}\n");
+        print_line!("recording, median of {rounds} rounds{note}\n");
         let mut table = Table::new(&["row", "chunks", "frame, µs", "on: ns per chunk", "on: % of the frame"]);
         for row in timed {
             let (frame, share) = (row.frame / 1e3, row.share * 100.0);
@@ -75,7 +76,7 @@ impl Report {
             }
             table.print();
         }
-        println!(
+        print_line!(
             "a span without a subscriber: {span:.1} ns; rings: {:.1} MiB a worker",
             *ring_bytes as f64 / 1048576.0
         );

@@ -21,6 +21,7 @@ mod pictures;
 mod report;
 
 use std::fs;
+use std::process::ExitCode;
 use std::path::PathBuf;
 use std::thread;
 
@@ -76,7 +77,11 @@ const FULL: &[Layout] = &[
 const QUICK: &[Layout] =
     &[Layout::objects(100), Layout::few(1_000), Layout::turn(1_000), Layout::record(1_000), Layout::ecs(1_000)];
 
-fn main() -> Result<(), Failure> {
+fn main() -> ExitCode {
+    drawloom_output::exit_code(run())
+}
+
+fn run() -> Result<(), Failure> {
     let arguments = Arguments::parse();
     let backend = if arguments.backend == "noop" { BackendName::Noop } else { BackendName::Adapter };
     let threads = match arguments.threads {

@@ -6,7 +6,7 @@ use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::chart::{self, HorizontalBars, Lines, Panel};
 use drawloom_benches::statistics::{median, percentile};
 use drawloom_benches::table::Table;
-use drawloom_output::OutputFile;
+use drawloom_output::{OutputFile, print_line};
 
 use crate::contender::{Contender, Failure, FrameTime, PARTS};
 use crate::layout::Layout;
@@ -95,15 +95,15 @@ impl Report {
     pub fn print(&self) {
         let Extent { backend, threads, is_quick, bursts, frames } = self.extent;
         let note = if is_quick { ", a quick run (meaningless figures)" } else { "" };
-        println!("{}{note}: medians of {bursts} × {frames} frames, {threads} threads", self.backend_name());
-        println!(
+        print_line!("{}{note}: medians of {bursts} × {frames} frames, {threads} threads", self.backend_name());
+        print_line!(
             "submitted: µs a frame, from the motion until submit returns, and its quartiles; its parts: {PARTS:?}"
         );
-        println!("bevy-pipelined: µs from one submit to the next, medians of {bursts} bursts");
+        print_line!("bevy-pipelined: µs from one submit to the next, medians of {bursts} bursts");
         if backend == BackendName::Adapter {
-            println!("drawn: µs until the device is idle; pipelined, the mean time of the frames of a burst");
+            print_line!("drawn: µs until the device is idle; pipelined, the mean time of the frames of a burst");
         }
-        println!("÷: the median divided by drawloom's\n");
+        print_line!("÷: the median divided by drawloom's\n");
         let [first, second, third] = PARTS;
         let headings =
             ["scene", "objects", "cameras", "contender", "submitted", "quartiles", first, second, third, "÷"];
@@ -152,7 +152,7 @@ impl Report {
             writer.serialize((run, what, submitted, row.drawn_us, row.drawn_ratio))?;
         }
         OutputFile::new(path)?.write_all(writer.into_inner()?)?;
-        println!("{} written", path.display());
+        print_line!("{} written", path.display());
         Ok(())
     }
 

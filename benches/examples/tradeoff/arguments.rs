@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use drawloom::demo;
 use drawloom::scene::{Scene, obj};
+use drawloom_output::print_diagnostic;
 use drawloom_testing::scenes::everything::everything;
 
 use crate::Failure;
@@ -92,7 +93,7 @@ impl Arguments {
         };
         let mut imported = obj::load(path)?;
         for warning in &imported.warnings {
-            eprintln!("warning: {warning}");
+            print_diagnostic!("warning: {warning}");
         }
         demo::add_camera_and_lights(&mut imported.scene);
         Ok(imported.scene)

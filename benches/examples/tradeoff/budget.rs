@@ -2,6 +2,7 @@
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Scene};
+use drawloom_output::print_line;
 
 use crate::Failure;
 use crate::backend::BackendUnderTest;
@@ -32,7 +33,7 @@ pub fn search(
     let mut steps = steps(settings, results);
     while time > budget_ms {
         let Some(step) = steps.pop() else {
-            println!("No setting fits into {budget_ms} ms: with {} a frame takes {time:.2} ms.", names(&reduced));
+            print_line!("No setting fits into {budget_ms} ms: with {} a frame takes {time:.2} ms.", names(&reduced));
             return Ok(());
         };
         let changed = step.knob.changed(&quality, &step.quality);
@@ -67,13 +68,13 @@ pub fn search(
             (quality, time) = (changed, slower);
         }
     }
-    println!("The most accurate settings found that fit into {budget_ms} ms take {time:.2} ms:\n");
+    print_line!("The most accurate settings found that fit into {budget_ms} ms take {time:.2} ms:\n");
     if reduced.is_empty() {
-        println!("Quality::exact()");
+        print_line!("Quality::exact()");
     } else {
-        println!("Quality::exact() with {}", names(&reduced));
+        print_line!("Quality::exact() with {}", names(&reduced));
     }
-    println!("\n{quality:#?}");
+    print_line!("\n{quality:#?}");
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use drawloom_benches::chart::{Area, write_svg};
-use drawloom_output::path_text;
+use drawloom_output::{path_text, print_line};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -44,7 +44,7 @@ pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
         &results.entries.iter().collect::<Vec<_>>(),
         of_bound,
     )?;
-    println!("charts written to {}", path_text(folder));
+    print_line!("charts written to {}", path_text(folder));
     Ok(())
 }
 

@@ -26,6 +26,7 @@ use std::time::Instant;
 use drawloom::raster::CulledTriangles;
 use drawloom::scene::{Camera, Scene};
 use drawloom::view::RenderView;
+use drawloom_output::{print_diagnostic, print_line};
 
 use arguments::Arguments;
 use measure::Measurements;
@@ -34,15 +35,11 @@ use results::Results;
 type Failure = Box<dyn Error>;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().with_target(false).init();
-    match run(&Arguments::checked()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    let outcome = run(&Arguments::checked());
+    drawloom_output::exit_code(
+        outcome.and_then(|is_within| is_within.then_some(()).ok_or_else(|| "an error is above its bound".into())),
+    )
 }
 
 /// Prints the number of invisible triangles, which CPU culling would save the device (S 9.6).
@@ -56,7 +53,7 @@ fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
         culled += view.cull_triangles(&scene, object, &mut kept);
     }
     let each = start.elapsed().as_nanos() as f64 / culled.triangles.max(1) as f64;
-    println!(
+    print_line!(
         "triangles: {}; the CPU could cull {:.1}% of them: {} face away, {} are off screen, {} cover no pixel, {} \
          are degenerate; {each:.0} ns each\n",
         culled.triangles,
@@ -74,7 +71,7 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let path = camera_path::of(&scene, arguments)?;
     let settings = settings::all();
     let mut backend = backend::open(arguments)?;
-    println!("drawn by {}", backend.name());
+    print_line!("drawn by {}", backend.name());
 
     let measurements = Measurements::take(&mut *backend, &scene, &path, &settings, arguments)?;
     let results = Results::new(arguments.scene_name(), backend.name(), &scene, &path, &settings, &measurements)?;
@@ -95,7 +92,12 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let exceeded: Vec<_> = results.exceeded().collect();
     for entry in &exceeded {
         let (error, bound) = (entry.error.unwrap_or_default(), entry.bound.unwrap_or_default());
-        eprintln!("{}, {}: an error of {error} {}, above the bound {bound}", entry.knob, entry.setting, entry.metric);
+        print_diagnostic!(
+            "{}, {}: an error of {error} {}, above the bound {bound}",
+            entry.knob,
+            entry.setting,
+            entry.metric
+        );
     }
     Ok(exceeded.is_empty())
 }

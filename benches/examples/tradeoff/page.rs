@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use drawloom::backend::Picture;
-use drawloom_output::{OutputError, OutputFile, PictureFile, path_text};
+use drawloom_output::{OutputError, OutputFile, PictureFile, path_text, print_line};
 
 use crate::Failure;
 use crate::charts::file_name;
@@ -25,7 +25,7 @@ pub fn write(folder: &Path, results: &Results, measurements: &Measurements) -> R
     }
     let path = folder.join("index.html");
     OutputFile::new(&path)?.write_all(html(results))?;
-    println!("{} written", path_text(&path));
+    print_line!("{} written", path_text(&path));
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 
 use drawloom::scene::{Camera, Scene};
-use drawloom_output::{OutputFile, path_text};
+use drawloom_output::{OutputFile, path_text, print_line};
 use serde::{Deserialize, Serialize};
 
 use crate::Failure;
@@ -122,13 +122,15 @@ impl Results {
 
     /// Prints the table, in Markdown, and the front.
     pub fn print(&self) {
-        println!("{}, {}; each knob alone, all else as in exact\n", self.scene, self.backend);
-        println!("| knob | setting | CPU, ms | frame, ms | of exact | error | bound | metric | RMSE × 255 | MSSIM |");
-        println!("| --- | --- | --: | --: | --: | --: | --: | --- | --: | --: |");
+        print_line!("{}, {}; each knob alone, all else as in exact\n", self.scene, self.backend);
+        print_line!(
+            "| knob | setting | CPU, ms | frame, ms | of exact | error | bound | metric | RMSE × 255 | MSSIM |"
+        );
+        print_line!("| --- | --- | --: | --: | --: | --: | --: | --- | --: | --: |");
         let exact = self.entries.first().map_or(1.0, Entry::frame_ms);
         for entry in &self.entries {
             let number = |value: Option<f64>| value.map_or_else(|| String::from("–"), short);
-            println!(
+            print_line!(
                 "| {} | {} | {:.2} | {:.2} | {:.2} | {} | {} | {} | {:.3} | {:.4} |",
                 entry.knob,
                 entry.setting,
@@ -142,9 +144,9 @@ impl Results {
                 entry.mssim,
             );
         }
-        println!("\nPareto front, by the frame's time and RMSE from the reference in f64:\n");
+        print_line!("\nPareto front, by the frame's time and RMSE from the reference in f64:\n");
         for entry in self.front() {
-            println!(
+            print_line!(
                 "{:>8.2} ms  RMSE {:.3}/255  MSSIM {:.4}  {}: {}",
                 entry.frame_ms(),
                 entry.rmse_from_reference * 255.0,
@@ -153,7 +155,7 @@ impl Results {
                 entry.setting
             );
         }
-        println!();
+        print_line!();
     }
 
     /// Writes the entries, and keeps those of other scenes and backends in the file.
@@ -169,7 +171,7 @@ impl Results {
         all.retain(|entry| entry.scene != self.scene || entry.backend != self.backend);
         all.extend(self.entries.iter().cloned());
         OutputFile::new(path)?.write_all(serde_json::to_string_pretty(&all)? + "\n")?;
-        println!("{} written", path_text(path));
+        print_line!("{} written", path_text(path));
         Ok(())
     }
 }

@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
-use drawloom_output::{PictureFile, path_text};
+use drawloom_output::{PictureFile, path_text, print_line};
 use drawloom_testing::adapter;
 
 use bevy_world::BevyWorld;
@@ -62,13 +62,7 @@ enum BackendName {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    drawloom_output::exit_code(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -77,23 +71,28 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         BackendName::Adapter => adapter::device()?,
     };
     let mut graphics = Graphics::new(device, queue)?;
-    println!("{} entities on {}, {} workers", options.entities, graphics.device_name(), graphics.scheduler.workers());
-    println!(
+    print_line!(
+        "{} entities on {}, {} workers",
+        options.entities,
+        graphics.device_name(),
+        graphics.scheduler.workers()
+    );
+    print_line!(
         "µs in a frame: update, replace, gather (or lend), record, submit; bytes copied; objects reported as changed"
     );
     for population in Population::all(options.entities) {
         for (name, replaced) in [("", 0), (", replaced", options.replaced.min(options.entities))] {
-            println!("{}{name}", population.name);
+            print_line!("{}{name}", population.name);
             let hecs = measure(&mut graphics, &mut HecsWorld::new(population), population, replaced, options.frames)?;
-            println!("  hecs      {hecs}");
+            print_line!("  hecs      {hecs}");
             let bevy = measure(&mut graphics, &mut BevyWorld::new(population), population, replaced, options.frames)?;
-            println!("  bevy_ecs  {bevy}");
+            print_line!("  bevy_ecs  {bevy}");
         }
     }
     if let Some(file) = &options.picture {
         let picture = graphics.picture()?;
         file.write([picture.width, picture.height], &picture.bytes)?;
-        println!("{} written", path_text(file.path()));
+        print_line!("{} written", path_text(file.path()));
     }
     Ok(())
 }

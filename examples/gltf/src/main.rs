@@ -3,7 +3,6 @@
 //!     cargo run --release -p gltf_scene -- scene.glb --picture scene.png --time 1.5
 
 use std::error::Error;
-use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -11,7 +10,7 @@ use std::sync::Arc;
 use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::task::Scheduler;
-use drawloom_output::{PictureFile, path_text};
+use drawloom_output::{PictureFile, path_text, print_diagnostic, print_line};
 use gltf_scene::{LoadOptions, draw, load, open_device};
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::filter::LevelFilter;
@@ -43,14 +42,8 @@ struct Arguments {
 
 fn main() -> ExitCode {
     // What Drawloom and wgpu warn of.
-    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(io::stderr).init();
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
+    drawloom_output::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -65,11 +58,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let world = load(&arguments.file, &options, &scheduler, &progress)?;
     progress.finish_and_clear();
     for warning in &world.warnings {
-        eprintln!("warning: {warning}");
+        print_diagnostic!("warning: {warning}");
     }
     let picture = draw(open_device()?, scheduler, &world, arguments.exposure)?;
     arguments.picture.write([picture.width, picture.height], &picture.bytes)?;
-    println!("{}", describe(&world, arguments));
+    print_line!("{}", describe(&world, arguments));
     Ok(())
 }
 

@@ -12,7 +12,7 @@ use drawloom::process::Format;
 use drawloom::task::{JobPanic, Scheduler};
 use drawloom::{Recorded, SubmitError};
 use drawloom_egui::Inspector;
-use drawloom_output::path_text;
+use drawloom_output::{path_text, print_line};
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{ElementState, WindowEvent};
@@ -92,14 +92,14 @@ impl Engine {
             return Err(error);
         }
         let [textures, buffers] = self.resources;
-        println!("{} frames; {}; {textures} textures and {buffers} buffers", self.frames, pacing_text(&self.pacing));
+        print_line!("{} frames; {}; {textures} textures and {buffers} buffers", self.frames, pacing_text(&self.pacing));
         let Some(file) = &self.options.screenshot else { return Ok(()) };
         let mut picture = self.screenshot.ok_or("the windows were closed before the screenshot")?;
         if picture.format == Format::Bgra8Srgb {
             picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
         }
         file.write([picture.width, picture.height], &picture.bytes)?;
-        println!("{} written", path_text(file.path()));
+        print_line!("{} written", path_text(file.path()));
         Ok(())
     }
 

@@ -16,7 +16,6 @@ mod view_window;
 mod world;
 
 use std::error::Error;
-use std::io;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -29,14 +28,8 @@ use options::Options;
 fn main() -> ExitCode {
     let options = Options::parse();
     // What Drawloom and wgpu warn of.
-    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(io::stderr).init();
-    match run(options) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
+    drawloom_output::exit_code(run(options))
 }
 
 fn run(options: Options) -> Result<(), Box<dyn Error>> {

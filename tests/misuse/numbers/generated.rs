@@ -133,10 +133,10 @@ fn chunks() -> Result<(), Failed> {
         for view in [100, usize::MAX] {
             record(&mut fixture, &buffer, |frame| {
                 frame.set_count(&buffer, 0)?;
-                let (list, objects) = (frame.draw_list("geometry", view)?, frame.visible_objects(view)?.count());
+                let (list, objects) = (frame.draw_list("geometry buffer", view)?, frame.visible_objects(view)?.count());
                 if list.is_none() && objects == 0 { Ok(()) } else { Err("there is no such view".into()) }
             })?;
-            ensure(fixture.renderer.draw_list("geometry", view).is_none(), "there is no such view")?;
+            ensure(fixture.renderer.draw_list("geometry buffer", view).is_none(), "there is no such view")?;
         }
     }
     Ok(())

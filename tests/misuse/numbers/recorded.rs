@@ -63,7 +63,7 @@ fn recorded() -> Result<(), Failed> {
         refused(recorded.read_back(view, "picture", [0; 2], [1; 2]), "picture")?;
         refused(recorded.read_back_whole(view, "picture"), "picture")?;
         refused(recorded.fence_at(FramePlace::View(view)), "place")?;
-        refused(recorded.fence_at(FramePlace::Pass { process: "geometry", view }), "place")?;
+        refused(recorded.fence_at(FramePlace::Pass { process: "geometry buffer", view }), "place")?;
     }
     for number in COUNTS {
         for other in COUNTS {
