@@ -23,10 +23,11 @@ fn shipped(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend
     builder.deferred(Deferred::to_picture())
 }
 
-/// A field without mirrored objects, whose pipelines are made when they are first drawn.
+/// The materials of a field and a mask, without mirrored objects, whose pipelines are made when they are first drawn.
 fn scene() -> Result<Scene, Failed> {
     let mut scene = field(0);
     let mesh = scene.add(cube())?;
+    scene.add(Material { alpha_cutoff: Some(0.5), ..Material::default() })?;
     let materials: Vec<_> = scene.as_scene_ref().assets.iter::<Material>().map(|(handle, _)| handle).collect();
     for (index, material) in materials.into_iter().enumerate() {
         let position = drawloom::glam::DVec3::X * (index as f64 * 2.5 - 5.0);
