@@ -112,9 +112,21 @@ fn mirrors(harness: &mut Harness) -> Result<(), Failed> {
         for lean in [DVec3::ZERO, right * 0.5 + up * 0.3, up * 2.0 - right * 0.4] {
             let plane = plane_before(&camera, lean - forward, 0.7 * extreme.scale);
             check_mirror(harness, extreme.name, &camera, plane, extreme.scale)?;
+            check_parallel_mirror(harness, &extreme, plane)?;
         }
     }
     Ok(())
+}
+
+/// Without perspective there is no clip plane: the mirror's camera sees what is behind the mirror, too.
+fn check_parallel_mirror(harness: &mut Harness, extreme: &Extreme, plane: ClipPlane) -> Result<(), Failed> {
+    let height = (5.0 * extreme.scale) as f32;
+    let projection = Projection::Orthographic { height };
+    let camera = Camera { projection, far: height * 20.0, ..camera_at(extreme) };
+    let reflected = as_main(camera.reflected("mirror", plane));
+    let mut scene = MarkerScene::new(reflected.clone(), spread(&reflected, extreme.scale))?;
+    scene.view = Some(View { near: f64::from(camera.near), clip_plane: None, ..mirrored(&camera, plane) });
+    expect_placed(harness, ("mirror", extreme.name, "without perspective"), &scene, 9).map(drop)
 }
 
 /// Distances of a camera from what it touches, in metres; its near plane is at 5 cm.
@@ -261,9 +273,10 @@ fn tiles(harness: &mut Harness) -> Result<(), Failed> {
         let height = (5.0 * extreme.scale) as f32;
         let parallel =
             Camera { projection: Projection::Orthographic { height }, far: height * 20.0, ..perspective.clone() };
-        // A parallel picture cannot be divided into parts lower than a micrometre.
-        let many = (height * 1e6).min(64.0) as u32;
-        for (main, many) in [(perspective, 64), (parallel, many)] {
+        // A parallel picture cannot be divided into parts lower than a micrometre, and the parts of a small one are as coarse as positions.
+        let most = if extreme.scale < 1.0 { 64 } else { 4096 };
+        let lowest = ((height * 1e6) as u32).min(most);
+        for (main, many) in [(perspective, most), (parallel, lowest)] {
             // The near plane is at the nearest marker, but for what the shader rounds.
             let near = if extreme.name == TOUCHING { 3.4 * (1.0 - 40.0 * UNIT_ROUNDOFF) } else { main.near.into() };
             let main = Camera { near: near as f32, ..main };
