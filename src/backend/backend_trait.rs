@@ -30,6 +30,8 @@ use crate::timeline::{Labels, TuningChoice};
 /// 4. `replace_view`, as often as the engine replaces a camera, and `read_back`.
 /// 5. Later, on the device thread, `submit`.
 ///
+/// A panic of a method fails the frame with an error that names the method or the stage of the pass, and the next frame is not affected.
+///
 /// What a backend must honour:
 ///
 /// - Depth is reversed: 1 at the near plane, and 0 at the far plane or at infinity. Depth targets are cleared to 0, and

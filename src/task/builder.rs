@@ -15,7 +15,7 @@ use super::wake_up_cost;
 use super::worker_thread::{Hook, WorkerThread};
 use crate::sync::{Arc, thread};
 use crate::timeline::{Timeline, TimelineSettings};
-use crate::unwind::catch;
+use crate::unwind::{Contained, catch};
 
 /// The settings of a scheduler: see [`Scheduler::builder`].
 ///
@@ -34,9 +34,9 @@ use crate::unwind::catch;
 #[derive(Default)]
 pub struct SchedulerBuilder {
     workers: Option<usize>,
-    name: Option<Box<dyn Fn(usize) -> String>>,
+    name: Option<Contained<Box<dyn Fn(usize) -> String>>>,
     stack_size: Option<usize>,
-    affinity: Option<Box<dyn Fn(usize) -> AffinityMask>>,
+    affinity: Option<Contained<Box<dyn Fn(usize) -> AffinityMask>>>,
     on_start: Option<Hook>,
     on_stop: Option<Hook>,
     shuffle: Option<u64>,
@@ -87,7 +87,7 @@ impl SchedulerBuilder {
 
     /// Sets the names of the threads, by the index of the worker, 1 or more. The default is `drawloom-1`, `drawloom-2` and so on.
     pub fn name(mut self, name: impl Fn(usize) -> String + 'static) -> Self {
-        self.name = Some(Box::new(name));
+        self.name = Some(Contained::new(Box::new(name)));
         self
     }
 
@@ -110,21 +110,21 @@ impl SchedulerBuilder {
     /// virtual machines, they are kept off there (on Linux and Android), except threads that [`on_start`](Self::on_start) has
     /// placed.
     pub fn affinity(mut self, affinity: impl Fn(usize) -> AffinityMask + 'static) -> Self {
-        self.affinity = Some(Box::new(affinity));
+        self.affinity = Some(Contained::new(Box::new(affinity)));
         self
     }
 
     /// Sets a hook that runs first on each thread that the scheduler starts, with the index of its worker. The scheduler is built
     /// when all hooks have returned.
     pub fn on_start(mut self, hook: impl Fn(usize) + Send + Sync + 'static) -> Self {
-        self.on_start = Some(Hook::from(Box::new(hook) as Box<dyn Fn(usize) + Send + Sync>));
+        self.on_start = Some(Hook::new(Contained::new(Box::new(hook))));
         self
     }
 
     /// Sets a hook that runs last on each thread that the scheduler has started, with the index of its worker. Its panic is
     /// reported to [`tracing`] as an error.
     pub fn on_stop(mut self, hook: impl Fn(usize) + Send + Sync + 'static) -> Self {
-        self.on_stop = Some(Hook::from(Box::new(hook) as Box<dyn Fn(usize) + Send + Sync>));
+        self.on_stop = Some(Hook::new(Contained::new(Box::new(hook))));
         self
     }
 

@@ -10,12 +10,10 @@ use super::scheduler_error::SchedulerError;
 use super::shared::Shared;
 use super::worker::{ExitCondition, Worker};
 use crate::sync::Arc;
-use crate::unwind::{AbortOnUnwind, catch, emit};
+use crate::unwind::{AbortOnUnwind, Contained, catch, emit};
 
 /// A function of the engine's that runs on each thread, with the index of its worker.
-///
-/// Not the model checker's `Arc`, which cannot hold unsized types.
-pub(super) type Hook = std::sync::Arc<dyn Fn(usize) + Send + Sync>;
+pub(super) type Hook = Arc<Contained<Box<dyn Fn(usize) + Send + Sync>>>;
 
 /// The thread of a worker, from start to end.
 pub(super) struct WorkerThread {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::ticks;
 use crate::sync::{AtomicU64, Instant, Ordering};
-use crate::unwind::{JobPanic, catch, emit};
+use crate::unwind::{Contained, JobPanic, catch, emit};
 
 /// The source of timestamps.
 pub(super) enum Clock {
@@ -97,7 +97,7 @@ impl MachineClock {
 ///
 /// If it panics, it is not called again, and time stops at its latest reading.
 pub(super) struct EngineClock {
-    call: Box<dyn Fn() -> Duration + Send + Sync>,
+    call: Contained<Box<dyn Fn() -> Duration + Send + Sync>>,
     /// The latest reading of any thread. Relaxed: it hands nothing over.
     latest: AtomicU64,
     panic: OnceLock<JobPanic>,
@@ -105,12 +105,12 @@ pub(super) struct EngineClock {
 
 impl EngineClock {
     pub(super) fn new(call: Box<dyn Fn() -> Duration + Send + Sync>) -> Self {
-        Self { call, latest: AtomicU64::new(0), panic: OnceLock::new() }
+        Self { call: Contained::new(call), latest: AtomicU64::new(0), panic: OnceLock::new() }
     }
 
     pub(super) fn read(&self) -> u64 {
         if self.panic.get().is_none() {
-            match catch(&self.call) {
+            match catch(|| (self.call)()) {
                 Ok(time) => {
                     let timestamp = nanoseconds(time);
                     self.latest.fetch_max(timestamp, Ordering::Relaxed);

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use drawloom::backend::{NullBackend, Picture};
+use drawloom::backend::{NullBackend, Picture, SoftwareBackend};
 use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
 use drawloom::process::Deferred;
 use drawloom::scene::{AssetLoader, Material, Scene};
@@ -56,6 +56,44 @@ fn a_panic_of_a_preparation_is_an_error_that_names_it() {
     });
 }
 
+/// Preparations whose handles are dropped leave nothing behind, on any number of workers: neither jobs, nor a scheduler that its own queue
+/// keeps by way of the backend.
+#[test]
+fn preparations_that_nobody_waits_for_are_not_kept() {
+    within_time(|| {
+        for workers in [1, 2, 3] {
+            let [scene, _] = worlds();
+            let (scheduler, alive_before) = (Arc::new(Scheduler::new(workers).unwrap()), fuse::alive());
+            let backend = OwnBackend::new(SoftwareBackend::new(Arc::clone(&scheduler)), false);
+            let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+            let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
+            for preparation in 0..300 {
+                drop(renderer.prepare_pipelines_in_background(scene.as_scene_ref()).unwrap());
+                if preparation % 100 == 0 {
+                    drop(submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap());
+                }
+            }
+            if workers == 1 {
+                let state = format!("{scheduler:?}");
+                assert!(state.contains("background_jobs: 0"), "{state}");
+            }
+            let scheduler = {
+                let weak = Arc::downgrade(&scheduler);
+                drop(scheduler);
+                weak
+            };
+            drop((renderer, submitter));
+            let is_gone = || scheduler.strong_count() == 0 && fuse::alive() == alive_before;
+            // Other workers may still run the last job.
+            let gone = (0..10_000).any(|_| {
+                std::thread::sleep(std::time::Duration::from_millis(u64::from(!is_gone())));
+                is_gone()
+            });
+            assert!(gone, "{workers} workers: the scheduler is kept");
+        }
+    });
+}
+
 #[test]
 fn a_panic_when_a_failed_frame_is_discarded_is_told_with_why_it_failed() {
     within_time(|| {
@@ -100,6 +138,31 @@ fn a_panic_in_the_destructor_of_a_job_changes_nothing() {
             }));
             fuse::disarm();
             assert!(ended.is_ok(), "{index} unwinds");
+            assert_eq!(fuse::alive(), alive_before);
+        }
+    });
+}
+
+/// The hooks and the clock of a scheduler, whose captures panic when they are dropped.
+#[test]
+fn a_panic_in_the_destructor_of_a_hook_changes_nothing() {
+    within_time(|| {
+        let alive_before = fuse::alive();
+        for (index, has_text) in (0..4).map(|index| (index, index % 2 == 0)) {
+            fuse::arm(Kind::Destructor, index, has_text);
+            let ended = catch_unwind(AssertUnwindSafe(|| {
+                let [start, stop, name, clock] = [(); 4].map(|()| Owned::new("captured by a hook", ()));
+                let builder = Scheduler::builder().workers(3).on_start(move |_| *start.get());
+                let builder = builder.on_stop(move |_| *stop.get());
+                let builder = builder.name(move |worker| format!("worker {worker} {:?}", name.get()));
+                let builder = builder.timeline_clock(move || {
+                    let () = clock.get();
+                    std::time::Duration::ZERO
+                });
+                let scheduler = builder.build().unwrap();
+                scheduler.parallel_for(10, 1, |_, _| {}).unwrap();
+            }));
+            assert!(fuse::disarm().is_some() && ended.is_ok(), "{index} unwinds");
             assert_eq!(fuse::alive(), alive_before);
         }
     });
