@@ -62,6 +62,12 @@ pub trait Backend: Send + Sync + 'static {
         0
     }
 
+    /// Whether targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) can be drawn into. Without them, some
+    /// of [`RadianceSum`](crate::quality::RadianceSum) falls back to half floats.
+    fn can_blend_floats(&self) -> bool {
+        false
+    }
+
     /// Compiles the shaders of a plan's processes, and makes the pipelines for objects of these states of each process, ahead of the first
     /// frame that needs them. A backend without pipelines does nothing.
     ///

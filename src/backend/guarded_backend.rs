@@ -73,6 +73,11 @@ impl<B: Backend> GuardedBackend<B> {
         self.call("uploaded_bytes", B::uploaded_bytes)
     }
 
+    /// A backend that panics instead of an answer blends none: what is then summed in half floats is what it can draw.
+    pub(crate) fn can_blend_floats(&self) -> bool {
+        self.call("can_blend_floats", B::can_blend_floats).unwrap_or(false)
+    }
+
     pub(crate) fn prepare_pipelines(
         &self,
         plan: &FramePlan,

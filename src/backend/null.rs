@@ -88,6 +88,10 @@ impl Backend for NullBackend {
         String::from("none (null backend)")
     }
 
+    fn can_blend_floats(&self) -> bool {
+        true
+    }
+
     fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
         request.check_reach()?;
         Ok(NullFrame {

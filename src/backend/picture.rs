@@ -73,7 +73,7 @@ fn decoded(format: Format, bytes: &[u8]) -> [f32; 4] {
         Format::Rgba16Float => [half(0), half(1), half(2), half(3)],
         Format::Rg16Float => [half(0), half(1), 0.0, 1.0],
         Format::R16Float => [half(0), 0.0, 0.0, 1.0],
-        Format::Rgba32Float => [single(0), single(1), single(2), single(3)],
+        Format::Rgba32Float | Format::Rgba32FloatBlendable => [single(0), single(1), single(2), single(3)],
         Format::R32Float | Format::Depth32Float | Format::Depth32FloatStencil8 => [single(0), 0.0, 0.0, 1.0],
         Format::R32Uint => [word(0) as f32, 0.0, 0.0, 1.0],
         Format::Stencil8 => [f32::from(bytes[0]), 0.0, 0.0, 1.0],

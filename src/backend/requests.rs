@@ -88,7 +88,9 @@ impl ViewRequest<'_> {
     /// # Errors
     /// If the camera is out of reach.
     pub fn gpu_view(&self) -> Result<GpuView, BackendError> {
-        GpuView::new(self.view, self.ambient, self.light_table.light_count())
+        let gpu_view = GpuView::new(self.view, self.ambient, self.light_table.light_count());
+        gpu_view
+            .map(|gpu_view| GpuView { light_ends: self.light_table.class_ends(), ..gpu_view })
             .ok_or_else(|| BackendError::ViewOutOfReach { view: self.view.name().to_owned() })
     }
 }

@@ -1,9 +1,9 @@
 //! Whether an object of the scene needs transparency, known by one object that does.
 
 use crate::handle::Handle;
-use crate::process::Requirements;
+use crate::process::{Deferred, Requirements};
 use crate::scene::{Assets, Material, SceneRef};
-use crate::view::{ObjectTable, set_bits};
+use crate::view::{ObjectTable, RejectionReason, Rejections, set_bits};
 
 /// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes no difference.
 ///
@@ -55,6 +55,14 @@ impl BlendedObjectWitness {
             }
         };
         self.witness.is_some()
+    }
+
+    /// Counts the witness if the pipeline lacks float blending.
+    pub(super) fn count_half_floats(&self, deferred: Option<&Deferred>, rejections: &Rejections) {
+        let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
+        if let Some(Witness { object, .. }) = witness {
+            rejections.count(RejectionReason::HalfFloatBlending, object);
+        }
     }
 }
 

@@ -104,8 +104,10 @@ impl<B: Backend> RendererBuilder<B> {
             (Some(deferred), Some(quality)) => Some(with_quality(deferred, quality)?),
             (deferred, _) => deferred,
         };
-        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
         let backend = GuardedBackend::new(Arc::new(self.backend));
+        let blends_floats = backend.can_blend_floats();
+        let deferred = deferred.map(|deferred| deferred.with_float_blending(blends_floats));
+        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;
         let submitter = Submitter::new(backend.clone(), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))
     }

@@ -64,6 +64,16 @@ impl PlanCache {
         self.deferred.as_ref()
     }
 
+    /// Sets whether the backend can blend floats. Plans are compiled anew if that changes.
+    pub(super) fn set_float_blending(&mut self, blends_floats: bool) {
+        if let Some(deferred) = self.deferred.take() {
+            if deferred.blends_floats() != blends_floats {
+                self.compiled.clear();
+            }
+            self.deferred = Some(deferred.with_float_blending(blends_floats));
+        }
+    }
+
     /// The plan of the latest frame; before the first one, that of an empty scene.
     pub(super) fn current(&self) -> &Arc<FramePlan> {
         &self.current

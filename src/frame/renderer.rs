@@ -287,6 +287,7 @@ impl<B: Backend> Renderer<B> {
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
+        self.tables.blended_object.count_half_floats(self.plans.deferred(), self.tables.objects.rejections());
         let interval = self.quality.shadows.interval;
         let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
@@ -403,6 +404,7 @@ impl<B: Backend> Renderer<B> {
 
     /// Puts a backend in the place of the one before, and drops what belongs to that one.
     pub(super) fn set_backend(&mut self, backend: GuardedBackend<B>) {
+        self.plans.set_float_blending(backend.can_blend_floats());
         self.backend = backend;
         self.recordings.clear();
         self.background_work = BackgroundWork::default();
@@ -414,7 +416,7 @@ impl<B: Backend> Renderer<B> {
     /// # Errors
     /// If the processes make no frame, or one of them panics; then nothing changes.
     pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
-        self.plans = self.plans.with_deferred(deferred)?;
+        self.plans = self.plans.with_deferred(deferred.with_float_blending(self.backend.can_blend_floats()))?;
         self.pipeline_has_quality = false;
         self.view_cache.invalidate();
         Ok(())

@@ -30,6 +30,10 @@ pub enum Format {
     R16Float,
     /// Four floats.
     Rgba32Float,
+    /// Four floats that can be blended, for sums of many small numbers. Devices need the feature `FLOAT32_BLENDABLE`, which
+    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) has if the adapter has it:
+    /// [`Backend::can_blend_floats`](crate::backend::Backend::can_blend_floats) tells.
+    Rgba32FloatBlendable,
     /// A float.
     R32Float,
     /// A whole number: shaders write and read `u32`.
@@ -65,7 +69,7 @@ impl Format {
         matches!(self, Self::Rgba8Unorm | Self::Rgba16Float | Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
 
-    /// Whether what is drawn can be blended with it on every adapter.
+    /// Whether what is drawn can be blended with it on every adapter that can have it.
     pub fn can_be_blended(self) -> bool {
         !self.is_depth_stencil() && !matches!(self, Self::Rgba32Float | Self::R32Float | Self::R32Uint)
     }
@@ -77,7 +81,7 @@ impl Format {
 
     /// Whether such a target's samples can be [resolved](super::Declare::resolves) on every adapter.
     pub fn can_be_resolved(self) -> bool {
-        self.can_be_blended()
+        self.is_filterable()
     }
 
     /// Whether it holds whole numbers.
@@ -87,19 +91,23 @@ impl Format {
 
     /// Whether a shader can sample it between pixels, with a filtering sampler, on every adapter.
     pub fn is_filterable(self) -> bool {
-        self.can_be_blended()
+        self.can_be_blended() && self != Self::Rgba32FloatBlendable
     }
 
     /// Whether it holds negative numbers.
     pub fn is_signed(self) -> bool {
-        matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R16Float | Self::Rgba32Float | Self::R32Float)
+        match self {
+            Self::Rgba16Float | Self::Rg16Float | Self::R16Float => true,
+            Self::Rgba32Float | Self::Rgba32FloatBlendable | Self::R32Float => true,
+            _ => false,
+        }
     }
 
     /// Channels per pixel, as shaders sample them.
     pub fn channels(self) -> usize {
         match self {
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => 4,
-            Self::Rgb10a2Unorm | Self::Rgba16Float | Self::Rgba32Float => 4,
+            Self::Rgb10a2Unorm | Self::Rgba16Float | Self::Rgba32Float | Self::Rgba32FloatBlendable => 4,
             Self::Rg8Unorm | Self::Rg16Float => 2,
             Self::R8Unorm | Self::R16Float | Self::R32Float | Self::R32Uint | Self::Depth32Float => 1,
             Self::Depth32FloatStencil8 | Self::Stencil8 => 1,
@@ -115,7 +123,7 @@ impl Format {
             Self::Rg16Float | Self::R32Float | Self::R32Uint => 4,
             Self::Depth32Float | Self::Depth32FloatStencil8 => 4,
             Self::Rgba16Float => 8,
-            Self::Rgba32Float => 16,
+            Self::Rgba32Float | Self::Rgba32FloatBlendable => 16,
         }
     }
 }

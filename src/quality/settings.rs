@@ -1,8 +1,8 @@
 //! The quality of frames: accuracy settings and presets.
 
 use super::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, QualityError, ShadowQuality, ToneCurve,
-    TransformPrecision, VertexFormat,
+    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, QualityError, RadianceSum, ShadowQuality,
+    ToneCurve, TransformPrecision, VertexFormat,
 };
 
 /// The settings that trade a frame's accuracy for speed.
@@ -97,6 +97,11 @@ pub struct Quality {
     /// cut-off times 2s² − s⁶ up to s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. Cost: the
     /// pixels within the lights' reach.
     pub light_cut_off: f32,
+    /// How lights and blended objects are added to the target `radiance` of a [`Deferred`](crate::process::Deferred) pipeline.
+    ///
+    /// Error: a fraction of the light that is added, by the number of lights or objects: see [`RadianceSum::max_light_error`] and
+    /// [`RadianceSum::max_blended_error`]. Cost: bytes per pixel and light, or every pixel tests every light.
+    pub radiance_sum: RadianceSum,
     /// The tone mapping curve.
     ///
     /// Error: RMSE of the picture. Cost: five multiplications and a division per pixel and channel.
@@ -125,6 +130,7 @@ impl Quality {
             depth_pre_pass: false,
             shadows: ShadowQuality { side: 512, filter: 0, interval: 2, widest_edge: 10.0, ..ShadowQuality::default() },
             light_cut_off: 1.0 / 255.0,
+            radiance_sum: RadianceSum::HalfFloat,
             tone_curve: ToneCurve::Filmic,
             transforms: TransformPrecision::CameraRelative,
         }
@@ -144,6 +150,7 @@ impl Quality {
             depth_pre_pass: false,
             shadows: ShadowQuality::default(),
             light_cut_off: 0.0,
+            radiance_sum: RadianceSum::HalfFloat,
             tone_curve: ToneCurve::Filmic,
             transforms: TransformPrecision::CameraRelative,
         }
@@ -157,6 +164,7 @@ impl Quality {
             normals: NormalFormat::Octahedral16,
             diffuse: DiffuseFormat::HalfFloat,
             level_of_detail: 0.0,
+            radiance_sum: RadianceSum::Shader,
             shadows: ShadowQuality { side: 2048, filter: 2, widest_edge: 2.0, ..ShadowQuality::default() },
             ..Self::balanced()
         }

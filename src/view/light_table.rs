@@ -137,6 +137,16 @@ impl LightTable {
         &self.layers
     }
 
+    /// For each class, by [`LightClass::index`]: where its lights end within [`LightTable::gpu_lights`]. They begin where those of the class
+    /// before end.
+    pub fn class_ends(&self) -> [u32; LightClass::COUNT] {
+        let mut end = 0;
+        self.ranges.each_ref().map(|range| {
+            end = end.max(range.end);
+            end
+        })
+    }
+
     /// The range of a class within [`LightTable::gpu_lights`].
     pub fn range(&self, class: LightClass) -> Range<u32> {
         self.ranges[class.index()].clone()
@@ -182,6 +192,12 @@ mod tests {
         assert_eq!(class(LightKind::Spot, false), 2..3);
         assert_eq!(class(LightKind::Spot, true), 3..4);
         assert!(class(LightKind::Directional, false).is_empty() && class(LightKind::Hemispherical, true).is_empty());
+        for class in LightClass::all().filter(|class| !table.range(*class).is_empty()) {
+            let index = class.index();
+            let begin = if index == 0 { 0 } else { table.class_ends()[index - 1] };
+            assert_eq!(table.range(class), begin..table.class_ends()[index]);
+        }
+        assert_eq!(table.class_ends()[LightClass::COUNT - 1], 4);
         let depths: Vec<_> = table.gpu_lights().iter().map(|light| light.position.z).collect();
         assert_eq!(depths, [-4.0, -6.0, -5.0, -3.0]);
         assert_eq!(table.gpu_lights()[3].shadow_layer, 7);

@@ -92,10 +92,14 @@ pub enum RejectionReason {
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
     /// objects are drawn as it says.
     UnknownObject,
+    /// A blended object is added in half floats, because the device does not blend floats, although
+    /// [`Quality::radiance_sum`](crate::quality::Quality::radiance_sum) asks for them. It is drawn nevertheless, with the error of
+    /// [`RadianceSum::HalfFloat`](crate::quality::RadianceSum::HalfFloat). One object counts for all.
+    HalfFloatBlending,
 }
 
 impl RejectionReason {
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -110,6 +114,7 @@ impl RejectionReason {
         Self::NotResident,
         Self::TextureNotResident,
         Self::UnknownObject,
+        Self::HalfFloatBlending,
     ];
 
     /// The description that reports print.
@@ -129,6 +134,7 @@ impl RejectionReason {
             Self::NotResident => "object with a mesh or material that is yet to arrive",
             Self::TextureNotResident => "material with a texture that is yet to arrive",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
+            Self::HalfFloatBlending => "blended object in half floats, because the device does not blend floats",
         }
     }
 }

@@ -3,6 +3,10 @@
 /// The methods of [`Backend`](drawloom::backend::Backend) that a wrapper of the backend `inner` passes on as they are.
 macro_rules! forward_unchanged_calls {
     () => {
+        fn can_blend_floats(&self) -> bool {
+            self.inner.can_blend_floats()
+        }
+
         fn uploaded_bytes(&self) -> u64 {
             self.inner.uploaded_bytes()
         }

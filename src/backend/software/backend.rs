@@ -84,6 +84,10 @@ impl Backend for SoftwareBackend {
         self.rasterizer.adapter_name()
     }
 
+    fn can_blend_floats(&self) -> bool {
+        true
+    }
+
     fn forget_histories(&self) {
         self.rasterizer.forget_histories();
     }

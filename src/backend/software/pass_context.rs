@@ -18,10 +18,11 @@ pub(super) struct PassContext<'a, R: Precision> {
 impl<R: Precision> PassContext<'_, R> {
     /// What the pass's CPU shader reads.
     pub(super) fn inputs<'a>(&'a self, sampled: &'a [&'a dyn SampledTexture<R>]) -> PassInputs<'a, R> {
-        let ViewState { shader_view, lights, lights_by_layer, .. } = self.view;
+        let ViewState { shader_view, lights, light_ends, lights_by_layer, .. } = self.view;
         PassInputs {
             view: shader_view,
             lights,
+            light_ends,
             lights_by_layer,
             materials: self.materials,
             sampled,

@@ -119,9 +119,8 @@ fn encoding_of(format: Format, channel: usize) -> ChannelEncoding {
         Format::Rgba8Srgb | Format::Rgba8Unorm | Format::Rg8Unorm | Format::R8Unorm => ChannelEncoding::Steps(255.0),
         Format::Bgra8Srgb | Format::Bgra8Unorm => ChannelEncoding::Steps(255.0),
         Format::Rgba16Float | Format::Rg16Float | Format::R16Float => ChannelEncoding::Half,
-        Format::Rgba32Float | Format::R32Float | Format::Depth32Float | Format::Depth32FloatStencil8 => {
-            ChannelEncoding::Float
-        }
+        Format::Rgba32Float | Format::Rgba32FloatBlendable | Format::R32Float => ChannelEncoding::Float,
+        Format::Depth32Float | Format::Depth32FloatStencil8 => ChannelEncoding::Float,
         Format::R32Uint => ChannelEncoding::Integer,
         Format::Stencil8 => ChannelEncoding::Steps(255.0),
     }
@@ -245,6 +244,7 @@ mod tests {
             Format::Rg16Float,
             Format::R16Float,
             Format::Rgba32Float,
+            Format::Rgba32FloatBlendable,
             Format::R32Float,
             Format::R32Uint,
             Format::Depth32Float,

@@ -5,13 +5,15 @@ use super::shader_inputs::{CameraPosition, light_as_uploaded};
 use crate::backend::{BackendError, ViewRequest};
 use crate::process::{ShaderLight, ShaderView};
 use crate::quality::TransformPrecision;
-use crate::view::{FixedPosition, GpuLight};
+use crate::view::{FixedPosition, GpuLight, LightClass};
 
 /// A view of a frame, as CPU shaders read it.
 pub(super) struct ViewState<R> {
     pub(super) shader_view: ShaderView<R>,
     /// The lights that reach it.
     pub(super) lights: Vec<ShaderLight<R>>,
+    /// See [`PassInputs::light_ends`](crate::process::PassInputs::light_ends).
+    pub(super) light_ends: [usize; LightClass::COUNT],
     /// See [`PassInputs::lights_by_layer`](crate::process::PassInputs::lights_by_layer).
     pub(super) lights_by_layer: Vec<ShaderLight<R>>,
     pub(super) camera: CameraPosition,
@@ -39,6 +41,7 @@ impl<R: Precision> ViewState<R> {
         Ok(Self {
             shader_view: R::view(view, &gpu_view, ambient),
             lights: gpu_lights.iter().zip(light_table.sources()).map(light).collect(),
+            light_ends: light_table.class_ends().map(|end| end as usize),
             lights_by_layer: by_layer.iter().zip(light_table.layer_sources()).map(of_layer).collect(),
             camera,
         })

@@ -76,6 +76,10 @@ impl WgpuBackend {
     /// The feature that targets of [`Format::Depth32FloatStencil8`](crate::process::Format::Depth32FloatStencil8) need.
     pub const STENCIL_FEATURES: wgpu::Features = wgpu::Features::DEPTH32FLOAT_STENCIL8;
 
+    /// The feature that targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) need, and with them some of
+    /// [`RadianceSum`](crate::quality::RadianceSum).
+    pub const BLENDING_FEATURES: wgpu::Features = wgpu::Features::FLOAT32_BLENDABLE;
+
     /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it only for such
     /// devices: see [`WgpuBackend::optional_features`].
     pub const MAPPING_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -84,7 +88,8 @@ impl WgpuBackend {
     /// [`WgpuBackend::REQUIRED_FEATURES`].
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         let mapping = if shares_memory(&adapter.get_info()) { Self::MAPPING_FEATURES } else { wgpu::Features::empty() };
-        adapter.features() & (Self::OPTIONAL_FEATURES | Self::STENCIL_FEATURES | Self::TIMING_FEATURES | mapping)
+        let formats = Self::STENCIL_FEATURES | Self::BLENDING_FEATURES;
+        adapter.features() & (Self::OPTIONAL_FEATURES | formats | Self::TIMING_FEATURES | mapping)
     }
 
     /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times

@@ -39,6 +39,10 @@ impl Backend for WgpuBackend {
         format!("{} ({})", info.name, info.backend)
     }
 
+    fn can_blend_floats(&self) -> bool {
+        self.device.features().contains(Self::BLENDING_FEATURES)
+    }
+
     fn uploaded_bytes(&self) -> u64 {
         self.uploads.bytes()
     }

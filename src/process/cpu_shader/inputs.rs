@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::level_sampling::{bilinear, trilinear};
 use crate::raster::{Quaternion, Real, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, ColumnLayout, LightKind, MaterialType, MaterialValues, ObjectColumn, Projection};
+use crate::view::LightClass;
 
 /// How many numbers a vertex hands on to the pixels.
 pub const VARYINGS: usize = 11;
@@ -56,6 +57,9 @@ pub struct PassInputs<'a, R: Real> {
     pub view: &'a ShaderView<R>,
     /// The lights that reach the view.
     pub lights: &'a [ShaderLight<R>],
+    /// For each class of lights, by [`LightClass::index`](crate::view::LightClass::index): where they end among the lights. They begin where
+    /// those of the class before end.
+    pub light_ends: &'a [usize; LightClass::COUNT],
     /// By layer of the shadow maps, the light that the layer belongs to, as that map shows it; empty unless a light has several
     /// maps.
     pub lights_by_layer: &'a [ShaderLight<R>],

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::{Materials, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderView};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, Camera, ClipPlane, Light, MaterialValues, Projection, ViewKind};
-use crate::view::{GpuLight, RenderView};
+use crate::view::{GpuLight, LightClass, RenderView};
 
 /// The unit roundoff of f32: 2⁻²⁴.
 pub(in crate::process) const UNIT: f64 = 1.0 / 16_777_216.0;
@@ -142,5 +142,13 @@ pub(in crate::process) fn pass<'a, R: Real>(
     materials: &'a dyn Materials<R>,
     sampled: &'a [&'a dyn SampledTexture<R>],
 ) -> PassInputs<'a, R> {
-    PassInputs { view, lights: &[], lights_by_layer: &[], materials, sampled, columns: ShaderColumns::default() }
+    PassInputs {
+        view,
+        lights: &[],
+        light_ends: &[0; LightClass::COUNT],
+        lights_by_layer: &[],
+        materials,
+        sampled,
+        columns: ShaderColumns::default(),
+    }
 }

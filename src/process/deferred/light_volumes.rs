@@ -6,7 +6,7 @@ mod cpu_shader;
 use std::borrow::Cow;
 
 use super::shading::{ILLUMINATION_SHADER, shadow_shader};
-use super::{GeometryFormats, ShadowCasters};
+use super::{FloatSum, GeometryFormats, ShadowCasters};
 use crate::process::{Declare, Draws, LightDraws, RenderProcess};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
@@ -30,6 +30,8 @@ pub struct LightVolumes {
     #[cfg_attr(not(feature = "software"), expect(dead_code, reason = "the WGSL is generated for them"))]
     formats: GeometryFormats,
     maps: Option<ShadowMaps>,
+    /// `None` if lights are added to `radiance` one by one; otherwise whether this process adds the first terms of their sum.
+    sum: Option<bool>,
 }
 
 impl LightVolumes {
@@ -51,7 +53,12 @@ impl LightVolumes {
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
             include_str!("light_volumes/light_volumes.wgsl"),
         ];
-        Self { name: Self::name_of(class), shader: shader.concat(), class, formats, maps: maps.copied() }
+        Self { name: Self::name_of(class), shader: shader.concat(), class, formats, maps: maps.copied(), sum: None }
+    }
+
+    /// The same, but it adds the lights to a sum of floats. The first process that does so begins the sum.
+    pub(super) fn into_sum(self, is_first: bool) -> Self {
+        Self { sum: Some(is_first), ..self }
     }
 
     /// The name of a class' process, such as "point lights" or "shadowed spot lights".
@@ -76,7 +83,10 @@ impl RenderProcess for LightVolumes {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
         declare.tests_depth("depth");
-        declare.draws_over("radiance");
+        match self.sum {
+            Some(is_first) => FloatSum::LIGHTS.declare_term(declare, is_first),
+            None => declare.draws_over("radiance"),
+        }
     }
 
     fn draws(&self) -> Draws<'_> {

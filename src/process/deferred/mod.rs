@@ -5,8 +5,10 @@
 
 mod deformation;
 mod depth_pre_pass;
+mod float_sum;
 mod geometry_buffer;
 mod geometry_formats;
+mod light_sum;
 mod light_volumes;
 mod pipeline;
 mod place;
@@ -17,8 +19,10 @@ mod transparency;
 
 pub use deformation::Deformation;
 pub use depth_pre_pass::DepthPrePass;
+use float_sum::FloatSum;
 pub use geometry_buffer::GeometryBuffer;
 pub use geometry_formats::GeometryFormats;
+use light_sum::{LightClasses, LightSum};
 pub use light_volumes::LightVolumes;
 pub use pipeline::Deferred;
 pub use place::Place;

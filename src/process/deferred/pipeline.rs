@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::deformation::{Deformation, split_by_deformation, undeformed, undeformed_name};
 use super::{
-    DepthPrePass, GeometryBuffer, GeometryFormats, LightVolumes, Place, Requirements, ShadowCasters, Transparency,
+    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, LightClasses, LightSum, LightVolumes, Place, Requirements,
+    ShadowCasters, Transparency,
 };
 use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
-use crate::quality::Quality;
+use crate::quality::{Quality, RadianceSum};
 use crate::scene::LightKind;
 use crate::view::{LightClass, ShadowMaps};
 
@@ -23,6 +24,10 @@ use crate::view::{LightClass, ShadowMaps};
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
 ///  depth pre-pass → geometry buffer → lights, a process per class → transparency → post-processing
 /// ```
+///
+/// How lights and blended objects add up in `radiance` is set by [`Quality::radiance_sum`]. If they are summed in floats, a process "sum of
+/// lights" follows the lights, or takes their place, and a process "sum of blended objects" follows transparency. A process of lights or
+/// of transparency that the engine [replaces](Self::replace) draws over `radiance` as ever.
 ///
 /// ```
 /// use drawloom::process::{Deferred, Fxaa, ToneMapping};
@@ -40,6 +45,8 @@ pub struct Deferred {
     formats: GeometryFormats,
     vertex_colors: bool,
     shadow_maps: Option<ShadowMaps>,
+    radiance_sum: RadianceSum,
+    blends_floats: bool,
     post: Vec<Arc<dyn PostStep>>,
     replaced: Vec<(String, Arc<dyn RenderProcess>)>,
     left_out: Vec<String>,
@@ -56,6 +63,8 @@ impl Deferred {
             formats: GeometryFormats::default(),
             vertex_colors: false,
             shadow_maps: Some(ShadowMaps::default()),
+            radiance_sum: RadianceSum::default(),
+            blends_floats: true,
             post: Vec::new(),
             replaced: Vec::new(),
             left_out: Vec::new(),
@@ -96,13 +105,14 @@ impl Deferred {
         Self { shadow_maps, ..self }
     }
 
-    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the
+    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the sum of lights, to the
     /// post-processing steps added so far and to the shadow maps if there are any. It changes neither the format of
     /// `radiance` nor how far the shadow maps of directional lights reach.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
         self.formats = GeometryFormats { normal, diffuse, ..self.formats };
+        self.radiance_sum = quality.radiance_sum;
         for step in &mut self.post {
             if let Some(other) = step.with_quality(quality) {
                 *step = other;
@@ -158,6 +168,20 @@ impl Deferred {
         if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
 
+    /// Sets whether the backend can [blend floats](crate::backend::Backend::can_blend_floats).
+    pub(crate) fn with_float_blending(self, blends_floats: bool) -> Self {
+        Self { blends_floats, ..self }
+    }
+
+    pub(crate) fn blends_floats(&self) -> bool {
+        self.blends_floats
+    }
+
+    /// Whether blended objects are added in half floats although the quality asks for floats.
+    pub(crate) fn lacks_float_blending(&self) -> bool {
+        self.radiance_sum != RadianceSum::HalfFloat && !self.blends_floats
+    }
+
     /// The names of all processes that a frame may have, whatever the scene, in order.
     pub fn names(&self) -> Vec<String> {
         self.build(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
@@ -179,7 +203,12 @@ impl Deferred {
             self.kept.iter().any(|kept| {
                 let deformed =
                     || self.deformations.iter().filter_map(|deformation| undeformed_name(&**deformation, kept));
-                kept == name || deformed().any(|undeformed| undeformed == name)
+                // A sum stays with a process whose terms it adds.
+                let has_sum = |sum: FloatSum, term: &str| kept == sum.process_name() && name == term;
+                kept == name
+                    || deformed().any(|undeformed| undeformed == name)
+                    || has_sum(FloatSum::LIGHTS, &LightVolumes::name_of(UNSHADOWED_POINT_LIGHTS))
+                    || has_sum(FloatSum::BLENDED_OBJECTS, Transparency::NAME)
             })
         })
     }
@@ -197,7 +226,7 @@ impl Deferred {
             let excluded = if is_deformed { &[][..] } else { &self.deformations };
             let replacement = replacement.map(|process| undeformed(process, excluded));
             let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
-            let process = process.filter(|_| !self.left_out.contains(&name));
+            let process = process.filter(|_| !self.left_out.contains(&name) && !self.is_summed_in_shader(&name));
             ChainSlot { process, keep: self.kept.contains(&name), name }
         };
         let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, Place)| {
@@ -270,25 +299,78 @@ impl Deferred {
     fn lighting(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
         let maps = self.required_maps(requirements);
+        let (sum, summed) = (self.light_sum(), self.summed_classes());
+        let mut has_terms = false;
         for class in LightClass::all().filter(|class| requirements.lights(*class)) {
-            match maps {
-                None if class.shadowed => {}
-                Some(maps) if class.shadowed => {
-                    processes.push(Arc::new(LightVolumes::shadowed(class.kind, self.formats, maps)));
-                }
-                _ => processes.push(Arc::new(LightVolumes::new(class.kind, self.formats))),
-            }
+            let volumes = match maps {
+                None if class.shadowed => continue,
+                Some(maps) if class.shadowed => LightVolumes::shadowed(class.kind, self.formats, maps),
+                _ => LightVolumes::new(class.kind, self.formats),
+            };
+            let is_summed = summed.contains(class);
+            let in_floats = is_summed && sum == RadianceSum::Float;
+            processes.push(Arc::new(if in_floats { volumes.into_sum(!has_terms) } else { volumes }));
+            has_terms |= is_summed;
+        }
+        match sum {
+            RadianceSum::Float if has_terms => processes.push(Arc::new(FloatSum::LIGHTS)),
+            RadianceSum::Shader if has_terms => processes.push(Arc::new(LightSum::new(summed, self.formats, maps))),
+            _ => {}
         }
         processes
+    }
+
+    /// How lights are summed on this backend.
+    fn light_sum(&self) -> RadianceSum {
+        match self.radiance_sum {
+            RadianceSum::Float if !self.blends_floats => RadianceSum::Shader,
+            sum => sum,
+        }
+    }
+
+    /// The lights that are summed, unless they are added one by one: those whose process is neither replaced nor left out.
+    fn summed_classes(&self) -> LightClasses {
+        let is_shipped = |class: &LightClass| {
+            let name = LightVolumes::name_of(*class);
+            !self.left_out.contains(&name) && !self.is_replaced(&name)
+        };
+        LightClass::all().filter(is_shipped).collect()
+    }
+
+    /// Whether a shader that sums lights takes the place of the process of this name.
+    fn is_summed_in_shader(&self, name: &str) -> bool {
+        self.light_sum() == RadianceSum::Shader
+            && !self.is_replaced(name)
+            && LightClass::all().any(|class| LightVolumes::name_of(class) == name)
+    }
+
+    fn is_replaced(&self, name: &str) -> bool {
+        self.replaced.iter().any(|(replaced, _)| replaced == name)
+    }
+
+    /// Whether blended objects are summed in floats: all of them, because those that are drawn later cover the others.
+    fn sums_blended_objects(&self) -> bool {
+        let draws_blended = |name: &str| {
+            let mut deformed = self.deformations.iter().map(|deformation| undeformed_name(&**deformation, name));
+            name == Transparency::NAME || deformed.any(|undeformed| undeformed == Some(Transparency::NAME))
+        };
+        self.radiance_sum != RadianceSum::HalfFloat
+            && self.blends_floats
+            && !self.left_out.iter().any(|name| name == Transparency::NAME)
+            && !self.replaced.iter().any(|(name, _)| draws_blended(name))
     }
 
     fn transparency(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
         let transparency = || {
             let transparency = Transparency::new(self.required_maps(requirements));
             let transparency = if self.vertex_colors { transparency.with_vertex_colors() } else { transparency };
-            Arc::new(transparency) as Arc<dyn RenderProcess>
+            let sums = self.sums_blended_objects();
+            Arc::new(if sums { transparency.into_sum() } else { transparency }) as Arc<dyn RenderProcess>
         };
-        self.with_deformed(requirements.transparency().then(transparency).into_iter().collect())
+        let sum = requirements.transparency() && self.sums_blended_objects();
+        let sum = sum.then(|| Arc::new(FloatSum::BLENDED_OBJECTS) as Arc<dyn RenderProcess>);
+        let processes = requirements.transparency().then(transparency).into_iter().collect();
+        self.with_deformed(processes).into_iter().chain(sum).collect()
     }
 
     /// These processes, which draw objects, and those that draw deformed objects, except in place of processes that are left out.
@@ -320,3 +402,4 @@ impl Default for Deferred {
 
 const RADIANCE: &str = "radiance";
 const PICTURE: &str = "picture";
+const UNSHADOWED_POINT_LIGHTS: LightClass = LightClass { kind: LightKind::Point, shadowed: false };

@@ -3,8 +3,8 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use super::ShadowCasters;
 use super::shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER, shadow_shader};
+use super::{FloatSum, ShadowCasters};
 use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
 use crate::scene::{VERTEX_COLOR, ViewKind};
@@ -25,6 +25,8 @@ pub struct Transparency {
     shader: String,
     maps: Option<ShadowMaps>,
     has_colors: bool,
+    /// Whether the objects are added to a sum of floats, and not to `radiance`.
+    sums: bool,
 }
 
 impl Transparency {
@@ -32,19 +34,27 @@ impl Transparency {
 
     /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
-        Self { shader: shader(SURFACE_SHADER, maps), maps: maps.copied(), has_colors: false }
+        Self { shader: shader(SURFACE_SHADER, maps, false), maps: maps.copied(), has_colors: false, sums: false }
     }
 
     /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in meshes without colours.
     pub fn with_vertex_colors(self) -> Self {
-        Self { shader: shader(COLORED_SURFACE_SHADER, self.maps.as_ref()), has_colors: true, ..self }
+        let shader = shader(COLORED_SURFACE_SHADER, self.maps.as_ref(), self.sums);
+        Self { shader, has_colors: true, ..self }
+    }
+
+    /// The same, but it adds the objects to a sum of floats.
+    pub(super) fn into_sum(self) -> Self {
+        let surface = if self.has_colors { COLORED_SURFACE_SHADER } else { SURFACE_SHADER };
+        Self { shader: shader(surface, self.maps.as_ref(), true), sums: true, ..self }
     }
 }
 
 /// The shader that draws such surfaces.
-fn shader(surface: &str, maps: Option<&ShadowMaps>) -> String {
+fn shader(surface: &str, maps: Option<&ShadowMaps>, sums: bool) -> String {
     let shadows = shadow_shader(maps.map(|maps| (1, maps)));
-    [surface, ILLUMINATION_SHADER, &shadows, include_str!("transparency/transparency.wgsl")].concat()
+    let sums = format!("const SUMS: bool = {sums};\n");
+    [surface, ILLUMINATION_SHADER, &shadows, &sums, include_str!("transparency/transparency.wgsl")].concat()
 }
 
 impl RenderProcess for Transparency {
@@ -60,7 +70,11 @@ impl RenderProcess for Transparency {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }
         declare.tests_depth("depth");
-        declare.draws_over("radiance");
+        if self.sums {
+            FloatSum::BLENDED_OBJECTS.declare_term(declare, true);
+        } else {
+            declare.draws_over("radiance");
+        }
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -74,7 +88,7 @@ impl RenderProcess for Transparency {
 
     #[cfg(feature = "software")]
     fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
-        let shader = cpu_shader::TransparencyCpuShader::new(self.maps.as_ref(), self.has_colors);
+        let shader = cpu_shader::TransparencyCpuShader::new(self.maps.as_ref(), self.has_colors, self.sums);
         Some(crate::process::CpuShader::objects(shader))
     }
 }

@@ -32,6 +32,9 @@ struct View {
     // Linear.
     ambient: vec3<f32>,
     far: f32,
+    // Where each of the eight classes of lights ends in `lights`, four a vector. It begins where the one before ends. The classes are, in
+    // this order, directional, point, spot and hemispherical lights, of each kind first those without a shadow and then those with one.
+    light_ends: array<vec4<u32>, 2>,
 }
 
 const PERSPECTIVE: u32 = 0u;

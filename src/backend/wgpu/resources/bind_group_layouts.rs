@@ -147,7 +147,7 @@ pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
         Format::Rg16Float => wgpu::TextureFormat::Rg16Float,
         Format::R16Float => wgpu::TextureFormat::R16Float,
-        Format::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
+        Format::Rgba32Float | Format::Rgba32FloatBlendable => wgpu::TextureFormat::Rgba32Float,
         Format::R32Float => wgpu::TextureFormat::R32Float,
         Format::R32Uint => wgpu::TextureFormat::R32Uint,
         Format::Depth32Float => wgpu::TextureFormat::Depth32Float,

@@ -20,11 +20,13 @@ pub(super) struct TransparencyCpuShader {
     shadows: Option<ShadowFilter>,
     /// Whether vertices have colours.
     has_colors: bool,
+    /// Whether the objects are added to a sum of floats.
+    sums: bool,
 }
 
 impl TransparencyCpuShader {
-    pub(super) fn new(maps: Option<&ShadowMaps>, has_colors: bool) -> Self {
-        Self { shadows: maps.map(ShadowFilter::new), has_colors }
+    pub(super) fn new(maps: Option<&ShadowMaps>, has_colors: bool, sums: bool) -> Self {
+        Self { shadows: maps.map(ShadowFilter::new), has_colors, sums }
     }
 }
 
@@ -53,8 +55,11 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
         let radiance = material.emission + rgb(diffuse).map(|value| value / pi) * illuminance;
         let radiance = radiance.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
         let opacity = diffuse[3];
-        // Alpha blending multiplies by the opacity.
-        targets[0] = with_alpha(if material.blend == Blend::Alpha { radiance } else { radiance * opacity }, opacity);
+        // Alpha blending multiplies by the opacity. In a sum alpha is how much is hidden of what is behind: what is added hides nothing.
+        targets[0] = match material.blend {
+            Blend::Alpha => with_alpha(radiance, opacity),
+            _ => with_alpha(radiance * opacity, if self.sums { R::zero() } else { opacity }),
+        };
         true
     }
 }

@@ -1,0 +1,89 @@
+//! Lighting by a shader that sums all lights.
+
+#[cfg(feature = "software")]
+mod cpu_shader;
+
+use super::shading::{ILLUMINATION_SHADER, shadow_shader};
+use super::{GeometryFormats, ShadowCasters};
+use crate::process::{Declare, Draws, FullScreen, RenderProcess};
+use crate::scene::{Blend, ViewKind};
+use crate::view::{LightClass, ShadowMaps};
+
+/// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target `radiance` once: see
+/// [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). [`LightVolumes`](super::LightVolumes) adds them one by one.
+#[derive(Clone, Debug)]
+pub(super) struct LightSum {
+    shader: String,
+    #[cfg_attr(not(feature = "software"), expect(dead_code, reason = "the WGSL is generated for them"))]
+    classes: LightClasses,
+    #[cfg_attr(not(feature = "software"), expect(dead_code, reason = "the WGSL is generated for them"))]
+    formats: GeometryFormats,
+    maps: Option<ShadowMaps>,
+}
+
+/// A bit for each class of lights, by [`LightClass::index`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct LightClasses(u32);
+
+impl LightClasses {
+    pub(super) fn insert(&mut self, class: LightClass) {
+        self.0 |= 1 << class.index();
+    }
+
+    pub(super) fn contains(self, class: LightClass) -> bool {
+        self.0 & 1 << class.index() != 0
+    }
+}
+
+impl FromIterator<LightClass> for LightClasses {
+    fn from_iter<I: IntoIterator<Item = LightClass>>(classes: I) -> Self {
+        let mut set = Self::default();
+        classes.into_iter().for_each(|class| set.insert(class));
+        set
+    }
+}
+
+impl LightSum {
+    pub(super) const NAME: &str = "sum of lights";
+
+    /// `maps` are those that [`ShadowCasters`] draws, if there are any.
+    pub(super) fn new(classes: LightClasses, formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
+        let shader = [
+            &formats.normal_encoding_wgsl(),
+            ILLUMINATION_SHADER,
+            &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
+            &format!("const CLASSES: u32 = {:#x}u;\nconst CLASS_COUNT: u32 = {}u;\n", classes.0, LightClass::COUNT),
+            include_str!("light_sum/light_sum.wgsl"),
+        ];
+        Self { shader: shader.concat(), classes, formats, maps: maps.copied() }
+    }
+}
+
+/// After depth, normal and diffuse.
+const SHADOW_MAPS_BINDING: u32 = 4;
+
+impl RenderProcess for LightSum {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples("depth");
+        declare.samples("normal");
+        declare.samples("diffuse");
+        if self.maps.is_some() {
+            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        }
+        declare.draws_over("radiance");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen { shader: &self.shader, blend: Blend::Additive, ..FullScreen::default() })
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
+        let shader = cpu_shader::LightSumCpuShader::new(self.classes, self.formats, self.maps.as_ref());
+        Some(crate::process::CpuShader::full_screen(shader))
+    }
+}

@@ -1,0 +1,52 @@
+@group(2) @binding(1) var depth_target: texture_depth_2d;
+@group(2) @binding(2) var normal_target: texture_2d<f32>;
+@group(2) @binding(3) var diffuse_target: texture_2d<f32>;
+
+@fragment
+fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+    let pixel = vec2<i32>(in.position.xy);
+    let depth = textureLoad(depth_target, pixel, 0);
+    if depth == 0.0 {
+        discard;
+    }
+    let position = position_from_depth(clip_of_pixel(in.position), depth);
+    let normal = decode_normal(textureLoad(normal_target, pixel, 0));
+
+    // A sum in batches: a term is rounded with the up to 32 of its batch, not with all that follow it.
+    var illuminance = vec3<f32>(0.0);
+    var batches = vec3<f32>(0.0);
+    var batch = vec3<f32>(0.0);
+    var count = 0u;
+    var end = 0u;
+    for (var class_index = 0u; class_index < CLASS_COUNT; class_index++) {
+        let begin = end;
+        end = view.light_ends[class_index / 4u][class_index % 4u];
+        if (CLASSES >> class_index & 1u) == 0u {
+            continue;
+        }
+        for (var index = begin; index < end; index++) {
+            let light = lights[index];
+            let unobstructed = illuminance_from(light, position, normal);
+            if all(unobstructed == vec3<f32>(0.0)) {
+                continue;
+            }
+            batch += unobstructed * light_visibility(light, position, normal);
+            count++;
+            if count % 32u == 0u {
+                batches += batch;
+                batch = vec3<f32>(0.0);
+                if count % 1024u == 0u {
+                    illuminance += batches;
+                    batches = vec3<f32>(0.0);
+                }
+            }
+        }
+    }
+    illuminance += batches + batch;
+    if all(illuminance == vec3<f32>(0.0)) {
+        discard;
+    }
+    let diffuse = textureLoad(diffuse_target, pixel, 0).rgb;
+    // Above 65,504 a half float would become infinite, and later NaN.
+    return vec4<f32>(min(diffuse / PI * illuminance, vec3<f32>(60000.0)), 0.0);
+}
