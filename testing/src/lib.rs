@@ -12,6 +12,7 @@ pub mod feedback;
 mod forwarded_calls;
 pub mod graph_oracle;
 pub mod hills;
+pub mod light_sums;
 pub mod mip_levels;
 pub mod obj_files;
 pub mod precision;

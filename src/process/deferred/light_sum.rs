@@ -3,7 +3,7 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use super::shading::{ILLUMINATION_SHADER, shadow_shader};
+use super::shading::{ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, shadow_shader};
 use super::{GeometryFormats, ShadowCasters};
 use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::scene::{Blend, ViewKind};
@@ -53,6 +53,7 @@ impl LightSum {
             ILLUMINATION_SHADER,
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
             &format!("const CLASSES: u32 = {:#x}u;\nconst CLASS_COUNT: u32 = {}u;\n", classes.0, LightClass::COUNT),
+            LIGHT_BATCHES_SHADER,
             include_str!("light_sum/light_sum.wgsl"),
         ];
         Self { shader: shader.concat(), classes, formats, maps: maps.copied() }

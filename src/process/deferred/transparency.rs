@@ -3,7 +3,9 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use super::shading::{COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, SURFACE_SHADER, shadow_shader};
+use super::shading::{
+    COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, SURFACE_SHADER, shadow_shader,
+};
 use super::{FloatSum, ShadowCasters};
 use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
@@ -12,7 +14,8 @@ use crate::view::ShadowMaps;
 
 /// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with
 /// alpha, additive or subtractive blending (M listing 10.1). It leaves out those whose material has a
-/// [`MaterialType`](crate::scene::MaterialType).
+/// [`MaterialType`](crate::scene::MaterialType). In a [`Deferred`](super::Deferred) pipeline they may be summed in floats first: see
+/// [`RadianceSum`](crate::quality::RadianceSum).
 ///
 /// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and
 /// adds their emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result
@@ -54,7 +57,8 @@ impl Transparency {
 fn shader(surface: &str, maps: Option<&ShadowMaps>, sums: bool) -> String {
     let shadows = shadow_shader(maps.map(|maps| (1, maps)));
     let sums = format!("const SUMS: bool = {sums};\n");
-    [surface, ILLUMINATION_SHADER, &shadows, &sums, include_str!("transparency/transparency.wgsl")].concat()
+    let shader = include_str!("transparency/transparency.wgsl");
+    [surface, ILLUMINATION_SHADER, &shadows, LIGHT_BATCHES_SHADER, &sums, shader].concat()
 }
 
 impl RenderProcess for Transparency {

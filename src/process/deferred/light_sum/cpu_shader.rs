@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::LightClasses;
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
 use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
+use crate::process::deferred::shading::cpu_shader::light_batches::LightBatches;
 use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
 use crate::process::{FullScreenCpuShader, FullScreenPixel, GeometryFormats, PassInputs};
 use crate::raster::{Real, Vector3, Vector4};
@@ -36,7 +37,7 @@ impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
         let position = pass.view.position_from_depth(pixel.clip, depth);
         let normal = self.formats.decode_normal(stored(NORMAL));
 
-        let mut sum = BatchedSum::default();
+        let mut batches = LightBatches::default();
         let mut begin = 0;
         for (class, &end) in LightClass::all().zip(pass.light_ends) {
             let lights = &pass.lights[begin..end];
@@ -46,17 +47,17 @@ impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
             }
             for light in lights {
                 let unobstructed = illuminance_from(light, position, normal);
-                if unobstructed == Vector3::zero() {
+                if unobstructed.0.iter().all(|&value| value <= R::zero()) {
                     continue;
                 }
                 let visibility = self.shadows.map_or(R::one(), |shadows| {
                     let (maps, by_layer) = (pass.sampled[SHADOW_MAPS], pass.lights_by_layer);
                     shadows.light_visibility(pass.view, maps, light, by_layer, position, normal)
                 });
-                sum.add(unobstructed * visibility);
+                batches.add(unobstructed * visibility);
             }
         }
-        let illuminance = sum.total();
+        let illuminance = batches.sum();
         if illuminance == Vector3::zero() {
             return false;
         }
@@ -64,39 +65,6 @@ impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
         // Above 65,504 a half float would become infinite, and later NaN.
         targets[0] = with_alpha(reflected.map(|value| value.min(R::of(MAX_STORED_RADIANCE))), R::zero());
         true
-    }
-}
-
-/// A sum in batches: a term is rounded with the up to 32 of its batch, not with all that follow it.
-struct BatchedSum<R> {
-    batch: Vector3<R>,
-    batches: Vector3<R>,
-    sum: Vector3<R>,
-    count: usize,
-}
-
-impl<R: Real> Default for BatchedSum<R> {
-    fn default() -> Self {
-        Self { batch: Vector3::zero(), batches: Vector3::zero(), sum: Vector3::zero(), count: 0 }
-    }
-}
-
-impl<R: Real> BatchedSum<R> {
-    fn add(&mut self, term: Vector3<R>) {
-        self.batch = self.batch + term;
-        self.count += 1;
-        if self.count.is_multiple_of(32) {
-            self.batches = self.batches + self.batch;
-            self.batch = Vector3::zero();
-        }
-        if self.count.is_multiple_of(1024) {
-            self.sum = self.sum + self.batches;
-            self.batches = Vector3::zero();
-        }
-    }
-
-    fn total(&self) -> Vector3<R> {
-        self.sum + (self.batches + self.batch)
     }
 }
 

@@ -12,11 +12,7 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
     let position = position_from_depth(clip_of_pixel(in.position), depth);
     let normal = decode_normal(textureLoad(normal_target, pixel, 0));
 
-    // A sum in batches: a term is rounded with the up to 32 of its batch, not with all that follow it.
-    var illuminance = vec3<f32>(0.0);
-    var batches = vec3<f32>(0.0);
-    var batch = vec3<f32>(0.0);
-    var count = 0u;
+    var batches = LightBatches();
     var end = 0u;
     for (var class_index = 0u; class_index < CLASS_COUNT; class_index++) {
         let begin = end;
@@ -27,22 +23,12 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
         for (var index = begin; index < end; index++) {
             let light = lights[index];
             let unobstructed = illuminance_from(light, position, normal);
-            if all(unobstructed == vec3<f32>(0.0)) {
-                continue;
-            }
-            batch += unobstructed * light_visibility(light, position, normal);
-            count++;
-            if count % 32u == 0u {
-                batches += batch;
-                batch = vec3<f32>(0.0);
-                if count % 1024u == 0u {
-                    illuminance += batches;
-                    batches = vec3<f32>(0.0);
-                }
+            if any(unobstructed > vec3<f32>(0.0)) {
+                add_light(&batches, unobstructed * light_visibility(light, position, normal));
             }
         }
     }
-    illuminance += batches + batch;
+    let illuminance = sum_of_light(batches);
     if all(illuminance == vec3<f32>(0.0)) {
         discard;
     }

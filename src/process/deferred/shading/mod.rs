@@ -26,3 +26,6 @@ pub const COLORED_SURFACE_SHADER: &str =
 /// The WGSL by which lights illuminate: `illuminance_from(light, position, normal)` is the illuminance of a surface at a position
 /// relative to the camera, without shadows.
 pub const ILLUMINATION_SHADER: &str = include_str!("illumination.wgsl");
+
+/// WGSL that sums light in batches.
+pub(super) const LIGHT_BATCHES_SHADER: &str = include_str!("light_batches.wgsl");

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
 use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
+use crate::process::deferred::shading::cpu_shader::light_batches::LightBatches;
 use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
 use crate::process::deferred::shading::cpu_shader::surface::{
     relative_of, shading_normal, surface_diffuse, surface_vertex,
@@ -42,6 +43,7 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
         let position = relative_of(pixel);
         let pi = R::of(PI);
         let mut illuminance = pass.view.ambient * pi;
+        let mut batches = LightBatches::default();
         for light in pass.lights {
             let unobstructed = illuminance_from(light, position, normal);
             if unobstructed.0.iter().any(|&value| value > R::zero()) {
@@ -49,8 +51,15 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
                     let maps = pass.sampled[SHADOW_MAPS];
                     shadows.light_visibility(pass.view, maps, light, pass.lights_by_layer, position, normal)
                 });
-                illuminance = illuminance + unobstructed * visibility;
+                if self.sums {
+                    batches.add(unobstructed * visibility);
+                } else {
+                    illuminance = illuminance + unobstructed * visibility;
+                }
             }
+        }
+        if self.sums {
+            illuminance = illuminance + batches.sum();
         }
         let radiance = material.emission + rgb(diffuse).map(|value| value / pi) * illuminance;
         let radiance = radiance.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));

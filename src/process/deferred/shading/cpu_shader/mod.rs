@@ -2,5 +2,6 @@
 
 pub(in crate::process::deferred) mod illumination;
 mod normal_encoding;
+pub(in crate::process::deferred) mod light_batches;
 pub(in crate::process::deferred) mod shadow;
 pub(in crate::process::deferred) mod surface;
