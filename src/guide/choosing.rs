@@ -41,9 +41,12 @@
 //! | the device, in pixels | `opaque_order` with 10 bits or `depth_pre_pass`, a `light_cut_off`, smaller shadow maps |
 //! | memory bandwidth | `normals: Octahedral8`, `diffuse: Srgb8` |
 //!
+//! A scene with hundreds of lights, or of panes, at one pixel loses light in half floats: set [`Quality::radiance_sum`].
+//!
 //! [`FrameStatistics::tuning`]: crate::FrameStatistics::tuning
 //! [`Granularity::Adaptive`]: crate::Granularity::Adaptive
 //! [`Quality::balanced`]: crate::quality::Quality::balanced
+//! [`Quality::radiance_sum`]: crate::quality::Quality::radiance_sum
 //! [`Scheduler::with_available_parallelism`]: crate::task::Scheduler::with_available_parallelism
 //! [`ShadowQuality::interval`]: crate::quality::ShadowQuality::interval
 //! [`PipelineLibrary`]: crate::backend::PipelineLibrary

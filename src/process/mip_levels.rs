@@ -15,7 +15,7 @@ impl Declare {
     ///
     /// A pixel of a level is the mean of the pixels of the level before that it covers, weighted by area: of 2 × 2, and of 3 in a direction
     /// in which their number is odd. So the last level is the mean of the whole target. Means are of linear values, also in sRGB formats;
-    /// each level is rounded to the format.
+    /// each level is rounded to the format: a mean in half floats is off by up to 2⁻¹⁰ of itself per level.
     ///
     /// Shaders choose a level with `textureSampleLevel`, or load a pixel of one: a rough mirror samples a coarse level of what its view has.
     /// CPU shaders have `SampledTexture::sample_level` and `SampledTexture::load_level`. A raw pass draws into a view of level 0, as a texture with several

@@ -3,8 +3,8 @@
 use drawloom::BuildError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::quality::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, QualityError, ShadowQuality, ToneCurve,
-    TransformPrecision, VertexFormat,
+    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, QualityError, RadianceSum,
+    ShadowQuality, ToneCurve, TransformPrecision, VertexFormat,
 };
 use drawloom::scene::{Camera, Light, Material, Scene};
 use drawloom_testing::scenes::everything::everything;
@@ -107,6 +107,8 @@ fn limits(harness: &mut Harness) -> Result<(), Failed> {
         Quality { shadows: ShadowQuality { widest_edge: 90.0, ..shadows }, ..usual },
         Quality { light_cut_off: f32::MAX, ..usual },
         Quality { light_cut_off: f32::from_bits(1), ..usual },
+        Quality { radiance_sum: RadianceSum::Float, ..usual },
+        Quality { radiance_sum: RadianceSum::Shader, ..usual },
         Quality { tone_curve: ToneCurve::Clipped, ..usual },
         Quality { transforms: TransformPrecision::Absolute, ..usual },
     ] {

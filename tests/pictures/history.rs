@@ -25,6 +25,7 @@ pub const CASES: &[Case] = &[
     ("frames_that_are_forgotten_leave_no_history", forgotten),
     ("a_frame_whose_scene_cannot_be_drawn_loses_no_history", impossible),
     ("software_keeps_the_frame_before_as_wgpu_does", history_in_software),
+    ("a_history_ends_within_the_loss_of_its_format_over_the_share_of_a_frame", mean),
     ("targets_may_be_parts_of_the_picture_or_of_a_size_of_their_own", sizes),
     ("objects_are_drawn_into_smaller_targets_as_into_smaller_pictures", smaller_objects),
 ];
@@ -309,4 +310,64 @@ fn smaller_objects() -> Result<(), Failed> {
     }
     let expected = draw(Fixture::with(2, |builder| builder.process(Tinted).output("tinted"))?, &scene)?;
     if found == expected { Ok(()) } else { Err("the pictures differ".into()) }
+}
+
+/// Mixes a constant into its own target of the frame before.
+struct Mix {
+    format: Format,
+}
+
+/// The share of a frame.
+const SHARE: f64 = 1.0 / 64.0;
+
+/// What is mixed in; the history begins with half of it.
+const MIXED: f64 = 0.7;
+
+impl RenderProcess for Mix {
+    fn name(&self) -> &str {
+        "mix"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.samples_previous("mean");
+        declare.clears_color("mean", self.format, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @group(2) @binding(1) var before: texture_2d<f32>;
+
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                let mean = textureLoad(before, vec2<i32>(in.position.xy), 0);
+                return vec4<f32>(select(0.35, mix(mean.r, 0.7, 1.0 / 64.0), mean.a == 1.0), 0.0, 0.0, 1.0);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
+    }
+}
+
+/// Each frame leaves a share of the distance, and adds what a write loses: in the end the sum of a geometric series.
+fn mean() -> Result<(), Failed> {
+    let mut scene = scene();
+    scene.cameras.truncate(1);
+    scene.cameras[0].size = [1, 1];
+    for (format, loss) in [(Format::Rgba16Float, 2_f64.powi(-10)), (Format::Rgba32Float, 2_f64.powi(-23))] {
+        let mut fixture = Fixture::with(1, |builder| builder.process(Mix { format }).output("mean"))?;
+        let mut found = 0.0;
+        for frame in 0..900 {
+            let recorded = fixture.record(&scene)?;
+            let submission = fixture.submit(recorded)?;
+            if frame == 899 {
+                found = f64::from(submission.read(0, "mean")?.texel([0, 0])[0]);
+            }
+        }
+        // In f32, mixing itself has four roundings.
+        let bound = (loss + 4.0 * 2_f64.powi(-24)) / SHARE + 0.5 * (1.0 - SHARE).powi(899);
+        let error = (found / MIXED - 1.0).abs();
+        if error > bound || (format == Format::Rgba16Float && error < 2_f64.powi(-10)) {
+            return Err(format!("{format:?}: an error of {error}, not {bound} at most").into());
+        }
+    }
+    Ok(())
 }

@@ -33,6 +33,7 @@ mod large_lists;
 mod late_latch;
 mod levels_of_detail;
 mod light_cut_off;
+mod light_sums;
 mod light_volumes;
 mod lighting;
 mod mask_shadows;
@@ -109,6 +110,7 @@ fn main() {
         (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
+        (light_sums::CASES, Needs::Adapter),
         (light_volumes::CASES, Needs::Adapter),
         (lighting::CASES, Needs::Adapter),
         (changing_shaders::CASES, Needs::Adapter),

@@ -18,7 +18,6 @@ fn expect_sums(scenes: &[SumScene]) {
         let mut fixture = Fixture::new(1, |builder| builder.deferred(Deferred::new()).quality(quality(sum)));
         for scene in scenes {
             let error = scene.error(&radiance(&fixture.draw(&scene.scene)));
-            println!("TABLE | {} | {sum:?} | {error:.2e} | {:.2e}", scene.name, scene.bound(sum));
             assert!(error <= scene.bound(sum), "{sum:?}: {}: {error}", scene.name);
             assert!(sum != RadianceSum::Shader || error <= 1e-3, "{}: {error}", scene.name);
         }

@@ -77,6 +77,7 @@ pub fn of(
         }
         Knob::ShadowEdge => Ok(case.shadow_edges()),
         Knob::LightCutOff => case.light_cut_off(),
+        Knob::RadianceSum => case.radiance_sum(),
         Knob::ToneCurve => Ok(KnobError {
             error: Some(measured.from_exact.rmse * 255.0),
             metric: "RMSE of 255",
@@ -190,7 +191,7 @@ impl Case<'_> {
     ///
     /// The error of each light is 1.089 times the cut-off at most ([`Quality::light_cut_off`]). A surface reflects its
     /// diffuse share of that, over π. Alpha-blended objects in front reduce it, and each additive or subtractive object
-    /// may add as much again. Truncation to half floats adds 2⁻¹⁰ of the radiance per light. No bound is known if such
+    /// may add as much again. Both sums have an error of their own. No bound is known if such
     /// a light casts shadows: its map ends with its range, so a shadow's edge may move.
     fn light_cut_off(&self) -> Result<KnobError, Failure> {
         let (own, exact) = (colors(&self.measured.contents.radiance)?, colors(&self.exact.contents.radiance)?);
@@ -209,7 +210,9 @@ impl Case<'_> {
         };
         let layers = 1 + (0..scene.object_count()).filter(|&object| is_added(object)).count();
         let of_light = 1.089 * f64::from(self.quality.light_cut_off) * diffuse / PI;
-        let bound = (of_light * lights as f64 + brightest * lights as f64 * 2_f64.powi(-10)) * layers as f64;
+        let (sum, all) = (self.quality.radiance_sum, scene.lights.len() as u32);
+        let of_sums = 2.0 * (sum.max_light_error(all) + sum.max_blended_error(layers as u32));
+        let bound = (of_light * lights as f64 + brightest * of_sums) * layers as f64;
         let has_maps = scene.lights.iter().any(|light| match *light {
             Light::Point { casts_shadow, .. }
             | Light::Spot { casts_shadow, .. }
@@ -221,6 +224,32 @@ impl Case<'_> {
             error,
             metric: "radiance",
             bound: (!has_maps).then_some(bound),
+            oracle: "the same target of exact",
+        })
+    }
+
+    /// The greatest difference of a pixel's radiance from that of `exact`, as a fraction of the latter.
+    ///
+    /// The error of each is a fraction of what the radiance is, so it is also one of what `exact` makes of it. Each addition to a half float
+    /// may lose 2⁻²⁴ beside that. Blended objects in front of the surface make its error a fraction of more than what is seen, so no bound is
+    /// known with them.
+    fn radiance_sum(&self) -> Result<KnobError, Failure> {
+        let (own, exact) = (colors(&self.measured.contents.radiance)?, colors(&self.exact.contents.radiance)?);
+        let lights = self.scene.lights.len() as u32;
+        let smallest = f64::from(lights + 2) * 2_f64.powi(-24);
+        let differences = own.iter().zip(&exact).flat_map(|(one, other)| {
+            [0, 1, 2].map(|channel| {
+                let difference = ((one[channel] - other[channel]).abs() - smallest).max(0.0);
+                if difference == 0.0 { 0.0 } else { difference / other[channel].abs() }
+            })
+        });
+        let [of_own, of_exact] =
+            [self.quality, &Quality::exact()].map(|quality| quality.radiance_sum.max_light_error(lights));
+        let bound = (of_own + of_exact) / (1.0 - of_exact);
+        Ok(KnobError {
+            error: if lights == 0 { None } else { differences.reduce(worst_of) },
+            metric: "of the radiance",
+            bound: self.measured.contents.blended.is_empty().then_some(bound),
             oracle: "the same target of exact",
         })
     }

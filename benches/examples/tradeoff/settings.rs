@@ -1,7 +1,7 @@
 //! The settings that are measured: each knob alone at each of its settings, and the presets.
 
 use drawloom::quality::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, ShadowQuality, ToneCurve,
+    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, RadianceSum, ShadowQuality, ToneCurve,
     TransformPrecision, VertexFormat,
 };
 
@@ -33,13 +33,14 @@ pub enum Knob {
     ShadowInterval,
     ShadowEdge,
     LightCutOff,
+    RadianceSum,
     ToneCurve,
     Transforms,
 }
 
 impl Knob {
     /// All knobs, in the order of reports.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Preset,
         Self::OpaqueOrder,
         Self::BlendedOrder,
@@ -56,6 +57,7 @@ impl Knob {
         Self::ShadowInterval,
         Self::ShadowEdge,
         Self::LightCutOff,
+        Self::RadianceSum,
         Self::ToneCurve,
         Self::Transforms,
     ];
@@ -79,6 +81,7 @@ impl Knob {
             Self::ShadowInterval => "shadows.interval",
             Self::ShadowEdge => "shadows.widest_edge",
             Self::LightCutOff => "light_cut_off",
+            Self::RadianceSum => "radiance_sum",
             Self::ToneCurve => "tone_curve",
             Self::Transforms => "transforms",
         }
@@ -104,6 +107,7 @@ impl Knob {
             Self::ShadowInterval => changed.shadows.interval = other.shadows.interval,
             Self::ShadowEdge => changed.shadows.widest_edge = other.shadows.widest_edge,
             Self::LightCutOff => changed.light_cut_off = other.light_cut_off,
+            Self::RadianceSum => changed.radiance_sum = other.radiance_sum,
             Self::ToneCurve => changed.tone_curve = other.tone_curve,
             Self::Transforms => changed.transforms = other.transforms,
         }
@@ -183,6 +187,11 @@ pub fn all() -> Vec<Setting> {
     }
     for (name, light_cut_off) in [("1/1020", 1.0 / 1020.0), ("1/255", 1.0 / 255.0), ("4/255", 4.0 / 255.0)] {
         add(Knob::LightCutOff, name, Quality { light_cut_off, ..exact });
+    }
+    for (name, radiance_sum) in
+        [("half floats", RadianceSum::HalfFloat), ("floats", RadianceSum::Float), ("shader", RadianceSum::Shader)]
+    {
+        add(Knob::RadianceSum, name, Quality { radiance_sum, ..exact });
     }
     add(Knob::ToneCurve, "clipped", Quality { tone_curve: ToneCurve::Clipped, ..exact });
     add(Knob::Transforms, "camera-relative", exact);

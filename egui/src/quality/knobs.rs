@@ -1,8 +1,8 @@
 //! The settings of the quality, each with values to choose from.
 
 use drawloom::quality::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, ToneCurve, TransformPrecision,
-    VertexFormat,
+    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, RadianceSum, ToneCurve,
+    TransformPrecision, VertexFormat,
 };
 
 /// A setting of the quality.
@@ -179,6 +179,16 @@ pub const KNOBS: &[Knob] = &[
         ],
     },
     Knob {
+        name: "sum of lights",
+        explanation: "Error: a fraction of the sum, 1/1024 for each light in half floats, 1/1024 in all otherwise. Cost: bytes a pixel for each \
+            light that reaches it; with a shader, every pixel tests every light.",
+        values: &[
+            ("half floats", |quality| quality.radiance_sum = RadianceSum::HalfFloat),
+            ("floats", |quality| quality.radiance_sum = RadianceSum::Float),
+            ("a shader", |quality| quality.radiance_sum = RadianceSum::Shader),
+        ],
+    },
+    Knob {
         name: "tone curve",
         explanation: "Error: the picture's contrast. Cost: some operations a pixel.",
         values: &[
@@ -218,6 +228,7 @@ mod tests {
             depth_pre_pass,
             shadows: ShadowQuality { side, filter, bias, interval, widest_edge },
             light_cut_off,
+            radiance_sum,
             tone_curve,
             transforms,
         } = quality;
@@ -237,6 +248,7 @@ mod tests {
             format!("{interval:?}"),
             format!("{widest_edge:?}"),
             format!("{light_cut_off:?}"),
+            format!("{radiance_sum:?}"),
             format!("{tone_curve:?}"),
             format!("{transforms:?}"),
         ]
