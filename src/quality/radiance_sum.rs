@@ -25,8 +25,8 @@ pub enum RadianceSum {
     /// Lights by a shader that adds them in batches of 32, these in batches of 32, and then to `radiance` once. On every device. Blended
     /// objects as by [`Self::Float`].
     ///
-    /// Cost: every pixel tests every light, whether it reaches the pixel or not: for many small lights, that is slower than
-    /// [`Self::Float`]. No bytes per light.
+    /// Cost: every pixel tests the lights that may reach its tile of 32 × 32 pixels, which a pass before it marks: for many small lights, that
+    /// is slower than [`Self::Float`]. No bytes per light, and one per pixel.
     Shader,
 }
 

@@ -100,7 +100,7 @@ pub struct Quality {
     /// How lights and blended objects are added to the target `radiance` of a [`Deferred`](crate::process::Deferred) pipeline.
     ///
     /// Error: a fraction of the light that is added, by the number of lights or objects: see [`RadianceSum::max_light_error`] and
-    /// [`RadianceSum::max_blended_error`]. Cost: bytes per pixel and light, or every pixel tests every light.
+    /// [`RadianceSum::max_blended_error`]. Cost: bytes per pixel and light, or every pixel tests the lights of its tile.
     pub radiance_sum: RadianceSum,
     /// The tone mapping curve.
     ///

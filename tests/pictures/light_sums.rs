@@ -1,14 +1,17 @@
 //! Many small contributions of light add up.
 
 use drawloom::backend::WgpuBackend;
-use drawloom::glam::DVec3;
+use drawloom::glam::{DVec3, Vec2, Vec3};
 use drawloom::process::{Declare, Deferred, Deformation, Draws, GeometryFormats, LightVolumes, Place, RenderProcess};
 use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, RadianceSum};
-use drawloom::scene::{Blend, Camera, LayerMask, Light, LightKind, Material, Projection, Scene, SceneRef, ViewKind};
+use drawloom::scene::{
+    Blend, Camera, LayerMask, Light, LightKind, Material, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
+};
 use drawloom::view::{LightClass, RejectionReason};
 use drawloom_testing::adapter;
 use drawloom_testing::light_sums::{SUMS, SumScene, blended_scenes, light_scenes, quality};
 use drawloom_testing::scenes::everything::{class_of, everything};
+use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -20,6 +23,7 @@ pub const CASES: &[Case] = &[
     ("exact_keeps_a_thousandth_of_every_sum_of_lights", exact),
     ("devices_that_do_not_blend_floats_lose_no_light_and_are_named", without_float_blending),
     ("a_sum_has_the_lights_of_every_class_and_camera", every_class),
+    ("a_shader_sums_the_lights_of_every_tile_of_pictures_of_any_size", tiles),
     ("a_process_of_lights_that_is_replaced_adds_to_the_sum_of_the_others", replaced),
     ("a_process_of_lights_that_is_left_out_is_not_in_the_sum", left_out),
     ("a_sum_that_is_kept_changes_nothing", kept),
@@ -127,6 +131,44 @@ fn every_class() -> Result<(), Failed> {
             expect_below(bound, errors.fold(0.0, f64::max), &format!("{sum:?}, view {view}"))?;
             if found.iter().all(|channel| *channel < 0.05) {
                 return Err("it is dark".into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Small lights all over a floor, more than a tile has bits. A sum that misses one differs from the one that draws each in its volume by a
+/// whole light.
+fn tiles() -> Result<(), Failed> {
+    let (columns, rows) = (130_u32, 60_u32);
+    let mut scene = Scene::new();
+    let mesh = scene.add(square(Topology::TriangleList))?;
+    let material = scene.add(Material { diffuse: Vec3::ONE, ..Material::default() })?;
+    scene.add_object(RenderObject { scale: Vec3::splat(80.0), ..RenderObject::new(mesh, material, DVec3::ZERO) })?;
+    for light in 0..columns * rows {
+        let [x, y] = [light % columns, light / columns].map(|cell| f64::from(cell) * 0.5);
+        let position = DVec3::new(x - 32.0, y - 15.0, 0.5);
+        scene.lights.push(Light::Point { position, intensity: Vec3::ONE, range: 1.5, casts_shadow: false });
+    }
+    let across = Camera::looking_at("main", DVec3::new(3.0, -20.0, 9.0), DVec3::new(0.0, -5.0, 0.0));
+    let flat = Projection::Orthographic { height: 30.0 };
+    let above = Camera { projection: flat, far: 90.0, ..Camera::looking_at("main", DVec3::Z * 40.0, DVec3::ZERO) };
+    let shifted = Camera { shift: Vec2::new(0.4, -0.7), ..across.clone() };
+    let mut one_by_one = fixture(RadianceSum::Float, Deferred::new())?;
+    let mut in_shader = fixture(RadianceSum::Shader, Deferred::new())?;
+    for size in [[1, 1], [2, 31], [33, 3], [64, 64], [131, 70]] {
+        for camera in [&across, &above, &shifted] {
+            scene.cameras = vec![sized(camera.clone(), size)];
+            let (expected, found) = (drawn(&mut one_by_one, &scene, 0)?, drawn(&mut in_shader, &scene, 0)?);
+            // No pixel has more than 49 lights: those of a square of 3 m.
+            let bound = RadianceSum::Float.max_light_error(49) + RadianceSum::Shader.max_light_error(49);
+            let pairs = found.as_flattened().iter().zip(expected.as_flattened());
+            // A half float has steps of 2⁻²⁴ at least.
+            let errors =
+                pairs.map(|(found, expected)| ((found - expected).abs() - 2_f64.powi(-23)) / expected.max(1e-9));
+            expect_below(bound, errors.fold(0.0, f64::max), &format!("{size:?}, {:?}", camera.projection))?;
+            if expected.iter().all(|pixel| pixel[0] == 0.0) {
+                return Err(format!("{size:?} is dark").into());
             }
         }
     }

@@ -181,7 +181,7 @@ pub const KNOBS: &[Knob] = &[
     Knob {
         name: "sum of lights",
         explanation: "Error: a fraction of the sum, 1/1024 for each light in half floats, 1/1024 in all otherwise. Cost: bytes a pixel for each \
-            light that reaches it; with a shader, every pixel tests every light.",
+            light that reaches it; with a shader, every pixel tests those of its tile.",
         values: &[
             ("half floats", |quality| quality.radiance_sum = RadianceSum::HalfFloat),
             ("floats", |quality| quality.radiance_sum = RadianceSum::Float),

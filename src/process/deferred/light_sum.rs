@@ -3,14 +3,16 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
+use super::light_tiles::LIGHT_TILES_SHADER;
 use super::shading::{ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, shadow_shader};
-use super::{GeometryFormats, ShadowCasters};
+use super::{GeometryFormats, LightTiles, ShadowCasters};
 use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::scene::{Blend, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
 /// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target `radiance` once: see
-/// [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). [`LightVolumes`](super::LightVolumes) adds them one by one.
+/// [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). Of each pixel it tests the lights that [`LightTiles`] marks.
+/// [`LightVolumes`](super::LightVolumes) adds them one by one.
 #[derive(Clone, Debug)]
 pub(super) struct LightSum {
     shader: String,
@@ -52,7 +54,8 @@ impl LightSum {
             &formats.normal_encoding_wgsl(),
             ILLUMINATION_SHADER,
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
-            &format!("const CLASSES: u32 = {:#x}u;\nconst CLASS_COUNT: u32 = {}u;\n", classes.0, LightClass::COUNT),
+            &format!("const CLASSES: u32 = {:#x}u;\n", classes.0),
+            LIGHT_TILES_SHADER,
             LIGHT_BATCHES_SHADER,
             include_str!("light_sum/light_sum.wgsl"),
         ];
@@ -60,8 +63,8 @@ impl LightSum {
     }
 }
 
-/// After depth, normal and diffuse.
-const SHADOW_MAPS_BINDING: u32 = 4;
+/// After depth, normal, diffuse and tiles.
+const SHADOW_MAPS_BINDING: u32 = 5;
 
 impl RenderProcess for LightSum {
     fn name(&self) -> &str {
@@ -72,6 +75,7 @@ impl RenderProcess for LightSum {
         declare.samples("depth");
         declare.samples("normal");
         declare.samples("diffuse");
+        declare.samples(LightTiles::TARGET);
         if self.maps.is_some() {
             declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
         }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::deformation::{Deformation, split_by_deformation, undeformed, undeformed_name};
 use super::{
-    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, LightClasses, LightSum, LightVolumes, Place, Requirements,
-    ShadowCasters, Transparency,
+    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, LightClasses, LightSum, LightTiles, LightVolumes, Place,
+    Requirements, ShadowCasters, Transparency,
 };
 use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
@@ -314,7 +314,10 @@ impl Deferred {
         }
         match sum {
             RadianceSum::Float if has_terms => processes.push(Arc::new(FloatSum::LIGHTS)),
-            RadianceSum::Shader if has_terms => processes.push(Arc::new(LightSum::new(summed, self.formats, maps))),
+            RadianceSum::Shader if has_terms => {
+                processes.push(Arc::new(LightTiles));
+                processes.push(Arc::new(LightSum::new(summed, self.formats, maps)));
+            }
             _ => {}
         }
         processes

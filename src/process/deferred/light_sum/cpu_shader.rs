@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::LightClasses;
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
+use crate::process::deferred::light_tiles::cpu_shader::{BITS, LightTile};
 use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
 use crate::process::deferred::shading::cpu_shader::light_batches::LightBatches;
 use crate::process::deferred::shading::cpu_shader::shadow::ShadowFilter;
@@ -25,6 +26,12 @@ impl LightSumCpuShader {
     pub(super) fn new(classes: LightClasses, formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
         Self { classes, formats, shadows: maps.map(ShadowFilter::new) }
     }
+
+    /// Whether a light is of a class that is summed.
+    fn is_summed<R: Real>(&self, pass: &PassInputs<'_, R>, index: usize) -> bool {
+        let class = LightClass::all().zip(pass.light_ends).find(|&(_, &end)| index < end);
+        class.is_some_and(|(class, _)| self.classes.contains(class))
+    }
 }
 
 impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
@@ -38,23 +45,27 @@ impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
         let normal = self.formats.decode_normal(stored(NORMAL));
 
         let mut batches = LightBatches::default();
-        let mut begin = 0;
-        for (class, &end) in LightClass::all().zip(pass.light_ends) {
-            let lights = &pass.lights[begin..end];
-            begin = end;
-            if !self.classes.contains(class) {
-                continue;
-            }
-            for light in lights {
-                let unobstructed = illuminance_from(light, position, normal);
-                if unobstructed.0.iter().all(|&value| value <= R::zero()) {
+        let tiles = pass.sampled[TILES];
+        let tile = LightTile::of(pixel.coordinates.map(|coordinate| coordinate / 2), tiles.size(), pass.lights.len());
+        for (word, lights) in pass.lights.chunks(BITS * tile.lights_per_bit).enumerate() {
+            let coordinates = [tile.first[0] + word % tile.size[0], tile.first[1] + word / tile.size[0]];
+            let marks = tiles.load(coordinates, 0)[0].as_f64() as u32;
+            for (bit, marked) in lights.chunks(tile.lights_per_bit).enumerate() {
+                if marks >> bit & 1 == 0 {
                     continue;
                 }
-                let visibility = self.shadows.map_or(R::one(), |shadows| {
-                    let (maps, by_layer) = (pass.sampled[SHADOW_MAPS], pass.lights_by_layer);
-                    shadows.light_visibility(pass.view, maps, light, by_layer, position, normal)
-                });
-                batches.add(unobstructed * visibility);
+                let first = (word * BITS + bit) * tile.lights_per_bit;
+                for (light, index) in marked.iter().zip(first..) {
+                    let unobstructed = illuminance_from(light, position, normal);
+                    if unobstructed.0.iter().all(|&value| value <= R::zero()) || !self.is_summed(pass, index) {
+                        continue;
+                    }
+                    let visibility = self.shadows.map_or(R::one(), |shadows| {
+                        let (maps, by_layer) = (pass.sampled[SHADOW_MAPS], pass.lights_by_layer);
+                        shadows.light_visibility(pass.view, maps, light, by_layer, position, normal)
+                    });
+                    batches.add(unobstructed * visibility);
+                }
             }
         }
         let illuminance = batches.sum();
@@ -72,4 +83,5 @@ impl<R: Real> FullScreenCpuShader<R> for LightSumCpuShader {
 const DEPTH: usize = 0;
 const NORMAL: usize = 1;
 const DIFFUSE: usize = 2;
-const SHADOW_MAPS: usize = 3;
+const TILES: usize = 3;
+const SHADOW_MAPS: usize = 4;
