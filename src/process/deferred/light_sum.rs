@@ -5,10 +5,10 @@ mod cpu_shader;
 
 use super::light_tiles::LIGHT_TILES_SHADER;
 use super::shading::{ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, shadow_shader};
-use super::{GeometryFormats, LightTiles, ShadowCasters};
+use super::{GeometryFormats, LightClasses, LightTiles, ShadowCasters};
 use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::scene::{Blend, ViewKind};
-use crate::view::{LightClass, ShadowMaps};
+use crate::view::ShadowMaps;
 
 /// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target `radiance` once: see
 /// [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). Of each pixel it tests the lights that [`LightTiles`] marks.
@@ -23,28 +23,6 @@ pub(super) struct LightSum {
     maps: Option<ShadowMaps>,
 }
 
-/// A bit for each class of lights, by [`LightClass::index`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct LightClasses(u32);
-
-impl LightClasses {
-    pub(super) fn insert(&mut self, class: LightClass) {
-        self.0 |= 1 << class.index();
-    }
-
-    pub(super) fn contains(self, class: LightClass) -> bool {
-        self.0 & 1 << class.index() != 0
-    }
-}
-
-impl FromIterator<LightClass> for LightClasses {
-    fn from_iter<I: IntoIterator<Item = LightClass>>(classes: I) -> Self {
-        let mut set = Self::default();
-        classes.into_iter().for_each(|class| set.insert(class));
-        set
-    }
-}
-
 impl LightSum {
     pub(super) const NAME: &str = "sum of lights";
 
@@ -54,7 +32,7 @@ impl LightSum {
             &formats.normal_encoding_wgsl(),
             ILLUMINATION_SHADER,
             &shadow_shader(maps.map(|maps| (SHADOW_MAPS_BINDING, maps))),
-            &format!("const CLASSES: u32 = {:#x}u;\n", classes.0),
+            &format!("const CLASSES: u32 = {:#x}u;\n", classes.bits()),
             LIGHT_TILES_SHADER,
             LIGHT_BATCHES_SHADER,
             include_str!("light_sum/light_sum.wgsl"),

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::LightClasses;
 use crate::process::cpu_shader::built_in::{rgb, with_alpha};
+use crate::process::deferred::LightClasses;
 use crate::process::deferred::light_tiles::cpu_shader::{BITS, LightTile};
 use crate::process::deferred::shading::cpu_shader::illumination::{MAX_STORED_RADIANCE, illuminance_from};
 use crate::process::deferred::shading::cpu_shader::light_batches::LightBatches;
