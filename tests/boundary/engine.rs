@@ -83,6 +83,11 @@ impl<B: Backend> Backend for OwnBackend<B> {
         self.inner.adapter_name()
     }
 
+    fn can_blend_floats(&self) -> bool {
+        backend("can_blend_floats");
+        self.inner.can_blend_floats()
+    }
+
     fn uploaded_bytes(&self) -> u64 {
         backend("uploaded_bytes");
         self.inner.uploaded_bytes()
