@@ -9,6 +9,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom::{FrameError, Recorded, Renderer, Submitted, Submitter};
 use drawloom_testing::adapter::noop_device;
 use libtest_mimic::Failed;
@@ -81,6 +82,11 @@ pub fn scene() -> Scene {
     scene
 }
 
+/// Maps that the software backend draws in no time.
+pub fn small_maps() -> ShadowMaps {
+    ShadowMaps { side: 16, ..ShadowMaps::default() }
+}
+
 /// A renderer with a submitter.
 pub struct Fixture<B: Backend> {
     pub renderer: Renderer<B>,
@@ -97,7 +103,8 @@ impl Fixture<SoftwareBackend> {
     pub fn software(deferred: Deferred) -> Result<Self, Failed> {
         let scheduler = Arc::new(Scheduler::new(1)?);
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-        let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+        let builder = Renderer::builder(backend).deferred(deferred).shadow_maps(small_maps());
+        let (renderer, submitter) = builder.build(scheduler)?;
         Ok(Self { renderer, submitter })
     }
 }

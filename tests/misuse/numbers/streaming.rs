@@ -31,7 +31,7 @@ pub const CASES: &[NumberCase] = &[
 ];
 
 /// Values that mean no limit, or overflow if they are doubled or added to.
-const NO_LIMITS: [u64; 5] = [u64::MAX, u64::MAX - 1, (1 << 63) + 1, 1 << 63, u64::MAX / 2];
+const NO_LIMITS: [u64; 3] = [u64::MAX, 1 << 63, u64::MAX / 2 + 2];
 
 fn budgets() -> Result<(), Failed> {
     let usual = StreamingBudget::default();

@@ -5,6 +5,7 @@ use wgpu::naga::{Binding, Block, BuiltIn, Function, Module, ShaderStage, Stateme
 
 use crate::command::Blending;
 use crate::process::Draws;
+use crate::unwind::emit_unlocked;
 
 /// Warns if a fragment shader, which compiles, discards pixels or returns a depth, and its process does not say so: its objects then hide
 /// from culling what is seen through their holes.
@@ -14,11 +15,14 @@ pub(super) fn warn_of_unsaid_discards(process: &str, draws: &Draws<'_>, before: 
     if let Some(fragment) = commands.fragment.filter(|_| may_hide)
         && leaves_out_pixels(fragment, before, own)
     {
-        tracing::warn!(
-            target: "drawloom", %process,
-            "discards pixels, or returns their depth, and does not set `CommandDraws::discards`: its objects hide what is seen through \
-             their holes from occlusion culling"
-        );
+        let process = process.to_owned();
+        emit_unlocked(move || {
+            tracing::warn!(
+                target: "drawloom", %process,
+                "discards pixels, or returns their depth, and does not set `CommandDraws::discards`: its objects hide what is seen through \
+                 their holes from occlusion culling"
+            );
+        });
     }
 }
 
