@@ -125,7 +125,8 @@ fn check(
         let (is_dark, to_edge) = shadow.shadow_at(point);
         let visible = shadowed.radiance(x, y)[0] / bare.radiance(x, y)[0];
         let expected = if is_dark { 0.0 } else { 1.0 };
-        let is_wrong = !((visible - expected).abs() < 0.01);
+        // NaN is wrong, too.
+        let is_wrong = (visible - expected).abs().total_cmp(&0.01).is_gt();
         // The filter reads `FILTER` + 1 pixels along each of the map's axes.
         let bound = f64::from(FILTER + 1) * 2_f64.sqrt();
         expect_within(
@@ -155,9 +156,8 @@ fn shadow_edges(harness: &mut Harness) -> Result<(), Failed> {
             let max_distance = (reach * extreme.scale) as f32;
             let maps = ShadowMaps { side: SIDE, filter: FILTER, max_distance, cascades, ..ShadowMaps::default() };
             let deferred = Deferred::to_picture().shadow_maps(Some(maps));
-            let mut harness = harness
-                .with(Setup { quality, deferred, numbers: None })
-                .map_err(|error| Failed::from(error.to_string()))?;
+            let mut harness =
+                harness.with(Setup { deferred, ..quality.into() }).map_err(|error| Failed::from(error.to_string()))?;
             // From above: its right vector is any, and the products of such a small number leave the range of f32.
             let overhead = [DVec3::NEG_Y, DVec3::new(1e-21, -1.0, 0.0), DVec3::new(-3e-23, -1.0, 2e-23)];
             for direction in [DVec3::new(0.3, -0.9, 0.2), DVec3::new(-0.4, -0.8, 0.1)].into_iter().chain(overhead) {

@@ -1,11 +1,13 @@
 //! Columns of the engine's own, and targets of its own, in which shaders find and leave extreme numbers.
 
+use std::sync::Arc;
+
 use drawloom::FrameError;
 use drawloom::backend::{BackendError, Picture};
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    ClearColor, CommandDraws, CpuShader, Declare, Deferred, Draws, Format, ObjectCpuShader, ObjectPixel, PassInputs,
+    ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, ObjectCpuShader, ObjectPixel, PassInputs,
     RenderProcess, ShaderObject, TargetSize, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::quality::Quality;
@@ -28,7 +30,7 @@ const TARGETS: [&str; 2] = ["numbers of objects", "words of objects"];
 
 /// Draws what columns say of an object into targets that round nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Numbers {
+struct Numbers {
     size: TargetSize,
 }
 
@@ -138,7 +140,8 @@ fn channel(picture: &Picture, square: usize, channel: usize) -> [u8; 4] {
 
 fn harness_with_targets(harness: &Harness, size: TargetSize) -> Result<Harness, Failed> {
     let quality = harness.name().affordable(Quality::balanced());
-    let setup = Setup { quality, deferred: Deferred::to_picture(), numbers: Some((Numbers { size }, &TARGETS)) };
+    let process: Option<Arc<dyn RenderProcess>> = Some(Arc::new(Numbers { size }));
+    let setup = Setup { process, own_targets: &TARGETS, ..quality.into() };
     harness.with(setup).map_err(|error| error.to_string().into())
 }
 

@@ -14,6 +14,7 @@ use crate::placement::expect_placed;
 
 pub const CASES: &[Case] = &[
     ("mirrors_show_what_a_reflected_ray_hits", mirrors),
+    ("tiles_of_mirrors_and_mirrors_in_tiles_show_the_same", mirrored_tiles),
     ("mirrors_that_the_camera_touches_show_what_a_reflected_ray_hits", touched_mirrors),
     ("portals_show_what_a_ray_through_them_hits", portals),
     ("portals_in_portals_show_what_a_ray_through_all_of_them_hits", portals_in_portals),
@@ -103,6 +104,32 @@ fn check_mirror(
     scene.view = Some(mirrored(camera, plane));
     let context = format!("{:e} m before {plane:?}", plane.distance(camera.position));
     expect_placed(harness, ("mirror", column, &context), &scene, 2).map(drop)
+}
+
+/// The tiles of a mirror's picture, and what mirrors show of tiles, whose columns follow each other from the right.
+fn mirrored_tiles(harness: &mut Harness) -> Result<(), Failed> {
+    const COUNT: u32 = 3;
+    for extreme in EXTREMES {
+        let camera = camera_at(&extreme);
+        let [right, up, forward] = axes(&camera);
+        let plane = plane_before(&camera, right * 0.5 + up * 0.3 - forward, 0.7 * extreme.scale);
+        let reflected = camera.reflected("mirror", plane);
+        let markers = markers_at_plane(&reflected, plane, extreme.scale);
+        let whole = Camera { size: SIZE.map(|side| side * COUNT), ..camera.clone() };
+        for [column, row] in [[1, 1], [0, 1], [2, 0], [1, 2]] {
+            let of_mirror = reflected.tile([column, row], COUNT);
+            let of_tile = camera.tile([COUNT - 1 - column, row], COUNT).reflected("mirror", plane);
+            for (context, tile) in [("a tile of a mirror", of_mirror), ("a mirror in a tile", of_tile)] {
+                let mut scene = MarkerScene::new(as_main(tile), markers.clone())?;
+                let corner = [column, row].map(f64::from);
+                let corner = [corner[0] * f64::from(SIZE[0]), corner[1] * f64::from(SIZE[1])];
+                scene.view = Some(View { corner, ..mirrored(&whole, plane) });
+                let context = format!("{context}: {column} {row}");
+                expect_placed(harness, ("mirror", extreme.name, &context), &scene, 0)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 fn mirrors(harness: &mut Harness) -> Result<(), Failed> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::backend::{
     Backend, BackendError, NullBackend, NullSubmission, Picture, SoftwareBackend, SoftwareSubmission, WgpuSubmission,
 };
-use drawloom::process::Deferred;
+use drawloom::process::{Deferred, RenderProcess};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
@@ -15,7 +15,6 @@ use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
 use crate::capture::{Capture, capture};
-use crate::columns::Numbers;
 
 /// A backend that cases are run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,13 +71,15 @@ impl BackendName {
 pub struct Setup {
     pub quality: Quality,
     pub deferred: Deferred,
-    /// A process of the test's own, and the targets of it that are read back.
-    pub numbers: Option<(Numbers, &'static [&'static str])>,
+    /// A process of the test's own.
+    pub process: Option<Arc<dyn RenderProcess>>,
+    /// The targets of it that are read back.
+    pub own_targets: &'static [&'static str],
 }
 
 impl From<Quality> for Setup {
     fn from(quality: Quality) -> Self {
-        Self { quality, deferred: Deferred::to_picture(), numbers: None }
+        Self { quality, deferred: Deferred::to_picture(), process: None, own_targets: &[] }
     }
 }
 
@@ -227,13 +228,10 @@ struct RendererOn<B: Backend> {
 
 impl<B: Backend<Submission: Pictures>> RendererOn<B> {
     fn open(backend: B, scheduler: Arc<Scheduler>, setup: Setup) -> Result<Box<dyn Runner>, OpenError> {
-        let Setup { quality, deferred, numbers } = setup;
-        let mut builder = Renderer::builder(backend).deferred(deferred).quality(quality);
-        let mut own_targets: &[&str] = &[];
-        if let Some((process, targets)) = numbers {
-            own_targets = targets;
-            builder = targets.iter().fold(builder.process(process), |builder, target| builder.output(*target));
-        }
+        let Setup { quality, deferred, process, own_targets } = setup;
+        let builder = Renderer::builder(backend).deferred(deferred).quality(quality);
+        let builder = process.into_iter().fold(builder, |builder, process| builder.process(process));
+        let builder = own_targets.iter().fold(builder, |builder, target| builder.output(*target));
         let (renderer, submitter) = builder.build(scheduler)?;
         Ok(Box::new(Self { renderer, submitter, own_targets }))
     }

@@ -18,6 +18,7 @@ mod levels_and_pieces;
 mod lit_mirrors;
 mod moved_scenes;
 mod placement;
+mod shown_mirror;
 mod surroundings;
 mod timeout;
 mod vertices;
@@ -56,7 +57,14 @@ fn main() {
         let lacks_adapter = backend == BackendName::Wgpu && no_adapter;
         let earlier =
             [cameras::CASES, positions::CASES, numbers::CASES, lights::CASES, counts::CASES, qualities::CASES];
-        let views = [derived::CASES, surroundings::CASES, degenerate::CASES, cascades::CASES, lit_mirrors::CASES];
+        let views = [
+            derived::CASES,
+            surroundings::CASES,
+            degenerate::CASES,
+            cascades::CASES,
+            lit_mirrors::CASES,
+            shown_mirror::CASES,
+        ];
         let geometry = [columns::CASES, levels_and_pieces::CASES, vertices::CASES];
         let cases = earlier.into_iter().chain(views).chain(geometry).flatten();
         for &(name, case) in cases {

@@ -137,7 +137,7 @@ impl<R: Real> DeformationCpuShader<R> for Inflate {
 
 fn harness_with(harness: &Harness, deferred: Deferred) -> Result<Harness, Failed> {
     let quality = harness.name().affordable(Quality::balanced());
-    harness.with(Setup { quality, deferred, numbers: None }).map_err(|error| error.to_string().into())
+    harness.with(Setup { deferred, ..quality.into() }).map_err(|error| error.to_string().into())
 }
 
 fn draw_deformed(harness: &mut Harness, scene: &Scene, factors: &[f32]) -> Result<Drawn, Failed> {
