@@ -1,22 +1,31 @@
 //! What can be wrong with a file.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use drawloom::scene::SceneError;
-use drawloom_output::path_text;
+
+use crate::files::path_text;
+use crate::text::excerpt;
 
 /// A file that cannot be loaded, and why.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path_text(file))]
+#[non_exhaustive]
 pub struct LoadError {
     /// The file that was to be loaded.
     pub file: PathBuf,
     /// What is wrong with it.
     #[source]
     pub problem: Box<Problem>,
+    /// What the loader had left out by then, as [`World::warnings`](crate::World::warnings).
+    pub warnings: Vec<String>,
 }
 
-/// What is wrong with a file. Elements are named as glTF numbers them, such as `accessor 3`.
+/// What is wrong with a file, or with an element of it. Elements are named as glTF numbers them, and by their names, in which control
+/// characters are escaped: `mesh 3 (wheel) primitive 0`.
+///
+/// A problem of an element loses that element only, and is one of the [warnings](crate::World::warnings).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
@@ -34,29 +43,51 @@ pub enum Problem {
         /// Why not.
         error: std::io::Error,
     },
-    /// More of something than the loader accepts.
-    #[error("{element} has {count} {what}; {limit} are accepted")]
-    TooMany {
+    /// More of something than a limit allows.
+    #[error("{element} takes {amount}{} or more{}, and `GltfLimits::{field}` is {limit}", unit(field), already_taken(*taken))]
+    OverLimit {
         /// The element.
         element: String,
-        /// What it has too many of.
-        what: &'static str,
-        /// How many it has.
-        count: u64,
-        /// How many the loader accepts.
+        /// How much it takes.
+        amount: u64,
+        /// How much is taken already.
+        taken: u64,
+        /// The field of [`GltfLimits`](crate::GltfLimits).
+        field: &'static str,
+        /// Its value.
         limit: u64,
     },
     /// It is not glTF 2.0.
     #[error("it is not glTF 2.0: {reason}")]
     Malformed {
-        /// What the parser says.
+        /// Why not.
         reason: String,
+    },
+    /// Another version of glTF.
+    #[error("it has {found}, and only glTF 2.0 is read")]
+    Version {
+        /// The member or the header, and the version in it.
+        found: String,
     },
     /// A required extension is unknown.
     #[error("it requires the extension {name}, which this loader does not know")]
     Extension {
         /// The name of the extension.
         name: String,
+    },
+    /// A mesh or a buffer view is compressed.
+    #[error("{element} is compressed with {extension}, which this loader does not know, and has no other data")]
+    Compressed {
+        /// The element.
+        element: String,
+        /// The name of the extension.
+        extension: &'static str,
+    },
+    /// All that the scene has to draw is left out.
+    #[error("nothing of it can be drawn; first of all, {first}")]
+    NothingToDraw {
+        /// The first warning about what would be drawn.
+        first: String,
     },
     /// A URI that leads nowhere.
     #[error("{element} has a URI that cannot be followed: {reason}")]
@@ -66,21 +97,11 @@ pub enum Problem {
         /// Why not.
         reason: String,
     },
-    /// A buffer has fewer bytes than the file says.
-    #[error("buffer {buffer} has {bytes} bytes, but the file says {expected}")]
-    ShortBuffer {
-        /// The index of the buffer.
-        buffer: usize,
-        /// How many it has.
-        bytes: usize,
-        /// How many it should have.
-        expected: usize,
-    },
-    /// A buffer without a URI in a file without a binary chunk.
-    #[error("buffer {buffer} has neither a URI nor a binary chunk")]
-    MissingBuffer {
-        /// The index of the buffer.
-        buffer: usize,
+    /// A buffer that was found to be unreadable before.
+    #[error("{reason}")]
+    Unavailable {
+        /// What is wrong with it.
+        reason: String,
     },
     /// It reads beyond the end of what it reads.
     #[error("{element} is out of range: it ends at byte {end} of {container}, which has {bytes}")]
@@ -95,10 +116,10 @@ pub enum Problem {
         bytes: usize,
     },
     /// An accessor of a type that does not serve its purpose.
-    #[error("accessor {accessor} is {found}, but {purpose} is {expected}")]
+    #[error("{accessor} is {found}, but {purpose} must be {expected}")]
     WrongType {
-        /// The index of the accessor.
-        accessor: usize,
+        /// The accessor.
+        accessor: String,
         /// What it is used as.
         purpose: String,
         /// Its type.
@@ -112,7 +133,7 @@ pub enum Problem {
         /// The element.
         element: String,
         /// What is counted.
-        what: String,
+        what: &'static str,
         /// How many there are.
         count: usize,
         /// How many there should be.
@@ -121,7 +142,7 @@ pub enum Problem {
         expected_by: String,
     },
     /// A number that is NaN or infinite.
-    #[error("{element} is not finite at index {index}")]
+    #[error("{element} has a number that is not finite at index {index}")]
     NotFinite {
         /// The element.
         element: String,
@@ -140,27 +161,19 @@ pub enum Problem {
         /// What it is an index of.
         what: &'static str,
     },
-    /// The nodes are not a forest.
-    #[error("node {node} {reason}")]
-    Hierarchy {
-        /// The index of the node.
-        node: usize,
-        /// What is wrong with it.
-        reason: &'static str,
-    },
     /// The transform of a node cannot be drawn.
-    #[error("node {node} has a transform that {reason}")]
+    #[error("{node} has a transform that {reason}")]
     Transform {
-        /// The index of the node.
-        node: usize,
+        /// The node.
+        node: String,
         /// What is wrong with it.
         reason: &'static str,
     },
     /// An image that cannot be decoded.
-    #[error("image {image} cannot be decoded: {reason}")]
+    #[error("{image} cannot be decoded: {reason}")]
     Image {
-        /// The index of the image.
-        image: usize,
+        /// The image.
+        image: String,
         /// What the decoder says.
         reason: String,
     },
@@ -184,12 +197,30 @@ pub enum Problem {
 
 impl Problem {
     /// An element with a value that it cannot have.
-    pub(crate) fn invalid(element: impl Into<String>, reason: impl Into<String>) -> Self {
-        Self::Invalid { element: element.into(), reason: reason.into() }
+    pub(crate) fn invalid(element: impl Display, reason: impl Into<String>) -> Self {
+        Self::Invalid { element: element.to_string(), reason: reason.into() }
     }
 
     /// For what Drawloom refuses of an element.
-    pub(crate) fn of_scene(element: &str) -> impl FnOnce(SceneError) -> Self {
-        move |error| Self::Scene { element: element.to_owned(), error }
+    pub(crate) fn of_scene(element: &dyn Display) -> impl FnOnce(SceneError) -> Self {
+        move |error| Self::Scene { element: element.to_string(), error }
     }
+
+    /// For what the parser, or the decoder of another format, says.
+    pub(crate) fn malformed(reason: impl Display) -> Self {
+        Self::Malformed { reason: excerpt(&reason.to_string()) }
+    }
+
+    /// Whether the whole file is refused for it, wherever it is found.
+    pub(crate) fn is_of_file(&self) -> bool {
+        matches!(self, Self::OverLimit { .. })
+    }
+}
+
+fn unit(field: &str) -> &'static str {
+    if field.ends_with("bytes") { " bytes" } else { "" }
+}
+
+fn already_taken(taken: u64) -> String {
+    if taken == 0 { String::new() } else { format!(", {taken} are taken") }
 }

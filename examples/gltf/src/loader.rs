@@ -6,18 +6,22 @@ use std::path::Path;
 
 use drawloom::glam::DAffine3;
 use drawloom::task::Scheduler;
-use gltf::Document;
 use indicatif::ProgressBar;
 
 use crate::accessors::Accessors;
-use crate::animations::{duration, pose_at};
-use crate::document::Source;
+use crate::animations::{pose_at, target_counts, warn_of_unknown};
+use crate::document::{Source, folder_of};
+use crate::element::{Element, Kind};
 use crate::error::{LoadError, Problem};
+use crate::files::read_file;
 use crate::images::Decoding;
-use crate::materials::{Surface, material_name, read_material};
+use crate::json::Json;
+use crate::limits::{GltfLimits, Limit};
+use crate::materials::read_material;
 use crate::nodes::Nodes;
 use crate::primitives::{Primitive, read_primitive};
 use crate::skins::Skin;
+use crate::surface::Surface;
 use crate::texture_arrays::{TextureArrays, TextureUses};
 use crate::warnings::Warnings;
 use crate::world::World;
@@ -34,128 +38,220 @@ pub struct LoadOptions {
     pub camera: Option<usize>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
+    /// What the file may take.
+    pub limits: GltfLimits,
+}
+
+impl Default for LoadOptions {
+    /// All as the file has it, for a picture of 960 by 540 pixels.
+    fn default() -> Self {
+        Self { time: None, animation: 0, camera: None, size: [960, 540], limits: GltfLimits::default() }
+    }
 }
 
 /// Loads a `.gltf` or `.glb`. Images are decoded by background jobs of the scheduler; `progress` counts them.
 ///
+/// What is wrong with an element of the file loses that element, and is one of the [warnings](World::warnings).
+///
 /// # Errors
-/// If the file is not glTF 2.0, refers to what is not there, or has numbers that cannot be drawn. The error names the element.
+/// If the file is not glTF 2.0, requires an extension that the loader does not know, exceeds a [limit](GltfLimits), or all that
+/// its scene has to draw is lost. The error names the element.
 pub fn load(
     path: &Path,
     options: &LoadOptions,
     scheduler: &Scheduler,
     progress: &ProgressBar,
 ) -> Result<World, LoadError> {
-    read(path, options, scheduler, progress)
-        .map_err(|problem| LoadError { file: path.to_owned(), problem: problem.into() })
+    let scene_bytes = Limit::new("scene_bytes", options.limits.scene_bytes);
+    match read_file(path, &scene_bytes) {
+        Ok(bytes) => load_bytes(path, bytes, options, scheduler, progress),
+        Err(problem) => Err(LoadError { file: path.to_owned(), problem: problem.into(), warnings: Vec::new() }),
+    }
+}
+
+/// Loads the bytes of a `.gltf` or `.glb`. Messages call it as `path`, and its URIs are relative to the folder of that.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_bytes(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &LoadOptions,
+    scheduler: &Scheduler,
+    progress: &ProgressBar,
+) -> Result<World, LoadError> {
+    let mut warnings = Warnings::new(options.limits.warnings);
+    let read = Source::parse(folder_of(path), bytes, &options.limits, &mut warnings)
+        .and_then(|source| read(&source, options, scheduler, progress, &mut warnings));
+    let unlisted_warnings = warnings.unlisted;
+    let warnings = warnings.take();
+    match read {
+        Ok(world) => Ok(World { warnings, unlisted_warnings, ..world }),
+        Err(problem) => Err(LoadError { file: path.to_owned(), problem: problem.into(), warnings }),
+    }
 }
 
 /// What is read of a file before the world is built of it.
 pub(crate) struct Parts<'a> {
-    pub(crate) document: &'a Document,
-    /// The nodes of the scene.
-    pub(crate) of_scene: Vec<usize>,
-    /// From each node to the world.
-    pub(crate) world: Vec<DAffine3>,
+    pub(crate) source: &'a Source,
+    /// The nodes of the scene that have a place in the world, with that.
+    pub(crate) nodes: Vec<(Element<'a>, DAffine3)>,
+    /// From each node to the world, whichever scene it is in.
+    pub(crate) world: Vec<Option<DAffine3>>,
     /// The morph weights that the animation gives to nodes.
     pub(crate) weights: BTreeMap<usize, Vec<f32>>,
+    /// The number of morph targets of each mesh.
+    pub(crate) target_counts: Vec<usize>,
     /// The primitives of each mesh that the scene has.
     pub(crate) primitives: BTreeMap<usize, Vec<Primitive>>,
-    pub(crate) skins: Vec<Skin>,
+    /// The skins of the nodes of the scene. Those with which something is wrong are missing.
+    pub(crate) skins: BTreeMap<usize, Skin>,
     /// By index; `None` for the default material.
     pub(crate) materials: BTreeMap<Option<usize>, (String, Surface)>,
 }
 
-fn read(path: &Path, options: &LoadOptions, scheduler: &Scheduler, progress: &ProgressBar) -> Result<World, Problem> {
-    let mut warnings = Warnings::default();
-    let source = Source::open(path, &mut warnings)?;
-    let accessors = Accessors::new(&source);
-    let document = &source.document;
+fn read(
+    source: &Source,
+    options: &LoadOptions,
+    scheduler: &Scheduler,
+    progress: &ProgressBar,
+    warnings: &mut Warnings,
+) -> Result<World, Problem> {
+    warn_of_unknown(source, warnings)?;
+    let mut nodes = Nodes::new(source, warnings)?;
+    let of_scene = nodes.of_scene(source, source.scene(warnings), warnings)?;
+    let target_counts = target_counts(source);
+    let weights = animate(source, options, &mut nodes, &target_counts, warnings)?;
+    let world = nodes.world_transforms(source, warnings)?;
+    let placed = |&node: &usize| Some((source.get(Kind::Node, node)?, world[node]?));
+    let nodes: Vec<_> = of_scene.iter().filter_map(placed).collect();
 
-    let mut nodes = Nodes::new(&source)?;
-    let of_scene = nodes.of_scene(document.default_scene().or_else(|| document.scenes().next()));
+    let meshes = meshes_of(source, &nodes, warnings)?;
     let mut uses = TextureUses::default();
-    let materials = materials_of(document, &of_scene, &mut uses, &mut warnings)?;
-    let decoding = Decoding::start(&source, uses.images(), scheduler)?;
+    let materials = materials_of(source, &meshes, &mut uses, warnings)?;
+    // What follows may be a problem of the file: the images are not decoded for that.
+    let (primitives, morphs) = primitives_of(source, &meshes, warnings)?;
+    warn_of_bumps(&primitives, &materials, warnings);
+    let skins = skins_of(source, &nodes, warnings)?;
+    let decoding = Decoding::start(source, uses.images(), scheduler, warnings)?;
     // Each is decoded, and then made a layer of a texture array, perhaps several times.
     progress.set_length((decoding.count() + uses.count()) as u64);
-
-    let weights = animate(&accessors, document, options, &mut nodes, &mut warnings)?;
-    let world = nodes.world_transforms()?;
-    let primitives = primitives_of(&accessors, document, &of_scene, &mut warnings)?;
-    let skins = document.skins().map(|skin| Skin::read(&accessors, &skin)).collect::<Result<_, _>>()?;
-
-    let images = decoding.wait(progress)?;
-    let textures = TextureArrays::new(&uses, &images, scheduler, progress)?;
-    let parts = Parts { document, of_scene, world, weights, primitives, skins, materials };
-    let mut builder = WorldBuilder::new(&parts, &textures, &mut warnings)?;
+    let images = decoding.wait(progress, warnings);
+    let textures = TextureArrays::new(&uses, &images, &options.limits, scheduler, progress, warnings);
+    let parts = Parts { source, nodes, world, weights, target_counts, primitives, skins, materials };
+    let mut builder = WorldBuilder::new(&parts, morphs, &textures, warnings)?;
     builder.add_objects()?;
     builder.add_lights()?;
     builder.add_camera(options.camera, options.size)?;
-    let world = builder.finish(textures);
-    Ok(World { warnings: warnings.into_inner(), ..world })
+    Ok(builder.finish(textures))
 }
 
 fn animate(
-    accessors: &Accessors<'_>,
-    document: &Document,
+    source: &Source,
     options: &LoadOptions,
     nodes: &mut Nodes,
+    target_counts: &[usize],
     warnings: &mut Warnings,
 ) -> Result<BTreeMap<usize, Vec<f32>>, Problem> {
     let Some(time) = options.time else { return Ok(BTreeMap::new()) };
-    let Some(animation) = document.animations().nth(options.animation) else {
-        let count = document.animations().count();
+    let Some(animation) = source.get(Kind::Animation, options.animation) else {
+        let count = source.count(Kind::Animation);
         warnings.add(format!("there is no animation {}: the file has {count}, and nothing moves", options.animation));
         return Ok(BTreeMap::new());
     };
-    let end = duration(accessors, &animation)?;
-    if time > end {
-        warnings.add(format!("animation {} ends at {end} s, and stays there", options.animation));
+    let motion = pose_at(source, &animation, time, nodes, target_counts, warnings)?;
+    if let Some(end) = motion.end.filter(|&end| time > end) {
+        warnings.add(format!("{animation} ends at {end} s, and stays there"));
     }
-    pose_at(accessors, &animation, time, nodes)
+    Ok(motion.weights)
+}
+
+/// The meshes of the scene, each once.
+fn meshes_of<'a>(
+    source: &'a Source,
+    nodes: &[(Element<'a>, DAffine3)],
+    warnings: &mut Warnings,
+) -> Result<BTreeMap<usize, Element<'a>>, Problem> {
+    let mut meshes = BTreeMap::new();
+    for (node, _) in nodes {
+        let mesh = source.member(node, "mesh", Kind::Mesh);
+        let mesh = warnings.keep_shape(mesh, format_args!("{node} has no mesh"))?.flatten();
+        meshes.extend(mesh.map(|mesh| (mesh.index, mesh)));
+    }
+    Ok(meshes)
 }
 
 /// The materials of all meshes of the scene.
 fn materials_of(
-    document: &Document,
-    of_scene: &[usize],
+    source: &Source,
+    meshes: &BTreeMap<usize, Element<'_>>,
     uses: &mut TextureUses,
     warnings: &mut Warnings,
 ) -> Result<BTreeMap<Option<usize>, (String, Surface)>, Problem> {
+    let nothing = Json::Object(Box::default());
     let mut materials = BTreeMap::new();
-    for (_, mesh) in meshes_of(document, of_scene) {
-        for material in mesh.primitives().map(|primitive| primitive.material()) {
-            if let Entry::Vacant(entry) = materials.entry(material.index()) {
-                entry.insert((material_name(&material), read_material(&material, uses, warnings)?));
+    let default = read_material(source, &Element::new(&nothing, Kind::Material, 0), uses, warnings)?;
+    materials.insert(None, ("the default material".to_owned(), default));
+    for mesh in meshes.values() {
+        for json in mesh.list("primitives").unwrap_or_default() {
+            let index = json.get("material").and_then(Json::as_index);
+            let Some(material) = index.and_then(|index| source.get(Kind::Material, index)) else { continue };
+            if let Entry::Vacant(entry) = materials.entry(index) {
+                entry.insert((material.to_string(), read_material(source, &material, uses, warnings)?));
             }
         }
     }
     Ok(materials)
 }
 
-/// The primitives of all meshes of the scene.
+/// The primitives of all meshes of the scene, and the numbers of their morph targets.
 fn primitives_of(
-    accessors: &Accessors<'_>,
-    document: &Document,
-    of_scene: &[usize],
+    source: &Source,
+    meshes: &BTreeMap<usize, Element<'_>>,
     warnings: &mut Warnings,
-) -> Result<BTreeMap<usize, Vec<Primitive>>, Problem> {
-    let mut of_meshes = BTreeMap::new();
-    for (index, mesh) in meshes_of(document, of_scene) {
-        let mesh_name = mesh.name().map(|name| format!(" ({name})")).unwrap_or_default();
+) -> Result<(BTreeMap<usize, Vec<Primitive>>, Vec<f32>), Problem> {
+    let (mut of_meshes, mut morphs) = (BTreeMap::new(), Vec::new());
+    for (&index, mesh) in meshes {
         let mut primitives = Vec::new();
-        for primitive in mesh.primitives() {
-            let element = format!("mesh {index}{mesh_name} primitive {}", primitive.index());
-            primitives.extend(read_primitive(accessors, &primitive, &element, warnings)?);
+        let list = warnings.keep_shape(mesh.list("primitives"), format_args!("{mesh} is not drawn"))?;
+        for (number, json) in list.unwrap_or_default().iter().enumerate() {
+            let primitive = mesh.part(json, "primitive", number);
+            let accessors = Accessors::of_geometry(source);
+            primitives.extend(read_primitive(accessors, &primitive, &mut morphs, warnings)?);
         }
         of_meshes.insert(index, primitives);
     }
-    Ok(of_meshes)
+    Ok((of_meshes, morphs))
 }
 
-/// The meshes of the scene, each once.
-fn meshes_of<'a>(document: &'a Document, of_scene: &[usize]) -> BTreeMap<usize, gltf::Mesh<'a>> {
-    let nodes = of_scene.iter().filter_map(|&node| document.nodes().nth(node));
-    nodes.filter_map(|node| node.mesh()).map(|mesh| (mesh.index(), mesh)).collect()
+/// The skins of the nodes of the scene.
+fn skins_of(
+    source: &Source,
+    nodes: &[(Element<'_>, DAffine3)],
+    warnings: &mut Warnings,
+) -> Result<BTreeMap<usize, Skin>, Problem> {
+    let mut skins = BTreeMap::new();
+    for (node, _) in nodes.iter().filter(|(node, _)| node.json.get("mesh").is_some()) {
+        let lost = format_args!("{node} is drawn without its skin");
+        let Some(skin) = warnings.keep(source.member(node, "skin", Kind::Skin), lost)?.flatten() else { continue };
+        if let Entry::Vacant(entry) = skins.entry(skin.index) {
+            let read = Skin::read(Accessors::of_geometry(source), &skin);
+            entry.insert(warnings.keep(read, format_args!("meshes are drawn without {skin}"))?);
+        }
+    }
+    Ok(skins.into_iter().filter_map(|(index, skin)| Some((index, skin?))).collect())
+}
+
+/// Tangents that a file leaves out are those of MikkTSpace, by the specification; here the shader derives them.
+fn warn_of_bumps(
+    primitives: &BTreeMap<usize, Vec<Primitive>>,
+    materials: &BTreeMap<Option<usize>, (String, Surface)>,
+    warnings: &mut Warnings,
+) {
+    let has_bumps = |primitive: &&Primitive| materials.get(&primitive.material).is_some_and(|(_, it)| it.has_bumps());
+    let with_bumps = primitives.values().flatten().filter(has_bumps);
+    if let Some(primitive) = with_bumps.into_iter().find(|primitive| !primitive.has_tangents) {
+        let reason = "has no tangents for its texture of normals: they are derived from the picture, not by MikkTSpace";
+        warnings.add(format!("{} {reason}", primitive.mesh.name()));
+    }
 }

@@ -1,17 +1,21 @@
 //! Draws a glTF 2.0 scene into a picture.
 //!
 //!     cargo run --release -p gltf_scene -- scene.glb --picture scene.png --time 1.5
+//!
+//! Its exit status is 0 if the picture is written; 1 if drawing or writing failed or there is no adapter, which may go
+//! well another time or on another machine; and 2 if the arguments or the file are wrong, which fails again.
 
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::task::Scheduler;
 use drawloom_output::{PictureFile, path_text, print_diagnostic, print_line};
-use gltf_scene::{LoadOptions, draw, load, open_device};
+use gltf_scene::{GltfLimits, LoadOptions, World, draw, load, open_device};
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::filter::LevelFilter;
 
@@ -36,49 +40,112 @@ struct Arguments {
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"], default_values_t = [960, 540], value_parser = clap::value_parser!(u32).range(1..=8192))]
     size: Vec<u32>,
     /// What radiance is multiplied by.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_exposure)]
     exposure: f32,
+    /// What the file may take, as in `--limit geometry_bytes=4000000000`: a field of `GltfLimits`, whose documentation
+    /// describes them.
+    #[arg(long = "limit", value_name = "NAME=VALUE")]
+    limits: Vec<FileLimit>,
 }
 
 fn main() -> ExitCode {
     // What Drawloom and wgpu warn of.
     tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
-    drawloom_output::exit_code(run(&Arguments::parse()))
+    let arguments = Arguments::parse();
+    match read(&arguments) {
+        Ok((world, scheduler)) => drawloom_output::exit_code(run(&arguments, &world, scheduler)),
+        Err(error) => {
+            print_diagnostic!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
 }
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+/// Loads the file, and prints what is left out of it.
+fn read(arguments: &Arguments) -> Result<(World, Arc<Scheduler>), Box<dyn Error>> {
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+    let mut limits = GltfLimits::default();
+    for limit in &arguments.limits {
+        limits.set(&limit.name, limit.value)?;
+    }
     let options = LoadOptions {
         time: arguments.time,
         animation: arguments.animation,
         camera: arguments.camera,
         size: [arguments.size[0], arguments.size[1]],
+        limits,
     };
     let progress = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} images")?);
-    let world = load(&arguments.file, &options, &scheduler, &progress)?;
+    let loaded = load(&arguments.file, &options, &scheduler, &progress);
     progress.finish_and_clear();
-    for warning in &world.warnings {
+    let (warnings, unlisted) = match &loaded {
+        Ok(world) => (&world.warnings, world.unlisted_warnings),
+        Err(error) => (&error.warnings, 0),
+    };
+    for warning in warnings {
         print_diagnostic!("warning: {warning}");
     }
-    let picture = draw(open_device()?, scheduler, &world, arguments.exposure)?;
+    if unlisted > 0 {
+        print_diagnostic!("warning: {unlisted} more warnings are not listed");
+    }
+    Ok((loaded?, scheduler))
+}
+
+fn run(arguments: &Arguments, world: &World, scheduler: Arc<Scheduler>) -> Result<(), Box<dyn Error>> {
+    let picture = draw(open_device()?, scheduler, world, arguments.exposure)?;
     arguments.picture.write([picture.width, picture.height], &picture.bytes)?;
-    print_line!("{}", describe(&world, arguments));
+    print_line!("{}", describe(world, arguments));
     Ok(())
 }
 
-fn describe(world: &gltf_scene::World, arguments: &Arguments) -> String {
+fn describe(world: &World, arguments: &Arguments) -> String {
     let objects = world.object_count();
     let animations = match (world.animations.get(arguments.animation), arguments.time) {
-        (Some(name), Some(time)) => format!(", {name:?} at {time} s"),
+        (Some(name), Some(time)) => format!(", \"{name}\" at {time} s"),
         _ if world.animations.is_empty() => String::new(),
-        _ => format!(", animations {:?} at rest", world.animations),
+        _ => format!(", {} animations at rest: {}", world.animations.len(), shown(&world.animations)),
     };
     format!("{objects} objects, {} cameras{animations}; {}", world.cameras, path_text(arguments.picture.path()))
+}
+
+/// The first names of a list.
+fn shown(names: &[String]) -> String {
+    const MAX_NAMES: usize = 10;
+    let mut shown = names.iter().take(MAX_NAMES).map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    if names.len() > MAX_NAMES {
+        shown += ", …";
+    }
+    shown
 }
 
 fn parse_time(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(time) if f64::is_finite(time) => Ok(time),
         _ => Err(format!("{text:?} is not a number of seconds")),
+    }
+}
+
+fn parse_exposure(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(factor) if f32::is_finite(factor) && factor >= 0.0 => Ok(factor),
+        _ => Err(format!("{text:?} is not a factor from 0 on")),
+    }
+}
+
+/// `NAME=VALUE`: a limit of [`GltfLimits`].
+#[derive(Clone, Debug)]
+struct FileLimit {
+    name: String,
+    value: u64,
+}
+
+impl FromStr for FileLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in geometry_bytes=4000000000")?;
+        let value = value.parse().map_err(|error| format!("{value:?}: {error}"))?;
+        GltfLimits::default().set(name, value)?;
+        Ok(Self { name: name.to_owned(), value })
     }
 }

@@ -12,13 +12,42 @@ pub(crate) fn mip_size(size: [u32; 2], level: u32) -> [u32; 2] {
 
 /// The number of mip levels of an image.
 pub(crate) fn mip_count([width, height]: [u32; 2]) -> u32 {
-    width.max(height).ilog2() + 1
+    width.max(height).max(1).ilog2() + 1
+}
+
+/// The bytes of an image with its mip levels.
+pub(crate) fn byte_count(size: [u32; 2]) -> u64 {
+    let of_level = |level| mip_size(size, level).map(u64::from).into_iter().product::<u64>() * 4;
+    (0..mip_count(size)).map(of_level).sum()
+}
+
+/// The bytes of a layer and of its mip levels, with an image and those of the image in the upper left.
+pub(crate) fn mip_levels_within(image: &RgbaImage, layer: [u32; 2], space: ColorSpace) -> Vec<u8> {
+    let size = <[u32; 2]>::from(image.dimensions());
+    let bytes = with_mip_levels(image, space);
+    if size == layer {
+        return bytes;
+    }
+    let mut of_layer = vec![0; byte_count(layer) as usize];
+    let (mut from, mut to) = (0, 0);
+    // A layer has at least as many levels as the image.
+    for level in 0..mip_count(size) {
+        let ([width, height], [layer_width, layer_height]) = (mip_size(size, level), mip_size(layer, level));
+        let (row, row_of_layer) = (width as usize * 4, layer_width as usize * 4);
+        for number in 0..height as usize {
+            of_layer[to + number * row_of_layer..][..row].copy_from_slice(&bytes[from + number * row..][..row]);
+        }
+        from += row * height as usize;
+        to += row_of_layer * layer_height as usize;
+    }
+    of_layer
 }
 
 /// The bytes of an image and of its mip levels. Each pixel is the mean of four, of their radiances if they are colours.
-pub(crate) fn with_mip_levels(image: RgbaImage, space: ColorSpace) -> Vec<u8> {
+fn with_mip_levels(image: &RgbaImage, space: ColorSpace) -> Vec<u8> {
     let size = <[u32; 2]>::from(image.dimensions());
-    let mut bytes = image.into_raw();
+    let mut bytes = Vec::with_capacity(byte_count(size) as usize);
+    bytes.extend_from_slice(image.as_raw());
     let decoded: [f32; 256] = std::array::from_fn(|byte| decode(byte as f32 / 255.0, space));
     let mut first = 0;
     for level in 1..mip_count(size) {

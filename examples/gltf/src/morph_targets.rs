@@ -3,55 +3,86 @@
 use drawloom::glam::Vec3;
 
 use crate::accessors::Accessors;
+use crate::element::Element;
 use crate::error::Problem;
 use crate::warnings::Warnings;
 
 /// How many numbers a vertex has for each morph target: the differences of its position, its normal and its tangent.
 pub(crate) const NUMBERS_PER_VERTEX: usize = 9;
 
-/// The morph targets of a primitive.
+/// The morph targets of a primitive. One that changes nothing takes no memory.
 #[derive(Debug, Default)]
 pub(crate) struct MorphTargets {
-    /// [`NUMBERS_PER_VERTEX`] numbers for each vertex of each target.
-    pub(crate) numbers: Vec<f32>,
+    /// Where its numbers begin: [`NUMBERS_PER_VERTEX`] for each vertex of each target.
+    pub(crate) first: u32,
+    /// The number of each target in the file.
+    pub(crate) numbers: Vec<usize>,
     /// How far each target moves a vertex at most, along each axis.
     pub(crate) reach: Vec<Vec3>,
 }
 
 impl MorphTargets {
+    /// Reads the targets of a primitive of so many vertices. What a target has not one finite value of for each vertex, it does not change,
+    /// which is a warning.
+    ///
     /// # Errors
-    /// If a target has not one finite value for each vertex.
+    /// If a limit is exceeded, or the numbers of all targets are too many for an index.
     pub(crate) fn read(
-        accessors: &Accessors<'_>,
-        primitive: &gltf::Primitive<'_>,
-        element: &str,
+        accessors: Accessors<'_>,
+        primitive: &Element<'_>,
         vertices: usize,
+        morphs: &mut Vec<f32>,
         warnings: &mut Warnings,
     ) -> Result<Self, Problem> {
-        let mut targets = Self::default();
-        for (number, target) in primitive.morph_targets().enumerate() {
-            let element = format!("morph target {number} of {element}");
-            if target.positions().is_none() && target.normals().is_none() && target.tangents().is_none() {
-                warnings.add(format!("{element} changes neither positions, normals nor tangents, and does nothing"));
+        let list = warnings.keep(primitive.list("targets"), format_args!("{primitive} has no morph targets"))?;
+        let mut targets = Self { first: number_of(morphs.len())?, ..Self::default() };
+        for (number, json) in list.unwrap_or_default().iter().enumerate() {
+            let (target, element) = (primitive.inner(json), format!("morph target {number} of {primitive}"));
+            for (name, _) in json.members() {
+                if !matches!(&**name, "POSITION" | "NORMAL" | "TANGENT") && !name.starts_with('_') {
+                    warnings.add(format!("{element}: its {} is ignored", crate::text::excerpt(name)));
+                }
             }
-            accessors.count_bytes(|| element.clone(), vertices as u64, 4 * NUMBERS_PER_VERTEX as u64)?;
-            let first = targets.numbers.len();
-            targets.numbers.resize(first + vertices * NUMBERS_PER_VERTEX, 0.0);
-            let parts =
-                [(target.positions(), "positions"), (target.normals(), "normals"), (target.tangents(), "tangents")];
-            for (part, (accessor, name)) in parts.into_iter().enumerate() {
-                let Some(accessor) = accessor else { continue };
-                let values = accessors.floats::<3>(&accessor, &format!("the {name} of {element}"))?;
-                check_count(&format!("{name} of {element}"), values.len(), vertices)?;
-                let of_target = targets.numbers[first..].chunks_mut(NUMBERS_PER_VERTEX);
-                of_target.zip(values).for_each(|(numbers, value)| numbers[part * 3..][..3].copy_from_slice(&value));
+            let mut parts = Vec::new();
+            for (part, member, name) in
+                [(0, "POSITION", "positions"), (1, "NORMAL", "normals"), (2, "TANGENT", "tangents")]
+            {
+                let read = || {
+                    let Some(accessor) = accessors.member(&target, member)? else { return Ok(None) };
+                    let values = accessors.floats::<3>(&accessor, &format!("the {name} of {element}"))?;
+                    check_count(&format!("{name} of {element}"), values.len(), vertices)?;
+                    Ok(Some((part, values)))
+                };
+                parts.extend(warnings.keep(read(), format_args!("{element} does not change {name}"))?.flatten());
             }
-            let moves =
-                targets.numbers[first..].chunks(NUMBERS_PER_VERTEX).map(|numbers| Vec3::from_slice(numbers).abs());
+            if parts.is_empty() {
+                continue;
+            }
+            accessors.limit.take(&element, vertices as u64, 4 * NUMBERS_PER_VERTEX as u64)?;
+            let first = morphs.len();
+            morphs.resize(first + vertices * NUMBERS_PER_VERTEX, 0.0);
+            number_of(morphs.len())?;
+            let of_target = &mut morphs[first..];
+            for (part, values) in parts {
+                let of_vertices = of_target.chunks_mut(NUMBERS_PER_VERTEX).zip(values);
+                of_vertices.for_each(|(numbers, value)| numbers[part * 3..][..3].copy_from_slice(&value));
+            }
+            let moves = of_target.chunks(NUMBERS_PER_VERTEX).map(|numbers| Vec3::from_slice(numbers).abs());
+            targets.numbers.push(number);
             targets.reach.push(moves.fold(Vec3::ZERO, Vec3::max));
         }
         Ok(targets)
     }
+
+    /// The weight of each target, of those of all targets in the file.
+    pub(crate) fn weights(&self, of_file: &[f32]) -> Vec<f32> {
+        self.numbers.iter().map(|&number| of_file.get(number).copied().unwrap_or(0.0)).collect()
+    }
+}
+
+/// A number of numbers, as the shader has it.
+fn number_of(count: usize) -> Result<u32, Problem> {
+    u32::try_from(count).map_err(|_| Problem::invalid("the scene", format!("has {count} numbers of morph targets")))
 }
 
 /// # Errors
@@ -60,6 +91,6 @@ pub(crate) fn check_count(what: &str, count: usize, vertices: usize) -> Result<(
     if count == vertices {
         return Ok(());
     }
-    let (element, what) = (what.to_owned(), "values".to_owned());
-    Err(Problem::UnequalCounts { element, what, count, expected: vertices, expected_by: "vertices".to_owned() })
+    let expected_by = "vertices".to_owned();
+    Err(Problem::UnequalCounts { element: what.to_owned(), what: "values", count, expected: vertices, expected_by })
 }

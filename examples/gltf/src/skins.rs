@@ -3,6 +3,7 @@
 use drawloom::glam::{DAffine3, DMat4, DVec4};
 
 use crate::accessors::Accessors;
+use crate::element::{Element, Kind};
 use crate::error::Problem;
 
 /// The joints of a skin.
@@ -15,21 +16,23 @@ pub(crate) struct Skin {
 impl Skin {
     /// # Errors
     /// If it has no joints, or fewer matrices than joints, or one that is not affine and finite.
-    pub(crate) fn read(accessors: &Accessors<'_>, skin: &gltf::Skin<'_>) -> Result<Self, Problem> {
-        let element = format!("skin {}", skin.index());
-        let nodes: Vec<_> = skin.joints().map(|joint| joint.index()).collect();
+    pub(crate) fn read(accessors: Accessors<'_>, skin: &Element<'_>) -> Result<Self, Problem> {
+        let joint = |json: &crate::json::Json| {
+            let index = json.as_index().ok_or_else(|| Problem::invalid(skin, "has a joint that is no index"))?;
+            Ok(accessors.source.referred(skin, Kind::Node, index)?.index)
+        };
+        let nodes = skin.list("joints")?.iter().map(joint).collect::<Result<Vec<_>, Problem>>()?;
         if nodes.is_empty() {
-            return Err(Problem::invalid(element, "has no joints"));
+            return Err(Problem::invalid(skin, "has no joints"));
         }
-        let Some(accessor) = skin.inverse_bind_matrices() else {
+        let Some(accessor) = accessors.member(skin, "inverseBindMatrices")? else {
             return Ok(Self { joints: nodes.into_iter().map(|node| (node, DAffine3::IDENTITY)).collect() });
         };
-        let purpose = format!("the inverse bind matrices of {element}");
-        let matrices = accessors.floats::<16>(&accessor, &purpose)?;
+        let matrices = accessors.floats::<16>(&accessor, &format!("the inverse bind matrices of {skin}"))?;
         if matrices.len() < nodes.len() {
             return Err(Problem::UnequalCounts {
-                element,
-                what: "inverse bind matrices".to_owned(),
+                element: skin.to_string(),
+                what: "inverse bind matrices",
                 count: matrices.len(),
                 expected: nodes.len(),
                 expected_by: "joints".to_owned(),
@@ -39,10 +42,7 @@ impl Skin {
         for (index, (node, matrix)) in nodes.into_iter().zip(matrices).enumerate() {
             let matrix = DMat4::from_cols_array(&matrix.map(f64::from));
             if !matrix.row(3).abs_diff_eq(DVec4::W, 1e-4) {
-                return Err(Problem::invalid(
-                    element,
-                    format!("has an inverse bind matrix {index} that is not affine"),
-                ));
+                return Err(Problem::invalid(skin, format!("has an inverse bind matrix {index} that is not affine")));
             }
             joints.push((node, DAffine3::from_mat4(matrix)));
         }

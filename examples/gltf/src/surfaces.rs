@@ -8,19 +8,9 @@ use drawloom::scene::ViewKind;
 
 use crate::attributes::{COLOR, DEFORMED, RIGID, SECOND_UV, TANGENT};
 use crate::deformation::SkinsAndMorphs;
-use crate::materials::{MASKED_SURFACE, SURFACE};
+use crate::surface::{MASKED_SURFACE, SURFACE};
+use crate::surface_kind::SurfaceKind;
 use crate::texture_arrays::ARRAYS;
-
-/// Which surfaces a process draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum SurfaceKind {
-    /// Without holes.
-    Opaque,
-    /// With holes.
-    Masked,
-    /// Blended over what is behind them.
-    Blended,
-}
 
 /// Draws surfaces of a kind, those that are deformed or those that are not, lit by all lights with their shadows.
 pub(crate) struct Surfaces {

@@ -3,8 +3,12 @@ struct TextureSlot {
     offset: vec2<f32>,
     // The array above the layer; all ones for no texture.
     texture: u32,
-    // 1: the second texture coordinates; 2: the nearest pixel; two bits each from 8 on: how u and v wrap.
+    // 1: the second texture coordinates; 2 and 4: the nearest pixel where the image is magnified and minified; 8: no mip levels; 16: the
+    // nearest mip level; two bits each from bit 8 on: how u and v wrap.
     flags: u32,
+    // Of the image in pixels: it fills the layer, or its upper left.
+    size: vec2<u32>,
+    padding: vec2<u32>,
 }
 
 struct GltfMaterial {
@@ -109,7 +113,7 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     var radiance = emission + view.ambient * occlusion * (diffuse + reflected_ambient(head_on, roughness, n_v));
     for (var index = 0u; index < view.light_count; index++) {
         let light = lights[index];
-        let illuminance = illuminance_from(light, in.relative, normal);
+        let illuminance = punctual_illuminance(light, in.relative, normal);
         if any(illuminance > vec3<f32>(0.0)) {
             let to_light = normalize(select(light.position - in.relative, -light.direction, light.kind == DIRECTIONAL));
             let reflected = reflection(normal, to_eye, to_light, n_v, roughness, head_on, diffuse);
@@ -117,6 +121,26 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
         }
     }
     return vec4<f32>(min(radiance, vec3<f32>(60000.0)), opacity);
+}
+
+// What a light sends to a surface, as `KHR_lights_punctual` has it: `illuminance_from` fades otherwise at the end of a range and of a cone.
+fn punctual_illuminance(light: Light, position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    if light.kind == DIRECTIONAL {
+        return illuminance_from(light, position, normal);
+    }
+    let to_light = light.position - position;
+    let distance_squared = dot(to_light, to_light);
+    if distance_squared == 0.0 || distance_squared >= light.range * light.range {
+        return vec3<f32>(0.0);
+    }
+    let towards = to_light * inverseSqrt(distance_squared);
+    var cone = 1.0;
+    if light.kind == SPOT {
+        cone = clamp((dot(-towards, light.direction) - light.cone_end) / (light.cone_begin - light.cone_end), 0.0, 1.0);
+    }
+    let fraction = distance_squared / (light.range * light.range);
+    let factor = cone * cone * max(dot(normal, towards), 0.0) * (1.0 - fraction * fraction) / distance_squared;
+    return min(light.intensity * min(factor, 1e30), MAX_ILLUMINANCE);
 }
 
 // The normal with that of the texture.

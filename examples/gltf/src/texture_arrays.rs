@@ -1,18 +1,26 @@
 //! All images of a file as layers of a few texture arrays, because a process has the same textures for all materials.
+//!
+//! Each image keeps its pixels: one that is smaller than its layer is in the upper left of it, and so are its mip levels in those of the
+//! layer. The shader filters such an image itself.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use drawloom::task::Scheduler;
+use drawloom::task::{JobPanic, Scheduler};
 use image::RgbaImage;
-use image::imageops::{self, FilterType};
 use indicatif::ProgressBar;
 
-use crate::error::Problem;
-use crate::mip_levels::with_mip_levels;
+use crate::array_sizes::array_sizes;
+use crate::limits::GltfLimits;
+use crate::mip_levels::mip_levels_within;
+use crate::surface::TexturePlace;
+use crate::warnings::Warnings;
 
 /// The number of arrays that the shader has.
 pub(crate) const ARRAYS: usize = 4;
+
+/// The number of images that a texture array has at most: what usual devices allow.
+const MAX_LAYERS: usize = 2048;
 
 /// How the channels of an image are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,11 +72,11 @@ impl TextureUses {
 #[derive(Debug, Default)]
 pub(crate) struct TextureArrays {
     pub(crate) arrays: Vec<TextureArray>,
-    /// The array and the layer of each use.
-    layers: Vec<[u32; 2]>,
+    /// Where each use is that has an image.
+    places: BTreeMap<u32, TexturePlace>,
 }
 
-/// Images of one size.
+/// Images of one size, or of smaller ones.
 #[derive(Debug)]
 pub(crate) struct TextureArray {
     pub(crate) size: [u32; 2],
@@ -77,81 +85,77 @@ pub(crate) struct TextureArray {
 }
 
 impl TextureArrays {
-    /// Scales images to the sizes of the arrays, and makes their mip levels, in background jobs.
-    ///
-    /// # Errors
-    /// If the arrays would be too large.
+    /// Makes the mip levels of images in background jobs. Images that exceed the limit of all textures, or the number of layers
+    /// that an array has, are left out, with a warning.
     pub(crate) fn new(
         uses: &TextureUses,
         images: &BTreeMap<usize, Arc<RgbaImage>>,
+        limits: &GltfLimits,
         scheduler: &Scheduler,
         progress: &ProgressBar,
-    ) -> Result<Self, Problem> {
-        let size_of_use = |used: &TextureUse| <[u32; 2]>::from(images[&used.image].dimensions());
-        let (sizes, array_of_size) = array_sizes(uses.uses.iter().map(size_of_use));
-        let array_of = |used: &TextureUse| array_of_size[&size_of_use(used)];
-        let bytes =
-            uses.uses.iter().map(|used| sizes[array_of(used)].map(u64::from)).map(|[width, height]| width * height * 4);
-        let count = bytes.sum::<u64>();
-        if count > MAX_BYTES {
-            let (element, what) = ("the scene".to_owned(), "bytes of textures");
-            return Err(Problem::TooMany { element, what, count, limit: MAX_BYTES });
+        warnings: &mut Warnings,
+    ) -> Self {
+        let decoded = |(number, used): (u32, &TextureUse)| Some((number, *used, images.get(&used.image)?));
+        let decoded: Vec<_> = (0..).zip(&uses.uses).filter_map(decoded).collect();
+        let size_of = |image: &RgbaImage| <[u32; 2]>::from(image.dimensions());
+        // Sizes that do not fit together take more than the images do, so fewer of them may fit: the most that do are searched for.
+        let arrays_of = |count: usize| array_sizes(decoded[..count].iter().map(|(_, _, image)| size_of(image)));
+        let fits =
+            |count: usize| arrays_of(count).iter().map(|array| array.bytes()).sum::<u64>() <= limits.all_textures_bytes;
+        let (mut kept, mut too_many) = (decoded.len(), decoded.len() + 1);
+        if !fits(kept) {
+            (kept, too_many) = (0, kept);
         }
-        let mut arrays: Vec<_> = sizes.iter().map(|&size| TextureArray { size, layers: Vec::new() }).collect();
+        while too_many - kept > 1 {
+            let middle = kept + (too_many - kept) / 2;
+            if fits(middle) { kept = middle } else { too_many = middle }
+        }
+        for (_, used, _) in &decoded[kept..] {
+            let limit = limits.all_textures_bytes;
+            warnings.add(format!(
+                "image {} is left out: texture arrays with it and the images before it exceed `GltfLimits::all_textures_bytes`, which is {limit}",
+                used.image
+            ));
+        }
+        let sizes = arrays_of(kept);
+        let mut arrays: Vec<_> =
+            sizes.iter().map(|array| TextureArray { size: array.size, layers: Vec::new() }).collect();
+        let mut layers = vec![0; arrays.len()];
         let mut jobs = Vec::new();
-        for used in &uses.uses {
-            let (image, space, [width, height]) = (Arc::clone(&images[&used.image]), used.space, sizes[array_of(used)]);
-            jobs.push(scheduler.background(move || {
-                let fits = image.dimensions() == (width, height);
-                let image = if fits {
-                    RgbaImage::clone(&image)
-                } else {
-                    imageops::resize(&*image, width, height, FilterType::Triangle)
-                };
-                with_mip_levels(image, space)
-            }));
+        for (number, used, image) in &decoded[..kept] {
+            let size = size_of(image);
+            let Some(array) = sizes.iter().position(|array| array.sizes.contains(&size)) else { continue };
+            if layers[array] == MAX_LAYERS {
+                let warning = format!("is left out: {MAX_LAYERS} other images share its texture array");
+                warnings.add(format!("image {} {warning}", used.image));
+                continue;
+            }
+            layers[array] += 1;
+            let (layer_size, space, image) = (sizes[array].size, used.space, Arc::clone(image));
+            let job = scheduler.background(move || mip_levels_within(&image, layer_size, space));
+            jobs.push((*number, used.image, array, size, job));
         }
-        let mut layers = Vec::new();
-        for (used, job) in uses.uses.iter().zip(jobs) {
-            let array = array_of(used);
-            let panicked =
-                |panic: drawloom::task::JobPanic| Problem::Image { image: used.image, reason: panic.to_string() };
-            layers.push([array as u32, arrays[array].layers.len() as u32]);
-            arrays[array].layers.push(job.wait().map_err(panicked)?);
+        let mut places = BTreeMap::new();
+        for (number, image, array, size, job) in jobs {
+            match job.wait() {
+                Ok(bytes) => {
+                    let layers = &mut arrays[array].layers;
+                    let layer = (array as u32) << 16 | layers.len() as u32;
+                    places.insert(number, TexturePlace { layer, size });
+                    layers.push(bytes);
+                }
+                Err(panic) => {
+                    let panic: JobPanic = panic;
+                    warnings.add(format!("image {image} is left out: {panic}"));
+                }
+            }
             progress.inc(1);
         }
-        Ok(Self { arrays, layers })
+        Self { arrays, places }
     }
 
-    /// Where a use is, as shaders read it: the array above the layer.
-    pub(crate) fn place(&self, used: u32) -> u32 {
-        let [array, layer] = self.layers[used as usize];
-        array << 16 | layer
+    /// Where a use is; `None` if it has no image.
+    pub(crate) fn place(&self, used: u32) -> Option<TexturePlace> {
+        self.places.get(&used).copied()
     }
-}
-
-/// The greatest number of bytes of all arrays without their mip levels.
-const MAX_BYTES: u64 = 4 << 30;
-
-/// The sizes of the arrays, and which of them images of a size are in. If there are more sizes than arrays, small images are scaled up.
-fn array_sizes(of_images: impl Iterator<Item = [u32; 2]>) -> (Vec<[u32; 2]>, BTreeMap<[u32; 2], usize>) {
-    // Each group: its size, and the sizes of images in it.
-    let mut groups: Vec<([u32; 2], Vec<[u32; 2]>)> = Vec::new();
-    for size in of_images {
-        if !groups.iter().any(|(of_group, _)| *of_group == size) {
-            groups.push((size, vec![size]));
-        }
-    }
-    while groups.len() > ARRAYS {
-        groups.sort_by_key(|([width, height], _)| std::cmp::Reverse(u64::from(*width) * u64::from(*height)));
-        if let (Some((small, of_small)), Some((larger, of_larger))) = (groups.pop(), groups.last_mut()) {
-            *larger = [larger[0].max(small[0]), larger[1].max(small[1])];
-            of_larger.extend(of_small);
-        }
-    }
-    let of_group = |(array, (_, sizes)): (usize, &(_, Vec<[u32; 2]>))| {
-        sizes.iter().map(move |&size| (size, array)).collect::<Vec<_>>()
-    };
-    let array_of_size = groups.iter().enumerate().flat_map(of_group).collect();
-    (groups.into_iter().map(|(size, _)| size).collect(), array_of_size)
 }

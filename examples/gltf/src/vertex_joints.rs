@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use drawloom::glam::Vec3;
 
+use crate::element::Element;
 use crate::error::Problem;
 
 /// Which joints move the vertices of a primitive, and where those vertices are.
@@ -11,7 +12,7 @@ use crate::error::Problem;
 pub(crate) struct VertexJoints {
     /// For each joint that moves a vertex, the lowest and highest corner of a box around all vertices that it moves.
     pub(crate) boxes: BTreeMap<u32, [Vec3; 2]>,
-    /// The greatest index of a joint that a vertex has, whether the joint moves it or not.
+    /// The greatest index of a joint that moves a vertex.
     pub(crate) greatest: u32,
 }
 
@@ -22,7 +23,7 @@ impl VertexJoints {
     /// If a weight is negative.
     #[expect(clippy::type_complexity, reason = "three parts of one primitive")]
     pub(crate) fn new(
-        element: &str,
+        primitive: &Element<'_>,
         positions: &[Vec3],
         joints: Vec<[u32; 4]>,
         mut weights: Vec<[f32; 4]>,
@@ -30,7 +31,7 @@ impl VertexJoints {
         let mut boxes = BTreeMap::new();
         for (index, ((position, joints), weights)) in positions.iter().zip(&joints).zip(&mut weights).enumerate() {
             if weights.iter().any(|&weight| weight < 0.0) {
-                return Err(Problem::invalid(element, format!("has a negative weight at vertex {index}")));
+                return Err(Problem::invalid(primitive, format!("has a negative weight at vertex {index}")));
             }
             let sum: f32 = weights.iter().sum();
             *weights =
@@ -40,7 +41,7 @@ impl VertexJoints {
                 (*low, *high) = (low.min(*position), high.max(*position));
             }
         }
-        let greatest = joints.iter().flatten().copied().max().unwrap_or(0);
+        let greatest = boxes.keys().next_back().copied().unwrap_or(0);
         Ok((Self { boxes, greatest }, joints, weights))
     }
 }

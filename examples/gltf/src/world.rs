@@ -6,10 +6,10 @@ use std::sync::Arc;
 use drawloom::scene::{Bounds, ColumnValues, Scene, SceneRef};
 
 use crate::attributes::{POSE, Pose};
-use crate::surfaces::SurfaceKind;
+use crate::surface_kind::SurfaceKind;
 use crate::texture_arrays::TextureArrays;
 
-/// A loaded scene: what Drawloom draws, and what the loader left out of the file.
+/// A loaded scene: what Drawloom draws, and what the loader left out of the file. In names of the file, control characters are escaped.
 #[derive(Debug)]
 pub struct World {
     pub(crate) scene: Scene,
@@ -22,8 +22,11 @@ pub struct World {
     pub(crate) textures: TextureArrays,
     /// Which surfaces there are, and whether they are deformed.
     pub(crate) surfaces: BTreeSet<(SurfaceKind, bool)>,
-    /// What the loader left out of the file, in sentences.
+    /// What the loader left out of the file or drew otherwise, in sentences that name the element. As many as
+    /// [`GltfLimits::warnings`](crate::GltfLimits::warnings) says are listed.
     pub warnings: Vec<String>,
+    /// How many more warnings there are.
+    pub unlisted_warnings: u64,
     /// The names of the file's animations; `animation 2` for one without a name.
     pub animations: Vec<String>,
     /// How many cameras the scene has.
@@ -34,6 +37,12 @@ impl World {
     /// How many objects there are: one for each primitive of each node.
     pub fn object_count(&self) -> usize {
         self.poses.len()
+    }
+
+    /// The bytes of its texture arrays, its joints and its morph targets.
+    pub fn resource_bytes(&self) -> usize {
+        let layers = self.textures.arrays.iter().flat_map(|array| &array.layers);
+        layers.map(Vec::len).sum::<usize>() + self.palette.len() + self.morphs.len()
     }
 
     /// The engine's own data of objects.

@@ -4,14 +4,22 @@
 //! The files and the pictures stay in `target/tmp/gltf`, to look at.
 
 mod appearance;
+mod escaping;
+mod faults;
 mod fixture;
 mod generate;
+mod invariants;
+mod limits;
 mod malformed;
 mod malformed_elements;
 mod moving;
 mod oracle;
 mod program;
+mod property;
+mod sharp;
 mod sources;
+mod valid;
+mod versions;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
@@ -21,11 +29,12 @@ fn main() {
     let no_adapter = fixture::device().is_none();
     let required = std::env::var_os("DRAWLOOM_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
     let mut trials = Vec::new();
-    let of_adapter = [moving::CASES, appearance::CASES, sources::CASES, program::CASES];
+    let of_adapter = [moving::CASES, appearance::CASES, sharp::CASES, sources::CASES, program::CASES];
     for &(name, case) in of_adapter.into_iter().flatten() {
         trials.push(Trial::test(name, case).with_ignored_flag(no_adapter && !required));
     }
-    trials
-        .extend(malformed::CASES.iter().chain(malformed_elements::CASES).map(|&(name, case)| Trial::test(name, case)));
+    let others = [malformed::CASES, malformed_elements::CASES, faults::CASES, valid::CASES, versions::CASES];
+    let others = others.into_iter().chain([limits::CASES, escaping::CASES, property::CASES]);
+    trials.extend(others.flatten().map(|&(name, case)| Trial::test(name, case)));
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }

@@ -1,4 +1,4 @@
-//! Malformed containers and URIs, and files that are changed at random: errors, no panic and no hang.
+//! Malformed containers and URIs.
 
 use std::fs;
 
@@ -6,40 +6,31 @@ use libtest_mimic::Failed;
 use serde_json::json;
 
 use crate::fixture::{AT_REST, expect, folder, load_bytes, load_file};
-use crate::generate::builder::{Builder, glb};
-use crate::generate::deforming::bending_tube;
-use crate::generate::static_scenes::{lights_and_cameras, textured_square};
-use gltf_scene::LoadOptions;
+use crate::generate::builder::Builder;
+use crate::generate::static_scenes::textured_square;
 
 pub const CASES: &[crate::Case] = &[
     ("containers_that_are_wrong_are_named", containers),
     ("what_is_left_out_is_a_warning", warnings),
     ("uris_lead_only_below_the_folder", uris),
-    ("files_that_are_cut_off_or_changed_never_panic", changed),
 ];
 
 type Change = fn(&mut Builder);
 
-const MOVING: LoadOptions = LoadOptions { time: Some(0.5), ..AT_REST };
-
 fn containers() -> Result<(), Failed> {
     let builder = textured_square();
     let whole = builder.glb();
-    let with_header = |length: u32| [&whole[..8], &length.to_le_bytes(), &whole[12..]].concat();
-    let short = json!({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 10}]});
-    let missing = serde_json::to_vec(&short)?;
-    let many = json!({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 1}, {"byteLength": 1}]});
     let deep = [b"[".repeat(100_000), b"]".repeat(100_000)].concat();
     let cases: [(&[u8], &str); 9] = [
         (b"", "it is not glTF 2.0"),
         (b"glTF", "its header is cut off"),
-        (b"{}", "missing field `asset`"),
-        (&with_header(3), "its header is cut off"),
-        (&with_header(u32::MAX), "it is not glTF 2.0"),
-        (&glb(&short, &[0; 4]), "buffer 0 has 4 bytes, but the file says 10"),
-        (&missing, "buffer 0 has neither a URI nor a binary chunk"),
-        (&glb(&many, &[0; 4]), "buffer 1 has neither a URI nor a binary chunk"),
-        (&deep, "it is not glTF 2.0"),
+        (b"{}", "no `asset`, and so no version"),
+        (b"[1, 2]", "no `asset`, and so no version"),
+        (b"{\"asset\": {\"version\": \"2.0\"}", "its JSON is cut off"),
+        (b"{\"asset\": {\"version\": \"2.0\"}} {}", "trailing characters"),
+        (&whole[..60], "its JSON chunk has"),
+        (&[b"\xff\xfe".as_slice(), b"{\0}\0"].concat(), "is UTF-16, as its byte order mark says"),
+        (&deep, "recursion limit exceeded"),
     ];
     for (bytes, expected) in cases {
         let error = load_bytes("containers", bytes, &AT_REST).err().map(|error| error.to_string()).unwrap_or_default();
@@ -56,11 +47,11 @@ fn warnings() -> Result<(), Failed> {
         ),
         (
             |it| it.json["meshes"][0]["primitives"][0]["mode"] = json!(1),
-            "mesh 0 primitive 0 of mode Lines has no triangles, and is not drawn",
+            "mesh 0 primitive 0 has the mode Lines, not triangles, and is not drawn",
         ),
         (
             |it| it.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_2"] = json!(2),
-            "ignored are its texture coordinates 2",
+            "mesh 0 primitive 0: its attribute TEXCOORD_2 is ignored",
         ),
         (|it| it.json["cameras"][0]["perspective"]["aspectRatio"] = json!(1), "camera 0: its height is kept"),
         (
@@ -100,51 +91,8 @@ fn uris() -> Result<(), Failed> {
         let path = folder.join("scene/scene.gltf");
         fs::write(&path, textured_square().gltf(uri))?;
         let error = load_file(&path, &AT_REST).err().map(|error| error.to_string()).unwrap_or_default();
-        expect(error.contains(expected), || format!("{uri}: {error:?}, not {expected:?}"))?;
+        let is_named = error.contains(expected) && error.contains("nothing of it can be drawn");
+        expect(is_named, || format!("{uri}: {error:?}, not {expected:?}"))?;
     }
     Ok(())
-}
-
-fn changed() -> Result<(), Failed> {
-    let path = folder("changed").join("scene.glb");
-    let mut loaded = 0;
-    for scene in [textured_square, lights_and_cameras, small_skin] {
-        let whole = scene().glb();
-        // A generator of numbers that is the same on every run.
-        let mut state = 1_u64;
-        let mut next = |below: usize| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as usize % below
-        };
-        for round in 0..1500 {
-            let mut bytes = whole.clone();
-            if round % 4 == 0 {
-                bytes.truncate(next(whole.len()));
-            } else {
-                for _ in 0..=round % 3 {
-                    let at = next(bytes.len());
-                    // Digits stay digits, so that the JSON stays JSON.
-                    bytes[at] = if bytes[at].is_ascii_digit() {
-                        b'0' + next(10) as u8
-                    } else if round % 2 == 0 {
-                        next(256) as u8
-                    } else {
-                        bytes[at]
-                    };
-                }
-            }
-            fs::write(&path, &bytes)?;
-            let result = std::panic::catch_unwind(|| load_file(&path, &MOVING).is_ok());
-            match result {
-                Ok(is_loaded) => loaded += usize::from(is_loaded),
-                Err(_) => return Err(format!("round {round}: it panics; see {}", path.display()).into()),
-            }
-        }
-    }
-    expect(loaded > 200, || format!("only {loaded} changed files are loaded, so little is tested"))
-}
-
-/// The tube, with few vertices.
-fn small_skin() -> Builder {
-    bending_tube(None)
 }

@@ -2,5 +2,8 @@
 
 pub mod builder;
 pub mod deforming;
+pub mod grammar;
+pub mod mutations;
+pub mod random_accessors;
 pub mod shapes;
 pub mod static_scenes;

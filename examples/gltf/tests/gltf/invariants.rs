@@ -1,0 +1,94 @@
+//! What holds of every loaded file, whatever is in it.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::process::Deferred;
+use drawloom::scene::Mesh;
+use drawloom::task::Scheduler;
+use drawloom::{Renderer, Submitter};
+use gltf_scene::{GltfLimits, LoadError, World};
+use libtest_mimic::Failed;
+
+use crate::fixture::expect;
+
+/// Little, so that small files reach every limit.
+pub const SMALL_LIMITS: GltfLimits = GltfLimits {
+    scene_bytes: 64 << 10,
+    json_values: 4000,
+    buffer_bytes: 32 << 10,
+    geometry_bytes: 256 << 10,
+    zero_bytes: 16 << 10,
+    keyframe_bytes: 16 << 10,
+    pose_bytes: 16 << 10,
+    objects: 100,
+    texture_file_bytes: 16 << 10,
+    texture_bytes: 64 << 10,
+    all_textures_bytes: 256 << 10,
+    warnings: 5,
+};
+
+/// Checks a world: it is within limits, has finite numbers and indices that are in range, and Drawloom draws it.
+///
+/// # Errors
+/// If it does not hold.
+pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), Failed> {
+    let columns = world.columns();
+    let scene = world.as_scene_ref(&columns);
+    expect(world.warnings.len() as u64 <= limits.warnings, || "too many warnings are listed".to_owned())?;
+    for name in world.warnings.iter().chain(&world.animations) {
+        check_text(name)?;
+    }
+    expect(world.object_count() as u64 <= limits.objects, || format!("{} objects", world.object_count()))?;
+    let mut geometry = 0;
+    for (_, mesh) in scene.assets.iter::<Mesh>() {
+        check_text(mesh.name())?;
+        let (vertices, indices) = (mesh.vertices(), mesh.indices());
+        geometry += (size_of_val(vertices) + size_of_val(indices)) as u64;
+        let is_finite = vertices.iter().all(|vertex| vertex.position.iter().all(|number| number.is_finite()));
+        expect(is_finite, || format!("{} is not finite", mesh.name()))?;
+        let is_in_range = indices.iter().all(|&index| (index as usize) < vertices.len());
+        expect(is_in_range && indices.len() % 3 == 0, || format!("{} has wrong indices", mesh.name()))?;
+    }
+    expect(geometry <= limits.geometry_bytes, || format!("{geometry} bytes of geometry"))?;
+    let resources = world.resource_bytes() as u64;
+    // A matrix and a number are there without a file that has any.
+    let greatest = limits.pose_bytes + limits.geometry_bytes + limits.all_textures_bytes + 68;
+    expect(resources <= greatest, || format!("{resources} bytes of textures, joints and morph targets"))?;
+    for (bounds, (position, scale)) in scene.bounds.iter().zip(scene.positions.iter().zip(scene.scales)) {
+        let is_finite = bounds.is_valid() && position.is_finite() && scale.is_finite();
+        expect(is_finite, || format!("{bounds:?} at {position}, scaled by {scale}"))?;
+    }
+    NULL.with_borrow_mut(|(renderer, submitter)| {
+        let recorded = renderer.record(scene).map_err(|error| format!("Drawloom draws it not: {error}"))?;
+        submitter.submit(recorded).map_err(|error| format!("Drawloom draws it not: {error}"))?;
+        Ok(())
+    })
+}
+
+/// Checks what is said of a file that is refused.
+///
+/// # Errors
+/// If it does not name the file, or has a control character.
+pub fn check_error(error: &LoadError, file: &str) -> Result<(), Failed> {
+    let text = error.to_string();
+    expect(text.starts_with(file) && text.len() > file.len() + 10, || format!("{text:?} does not say what is wrong"))?;
+    error.warnings.iter().chain([&text]).try_for_each(|text| check_text(text))
+}
+
+/// # Errors
+/// If it has a control character.
+pub fn check_text(text: &str) -> Result<(), Failed> {
+    expect(!text.chars().any(char::is_control), || format!("{text:?} has a control character"))?;
+    expect(text.len() < 2000, || format!("{text:?} is long"))
+}
+
+thread_local! {
+    static NULL: RefCell<(Renderer<NullBackend>, Submitter<NullBackend>)> = RefCell::new(null_renderer());
+}
+
+fn null_renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let scheduler = Arc::new(Scheduler::new(1).expect("one worker"));
+    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).expect("a null backend")
+}

@@ -1,0 +1,267 @@
+//! What is made of a file is bounded, and not only what is read of it: small files that would grow are refused at once, by the name of the
+//! limit.
+
+use libtest_mimic::Failed;
+use serde_json::{Value, json};
+
+use crate::fixture::{AT_REST, expect, load_memory};
+use crate::generate::builder::{Builder, glb, png};
+use crate::generate::deforming::{bending_tube, morphing_sphere};
+use crate::generate::static_scenes::textured_square;
+use crate::invariants::check_world;
+use gltf_scene::{GltfLimits, LoadOptions};
+
+pub const CASES: &[crate::Case] = &[
+    ("small_files_that_would_grow_are_refused_by_the_name_of_the_limit", growing),
+    ("images_beyond_a_limit_are_left_out_by_its_name", images),
+    ("a_limit_that_is_just_enough_changes_nothing", just_enough),
+    ("hierarchies_may_be_deep_and_round", hierarchies),
+    ("warnings_are_counted_and_listed_up_to_a_limit", warnings),
+];
+
+type Change = fn(&mut Builder);
+
+/// Files of a few kilobytes, with the limits that a user has not changed.
+fn growing() -> Result<(), Failed> {
+    let changes: [(fn() -> Builder, Change, &str); 12] = [
+        (textured_square, |it| zeros(it, 0, 177_999_999), "zero_bytes"),
+        (textured_square, |it| zeros(it, 0, 1 << 40), "zero_bytes"),
+        (textured_square, |it| zeros(it, 0, 9_000_000_000_000_000), "zero_bytes"),
+        (textured_square, |it| zeros(it, 3, 1 << 28), "zero_bytes"),
+        // Sparse: four values of many are there.
+        (
+            textured_square,
+            |it| {
+                let (indices, values) = (it.view(&[0, 1, 2, 3]), it.view(&[0; 48]));
+                zeros(it, 0, 100_000_000);
+                it.json["accessors"][0]["sparse"] = json!({
+                    "count": 4, "indices": {"bufferView": indices, "componentType": 5121}, "values": {"bufferView": values},
+                });
+            },
+            "zero_bytes",
+        ),
+        // Each below the limit, and all together above.
+        (
+            textured_square,
+            |it| {
+                zeros(it, 0, 1_000_000);
+                let primitive = json!({"attributes": {"POSITION": 0}, "indices": 3});
+                it.json["meshes"][0]["primitives"] = (0..300).map(|_| primitive.clone()).collect();
+            },
+            "zero_bytes",
+        ),
+        // A target takes 36 bytes for each vertex.
+        (
+            textured_square,
+            |it| {
+                zeros(it, 0, 1_000_000);
+                let primitive = &mut it.json["meshes"][0]["primitives"][0];
+                *primitive = json!({"attributes": {"POSITION": 0}, "indices": 3});
+                primitive["targets"] = (0..500).map(|_| json!({"NORMAL": 0})).collect();
+            },
+            "zero_bytes",
+        ),
+        // Primitives times nodes.
+        (
+            textured_square,
+            |it| {
+                let primitive = it.json["meshes"][0]["primitives"][0].clone();
+                it.json["meshes"][0]["primitives"] = (0..1500).map(|_| primitive.clone()).collect();
+                (0..1500).for_each(|_| _ = it.root(json!({"mesh": 0})));
+            },
+            "objects",
+        ),
+        // Joints times nodes.
+        (
+            || bending_tube(None),
+            |it| {
+                let joints: Vec<_> = (0..3000).map(|joint| joint % 3).collect();
+                it.json["skins"][0] = json!({"joints": joints});
+                (0..1000).for_each(|_| _ = it.root(json!({"mesh": 0, "skin": 0})));
+            },
+            "pose_bytes",
+        ),
+        // Joints of a mesh without a skin, below a skewed node.
+        (
+            || bending_tube(None),
+            |it| {
+                let joints: Vec<[u8; 8]> = vec![[0xff; 8]; 31 * 25];
+                let view = it.view(joints.as_flattened());
+                let primitive = &it.json["meshes"][0]["primitives"][0];
+                let accessor = primitive["attributes"]["JOINTS_0"].as_u64().map_or(0, |index| index as usize);
+                it.json["accessors"][accessor]["componentType"] = json!(5123);
+                it.json["accessors"][accessor]["bufferView"] = json!(view);
+                let skewed = json!([1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+                (0..100).for_each(|_| _ = it.root(json!({"mesh": 0, "matrix": skewed})));
+            },
+            "pose_bytes",
+        ),
+        // Weights times nodes.
+        (
+            || morphing_sphere(None),
+            |it| {
+                let targets: Vec<_> = (0..10_000).map(|_| json!({"POSITION": 0})).collect();
+                let primitive = json!({"attributes": {"POSITION": 0}, "targets": targets});
+                it.json["meshes"][0] = json!({"primitives": [primitive]});
+                it.json["accessors"][0]["count"] = json!(3);
+                (0..4000).for_each(|_| _ = it.root(json!({"mesh": 0})));
+            },
+            "pose_bytes",
+        ),
+        // Keyframes for each channel again.
+        (
+            || bending_tube(None),
+            |it| {
+                let times = it.json["animations"][0]["samplers"][0]["input"].as_u64().map_or(0, |index| index as usize);
+                it.json["accessors"][times]["count"] = json!(1 << 25);
+                it.json["accessors"][times].as_object_mut().map(|accessor| accessor.remove("bufferView"));
+            },
+            "zero_bytes",
+        ),
+    ];
+    for (number, (scene, change, expected)) in changes.into_iter().enumerate() {
+        let mut builder = scene();
+        change(&mut builder);
+        refused(number, builder.glb(), GltfLimits::DEFAULT, expected)?;
+    }
+    // What is large in the file, with limits below that.
+    let builder = textured_square();
+    let limits = |change: fn(&mut GltfLimits)| {
+        let mut limits = GltfLimits::DEFAULT;
+        change(&mut limits);
+        limits
+    };
+    let uri = format!("data:application/octet-stream;base64,{}", "AAAA".repeat(builder.binary.len() / 3 + 1));
+    refused(20, builder.gltf(&uri), limits(|it| it.buffer_bytes = 100), "buffer_bytes")?;
+    refused(21, builder.glb(), limits(|it| it.json_values = 50), "json_values")?;
+    refused(22, builder.glb(), limits(|it| it.geometry_bytes = 100), "geometry_bytes")?;
+    refused(23, builder.glb(), limits(|it| it.objects = 0), "objects")?;
+    let moving = limits(|it| it.keyframe_bytes = 60);
+    refused(24, bending_tube(None).glb(), moving, "keyframe_bytes")?;
+    let posed = limits(|it| it.pose_bytes = 191);
+    refused(25, bending_tube(None).glb(), posed, "pose_bytes")?;
+    let path = crate::fixture::folder("limits").join("scene.glb");
+    std::fs::write(&path, builder.glb())?;
+    let options = LoadOptions { limits: limits(|it| it.scene_bytes = 1000), ..AT_REST };
+    let error = crate::fixture::load_file(&path, &options).err().map(|error| error.to_string()).unwrap_or_default();
+    expect(error.contains("`GltfLimits::scene_bytes` is 1000"), || error)
+}
+
+fn refused(number: usize, bytes: Vec<u8>, limits: GltfLimits, expected: &str) -> Result<(), Failed> {
+    let options = LoadOptions { limits, time: Some(0.5), ..AT_REST };
+    let error = load_memory("growing.glb", bytes, &options).err().map(|error| error.to_string());
+    let error = error.ok_or_else(|| format!("{number}: it is drawn"))?;
+    expect(error.contains(&format!("`GltfLimits::{expected}` is")), || format!("{number}: {error}, not {expected}"))
+}
+
+/// Makes an accessor one of zeros.
+fn zeros(it: &mut Builder, accessor: usize, count: u64) {
+    it.json["accessors"][accessor]["count"] = json!(count);
+    it.json["accessors"][accessor].as_object_mut().map(|accessor| accessor.remove("bufferView"));
+}
+
+fn images() -> Result<(), Failed> {
+    // A file of a few hundred bytes per megapixel: one colour.
+    let large = png(&image::RgbaImage::new(2000, 1000));
+    let deep = {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = image::DynamicImage::from(image::ImageBuffer::<image::Rgba<u16>, _>::new(300, 100));
+        image.write_to(&mut bytes, image::ImageFormat::Png)?;
+        bytes.into_inner()
+    };
+    let limits = GltfLimits { texture_bytes: 300 * 100 * 12 - 1, ..GltfLimits::DEFAULT };
+    left_out(&large, limits, "image 1 takes 8000000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
+    left_out(&deep, limits, "image 1 takes 360000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
+    let limits = GltfLimits { texture_file_bytes: 1000, ..GltfLimits::DEFAULT };
+    left_out(&large, limits, "`GltfLimits::texture_file_bytes` is 1000")?;
+    let limits = GltfLimits { all_textures_bytes: 100_000, ..GltfLimits::DEFAULT };
+    left_out(&large, limits, "`GltfLimits::all_textures_bytes` is 100000")?;
+    // The greatest size that a header can say.
+    let mut huge = large.clone();
+    huge[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+    let crc = crc32(&huge[12..29]);
+    huge[29..33].copy_from_slice(&crc.to_be_bytes());
+    left_out(&huge, GltfLimits::DEFAULT, "image 1 ")?;
+    // Too long for a texture: it is reduced, and that is said.
+    let long = png(&image::RgbaImage::from_pixel(16384, 4, image::Rgba([0, 255, 0, 255])));
+    left_out(&long, GltfLimits::DEFAULT, "image 1 of 16384x4 pixels is reduced to 8192x2")
+}
+
+/// Draws a scene with a second image.
+fn left_out(image: &[u8], limits: GltfLimits, expected: &str) -> Result<(), Failed> {
+    let mut builder = textured_square();
+    let view = builder.view(image);
+    let source = builder.push("images", json!({"bufferView": view}));
+    let texture = builder.push("textures", json!({"source": source}));
+    builder.json["materials"][0]["emissiveTexture"] = json!({"index": texture});
+    let world = load_memory("images.glb", builder.glb(), &LoadOptions { limits, ..AT_REST })?;
+    let is_named = world.warnings.len() == 1 && world.warnings[0].contains(expected);
+    expect(is_named && world.object_count() == 1, || format!("{:?}, not {expected:?}", world.warnings))?;
+    check_world(&world, &limits)
+}
+
+/// As PNG has it.
+fn crc32(bytes: &[u8]) -> u32 {
+    let step = |crc: u32, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 };
+    !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
+}
+
+/// A limit is what a scene takes, and less by one is too little.
+fn just_enough() -> Result<(), Failed> {
+    // Positions, normals and coordinates of 4 vertices; vertices of 32 bytes; 6 indices.
+    let of_geometry = 4 * (12 + 12 + 8) + 4 * 32 + 6 * 4;
+    let enough =
+        GltfLimits { geometry_bytes: of_geometry, objects: 1, zero_bytes: 0, pose_bytes: 0, ..GltfLimits::DEFAULT };
+    let options = LoadOptions { limits: enough, ..AT_REST };
+    let world = load_memory("enough.glb", textured_square().glb(), &options)?;
+    expect(world.warnings.is_empty() && world.object_count() == 1, || format!("{:?}", world.warnings))?;
+    check_world(&world, &enough)?;
+    let less = GltfLimits { geometry_bytes: of_geometry - 1, ..enough };
+    refused(0, textured_square().glb(), less, "geometry_bytes")
+}
+
+fn hierarchies() -> Result<(), Failed> {
+    const DEPTH: usize = 20_000;
+    let mut builder = textured_square();
+    let first = builder.json["nodes"].as_array().map_or(0, Vec::len);
+    let nodes = builder.json["nodes"].as_array_mut().ok_or("there are nodes")?;
+    nodes.extend((0..DEPTH).map(|depth| json!({"children": [first + depth + 1]})));
+    nodes.push(json!({"mesh": 0}));
+    builder.json["scenes"][0]["nodes"] = json!([0, 1, 2, first]);
+    let world = load_memory("deep.glb", builder.glb(), &AT_REST)?;
+    expect(world.object_count() == 2 && world.warnings.is_empty(), || format!("{:?}", world.warnings))?;
+
+    // In circles, of which some are in the scene.
+    let rounds: [(Value, Value, &str); 4] = [
+        (json!([first]), json!([]), "is its own ancestor"),
+        (json!([first + 1]), json!([first]), "is its own ancestor"),
+        (json!([first + 1, first + 1]), json!([]), "is a child twice"),
+        (json!([0, first + 1]), json!([0]), "is a child twice"),
+    ];
+    for (of_one, of_other, expected) in rounds {
+        let mut builder = textured_square();
+        let nodes = builder.json["nodes"].as_array_mut().ok_or("there are nodes")?;
+        nodes.extend([json!({"mesh": 0, "children": of_one}), json!({"mesh": 0, "children": of_other})]);
+        builder.json["scenes"][0]["nodes"] = json!([0, 1, 2, first, first + 1]);
+        let world = load_memory("round.glb", builder.glb(), &AT_REST)?;
+        let is_named = world.warnings.iter().any(|warning| warning.contains(expected));
+        expect(is_named && world.object_count() >= 1, || format!("{:?}, not {expected:?}", world.warnings))?;
+        check_world(&world, &GltfLimits::DEFAULT)?;
+    }
+    Ok(())
+}
+
+fn warnings() -> Result<(), Failed> {
+    let mut builder = textured_square();
+    (0..500).for_each(|number| _ = builder.root(json!({"mesh": 100 + number})));
+    let whole = load_memory("warnings.glb", builder.glb(), &AT_REST)?;
+    expect(whole.warnings.len() == 100 && whole.unlisted_warnings >= 400, || format!("{}", whole.unlisted_warnings))?;
+    let limits = GltfLimits { warnings: 0, ..GltfLimits::DEFAULT };
+    let none = load_memory("warnings.glb", builder.glb(), &LoadOptions { limits, ..AT_REST })?;
+    expect(none.warnings.is_empty() && none.unlisted_warnings >= 500, || format!("{}", none.unlisted_warnings))?;
+    let mut json = builder.json.clone();
+    json["buffers"] = json!([{"byteLength": 0}]);
+    let error = load_memory("warnings.glb", glb(&json, &[]), &LoadOptions { limits, ..AT_REST }).err();
+    let error = error.map(|error| error.to_string()).unwrap_or_default();
+    expect(error.contains("node 3 has no mesh"), || format!("the first loss is not named: {error}"))
+}
