@@ -1,4 +1,5 @@
-//! glTF files: a file is loaded as a world that can be drawn and is within the limits, or refused with an error that names the file.
+//! glTF files: a file is loaded as a world that can be drawn and is within the limits, or refused with an error that
+//! names the file.
 
 #![no_main]
 

@@ -1,6 +1,6 @@
 //! Typed values from the bytes of buffers.
 
-use crate::document::Source;
+use crate::document::{Source, View};
 use crate::element::{Element, Kind};
 use crate::error::Problem;
 use crate::limits::Limit;
@@ -112,44 +112,35 @@ impl<'a> Accessors<'a> {
     ) -> Result<Vec<[T; N]>, Problem> {
         let size = N * component.size();
         let value = |bytes: &[u8]| std::array::from_fn(|index| convert(&bytes[index * component.size()..]));
+        // What is replaced is in the file: it is there before anything is made.
+        let replaced = Replaced::find(self.source, accessor, size)?;
         let taken = (N * size_of::<T>()) as u64;
         let mut values = match accessor.index("bufferView")? {
             Some(view) => {
                 let view = self.source.view(accessor, view)?;
                 let stride = view.stride.unwrap_or(size);
                 let offset = accessor.index("byteOffset")?.unwrap_or(0);
-                let bytes = elements(&accessor, &view, offset, stride, size, count)?;
+                let bytes = elements(accessor, &view, offset, stride, size, count)?;
                 self.limit.take(accessor, count as u64, taken)?;
                 bytes.chunks(stride).map(value).collect()
             }
             None => {
-                self.source.budget.zeros.take(accessor, count as u64, taken)?;
+                let in_file = replaced.as_ref().map_or(0, |replaced| replaced.count.saturating_mul(ZEROS_PER_REPLACED));
+                self.source.budget.zeros.take(accessor, count.saturating_sub(in_file) as u64, taken)?;
                 self.limit.take(accessor, count as u64, taken)?;
                 vec![[T::default(); N]; count]
             }
         };
-        let Some(sparse) = accessor.object("sparse")? else { return Ok(values) };
-        let part = |member: &str| sparse.object(member)?.ok_or_else(|| sparse.lacks(member));
-        let (indices, replaced, count) = (part("indices")?, part("values")?, sparse.needed_index("count")?);
-        let index_type = match Component::of_number(indices.needed_index("componentType")?) {
-            Some(unsigned @ (Component::U8 | Component::U16 | Component::U32)) => unsigned,
-            _ => return Err(Problem::invalid(accessor, "has sparse indices that are no unsigned integers")),
-        };
-        let view_of = |part: &Element<'_>| self.source.view(accessor, part.needed_index("bufferView")?);
-        let (of_indices, of_values) = (view_of(&indices)?, view_of(&replaced)?);
-        let offset = |part: &Element<'_>| Ok::<_, Problem>(part.index("byteOffset")?.unwrap_or(0));
-        let named = |part: &str| format!("the sparse {part} of {accessor}");
-        let index_size = index_type.size();
-        let numbers = elements(&named("indices"), &of_indices, offset(&indices)?, index_size, index_size, count)?;
-        let bytes = elements(&named("values"), &of_values, offset(&replaced)?, size, size, count)?;
-        for (index, bytes) in numbers.chunks(index_size).zip(bytes.chunks(size)) {
-            let (index, count) = (integer(index, index_type), values.len());
-            *values.get_mut(index as usize).ok_or_else(|| Problem::IndexOutOfRange {
-                element: named("indices"),
-                index: index.into(),
-                count,
-                what: "elements",
-            })? = value(bytes);
+        if let Some(replaced) = replaced {
+            for (index, bytes) in replaced.elements(size)? {
+                let count = values.len();
+                *values.get_mut(index as usize).ok_or_else(|| Problem::IndexOutOfRange {
+                    element: format!("the sparse indices of {accessor}"),
+                    index: index.into(),
+                    count,
+                    what: "elements",
+                })? = value(bytes);
+            }
         }
         Ok(values)
     }
@@ -163,10 +154,57 @@ impl<'a> Accessors<'a> {
     }
 }
 
+/// How many zeros a sparse accessor may have for each value that it replaces, before they count as made of nothing.
+const ZEROS_PER_REPLACED: usize = 64;
+
+/// The values that a sparse accessor replaces.
+struct Replaced<'a> {
+    accessor: &'a Element<'a>,
+    count: usize,
+    index_type: Component,
+    indices: View<'a>,
+    values: View<'a>,
+    /// Where they begin in their views.
+    offsets: [usize; 2],
+}
+
+impl<'a> Replaced<'a> {
+    /// Those of an accessor whose values take `size` bytes, if it is sparse.
+    fn find(source: &'a Source, accessor: &'a Element<'a>, size: usize) -> Result<Option<Self>, Problem> {
+        let Some(sparse) = accessor.object("sparse")? else { return Ok(None) };
+        let part = |member: &str| sparse.object(member)?.ok_or_else(|| sparse.lacks(member));
+        let (indices, values, count) = (part("indices")?, part("values")?, sparse.needed_index("count")?);
+        let index_type = match Component::of_number(indices.needed_index("componentType")?) {
+            Some(unsigned @ (Component::U8 | Component::U16 | Component::U32)) => unsigned,
+            _ => return Err(Problem::invalid(accessor, "has sparse indices that are no unsigned integers")),
+        };
+        let view_of = |part: &Element<'_>| source.view(accessor, part.needed_index("bufferView")?);
+        let offset = |part: &Element<'_>| Ok::<_, Problem>(part.index("byteOffset")?.unwrap_or(0));
+        let offsets = [offset(&indices)?, offset(&values)?];
+        let (indices, values) = (view_of(&indices)?, view_of(&values)?);
+        let replaced = Self { accessor, count, index_type, indices, values, offsets };
+        replaced.elements(size).map(|_| ())?;
+        Ok(Some(replaced))
+    }
+
+    /// The index and the bytes of each.
+    ///
+    /// # Errors
+    /// If they are not all there.
+    fn elements(&self, size: usize) -> Result<impl Iterator<Item = (u32, &[u8])>, Problem> {
+        let named = |part: &str| format!("the sparse {part} of {}", self.accessor);
+        let (index_size, [of_indices, of_values]) = (self.index_type.size(), self.offsets);
+        let indices = elements(&named("indices"), &self.indices, of_indices, index_size, index_size, self.count)?;
+        let values = elements(&named("values"), &self.values, of_values, size, size, self.count)?;
+        let indices = indices.chunks(index_size).map(|bytes| integer(bytes, self.index_type));
+        Ok(indices.zip(values.chunks(size)))
+    }
+}
+
 /// The bytes of `count` elements of `size` bytes, `stride` bytes apart.
 fn elements<'v>(
     element: &dyn std::fmt::Display,
-    view: &'v crate::document::View<'_>,
+    view: &'v View<'_>,
     offset: usize,
     stride: usize,
     size: usize,

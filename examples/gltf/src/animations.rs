@@ -34,8 +34,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) end: Option<f64>,
 }
 
-/// Moves nodes to where an animation has them at a time in seconds. A channel with which something is wrong moves nothing, which is a
-/// warning.
+/// Moves nodes to where an animation has them at a time in seconds. A channel with which something is wrong moves
+/// nothing, which is a warning.
 ///
 /// # Errors
 /// If a limit is exceeded.

@@ -30,8 +30,8 @@ impl ArraySize {
 /// How many arrays are compared with each other.
 const MAX_COMPARED: usize = 64;
 
-/// The sizes of up to [`ARRAYS`] arrays for images of some sizes: each size has one of its own, as long as there are enough. Then those share
-/// one that waste the least.
+/// The sizes of up to [`ARRAYS`] arrays for images of some sizes: each size has one of its own, as long as there are
+/// enough. Then those share one that waste the least.
 pub(crate) fn array_sizes(of_images: impl Iterator<Item = [u32; 2]>) -> Vec<ArraySize> {
     let mut of_sizes = BTreeMap::new();
     for size in of_images {

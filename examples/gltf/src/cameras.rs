@@ -72,7 +72,8 @@ pub(crate) fn read_camera(
     })
 }
 
-/// A camera that sees a whole sphere, from before, from the right and from above; a part of one that is larger than the world.
+/// A camera that sees a whole sphere, from before, from the right and from above; a part of one that is larger than the
+/// world.
 pub(crate) fn framing_camera(center: DVec3, radius: f64, size: [u32; 2]) -> Camera {
     const FIELD_OF_VIEW: f64 = 0.8;
     let narrowest = (size[0] as f64 / size[1] as f64).min(1.0);

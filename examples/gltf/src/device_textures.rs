@@ -6,10 +6,11 @@ use drawloom::wgpu;
 use crate::mip_levels::{mip_count, mip_size};
 use crate::texture_arrays::{ARRAYS, TextureArray, TextureArrays};
 
-/// Uploads texture arrays. Returns the resources of `textures.wgsl`: the arrays as colours, then as numbers, and two samplers.
+/// Uploads texture arrays. Returns the resources of `textures.wgsl`: the arrays as colours, then as numbers, and two
+/// samplers.
 ///
 /// # Errors
-/// If the device has not so many layers or pixels.
+/// If the device has not so many layers or pixels, or not the memory for them.
 pub(crate) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -17,7 +18,18 @@ pub(crate) fn upload(
 ) -> Result<Vec<ShaderResource<'static>>, String> {
     let empty = TextureArray { size: [1, 1], layers: vec![vec![255; 4]] };
     let arrays = textures.arrays.iter().chain(std::iter::repeat(&empty)).take(ARRAYS);
-    let uploaded = arrays.map(|array| upload_array(device, queue, array)).collect::<Result<Vec<_>, _>>()?;
+    let scopes = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+    let scopes = scopes.map(|filter| device.push_error_scope(filter));
+    let uploaded = arrays.map(|array| upload_array(device, queue, array)).collect::<Result<Vec<_>, _>>();
+    // Scopes are a stack, and each must be popped.
+    let mut failed = None;
+    for scope in scopes.into_iter().rev() {
+        failed = failed.or(pollster::block_on(scope.pop()));
+    }
+    if let Some(error) = failed {
+        return Err(format!("the device cannot have the textures: {error}"));
+    }
+    let uploaded = uploaded?;
     let formats = [wgpu::TextureFormat::Rgba8UnormSrgb, wgpu::TextureFormat::Rgba8Unorm];
     let views = formats.into_iter().flat_map(|format| uploaded.iter().map(move |texture| view(texture, format)));
     let samplers = [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(|filter| sampler(device, filter));

@@ -22,8 +22,8 @@ pub struct LoadError {
     pub warnings: Vec<String>,
 }
 
-/// What is wrong with a file, or with an element of it. Elements are named as glTF numbers them, and by their names, in which control
-/// characters are escaped: `mesh 3 (wheel) primitive 0`.
+/// What is wrong with a file, or with an element of it. Elements are named as glTF numbers them, and by their names, in
+/// which control characters are escaped: `mesh 3 (wheel) primitive 0`.
 ///
 /// A problem of an element loses that element only, and is one of the [warnings](crate::World::warnings).
 #[derive(Debug, thiserror::Error)]
@@ -44,7 +44,7 @@ pub enum Problem {
         error: std::io::Error,
     },
     /// More of something than a limit allows.
-    #[error("{element} takes {amount}{} or more{}, and `GltfLimits::{field}` is {limit}", unit(field), already_taken(*taken))]
+    #[error("{element} takes {}{}, and `GltfLimits::{field}` is {limit}", at_least(*amount, field), already_taken(*taken))]
     OverLimit {
         /// The element.
         element: String,
@@ -217,8 +217,8 @@ impl Problem {
     }
 }
 
-fn unit(field: &str) -> &'static str {
-    if field.ends_with("bytes") { " bytes" } else { "" }
+fn at_least(amount: u64, field: &str) -> String {
+    format!("{amount}{} or more", if field.ends_with("bytes") { " bytes" } else { "" })
 }
 
 fn already_taken(taken: u64) -> String {

@@ -47,7 +47,8 @@ pub(crate) fn read_file(path: &Path, limit: &Limit) -> Result<Vec<u8>, Problem> 
 /// Reads what a URI of an element refers to: data inside the URI, or a file in the folder of the document or below it.
 ///
 /// # Errors
-/// If the URI has another scheme, leads out of the folder, leads to what cannot be read, or to more bytes than what is left of the limit.
+/// If the URI has another scheme, leads out of the folder, leads to what cannot be read, or to more bytes than what is
+/// left of the limit.
 pub(crate) fn read_uri(folder: &Path, element: &dyn Display, uri: &str, limit: &Limit) -> Result<Vec<u8>, Problem> {
     let refused = |reason: String| Problem::Uri { element: element.to_string(), reason };
     if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {

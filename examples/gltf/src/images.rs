@@ -28,7 +28,8 @@ struct Decoded {
 }
 
 impl Decoding {
-    /// Starts to decode the images of these indices. Those that cannot be read or are too large are left out, with a warning.
+    /// Starts to decode the images of these indices. Those that cannot be read or are too large are left out, with a
+    /// warning.
     ///
     /// # Errors
     /// If a limit is exceeded.

@@ -11,7 +11,8 @@ use crate::error::Problem;
 pub(crate) struct Keyframes {
     /// In seconds.
     times: Vec<f32>,
-    /// For each time `width` numbers; with cubic splines thrice that: the tangent before it, the value, the tangent behind it.
+    /// For each time `width` numbers; with cubic splines thrice that: the tangent before it, the value, the tangent
+    /// behind it.
     values: Vec<f32>,
     width: usize,
     interpolation: Interpolation,

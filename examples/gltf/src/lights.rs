@@ -75,10 +75,9 @@ fn cone(light: &Element<'_>, warnings: &mut Warnings) -> Result<[f32; 2], Proble
     // Half a turn over four is more than its nearest f32 in some files.
     let is_valid = 0.0 <= inner && inner < outer && outer <= FRAC_PI_2 + 1e-6;
     if !is_valid || drawn_outer > outer {
-        let drawn = format!("{drawn_inner} and {drawn_outer}");
-        warnings.add(format!(
-            "{light} has a cone of the angles {inner} and {outer}, not 0 <= inner < outer <= 90 degrees or too narrow, and is drawn with {drawn}"
-        ));
+        let reason = "which are not 0 <= inner < outer <= 90 degrees, or too narrow";
+        let drawn = format!("the nearest that can be drawn: {drawn_inner} and {drawn_outer}");
+        warnings.add(format!("{light} has a cone of the angles {inner} and {outer}, {reason}, and has {drawn}"));
     }
     Ok([drawn_inner, drawn_outer])
 }

@@ -5,12 +5,12 @@ use std::fmt::Display;
 
 use crate::error::Problem;
 
-/// What a file may take, so that a damaged or hostile one cannot exhaust memory or take very long. What is made of a file counts, and not only
-/// what is read of it: an accessor without a buffer view makes zeros of nothing, and an accessor that many primitives refer to is
-/// read for each of them.
+/// What a file may take, so that a damaged or hostile one cannot exhaust memory or take very long. What is made of a
+/// file counts, and not only what is read of it: an accessor without a buffer view makes zeros of nothing, and an
+/// accessor that many primitives refer to is read for each of them.
 ///
-/// A file that exceeds a limit is refused, and the message names the limit. Images that exceed theirs are left out, with a warning that names
-/// it.
+/// A file that exceeds a limit is refused, and the message names the limit. Images that exceed theirs are left out,
+/// with a warning that names it.
 ///
 /// ```
 /// use gltf_scene::{GltfLimits, LoadOptions};
@@ -22,28 +22,28 @@ use crate::error::Problem;
 pub struct GltfLimits {
     /// The bytes of the `.gltf` or `.glb`. Default: 2 GiB.
     pub scene_bytes: u64,
-    /// The values of its JSON: numbers, strings, lists and objects. Each takes up to 100 bytes while the file is loaded. Default: 16 Mi.
+    /// The values of its JSON: numbers, strings, lists and objects. Each takes up to 100 bytes while the file is
+    /// loaded. Default: 16 Mi.
     pub json_values: u64,
     /// The bytes of all buffers outside the `.glb` together. Default: 2 GiB.
     pub buffer_bytes: u64,
     /// The bytes of all vertices, indices, attributes, morph targets and inverse bind matrices. Default: 1 GiB.
     pub geometry_bytes: u64,
-    /// The bytes of all values of accessors without a buffer view, which are zeros but for those that a sparse accessor replaces.
-    /// Default: 64 MiB.
+    /// The bytes of the zeros of accessors without a buffer view, beyond 64 for each value that a sparse accessor replaces. Default: 4 MiB.
     pub zero_bytes: u64,
     /// The bytes of the keyframes of the animation that is drawn. Default: 256 MiB.
     pub keyframe_bytes: u64,
-    /// The bytes of the joints and the morph weights of all objects. Default: 128 MiB.
+    /// The bytes of the joints and the morph weights of all objects. Default: 24 MiB.
     pub pose_bytes: u64,
-    /// The objects: one for each primitive of each node's mesh. Default: 2 Mi.
+    /// The objects: one for each primitive of each node's mesh. Default: 1 Mi.
     pub objects: u64,
     /// The bytes of an image before it is decoded. Default: 256 MiB.
     pub texture_file_bytes: u64,
-    /// The bytes that an image takes while it is decoded: 4 for each pixel, and besides those of the file's own format where a
-    /// channel has more than 8 bits. Default: 512 MiB.
+    /// The bytes that an image takes while it is decoded: 4 for each pixel, and besides those of the file's own format
+    /// where a channel has more than 8 bits. Default: 512 MiB.
     pub texture_bytes: u64,
-    /// The bytes that all images take together: those of their files, and 4 for each pixel. The texture arrays that are made of them, with mip
-    /// levels, take as much again at most. Default: 2 GiB.
+    /// The bytes that all images take together: those of their files, and 4 for each pixel. The texture arrays that are
+    /// made of them, with mip levels, take as much again at most. Default: 1 GiB.
     pub all_textures_bytes: u64,
     /// The warnings that are listed. All are counted. Default: 100.
     pub warnings: u64,
@@ -79,13 +79,13 @@ impl GltfLimits {
         json_values: 16 << 20,
         buffer_bytes: 2 << 30,
         geometry_bytes: 1 << 30,
-        zero_bytes: 64 << 20,
+        zero_bytes: 4 << 20,
         keyframe_bytes: 256 << 20,
-        pose_bytes: 128 << 20,
-        objects: 2 << 20,
+        pose_bytes: 24 << 20,
+        objects: 1 << 20,
         texture_file_bytes: 256 << 20,
         texture_bytes: 512 << 20,
-        all_textures_bytes: 2 << 30,
+        all_textures_bytes: 1 << 30,
         warnings: 100,
     };
 

@@ -34,7 +34,8 @@ pub struct LoadOptions {
     pub time: Option<f64>,
     /// The index of the animation.
     pub animation: usize,
-    /// The index of the camera among those of the scene; `None` for the first, or one that frames the scene if there is none.
+    /// The index of the camera among those of the scene; `None` for the first, or one that frames the scene if there is
+    /// none.
     pub camera: Option<usize>,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
@@ -54,8 +55,8 @@ impl Default for LoadOptions {
 /// What is wrong with an element of the file loses that element, and is one of the [warnings](World::warnings).
 ///
 /// # Errors
-/// If the file is not glTF 2.0, requires an extension that the loader does not know, exceeds a [limit](GltfLimits), or all that
-/// its scene has to draw is lost. The error names the element.
+/// If the file is not glTF 2.0, requires an extension that the loader does not know, exceeds a [limit](GltfLimits), or
+/// all that its scene has to draw is lost. The error names the element.
 pub fn load(
     path: &Path,
     options: &LoadOptions,
@@ -137,7 +138,7 @@ fn read(
     // Each is decoded, and then made a layer of a texture array, perhaps several times.
     progress.set_length((decoding.count() + uses.count()) as u64);
     let images = decoding.wait(progress, warnings);
-    let textures = TextureArrays::new(&uses, &images, &options.limits, scheduler, progress, warnings);
+    let textures = TextureArrays::new(&uses, images, &options.limits, scheduler, progress, warnings);
     let parts = Parts { source, nodes, world, weights, target_counts, primitives, skins, materials };
     let mut builder = WorldBuilder::new(&parts, morphs, &textures, warnings)?;
     builder.add_objects()?;

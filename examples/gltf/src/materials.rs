@@ -13,8 +13,8 @@ use crate::warnings::Warnings;
 /// The greatest factor of a colour. A brighter one is drawn as bright.
 const MAX_FACTOR: f32 = 1e30;
 
-/// Reads a material, and adds the images that it uses. What is wrong with one of its values is a warning, and the value is the default
-/// one.
+/// Reads a material, and adds the images that it uses. What is wrong with one of its values is a warning, and the value
+/// is the default one.
 ///
 /// # Errors
 /// If a limit is exceeded.

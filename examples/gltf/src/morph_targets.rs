@@ -10,6 +10,10 @@ use crate::warnings::Warnings;
 /// How many numbers a vertex has for each morph target: the differences of its position, its normal and its tangent.
 pub(crate) const NUMBERS_PER_VERTEX: usize = 9;
 
+/// The greatest number of bytes of all targets. With the weights of objects, which are behind them, they are one binding of the
+/// shader, and WebGPU allows 128 MiB.
+const MAX_BYTES: u64 = 96 << 20;
+
 /// The morph targets of a primitive. One that changes nothing takes no memory.
 #[derive(Debug, Default)]
 pub(crate) struct MorphTargets {
@@ -22,11 +26,11 @@ pub(crate) struct MorphTargets {
 }
 
 impl MorphTargets {
-    /// Reads the targets of a primitive of so many vertices. What a target has not one finite value of for each vertex, it does not change,
-    /// which is a warning.
+    /// Reads the targets of a primitive of so many vertices. What a target has not one finite value of for each vertex,
+    /// it does not change, which is a warning.
     ///
     /// # Errors
-    /// If a limit is exceeded, or the numbers of all targets are too many for an index.
+    /// If a limit is exceeded.
     pub(crate) fn read(
         accessors: Accessors<'_>,
         primitive: &Element<'_>,
@@ -35,7 +39,7 @@ impl MorphTargets {
         warnings: &mut Warnings,
     ) -> Result<Self, Problem> {
         let list = warnings.keep(primitive.list("targets"), format_args!("{primitive} has no morph targets"))?;
-        let mut targets = Self { first: number_of(morphs.len())?, ..Self::default() };
+        let mut targets = Self { first: morphs.len() as u32, ..Self::default() };
         for (number, json) in list.unwrap_or_default().iter().enumerate() {
             let (target, element) = (primitive.inner(json), format!("morph target {number} of {primitive}"));
             for (name, _) in json.members() {
@@ -58,10 +62,16 @@ impl MorphTargets {
             if parts.is_empty() {
                 continue;
             }
-            accessors.limit.take(&element, vertices as u64, 4 * NUMBERS_PER_VERTEX as u64)?;
             let first = morphs.len();
+            let bytes = (first as u64).saturating_add(vertices as u64 * NUMBERS_PER_VERTEX as u64).saturating_mul(4);
+            if bytes > MAX_BYTES {
+                let reason =
+                    format!("with those before it, it takes {bytes} bytes of the {MAX_BYTES} that devices bind");
+                warnings.add(format!("{element} is left out: {reason}"));
+                continue;
+            }
+            accessors.limit.take(&element, vertices as u64, 4 * NUMBERS_PER_VERTEX as u64)?;
             morphs.resize(first + vertices * NUMBERS_PER_VERTEX, 0.0);
-            number_of(morphs.len())?;
             let of_target = &mut morphs[first..];
             for (part, values) in parts {
                 let of_vertices = of_target.chunks_mut(NUMBERS_PER_VERTEX).zip(values);
@@ -78,11 +88,6 @@ impl MorphTargets {
     pub(crate) fn weights(&self, of_file: &[f32]) -> Vec<f32> {
         self.numbers.iter().map(|&number| of_file.get(number).copied().unwrap_or(0.0)).collect()
     }
-}
-
-/// A number of numbers, as the shader has it.
-fn number_of(count: usize) -> Result<u32, Problem> {
-    u32::try_from(count).map_err(|_| Problem::invalid("the scene", format!("has {count} numbers of morph targets")))
 }
 
 /// # Errors

@@ -70,7 +70,8 @@ impl Nodes {
         Ok(Self { local, parents, order })
     }
 
-    /// From each node to the world; `None` if it has no place there: its transform leaves the range of numbers, which is a warning.
+    /// From each node to the world; `None` if it has no place there: its transform leaves the range of numbers, which
+    /// is a warning.
     ///
     /// # Errors
     /// If a limit is exceeded.

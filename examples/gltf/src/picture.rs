@@ -14,8 +14,8 @@ use crate::device_textures::upload;
 use crate::surfaces::Surfaces;
 use crate::world::World;
 
-/// Opens a device on the best adapter, with all its limits: poses and morph targets take storage buffers beyond those that Drawloom
-/// requires.
+/// Opens a device on the best adapter, with all its limits: poses and morph targets take storage buffers beyond those
+/// that Drawloom requires.
 ///
 /// # Errors
 /// If there is no adapter, or it has not what Drawloom requires.

@@ -26,8 +26,9 @@ pub(crate) struct Primitive {
     pub(crate) joints: Option<VertexJoints>,
 }
 
-/// Reads a primitive; `None`, with a warning, if it is not drawn. What is wrong with one of its attributes loses that attribute, with a warning;
-/// what is wrong with its positions or indices loses the primitive. The numbers of its morph targets go to `morphs`.
+/// Reads a primitive; `None`, with a warning, if it is not drawn. What is wrong with one of its attributes loses that
+/// attribute, with a warning; what is wrong with its positions or indices loses the primitive. The numbers of its morph
+/// targets go to `morphs`.
 ///
 /// # Errors
 /// If a limit is exceeded.

@@ -5,8 +5,8 @@ use drawloom::scene::{Blend, Material, MaterialType};
 /// Materials without holes, and blended ones.
 pub(crate) const SURFACE: MaterialType<Surface> = MaterialType::new("gltf surface");
 
-/// Materials with holes where alpha is below their cut-off. A type of their own, because the process that draws them must not count as
-/// one that hides what is behind the whole shape.
+/// Materials with holes where alpha is below their cut-off. A type of their own, because the process that draws them
+/// must not count as one that hides what is behind the whole shape.
 pub(crate) const MASKED_SURFACE: MaterialType<Surface> = MaterialType::new("gltf masked surface");
 
 /// What distinguishes materials: `GltfMaterial` in `surfaces.wgsl`.

@@ -24,8 +24,8 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// With the textures and samplers of [`TextureArrays`](crate::texture_arrays::TextureArrays). Processes that draw into one target
-    /// need an order: this one comes after `previous`.
+    /// With the textures and samplers of [`TextureArrays`](crate::texture_arrays::TextureArrays). Processes that draw
+    /// into one target need an order: this one comes after `previous`.
     pub(crate) fn new(
         kind: SurfaceKind,
         deformation: Option<SkinsAndMorphs>,

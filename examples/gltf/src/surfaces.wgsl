@@ -3,8 +3,8 @@ struct TextureSlot {
     offset: vec2<f32>,
     // The array above the layer; all ones for no texture.
     texture: u32,
-    // 1: the second texture coordinates; 2 and 4: the nearest pixel where the image is magnified and minified; 8: no mip levels; 16: the
-    // nearest mip level; two bits each from bit 8 on: how u and v wrap.
+    // 1: the second texture coordinates; 2 and 4: the nearest pixel where the image is magnified and minified; 8: no
+    // mip levels; 16: the nearest mip level; two bits each from bit 8 on: how u and v wrap.
     flags: u32,
     // Of the image in pixels: it fills the layer, or its upper left.
     size: vec2<u32>,
@@ -123,7 +123,8 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     return vec4<f32>(min(radiance, vec3<f32>(60000.0)), opacity);
 }
 
-// What a light sends to a surface, as `KHR_lights_punctual` has it: `illuminance_from` fades otherwise at the end of a range and of a cone.
+// What a light sends to a surface, as `KHR_lights_punctual` has it: `illuminance_from` fades otherwise at the end of a
+// range and of a cone.
 fn punctual_illuminance(light: Light, position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     if light.kind == DIRECTIONAL {
         return illuminance_from(light, position, normal);
@@ -186,7 +187,8 @@ fn reflection(
     return (1.0 - fresnel) * diffuse / PI + fresnel * distribution * 0.5 / max(masking, 1e-6);
 }
 
-// What a glossy surface reflects of radiance that comes from everywhere: Karis, "Physically Based Shading on Mobile", 2014.
+// What a glossy surface reflects of radiance that comes from everywhere: Karis, "Physically Based Shading on Mobile",
+// 2014.
 fn reflected_ambient(head_on: vec3<f32>, roughness: f32, n_v: f32) -> vec3<f32> {
     let r = roughness * vec4<f32>(-1.0, -0.0275, -0.572, 0.022) + vec4<f32>(1.0, 0.0425, 1.04, -0.04);
     let bent = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;

@@ -3,8 +3,8 @@
 /// How many characters of a text messages show.
 const MAX_CHARACTERS: usize = 80;
 
-/// The beginning of a text, without control characters and those that turn or break lines: they are escaped, so that none reaches a
-/// terminal.
+/// The beginning of a text, without control characters and those that turn or break lines: they are escaped, so that
+/// none reaches a terminal.
 pub(crate) fn excerpt(text: &str) -> String {
     let mut shown = String::new();
     for (number, character) in text.chars().enumerate() {

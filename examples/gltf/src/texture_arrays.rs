@@ -1,7 +1,7 @@
 //! All images of a file as layers of a few texture arrays, because a process has the same textures for all materials.
 //!
-//! Each image keeps its pixels: one that is smaller than its layer is in the upper left of it, and so are its mip levels in those of the
-//! layer. The shader filters such an image itself.
+//! Each image keeps its pixels: one that is smaller than its layer is in the upper left of it, and so are its mip
+//! levels in those of the layer. The shader filters such an image itself.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -85,21 +85,24 @@ pub(crate) struct TextureArray {
 }
 
 impl TextureArrays {
-    /// Makes the mip levels of images in background jobs. Images that exceed the limit of all textures, or the number of layers
-    /// that an array has, are left out, with a warning.
+    /// Makes the mip levels of images in background jobs. Images that exceed the limit of all textures, or the number
+    /// of layers that an array has, are left out, with a warning.
     pub(crate) fn new(
         uses: &TextureUses,
-        images: &BTreeMap<usize, Arc<RgbaImage>>,
+        images: BTreeMap<usize, Arc<RgbaImage>>,
         limits: &GltfLimits,
         scheduler: &Scheduler,
         progress: &ProgressBar,
         warnings: &mut Warnings,
     ) -> Self {
-        let decoded = |(number, used): (u32, &TextureUse)| Some((number, *used, images.get(&used.image)?));
-        let decoded: Vec<_> = (0..).zip(&uses.uses).filter_map(decoded).collect();
+        let decoded = |(number, used): (u32, &TextureUse)| Some((number, *used, Arc::clone(images.get(&used.image)?)));
+        let mut decoded: Vec<_> = (0..).zip(&uses.uses).filter_map(decoded).collect();
         let size_of = |image: &RgbaImage| <[u32; 2]>::from(image.dimensions());
-        // Sizes that do not fit together take more than the images do, so fewer of them may fit: the most that do are searched for.
+        // Sizes that do not fit together take more than the images do, so fewer of them may fit: the most that do are
+        // searched for.
         let arrays_of = |count: usize| array_sizes(decoded[..count].iter().map(|(_, _, image)| size_of(image)));
+        // From here on each image is freed when its last layer is made.
+        drop(images);
         let fits =
             |count: usize| arrays_of(count).iter().map(|array| array.bytes()).sum::<u64>() <= limits.all_textures_bytes;
         let (mut kept, mut too_many) = (decoded.len(), decoded.len() + 1);
@@ -111,19 +114,18 @@ impl TextureArrays {
             if fits(middle) { kept = middle } else { too_many = middle }
         }
         for (_, used, _) in &decoded[kept..] {
-            let limit = limits.all_textures_bytes;
-            warnings.add(format!(
-                "image {} is left out: texture arrays with it and the images before it exceed `GltfLimits::all_textures_bytes`, which is {limit}",
-                used.image
-            ));
+            let (image, limit) = (used.image, limits.all_textures_bytes);
+            let reason = "with those before it, its texture array exceeds `GltfLimits::all_textures_bytes`";
+            warnings.add(format!("image {image} is left out: {reason}, which is {limit}"));
         }
         let sizes = arrays_of(kept);
+        decoded.truncate(kept);
         let mut arrays: Vec<_> =
             sizes.iter().map(|array| TextureArray { size: array.size, layers: Vec::new() }).collect();
         let mut layers = vec![0; arrays.len()];
         let mut jobs = Vec::new();
-        for (number, used, image) in &decoded[..kept] {
-            let size = size_of(image);
+        for (number, used, image) in decoded {
+            let size = size_of(&image);
             let Some(array) = sizes.iter().position(|array| array.sizes.contains(&size)) else { continue };
             if layers[array] == MAX_LAYERS {
                 let warning = format!("is left out: {MAX_LAYERS} other images share its texture array");
@@ -131,9 +133,9 @@ impl TextureArrays {
                 continue;
             }
             layers[array] += 1;
-            let (layer_size, space, image) = (sizes[array].size, used.space, Arc::clone(image));
+            let (layer_size, space) = (sizes[array].size, used.space);
             let job = scheduler.background(move || mip_levels_within(&image, layer_size, space));
-            jobs.push((*number, used.image, array, size, job));
+            jobs.push((number, used.image, array, size, job));
         }
         let mut places = BTreeMap::new();
         for (number, image, array, size, job) in jobs {

@@ -47,7 +47,8 @@ impl SlotReader<'_> {
         Ok(TextureSlot { texture, flags, ..slot })
     }
 
-    /// How a texture is filtered and wrapped: smoothly with mip levels, and repeated, unless its sampler says otherwise.
+    /// How a texture is filtered and wrapped: smoothly with mip levels, and repeated, unless its sampler says
+    /// otherwise.
     fn sampler_flags(&mut self, texture: &Element<'_>) -> Result<u32, Problem> {
         let read = self.source.member(texture, "sampler", Kind::Sampler);
         let lost = format_args!("{texture} is drawn with the default sampler");

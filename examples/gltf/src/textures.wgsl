@@ -82,7 +82,8 @@ fn texel_of_part(
     if fract(level) == 0.0 {
         return texel;
     }
-    return mix(texel, texel_of_level(colors, slot, uv, layer, min(first + 1u, last_level(slot)), nearest), fract(level));
+    let next = texel_of_level(colors, slot, uv, layer, min(first + 1u, last_level(slot)), nearest);
+    return mix(texel, next, fract(level));
 }
 
 fn texel_of_level(

@@ -6,8 +6,8 @@ use crate::error::Problem;
 use crate::primitives::Mode;
 use crate::warnings::Warnings;
 
-/// The corners of the triangles of a primitive; `None`, with a warning, if it is of points or lines, or has no triangle. Triangles that are
-/// not whole, or have a corner that is no vertex, are left out, with a warning.
+/// The corners of the triangles of a primitive; `None`, with a warning, if it is of points or lines, or has no
+/// triangle. Triangles that are not whole, or have a corner that is no vertex, are left out, with a warning.
 ///
 /// # Errors
 /// If the indices cannot be read.

@@ -9,7 +9,8 @@ use crate::attributes::{POSE, Pose};
 use crate::surface_kind::SurfaceKind;
 use crate::texture_arrays::TextureArrays;
 
-/// A loaded scene: what Drawloom draws, and what the loader left out of the file. In names of the file, control characters are escaped.
+/// A loaded scene: what Drawloom draws, and what the loader left out of the file. In names of the file, control
+/// characters are escaped.
 #[derive(Debug)]
 pub struct World {
     pub(crate) scene: Scene,

@@ -181,7 +181,8 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
         Ok(())
     }
 
-    /// Adds the camera that the picture is drawn with: one that frames the scene, if something is wrong with that of the file.
+    /// Adds the camera that the picture is drawn with: one that frames the scene, if something is wrong with that of
+    /// the file.
     ///
     /// # Errors
     /// If there is no such camera.

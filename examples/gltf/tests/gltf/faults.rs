@@ -1,4 +1,5 @@
-//! One element with which something is wrong loses itself, by name, and nothing else: neither at rest nor while an animation is drawn.
+//! One element with which something is wrong loses itself, by name, and nothing else: neither at rest nor while an
+//! animation is drawn.
 
 use drawloom::scene::Light;
 use libtest_mimic::Failed;
@@ -197,7 +198,8 @@ fn cones() -> Result<(), Failed> {
             _ => None,
         });
         let Some([drawn_inner, drawn_outer]) = cone else { return Err(format!("{spot}: the lamp is lost").into()) };
-        // Cosines of f32 differ from 6e-8 on, so angles may have to differ by the root of twice that where cosines are flat.
+        // Cosines of f32 differ from 6e-8 on, so angles may have to differ by the root of twice that where cosines are
+        // flat.
         let is_near = (drawn_inner - inner).abs() < 4e-4 && (drawn_outer - outer).abs() < 1e-6;
         expect(is_near, || format!("{spot}: {drawn_inner} and {drawn_outer}"))?;
         let warnings = world.warnings.iter().filter(|it| it.contains("light 1")).count();

@@ -1,5 +1,5 @@
-//! What is made of a file is bounded, and not only what is read of it: small files that would grow are refused at once, by the name of the
-//! limit.
+//! What is made of a file is bounded, and not only what is read of it: small files that would grow are refused at once,
+//! by the name of the limit.
 
 use libtest_mimic::Failed;
 use serde_json::{Value, json};
@@ -15,6 +15,7 @@ pub const CASES: &[crate::Case] = &[
     ("small_files_that_would_grow_are_refused_by_the_name_of_the_limit", growing),
     ("images_beyond_a_limit_are_left_out_by_its_name", images),
     ("a_limit_that_is_just_enough_changes_nothing", just_enough),
+    ("sparse_accessors_have_as_many_zeros_as_their_values_allow", sparse),
     ("hierarchies_may_be_deep_and_round", hierarchies),
     ("warnings_are_counted_and_listed_up_to_a_limit", warnings),
 ];
@@ -23,7 +24,7 @@ type Change = fn(&mut Builder);
 
 /// Files of a few kilobytes, with the limits that a user has not changed.
 fn growing() -> Result<(), Failed> {
-    let changes: [(fn() -> Builder, Change, &str); 12] = [
+    let changes: [(fn() -> Builder, Change, &str); 13] = [
         (textured_square, |it| zeros(it, 0, 177_999_999), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 1 << 40), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 9_000_000_000_000_000), "zero_bytes"),
@@ -34,9 +35,24 @@ fn growing() -> Result<(), Failed> {
             |it| {
                 let (indices, values) = (it.view(&[0, 1, 2, 3]), it.view(&[0; 48]));
                 zeros(it, 0, 100_000_000);
-                it.json["accessors"][0]["sparse"] = json!({
-                    "count": 4, "indices": {"bufferView": indices, "componentType": 5121}, "values": {"bufferView": values},
-                });
+                let (indices, values) =
+                    (json!({"bufferView": indices, "componentType": 5121}), json!({"bufferView": values}));
+                it.json["accessors"][0]["sparse"] = json!({"count": 4, "indices": indices, "values": values});
+            },
+            "zero_bytes",
+        ),
+        // Sparse accessors that say that many values are there.
+        (
+            textured_square,
+            |it| {
+                let (indices, values) = (it.view(&[0, 1, 2, 3]), it.view(&[0; 48]));
+                zeros(it, 0, 100_000_000);
+                let (indices, values) =
+                    (json!({"bufferView": indices, "componentType": 5121}), json!({"bufferView": values}));
+                let sparse = json!({"count": 4, "indices": indices, "values": values});
+                it.json["accessors"][0]["sparse"] = sparse.clone();
+                it.json["accessors"][2]["sparse"] = sparse;
+                it.json["accessors"][2]["sparse"]["count"] = json!(100_000_000);
             },
             "zero_bytes",
         ),
@@ -44,7 +60,7 @@ fn growing() -> Result<(), Failed> {
         (
             textured_square,
             |it| {
-                zeros(it, 0, 1_000_000);
+                zeros(it, 0, 100_000);
                 let primitive = json!({"attributes": {"POSITION": 0}, "indices": 3});
                 it.json["meshes"][0]["primitives"] = (0..300).map(|_| primitive.clone()).collect();
             },
@@ -54,7 +70,7 @@ fn growing() -> Result<(), Failed> {
         (
             textured_square,
             |it| {
-                zeros(it, 0, 1_000_000);
+                zeros(it, 0, 100_000);
                 let primitive = &mut it.json["meshes"][0]["primitives"][0];
                 *primitive = json!({"attributes": {"POSITION": 0}, "indices": 3});
                 primitive["targets"] = (0..500).map(|_| json!({"NORMAL": 0})).collect();
@@ -218,6 +234,29 @@ fn just_enough() -> Result<(), Failed> {
     check_world(&world, &enough)?;
     let less = GltfLimits { geometry_bytes: of_geometry - 1, ..enough };
     refused(0, textured_square().glb(), less, "geometry_bytes")
+}
+
+/// A sparse accessor of many zeros is no attack, if the file has many of its values.
+fn sparse() -> Result<(), Failed> {
+    const REPLACED: usize = 10_000;
+    let mut builder = textured_square();
+    let indices = builder.view(bytemuck::cast_slice(&(0..REPLACED as u32).collect::<Vec<_>>()));
+    let values = builder.view(&[0; 12 * REPLACED]);
+    let (indices, values) = (json!({"bufferView": indices, "componentType": 5125}), json!({"bufferView": values}));
+    let sparse = json!({"count": REPLACED, "indices": indices, "values": values});
+    for (count, is_drawn) in [(64 * REPLACED, true), (64 * REPLACED + (4 << 20) / 12 + 1, false)] {
+        let accessor = json!({"componentType": 5126, "type": "VEC3", "count": count, "sparse": sparse});
+        let accessor = builder.push("accessors", accessor);
+        builder.json["meshes"][0]["primitives"] = json!([{"attributes": {"POSITION": accessor}}]);
+        match load_memory("sparse.glb", builder.glb(), &AT_REST) {
+            Ok(world) => expect(is_drawn && world.object_count() == 1, || format!("{count} values are drawn"))?,
+            Err(error) => {
+                let is_named = error.to_string().contains("`GltfLimits::zero_bytes` is 4194304");
+                expect(!is_drawn && is_named, || error.to_string())?;
+            }
+        }
+    }
+    Ok(())
 }
 
 fn hierarchies() -> Result<(), Failed> {

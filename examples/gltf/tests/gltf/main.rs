@@ -1,7 +1,7 @@
 //! Loading and drawing of small glTF files, which the tests generate.
 //!
-//! Without an adapter, the cases that draw are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
-//! The files and the pictures stay in `target/tmp/gltf`, to look at.
+//! Without an adapter, the cases that draw are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter
+//! fails them. The files and the pictures stay in `target/tmp/gltf`, to look at.
 
 mod appearance;
 mod escaping;

@@ -30,7 +30,7 @@ const CHANGES: &[Malformed] = &[
     (
         textured_square,
         |it| it.json["accessors"][3]["componentType"] = json!(5126),
-        "accessor 3 is a scalar of F32, but the indices of mesh 0 primitive 0 must be of unsigned integers of up to 4 bytes",
+        "accessor 3 is a scalar of F32, but the indices of mesh 0 primitive 0 must be of unsigned integers",
     ),
     (
         textured_square,

@@ -1,4 +1,5 @@
-//! Images keep their pixels, however many sizes of images a file has: those that share a texture array look as those with one of their own.
+//! Images keep their pixels, however many sizes of images a file has: those that share a texture array look as those
+//! with one of their own.
 
 use image::{Rgba, RgbaImage};
 use libtest_mimic::Failed;

@@ -1,4 +1,5 @@
-//! What the specification allows, or leaves open, is drawn: an application's own members, elements that nobody needs, numbers in any form.
+//! What the specification allows, or leaves open, is drawn: an application's own members, elements that nobody needs,
+//! numbers in any form.
 
 use libtest_mimic::Failed;
 use serde_json::{Value, json};

@@ -1,5 +1,5 @@
-//! Scenes of meshes that joints, morph targets or animations move. Each comes in two forms: as such, and with all vertices where they
-//! are at a time, by plain arithmetic.
+//! Scenes of meshes that joints, morph targets or animations move. Each comes in two forms: as such, and with all
+//! vertices where they are at a time, by plain arithmetic.
 
 use serde_json::{Value, json};
 
@@ -26,7 +26,8 @@ fn joint_weights(height: f32) -> [(usize, f32); 2] {
     [(below, 1.0 - share), (below + 1, share)]
 }
 
-/// A tube that three joints bend within two seconds. `time` is that of the vertices; `None` for joints and an animation.
+/// A tube that three joints bend within two seconds. `time` is that of the vertices; `None` for joints and an
+/// animation.
 pub fn bending_tube(time: Option<f64>) -> Builder {
     tube_scene(time, false)
 }
@@ -162,7 +163,8 @@ pub fn morphing_sphere(time: Option<f64>) -> Builder {
     builder
 }
 
-/// Three bricks that move up within two seconds: in steps, in a straight line, and along a spline; and one that grows and turns.
+/// Three bricks that move up within two seconds: in steps, in a straight line, and along a spline; and one that grows
+/// and turns.
 pub fn interpolations(time: Option<f64>) -> Builder {
     let mut builder = Builder::new();
     let shape = brick([0.8, 0.5, 0.4]);

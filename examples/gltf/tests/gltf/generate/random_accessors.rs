@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 
 use super::builder::Builder;
 
-/// Floats, floats of which some are replaced, zeros of which some are replaced, and, with `KHR_mesh_quantization`, integers.
+/// Floats, floats of which some are replaced, zeros of which some are replaced, and, with `KHR_mesh_quantization`,
+/// integers.
 pub fn random_positions(builder: &mut Builder, rng: &mut Rng, count: usize, may_be_compact: bool) -> usize {
     let mut positions: Vec<_> = (0..count).map(|_| [rng.f32() * 4.0 - 2.0, rng.f32(), -rng.f32()]).collect();
     match rng.u8(..5) {
@@ -39,12 +40,11 @@ pub fn random_positions(builder: &mut Builder, rng: &mut Rng, count: usize, may_
                 1 => (builder.view(&(replaced as u16).to_le_bytes()), 5123),
                 _ => (builder.view(&(replaced as u32).to_le_bytes()), 5125),
             };
+            let indices = json!({"bufferView": indices, "componentType": component});
             let values = builder.view(bytemuck::cast_slice(&[[5.0_f32, -6.0, 7.0]]));
             let parts = json!({
                 "componentType": 5126, "count": count, "type": "VEC3",
-                "sparse": {
-                    "count": 1, "indices": {"bufferView": indices, "componentType": component}, "values": {"bufferView": values},
-                },
+                "sparse": {"count": 1, "indices": indices, "values": {"bufferView": values}},
                 "min": edge(&positions, f32::min), "max": edge(&positions, f32::max),
             });
             let parts = parts.as_object().expect("an object").clone();

@@ -6,7 +6,8 @@ use serde_json::json;
 use super::builder::Builder;
 use super::shapes::{Shape, brick, sphere, square};
 
-/// A square in the middle of the picture, with a texture of four colours: red, green, blue, yellow, from the upper left.
+/// A square in the middle of the picture, with a texture of four colours: red, green, blue, yellow, from the upper
+/// left.
 pub fn textured_square() -> Builder {
     let mut builder = Builder::new();
     let texture = builder.texture(&four_colors(64));
@@ -67,8 +68,8 @@ pub fn metallic_roughness_grid() -> Builder {
     builder
 }
 
-/// Three squares before a white wall, lit by ambient light and a sun: with round holes, half transparent red, and single-sided seen
-/// from behind; each at x = -2.5, 0, 2.5.
+/// Three squares before a white wall, lit by ambient light and a sun: with round holes, half transparent red, and
+/// single-sided seen from behind; each at x = -2.5, 0, 2.5.
 pub fn alpha_modes() -> Builder {
     let mut builder = Builder::new();
     let round = RgbaImage::from_fn(64, 64, |x, y| {
@@ -111,8 +112,8 @@ pub fn alpha_modes() -> Builder {
     builder
 }
 
-/// A white wall, with a red point light before its left, and a green cone on its right. Two cameras: one in perspective, and a
-/// parallel one that sees the right half.
+/// A white wall, with a red point light before its left, and a green cone on its right. Two cameras: one in
+/// perspective, and a parallel one that sees the right half.
 pub fn lights_and_cameras() -> Builder {
     let mut builder = Builder::new();
     let white = builder.push("materials", json!({"pbrMetallicRoughness": {"metallicFactor": 0.0}}));
@@ -133,8 +134,8 @@ pub fn lights_and_cameras() -> Builder {
     builder
 }
 
-/// Bricks below nodes that turn, scale unevenly, mirror and so skew them. With `is_flat`, the same in a mesh without a hierarchy:
-/// positions and normals are those in the world, by plain arithmetic in double precision.
+/// Bricks below nodes that turn, scale unevenly, mirror and so skew them. With `is_flat`, the same in a mesh without a
+/// hierarchy: positions and normals are those in the world, by plain arithmetic in double precision.
 pub fn hierarchy(is_flat: bool) -> Builder {
     let mut builder = Builder::new();
     let material = builder.push("materials", json!({
