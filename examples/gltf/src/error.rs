@@ -218,7 +218,12 @@ impl Problem {
 }
 
 fn at_least(amount: u64, field: &str) -> String {
-    format!("{amount}{} or more", if field.ends_with("bytes") { " bytes" } else { "" })
+    let unit = match field {
+        "objects" => "objects",
+        "json_values" => "values",
+        _ => "bytes",
+    };
+    format!("{amount} {unit} or more")
 }
 
 fn already_taken(taken: u64) -> String {
