@@ -21,14 +21,15 @@ pub(crate) enum Json {
 }
 
 impl Json {
-    /// Parses JSON in UTF-8. Members named `extras` are skipped, however deep they are: they are an application's own.
+    /// Parses JSON in UTF-8. Members named `extras`, which are an application's own, and what is deeper than any element
+    /// of glTF are skipped.
     ///
     /// # Errors
-    /// If it is not JSON, is nested more than 128 deep elsewhere, or has more values than `limit` allows.
+    /// If it is not JSON, or has more values than `limit` allows.
     pub(crate) fn parse(text: &[u8], limit: &Limit) -> Result<Self, Problem> {
         let over = Cell::new(None);
         let mut parser = Deserializer::new(SliceRead::new(text));
-        let seed = Tree { limit, over: &over };
+        let seed = Tree { limit, over: &over, depth: 0 };
         let parsed = serde::de::DeserializeSeed::deserialize(seed, &mut parser).and_then(|tree| {
             parser.end()?;
             Ok(tree)
@@ -80,6 +81,18 @@ struct Tree<'a> {
     limit: &'a Limit,
     /// The problem, if there are too many: errors of the parser are text.
     over: &'a Cell<Option<Problem>>,
+    /// How many lists and objects it is in.
+    depth: usize,
+}
+
+/// How deep values are kept. The parser recurses into those, and skips others without recursion.
+const MAX_DEPTH: usize = 64;
+
+impl Tree<'_> {
+    /// For the values of a list or an object.
+    fn inside(self) -> Self {
+        Self { depth: self.depth + 1, ..self }
+    }
 }
 
 impl<'de> serde::de::DeserializeSeed<'de> for Tree<'_> {
@@ -89,6 +102,10 @@ impl<'de> serde::de::DeserializeSeed<'de> for Tree<'_> {
         if let Err(problem) = self.limit.take("its JSON", 1, 1) {
             self.over.set(Some(problem));
             return Err(serde::de::Error::custom("there are too many values"));
+        }
+        if self.depth > MAX_DEPTH {
+            parser.deserialize_ignored_any(serde::de::IgnoredAny)?;
+            return Ok(Json::Null);
         }
         parser.deserialize_any(self)
     }
@@ -127,7 +144,7 @@ impl<'de> serde::de::Visitor<'de> for Tree<'_> {
 
     fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut list: A) -> Result<Json, A::Error> {
         let mut values = Vec::new();
-        while let Some(value) = list.next_element_seed(self)? {
+        while let Some(value) = list.next_element_seed(self.inside())? {
             values.push(value);
         }
         Ok(Json::List(values.into()))
@@ -139,7 +156,7 @@ impl<'de> serde::de::Visitor<'de> for Tree<'_> {
             if &*name == "extras" {
                 map.next_value::<serde::de::IgnoredAny>()?;
             } else {
-                members.push((name, map.next_value_seed(self)?));
+                members.push((name, map.next_value_seed(self.inside())?));
             }
         }
         // Of members with the same name the last one counts, as in other parsers. The sort is stable.

@@ -1,4 +1,4 @@
-//! An engine's own loader: any glTF 2.0 scene, drawn with Drawloom.
+//! An engine's own loader of glTF 2.0, whose scenes Drawloom draws.
 //!
 //! [`load`] makes a [`World`] of a file, and [`draw`] makes a picture of that.
 //!

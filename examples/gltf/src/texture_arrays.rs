@@ -79,6 +79,7 @@ pub(crate) struct TextureArrays {
 /// Images of one size, or of smaller ones.
 #[derive(Debug)]
 pub(crate) struct TextureArray {
+    #[cfg_attr(not(feature = "draw"), expect(dead_code, reason = "only drawing needs it"))]
     pub(crate) size: [u32; 2],
     /// The RGBA bytes of each layer: all mip levels, the largest first.
     pub(crate) layers: Vec<Vec<u8>>,

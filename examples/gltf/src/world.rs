@@ -22,6 +22,7 @@ pub struct World {
     pub(crate) morphs: Arc<[u8]>,
     pub(crate) textures: TextureArrays,
     /// Which surfaces there are, and whether they are deformed.
+    #[cfg_attr(not(feature = "draw"), expect(dead_code, reason = "only drawing needs it"))]
     pub(crate) surfaces: BTreeSet<(SurfaceKind, bool)>,
     /// What the loader left out of the file or drew otherwise, in sentences that name the element. As many as
     /// [`GltfLimits::warnings`](crate::GltfLimits::warnings) says are listed.

@@ -119,7 +119,7 @@ fn forms() -> Result<(), Failed> {
     let unknown_chunk = [builder.glb(), 4_u32.to_le_bytes().to_vec(), b"ACME".to_vec(), vec![0; 4]].concat();
     let mut in_floats = json.clone();
     as_floats(&mut in_floats);
-    let files: [(&str, Vec<u8>, Option<&str>); 8] = [
+    let files: [(&str, Vec<u8>, Option<&str>); 9] = [
         ("numbers as fractions", glb(&in_floats, binary), None),
         (
             "numbers with exponents",
@@ -128,6 +128,7 @@ fn forms() -> Result<(), Failed> {
         ),
         ("space around", chunk(&format!("\n\t {text} \r\n")), None),
         ("deep extras", chunk(&text.replacen('{', &format!("{{\"extras\":{deep},"), 1)), None),
+        ("a deep extension", chunk(&text.replacen('{', &format!("{{\"extensions\":{{\"ACME\":{deep}}},"), 1)), None),
         ("a member twice", chunk(&text.replacen('{', "{\"nodes\":[{\"camera\":99}],\"asset\":7,", 1)), None),
         ("escapes", chunk(&text.replace("POSITION", "\\u0050OSITION")), None),
         ("a byte order mark", chunk(&format!("\u{feff}{text}")), Some("byte order mark")),
