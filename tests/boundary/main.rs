@@ -40,6 +40,22 @@ fn within_time(case: impl FnOnce() + Send + 'static) {
     if let Err(payload) = thread.join() {
         panic::resume_unwind(payload);
     }
+    // The last job of a scheduler, or the last frame of a loop, may end on a thread of theirs.
+    wait_until(|| fuse::alive() == 0, "values of the engine's are kept");
+}
+
+/// Waits until something holds.
+///
+/// # Panics
+/// If it does not.
+fn wait_until(holds: impl Fn() -> bool, otherwise: &str) {
+    for _ in 0..10_000 {
+        if holds() {
+            return;
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+    panic!("{otherwise}");
 }
 
 /// Sets the program's subscriber, and hides the panics that are wanted.

@@ -13,7 +13,7 @@ use drawloom::{FrameError, Renderer};
 use crate::engine::{OwnBackend, OwnProcess};
 use crate::frames::worlds;
 use crate::fuse::{self, Kind, Owned};
-use crate::within_time;
+use crate::{wait_until, within_time};
 
 #[test]
 fn a_panic_of_a_preparation_is_an_error_that_names_it() {
@@ -63,7 +63,7 @@ fn preparations_that_nobody_waits_for_are_not_kept() {
     within_time(|| {
         for workers in [1, 2, 3] {
             let [scene, _] = worlds();
-            let (scheduler, alive_before) = (Arc::new(Scheduler::new(workers).unwrap()), fuse::alive());
+            let scheduler = Arc::new(Scheduler::new(workers).unwrap());
             let backend = OwnBackend::new(SoftwareBackend::new(Arc::clone(&scheduler)), false);
             let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
             let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
@@ -83,13 +83,8 @@ fn preparations_that_nobody_waits_for_are_not_kept() {
                 weak
             };
             drop((renderer, submitter));
-            let is_gone = || scheduler.strong_count() == 0 && fuse::alive() == alive_before;
             // Other workers may still run the last job.
-            let gone = (0..10_000).any(|_| {
-                std::thread::sleep(std::time::Duration::from_millis(u64::from(!is_gone())));
-                is_gone()
-            });
-            assert!(gone, "{workers} workers: the scheduler is kept");
+            wait_until(|| scheduler.strong_count() == 0, "the scheduler is kept");
         }
     });
 }
