@@ -22,8 +22,8 @@ impl WarningList {
     /// Adds the warnings of a frame.
     pub fn add_frame(&mut self, statistics: &FrameStatistics) {
         self.frames += 1;
-        for &rejection in &statistics.rejections {
-            let entry = Entry { rejection, frame: self.frames };
+        for rejection in &statistics.rejections {
+            let entry = Entry { rejection: rejection.clone(), frame: self.frames };
             match self.entries.iter_mut().find(|entry| entry.rejection.reason == rejection.reason) {
                 Some(known) => *known = entry,
                 None => self.entries.push(entry),
@@ -42,8 +42,8 @@ impl WarningList {
             ui.label("Everything was drawn as requested.");
             return;
         }
-        Grid::new("warnings").striped(true).num_columns(4).show(ui, |ui| {
-            ["not drawn as requested", "how many", "the first", "last seen"]
+        Grid::new("warnings").striped(true).num_columns(5).show(ui, |ui| {
+            ["not drawn as requested", "how many", "the first", "its name", "last seen"]
                 .into_iter()
                 .for_each(|name| _ = ui.weak(name));
             ui.end_row();
@@ -51,6 +51,7 @@ impl WarningList {
                 ui.label(rejection.reason.name());
                 ui.label(rejection.count.to_string());
                 ui.label(format!("index {}", rejection.first));
+                ui.label(rejection.name.as_deref().map(|name| name.escape_debug().to_string()).unwrap_or_default());
                 ui.label(match self.frames - frame {
                     0 => "in the latest frame".to_owned(),
                     ago => format!("{ago} frames ago"),

@@ -8,11 +8,13 @@ use super::frame_fence::FrameFence;
 use super::picture::Picture;
 use super::read_back::ReadBack;
 use super::requests::{FrameRequest, PassRequest, ViewRequest};
+use super::scene_limits::SceneLimits;
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan, ShaderResource};
-use crate::quality::Quality;
+use crate::quality::{Quality, VertexFormat};
+use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
@@ -97,6 +99,23 @@ pub trait Backend: Send + Sync + 'static {
     /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes that it uploaded.
     fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
         let _ = count;
+    }
+
+    /// What the backend can hold of a scene, asked before each frame: none is lost because of what is beyond.
+    fn limits(&self) -> SceneLimits {
+        SceneLimits::NONE
+    }
+
+    /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or not, before the first
+    /// frame with it, and again after another backend or format was set. Objects with a mesh that cannot be drawn are left out, and counted
+    /// as [`UndrawableMesh`](crate::view::RejectionReason::UndrawableMesh); the error becomes a warning. `begin` never sees such a mesh
+    /// among the used ones.
+    ///
+    /// # Errors
+    /// If it cannot be drawn, as it exceeds a limit of the device, or is in buffers that the backend cannot read.
+    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
+        let _ = (mesh, vertices);
+        Ok(())
     }
 
     /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the meshes, the frame draws

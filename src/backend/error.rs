@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use crate::process::AccessError;
-use crate::scene::SceneError;
 
 /// An error of a backend or its device.
 #[derive(Debug, thiserror::Error)]
@@ -114,7 +113,7 @@ pub enum BackendError {
         process: String,
     },
     /// A mesh [in the engine's own buffers](crate::scene::Mesh::from_buffers) has an attribute in a format that shaders read as another kind
-    /// of number.
+    /// of number. The process leaves its objects out, and warns with this error.
     #[error(
         "process {process:?} reads {attribute:?} as {expected}, but mesh `{mesh}`, or one with the same layout, has it as {format}"
     )]
@@ -130,19 +129,11 @@ pub enum BackendError {
         /// The type of number in the shader.
         expected: &'static str,
     },
-    /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see.
+    /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see: objects with it are left out.
     #[error("mesh `{mesh}` is in wgpu buffers, which the software backend cannot draw")]
     ImportedMesh {
         /// The mesh.
         mesh: String,
-    },
-    /// A [generated mesh](crate::scene::Mesh::generated) that CPU nodes have filled with what is no mesh. Only the software backend looks.
-    #[error("nodes have filled mesh `{mesh}` with what cannot be drawn: {source}")]
-    GeneratedMesh {
-        /// The mesh.
-        mesh: String,
-        /// What is wrong with it.
-        source: SceneError,
     },
     /// A render process draws into multisampled targets, and the software backend has none.
     #[error("process {process:?} draws into multisampled targets, which the software backend does not support")]

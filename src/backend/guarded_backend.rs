@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use super::{Backend, BackendError, FrameFence, FrameRequest, ReadBack, TargetMemory, ViewQueue, ViewRequest};
+use super::{
+    Backend, BackendError, FrameFence, FrameRequest, ReadBack, SceneLimits, TargetMemory, ViewQueue, ViewRequest,
+};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
-use crate::quality::Quality;
+use crate::quality::{Quality, VertexFormat};
+use crate::scene::Mesh;
 use crate::timeline::{Labels, TuningChoice};
 use crate::unwind::{Contained, JobPanic, catch};
 
@@ -98,6 +101,18 @@ impl<B: Backend> GuardedBackend<B> {
 
     pub(crate) fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) -> Result<(), CallPanic> {
         self.call("counters", |backend| backend.counters(count))
+    }
+
+    pub(crate) fn limits(&self) -> Result<SceneLimits, CallPanic> {
+        self.call("limits", B::limits)
+    }
+
+    pub(crate) fn check_mesh(
+        &self,
+        mesh: &Mesh,
+        vertices: VertexFormat,
+    ) -> Result<Result<(), BackendError>, CallPanic> {
+        self.call("check_mesh", |backend| backend.check_mesh(mesh, vertices))
     }
 
     pub(crate) fn begin(

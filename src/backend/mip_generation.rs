@@ -3,15 +3,24 @@
 use std::sync::LazyLock;
 
 use crate::raster::Real;
-use crate::scene::Texture;
+use crate::scene::{Assets, Texture};
 
 /// The layer sizes of the texture arrays in pixels; layers are square. All backends scale textures to these.
-pub(super) const ARRAY_SIDES: [u32; 4] = [256, 512, 1024, 2048];
+pub(super) const ARRAY_SIDES: [u32; 4] = [256, 512, 1024, Texture::MAX_DETAIL];
 
 /// The index in [`ARRAY_SIDES`] that a texture is scaled to: the smallest that is large enough, or the largest.
 pub(super) fn array_for(texture: &Texture) -> usize {
     let size = texture.width().max(texture.height());
     ARRAY_SIDES.iter().position(|&side| size <= side).unwrap_or(ARRAY_SIDES.len() - 1)
+}
+
+/// The slots of the textures that have more pixels, in one direction at least, than what they are scaled to.
+pub(super) fn reduced_textures(assets: &Assets) -> impl Iterator<Item = usize> {
+    let reduced = assets.textures.iter().filter(|(_, texture)| {
+        let side = ARRAY_SIDES[array_for(texture)];
+        texture.width() > side || texture.height() > side
+    });
+    reduced.map(|(handle, _)| handle.index() as usize)
 }
 
 /// All mip levels of a texture scaled to a square, from `side` pixels down to one; RGBA bytes, sRGB encoded.

@@ -13,6 +13,7 @@ mod null;
 mod picture;
 mod read_back;
 mod requests;
+mod scene_limits;
 #[cfg(feature = "software")]
 mod software;
 #[cfg(any(feature = "wgpu", feature = "software"))]
@@ -37,6 +38,7 @@ pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;
 pub use read_back::ReadBack;
 pub use requests::{FrameRequest, PassRequest, ViewRequest};
+pub use scene_limits::SceneLimits;
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
 pub use target_memory::TargetMemory;

@@ -96,7 +96,7 @@ impl Backend for NullBackend {
         request.check_reach()?;
         Ok(NullFrame {
             passes: request.passes.to_vec(),
-            object_count: request.scene.object_count(),
+            object_count: request.objects.len(),
             uploaded: Mutex::default(),
             prepared: Mutex::default(),
             recorded: Mutex::default(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::BackendError;
+use super::{BackendError, SceneLimits};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
@@ -38,6 +38,9 @@ pub struct FrameRequest<'a> {
     pub generated: &'a [Arc<GeneratedContents>],
     /// The frame's accuracy.
     pub quality: &'a Quality,
+    /// The backend's [limits](super::Backend::limits). What is beyond them is not drawn: a backend that keeps arrays of the scene's lights or
+    /// materials may cut them off there.
+    pub limits: SceneLimits,
     /// Counts what the backend leaves out.
     pub rejections: &'a Rejections,
 }

@@ -24,8 +24,8 @@ pub(super) struct SubdivisionCache<T> {
 
 /// A subdivided mesh.
 pub(crate) struct CachedSubdivision<T> {
-    /// The backend's geometry.
-    pub(super) geometry: T,
+    /// The backend's geometry; `None` if the mesh, once subdivided, exceeds the backend's limits, and nothing is drawn.
+    pub(super) geometry: Option<T>,
     /// Whether its edges are too long, because shorter ones would take too many triangles.
     pub(super) is_coarse: bool,
     triangles: usize,
@@ -90,8 +90,8 @@ impl<T> SubdivisionCache<T> {
         self.meshes.lock().clear();
     }
 
-    /// Calls `emit` with each subdivided mesh that a list draws. `create` makes the geometry of missing ones.
-    /// Counts objects whose edges stay too long.
+    /// Calls `emit` with each subdivided mesh that a list draws. `create` makes the geometry of missing ones, or `None` if it exceeds the
+    /// backend's limits. Counts objects without geometry, and those whose edges stay too long.
     ///
     /// # Errors
     /// If there is no such mesh, or `create` fails.
@@ -100,16 +100,19 @@ impl<T> SubdivisionCache<T> {
         request: &FrameRequest<'_>,
         list: &DrawList,
         vertices: VertexFormat,
-        mut create: impl FnMut(Mesh) -> Result<T, BackendError>,
+        mut create: impl FnMut(Mesh) -> Result<Option<T>, BackendError>,
         mut emit: impl FnMut(Subdivision, Arc<CachedSubdivision<T>>),
     ) -> Result<(), BackendError> {
         for batch in list.batches.iter().filter(|batch| batch.state.subdivision_level() > 0) {
             let &Batch { first, count, .. } = batch;
             let found = self.get_or_create(request.scene.assets, subdivision_of(batch), vertices, &mut create)?;
-            if found.is_coarse {
-                for &object in &list.objects[first as usize..][..count as usize] {
-                    request.rejections.count_once(RejectionReason::CoarseEdges, object as usize);
-                }
+            let reason = match &found.geometry {
+                None => Some(RejectionReason::UndrawableMesh),
+                Some(_) => found.is_coarse.then_some(RejectionReason::CoarseEdges),
+            };
+            if let Some(reason) = reason {
+                let objects = &list.objects[first as usize..][..count as usize];
+                request.rejections.count_all_once(reason, objects.iter().map(|object| *object as usize));
             }
             emit(subdivision_of(batch), found);
         }
@@ -121,7 +124,7 @@ impl<T> SubdivisionCache<T> {
         assets: &Assets,
         subdivision: Subdivision,
         vertices: VertexFormat,
-        create: impl FnOnce(Mesh) -> Result<T, BackendError>,
+        create: impl FnOnce(Mesh) -> Result<Option<T>, BackendError>,
     ) -> Result<Arc<CachedSubdivision<T>>, BackendError> {
         let (slot, level_of_detail, level) = subdivision;
         let (revision, mesh) = assets.meshes.get_with_revision(slot).ok_or_else(missing_mesh_error)?;
@@ -176,7 +179,7 @@ mod tests {
     fn draw(cache: &Cache, assets: &Assets, slot: u32, level: u32, made: &mut usize) {
         let create = |_| {
             *made += 1;
-            Ok(())
+            Ok(Some(()))
         };
         cache.get_or_create(assets, (slot, 0, level), VertexFormat::Full, create).unwrap();
     }

@@ -30,7 +30,7 @@ impl BlendedObjectWitness {
     pub(super) fn update(&mut self, scene: &SceneRef<'_>, objects: &ObjectTable) -> bool {
         let has_started = self.materials.update(scene.assets);
         let materials = &self.materials;
-        let count = scene.object_count();
+        let count = objects.len();
         let witness_of = |object: usize| {
             let material = scene.materials[object];
             materials.contains(material).then_some(Witness { object, material })

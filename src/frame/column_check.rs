@@ -35,7 +35,9 @@ impl ColumnCheck {
             };
             let elements = copy.chunks_exact(layout.stride).zip(bytes.chunks_exact(layout.stride));
             let changed = elements.enumerate().filter(|(_, (before, now))| before != now).map(|(object, _)| object);
-            if let Some(object) = changed.into_iter().find(|object| !objects.is_reported(*object)) {
+            if let Some(object) =
+                changed.take_while(|object| *object < objects.len()).find(|object| !objects.is_reported(*object))
+            {
                 outcome = outcome.and(Err(match layout == LAYERS.layout() {
                     true => SceneError::UnreportedChange { object },
                     false => SceneError::UnreportedColumnChange { column: layout.name, object },

@@ -91,12 +91,6 @@ pub enum FrameError {
     /// The scene cannot be drawn as it is.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// More objects than a command can name.
-    #[error("{objects} objects are more than a frame can hold")]
-    TooManyObjects {
-        /// How many.
-        objects: usize,
-    },
     /// The backend could not begin the frame, or a pass was not finished.
     #[error("the backend refused the frame: {0}")]
     Backend(#[from] BackendError),

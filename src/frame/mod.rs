@@ -37,6 +37,7 @@ mod recorded_piece;
 mod renderer;
 mod replace_backend;
 mod run_error;
+mod scene_capacity;
 mod scene_check;
 mod stage;
 mod stage_clock;

@@ -44,7 +44,7 @@ pub(super) struct PieceTable {
     recording: Vec<u32>,
     /// What processes draw of all pieces: one for each selection.
     joined: Vec<RwLock<JoinedPieces>>,
-    /// The number of objects of all pieces, and whether the scene has all of them.
+    /// The number of objects of all pieces, and whether the frame has all of them.
     object_count: usize,
     has_unknown_objects: bool,
     /// The number of recorded pieces.
@@ -118,13 +118,14 @@ const NO_PIECE: u32 = u32::MAX;
 const MAX_SELECTIONS: usize = 32;
 
 impl PieceTable {
-    /// Begins a frame, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
+    /// Begins a frame of so many objects, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
     ///
     /// # Errors
     /// If two pieces have the same name or share an object.
     pub(super) fn begin_frame(
         &mut self,
         scene: &SceneRef<'_>,
+        objects: usize,
         conditions: ListConditions,
         selections: impl Iterator<Item = Selection>,
     ) -> Result<(), SceneError> {
@@ -135,7 +136,7 @@ impl PieceTable {
         for piece in self.changed.drain(..) {
             self.pieces[piece as usize].has_changed = false;
         }
-        if let Err(error) = self.sync(scene) {
+        if let Err(error) = self.sync(scene.pieces, objects) {
             *self = Self { revision: self.revision + 1, lists_revision: self.lists_revision + 1, ..Self::default() };
             return Err(error);
         }
@@ -194,9 +195,8 @@ impl PieceTable {
         }
     }
 
-    /// Takes over the pieces of a scene. Those that it had keep what is recorded.
-    fn sync(&mut self, scene: &SceneRef<'_>) -> Result<(), SceneError> {
-        let objects = scene.object_count();
+    /// Takes over the pieces of a scene with so many objects. Those that it had keep what is recorded.
+    fn sync(&mut self, pieces: &[Piece], objects: usize) -> Result<(), SceneError> {
         let before = self.owners.len();
         for piece in 0..self.pieces.len() {
             // Objects that are gone, or new at indices that it lists.
@@ -206,7 +206,7 @@ impl PieceTable {
         }
         self.owners.resize(objects, NO_PIECE);
         self.recorded_words.resize(objects.div_ceil(WORD), 0);
-        if self.pieces.iter().map(|known| &known.piece).eq(scene.pieces) {
+        if self.pieces.iter().map(|known| &known.piece).eq(pieces) {
             if before != objects {
                 (0..self.pieces.len()).try_for_each(|piece| self.claim(piece, before..objects))?;
                 self.find_unknown_objects(objects);
@@ -216,7 +216,7 @@ impl PieceTable {
         let mut known: HashMap<_, _> = self.pieces.drain(..).map(|known| (known.piece.name.clone(), known)).collect();
         self.owners.fill(NO_PIECE);
         let mut names = HashMap::new();
-        for (index, piece) in scene.pieces.iter().enumerate() {
+        for (index, piece) in pieces.iter().enumerate() {
             if names.insert(piece.name.as_str(), index).is_some() {
                 return Err(SceneError::RepeatedPiece { piece: piece.name.clone() });
             }
@@ -263,10 +263,10 @@ impl PieceTable {
             self.pieces.iter().any(|known| known.piece.objects.iter_from(objects).next().is_some());
     }
 
-    /// Counts the indices at which the scene has no object, each once.
-    pub(super) fn count_unknown_objects(&self, rejections: &Rejections) {
+    /// Counts the indices at which the scene, which has so many objects, has none, each once.
+    pub(super) fn count_unknown_objects(&self, objects: usize, rejections: &Rejections) {
         let pieces = if self.has_unknown_objects { &self.pieces[..] } else { &[] };
-        for index in pieces.iter().flat_map(|known| known.piece.objects.iter_from(self.owners.len())) {
+        for index in pieces.iter().flat_map(|known| known.piece.objects.iter_from(objects)) {
             rejections.count_once(RejectionReason::UnknownObject, index as usize);
         }
     }

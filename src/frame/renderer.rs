@@ -14,6 +14,7 @@ use super::pass_runs::PassRuns;
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded::{FrameFences, Recorded};
 use super::run_error::error_of_pass;
+use super::scene_capacity::SceneCapacity;
 use super::scene_check::check_scene;
 use super::stage_clock::{StageClock, StageGroup};
 use super::stage_graph::StageOptions;
@@ -76,6 +77,7 @@ pub struct Renderer<B: Backend> {
     scheduler: Arc<Scheduler>,
     graphs: StageGraphCache<B>,
     tables: FrameTables,
+    capacity: SceneCapacity,
     view_cache: ViewCache,
     /// One for each pass of the latest frame.
     recordings: Vec<PassRecording<B>>,
@@ -109,6 +111,7 @@ impl<B: Backend> Renderer<B> {
             scheduler,
             graphs: StageGraphCache::default(),
             tables: FrameTables::default(),
+            capacity: SceneCapacity::default(),
             view_cache: ViewCache::default(),
             recordings: Vec::new(),
             pass_runs: PassRuns::default(),
@@ -126,13 +129,14 @@ impl<B: Backend> Renderer<B> {
     /// What is derived from an object is kept for the next frame. [`SceneRef::changes`] says which objects changed since the last
     /// call.
     ///
-    /// Objects, lights and textures that cannot be drawn are left out, counted in the statistics, and warned of through
-    /// `tracing` when their number changes. A process that declares what its [raw pass](crate::process::RawPassResources) never asks for
+    /// Objects, lights, materials and textures that cannot be drawn, among them those that the [device has no room for](Backend::limits),
+    /// are left out, counted and named in the [statistics](FrameStatistics::rejections), and warned of through
+    /// `tracing` when their number changes; everything else is drawn. A process that declares what its [raw pass](crate::process::RawPassResources) never asks for
     /// is warned of once.
     ///
     /// # Errors
-    /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, too many
-    /// objects, an invalid ambient light or background; if the processes make no frame of it; if the device refuses
+    /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, an invalid
+    /// ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
         self.record_part(&scene, &[], true)
@@ -281,13 +285,15 @@ impl<B: Backend> Renderer<B> {
         check_scene(scene)?;
 
         // Scene → views: one for each camera, and one for each shadow map.
+        let limits = self.backend.limits()?;
         self.tables.objects.configure(self.quality.culling);
-        self.tables.objects.begin_frame(scene);
+        self.capacity.begin_frame(&self.backend, limits, scene, &mut self.tables.objects, self.quality.vertices)?;
         count_unknown_objects(scene, self.tables.objects.rejections());
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
         self.tables.blended_object.count_half_floats(self.plans.deferred(), self.tables.objects.rejections());
+        self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
         let interval = self.quality.shadows.interval;
         let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
@@ -313,7 +319,9 @@ impl<B: Backend> Renderer<B> {
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
-        clock.measure(StageGroup::Visibility, || self.tables.fill_lights(&views, &lights, separate_shadowed_lights));
+        let fill_lights = || self.tables.fill_lights(&views, &lights, separate_shadowed_lights, limits);
+        let (left_out, _) = clock.measure(StageGroup::Visibility, fill_lights);
+        ValidLights::count_left_out(scene, &left_out, self.tables.objects.rejections());
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
@@ -324,9 +332,10 @@ impl<B: Backend> Renderer<B> {
             sampled_views: &graph.sampled_views,
             scene,
             objects: &self.tables.objects,
-            list_capacity: scene.object_count() + self.tables.pieces.listed_objects(),
+            list_capacity: self.tables.objects.len() + self.tables.pieces.listed_objects(),
             generated: &nodes.declarations.generated,
             quality: &self.quality,
+            limits,
             rejections: self.tables.objects.rejections(),
         };
         let uploaded_before = self.backend.uploaded_bytes()?;
@@ -406,6 +415,7 @@ impl<B: Backend> Renderer<B> {
     pub(super) fn set_backend(&mut self, backend: GuardedBackend<B>) {
         self.plans.set_float_blending(backend.can_blend_floats());
         self.backend = backend;
+        self.capacity.forget_backend();
         self.recordings.clear();
         self.background_work = BackgroundWork::default();
         self.view_cache.forget_frames_in_flight();

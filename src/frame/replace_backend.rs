@@ -21,8 +21,9 @@ impl<B: Backend> Renderer<B> {
     /// - What it set on the backend before, it sets on the new one: the recording and encoding strategy, the timing of passes, transient
     ///   targets, and imports for the next frame.
     /// - [Meshes in its own buffers](crate::scene::Mesh::from_buffers) and other resources of its own belong to the device before. It makes
-    ///   their buffers anew and replaces the assets. Otherwise the next frame is refused with an error that names the mesh, if the new device
-    ///   is of the same `wgpu::Instance`; wgpu cannot tell resources of several instances apart.
+    ///   their buffers anew and replaces the assets. Otherwise objects with such a mesh are left out, and
+    ///   [named](crate::view::RejectionReason::UndrawableMesh), if the new device is of the same `wgpu::Instance`; wgpu cannot tell resources
+    ///   of several instances apart.
     /// - A window's [surface](crate::backend::WindowSurface) belongs to a device too. It is dropped before another one is made.
     /// - [Histories](crate::process::Declare::samples_previous) are empty, and buffers that processes share are zero, as in the first frame.
     /// - Pipelines are made in the next frame, unless the engine calls [`prepare_pipelines`](Self::prepare_pipelines) before it. One that it

@@ -7,10 +7,6 @@ use crate::scene::{SceneError, SceneRef};
 /// If no frame can be made of the scene.
 pub(super) fn check_scene(scene: &SceneRef<'_>) -> Result<(), FrameError> {
     scene.check_lengths()?;
-    let objects = scene.object_count();
-    if u32::try_from(objects).is_err() {
-        return Err(FrameError::TooManyObjects { objects });
-    }
     if scene.cameras.is_empty() {
         return Err(FrameError::NoView);
     }

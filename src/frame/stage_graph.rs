@@ -309,7 +309,7 @@ impl<B: Backend> StageGraph<B> {
             let view = &views[pass.view_index];
             let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
             let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
-            table.begin_frame(selection, scene.object_count(), culls_triangles, orders_by_bin);
+            table.begin_frame(selection, tables.objects.len(), culls_triangles, orders_by_bin);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_pieces(scene, conditions, &self.passes)?;

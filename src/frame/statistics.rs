@@ -153,7 +153,7 @@ impl FrameStatistics {
             generated: request.generated.iter().map(|contents| contents.byte_count() as u64).sum(),
             targets,
             stages,
-            rejections: request.rejections.list(),
+            rejections: request.rejections.list_of(request.scene),
             tuning,
             helpers: Vec::new(),
         }

@@ -13,6 +13,7 @@ use super::view_levels::ViewLevels;
 use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
+use crate::backend::SceneLimits;
 use crate::chunked_array::ChunkedArray;
 use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version,
@@ -98,8 +99,8 @@ impl FrameTables {
             self.visibility[pass.view_index].may_execute_pieces &= !table.selection.is_some_and(draws_in_order);
         }
         let selections = self.passes.iter().filter(|table| table.orders_by_bin).filter_map(|table| table.selection);
-        self.pieces.begin_frame(scene, conditions, selections)?;
-        self.pieces.count_unknown_objects(self.objects.rejections());
+        self.pieces.begin_frame(scene, self.objects.len(), conditions, selections)?;
+        self.pieces.count_unknown_objects(scene.object_count(), self.objects.rejections());
         Ok(())
     }
 
@@ -131,14 +132,29 @@ impl FrameTables {
         Version { frame: self.frames, index }
     }
 
-    /// Finds the lights that reach each view that is drawn: see [`LightTable::fill`].
-    pub(super) fn fill_lights(&mut self, views: &[RenderView], lights: &[Light], separate_shadowed_lights: bool) {
+    /// Finds the lights that reach each view that is drawn, within the limits of the backend: see [`LightTable::fill`]. Returns the indices of
+    /// those that a view has no room for.
+    pub(super) fn fill_lights(
+        &mut self,
+        views: &[RenderView],
+        lights: &[Light],
+        separate_shadowed_lights: bool,
+        limits: SceneLimits,
+    ) -> Vec<usize> {
+        let (mut left_out, mut room) = (Vec::new(), limits.buffer_bytes);
         for (view, table) in views.iter().zip(&mut self.lights) {
             let lights = if view.is_cached() { &[] } else { lights };
-            table.fill(view, lights, views, separate_shadowed_lights);
+            let of_view = SceneLimits { binding_bytes: limits.binding_bytes.min(room), ..limits };
+            table.fill_within(view, lights, views, separate_shadowed_lights, (of_view.max_lights(), &mut left_out));
+            // Each view's lights begin where a binding can.
+            room = room.saturating_sub((size_of_val(table.gpu_lights()) as u64).next_multiple_of(LIGHT_ALIGNMENT));
         }
+        left_out
     }
 }
+
+/// The alignment of a view's lights in a buffer that all devices support, in bytes.
+const LIGHT_ALIGNMENT: u64 = 256;
 
 /// What one pass draws, from commands to the draw list.
 #[derive(Debug, Default)]

@@ -16,10 +16,13 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
-    /// Warns of the rejections of a frame that are not reported yet. Only drawing shadow maps finds coarse edges, so a frame with
-    /// cached views finds a part of them: that many or more were reported.
+    /// Warns of the rejections of a frame that are not reported yet. Some of them only drawing finds, so a frame with cached views finds a part
+    /// of these: that many or more were reported.
     pub(super) fn report(&mut self, rejections: &[Rejection], has_cached_views: bool) {
-        let is_partial = |reason| has_cached_views && reason == RejectionReason::CoarseEdges;
+        let is_partial = |reason| {
+            use RejectionReason::{CoarseEdges, LightLimit, UndrawableMesh};
+            has_cached_views && matches!(reason, CoarseEdges | LightLimit | UndrawableMesh)
+        };
         for rejection in rejections {
             let is_part = |known: &Rejection| {
                 is_partial(known.reason) && known.reason == rejection.reason && known.count >= rejection.count
@@ -33,13 +36,14 @@ impl Warnings {
             if is_expected || is_reported {
                 continue;
             }
-            let (reason, count, first) = (rejection.reason.name(), rejection.count, rejection.first);
-            emit(|| tracing::warn!(target: "drawloom", count, first, "not drawn as requested: {reason}"));
+            let Rejection { reason, count, first, name } = rejection;
+            // A name is the engine's, or a file's.
+            let (reason, name) = (reason.name(), name.as_deref().map(tracing::field::debug));
+            emit(|| tracing::warn!(target: "drawloom", count, first, name, "not drawn as requested: {reason}"));
         }
-        let before = self.reported.iter().copied().find(|known| is_partial(known.reason));
-        self.reported.clear();
-        self.reported.extend(rejections);
-        if let Some(before) = before {
+        let before: Vec<_> = self.reported.drain(..).filter(|known| is_partial(known.reason)).collect();
+        self.reported.extend_from_slice(rejections);
+        for before in before {
             match self.reported.iter_mut().find(|known| known.reason == before.reason) {
                 Some(known) if known.count < before.count => *known = before,
                 Some(_) => {}

@@ -94,6 +94,11 @@ pub enum Blend {
 }
 
 /// An RGBA image for a material. Clones share their pixels.
+///
+/// Backends scale a texture to a square with sides of 256, 512, 1024 or 2048 pixels: to the smallest that is at least as wide and as high,
+/// so that it keeps its detail, or else to the largest. One that has more pixels than [`Texture::MAX_DETAIL`] in a direction is drawn with
+/// that many, filtered when it is uploaded, and counted as [`ReducedTexture`](crate::view::RejectionReason::ReducedTexture) in every
+/// frame: details that are finer become their mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     name: String,
@@ -103,8 +108,11 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// The largest width and height, which every wgpu adapter supports.
+    /// The largest width and height that a texture may be given with. More than [`Texture::MAX_DETAIL`] are not drawn.
     pub const MAX_SIZE: u32 = 8192;
+
+    /// The largest width and height that frames draw: wider and higher textures are scaled down to it.
+    pub const MAX_DETAIL: u32 = 2048;
 
     /// A texture of RGBA bytes, sRGB encoded, rows from top to bottom without padding.
     ///

@@ -101,7 +101,7 @@ pub(crate) fn emit(event: impl FnOnce()) {
     }
 }
 
-#[cfg(any(feature = "wgpu", test))]
+#[cfg(any(feature = "wgpu", feature = "software", test))]
 thread_local! {
     /// The events that wait until this thread leaves [`hold_events`]; `None` outside it.
     static HELD_EVENTS: std::cell::RefCell<Option<Vec<Box<dyn FnOnce()>>>> = const { std::cell::RefCell::new(None) };
@@ -109,7 +109,7 @@ thread_local! {
 
 /// Calls `work`, which may hold locks, and only then sends the events of [`emit_unlocked`]: the engine's subscriber may ask for what the locks
 /// guard. `work` must have let go of them when it returns.
-#[cfg(any(feature = "wgpu", test))]
+#[cfg(any(feature = "wgpu", feature = "software", test))]
 pub(crate) fn hold_events<R>(work: impl FnOnce() -> R) -> R {
     /// Sends the events when it is dropped, also by an unwind.
     struct Held {
@@ -135,7 +135,7 @@ pub(crate) fn hold_events<R>(work: impl FnOnce() -> R) -> R {
 }
 
 /// [Emits](emit) an event when this thread leaves [`hold_events`]; at once if it is not there.
-#[cfg(any(feature = "wgpu", test))]
+#[cfg(any(feature = "wgpu", feature = "software", test))]
 pub(crate) fn emit_unlocked(event: impl FnOnce() + 'static) {
     let unheld = HELD_EVENTS.with_borrow_mut(|held| match held {
         Some(events) => {

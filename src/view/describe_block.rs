@@ -188,7 +188,8 @@ impl RemainingWork {
             block.bins[objects[lane] % ObjectBlock::SIZE] = bin_of(inputs.bins, draws[lane]);
         }
         for lane in set_bits(self.rejection_reason.into()) {
-            block.reject(objects[lane] % ObjectBlock::SIZE, rejection_reason(inputs.scene, objects[lane]));
+            let reason = rejection_reason(inputs.scene, inputs.draw_states, objects[lane]);
+            block.reject(objects[lane] % ObjectBlock::SIZE, reason);
         }
         for lane in set_bits(self.bounding_box.into()) {
             let object = objects[lane];

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::TableLimits;
 use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
 use crate::scene::{Assets, Material, MaterialLayout, MaterialValues, Mesh, Topology};
@@ -13,8 +14,7 @@ pub(super) struct DrawStates {
     /// The meshes and materials that the tables are of; `None` before the first update.
     version: Option<AssetVersion>,
     meshes: Vec<Option<MeshEntry>>,
-    /// With the states of objects with triangle lists, as they are and mirrored.
-    materials: Vec<Option<(Handle<Material>, [DrawState; 2])>>,
+    materials: Vec<Option<MaterialEntry>>,
     /// The type of each material, by slot; empty if none has one.
     types: Vec<Option<MaterialLayout>>,
     /// Each type once.
@@ -28,6 +28,16 @@ struct MeshEntry {
     mesh: Handle<Mesh>,
     topology: Topology,
     revision: u64,
+    is_drawable: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct MaterialEntry {
+    material: Handle<Material>,
+    /// Those of objects with triangle lists, as they are and mirrored.
+    states: [DrawState; 2],
+    /// Whether the arrays of materials reach to it.
+    is_in_arrays: bool,
 }
 
 /// The meshes and materials of a scene at one time: of each the identity of the collection, and its revision.
@@ -37,34 +47,45 @@ struct AssetVersion {
     materials: (u64, u64),
     /// Counts the handles whose meshes and materials were loaded after they were made.
     arrivals: u64,
+    /// That of the limits.
+    limits: u64,
 }
 
 impl DrawStates {
     /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there before, or was loaded
     /// after its handle was made: no object can have been described with another one that is new.
-    pub(super) fn update(&mut self, assets: &Assets) -> bool {
+    pub(super) fn update(&mut self, assets: &Assets, limits: &TableLimits<'_>) -> bool {
         let Assets { meshes, materials, .. } = assets;
         let version = AssetVersion {
             meshes: (meshes.identity(), meshes.revision()),
             materials: (materials.identity(), materials.revision()),
             arrivals: meshes.arrivals() + materials.arrivals(),
+            limits: limits.revision,
         };
         if self.version == Some(version) {
             return false;
         }
         let before = self.version.replace(version);
         let has_arrivals = before.is_some_and(|before| before.arrivals != version.arrivals);
+        let has_same_limits = before.is_some_and(|before| before.limits == version.limits);
         let mut new_meshes = vec![None; meshes.slot_count()];
         for (mesh, revision, content) in meshes.iter_with_revision() {
-            new_meshes[mesh.index() as usize] = Some(MeshEntry { mesh, topology: content.topology(), revision });
+            let slot = mesh.index() as usize;
+            let is_same = |known: &&MeshEntry| has_same_limits && (known.mesh, known.revision) == (mesh, revision);
+            let known = self.meshes.get(slot).and_then(Option::as_ref).filter(is_same);
+            let is_drawable = known.map_or_else(|| (limits.can_draw)(content), |known| known.is_drawable);
+            new_meshes[slot] = Some(MeshEntry { mesh, topology: content.topology(), revision, is_drawable });
         }
         let mut new_materials = vec![None; materials.slot_count()];
         let mut types = Vec::new();
         for (handle, material) in materials.iter() {
-            new_materials[handle.index() as usize] = Some((handle, states_of(material)));
-            if let Some(values) = &material.values {
+            let slot = handle.index() as usize;
+            let layout = material.values.as_ref().map(MaterialValues::layout);
+            let is_in_arrays = limits.reach_material(slot, layout.map_or(0, |layout| layout.stride));
+            new_materials[slot] = Some(MaterialEntry { material: handle, states: states_of(material), is_in_arrays });
+            if layout.is_some() {
                 types.resize(materials.slot_count(), None);
-                types[handle.index() as usize] = Some(values.layout());
+                types[slot] = layout;
             }
         }
         self.set_types(types);
@@ -102,15 +123,32 @@ impl DrawStates {
         self.types_revision
     }
 
-    /// The state of an object; `None` if a handle is stale.
+    /// The state of an object; `None` if a handle is stale, or the object cannot be drawn with such a mesh or material.
     #[inline(always)]
     pub(super) fn get(&self, mesh: Handle<Mesh>, material: Handle<Material>, scale: Vec3) -> Option<DrawState> {
-        let MeshEntry { mesh: known_mesh, topology, .. } = (*self.meshes.get(mesh.index() as usize)?)?;
-        let (known_material, states) = (*self.materials.get(material.index() as usize)?)?;
+        let MeshEntry { mesh: known_mesh, topology, is_drawable, .. } = (*self.meshes.get(mesh.index() as usize)?)?;
+        let MaterialEntry { material: known_material, states, is_in_arrays } =
+            (*self.materials.get(material.index() as usize)?)?;
         let is_mirrored = (scale.x.to_bits() ^ scale.y.to_bits() ^ scale.z.to_bits()) >> 31 == 1;
         let [as_is, mirrored] = states;
         let state = if is_mirrored { mirrored } else { as_is };
-        (known_mesh == mesh && known_material == material).then(|| state.with_topology(topology))
+        let is_drawn = (known_mesh == mesh) & (known_material == material) & is_drawable & is_in_arrays;
+        is_drawn.then(|| state.with_topology(topology))
+    }
+
+    /// The revision of the limits that the tables are of.
+    pub(super) fn limits_revision(&self) -> u64 {
+        self.version.map_or(0, |version| version.limits)
+    }
+
+    /// Whether the mesh in a slot can be drawn; false for an empty slot.
+    pub(super) fn is_drawable(&self, slot: usize) -> bool {
+        self.meshes.get(slot).copied().flatten().is_some_and(|entry| entry.is_drawable)
+    }
+
+    /// Whether the arrays of materials reach to a slot.
+    pub(super) fn has_material(&self, slot: usize) -> bool {
+        self.materials.get(slot).copied().flatten().is_some_and(|entry| entry.is_in_arrays)
     }
 }
 

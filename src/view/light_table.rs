@@ -59,6 +59,19 @@ impl LightTable {
     /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their own,
     /// and the shadow maps that `views` draw of them. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
+        self.fill_within(view, lights, views, shadows, (usize::MAX, &mut Vec::new()));
+    }
+
+    /// The same with at most `capacity` of [`LightTable::gpu_lights`], as long as the layers of shadow maps are not more. The first lights of the
+    /// scene have room. Adds the indices of the others that reach the view to `left_out`.
+    pub(crate) fn fill_within(
+        &mut self,
+        view: &RenderView,
+        lights: &[Light],
+        views: &[RenderView],
+        shadows: bool,
+        (capacity, left_out): (usize, &mut Vec<usize>),
+    ) {
         self.gpu_lights.clear();
         self.layers.clear();
         self.reaching.clear();
@@ -76,9 +89,18 @@ impl LightTable {
                 shadow_view.get_or_insert(index);
             }
         }
+        if has_several {
+            let maps = views.iter().enumerate().filter(|(_, map)| map.kind() == ViewKind::Shadow);
+            self.layers.extend(maps.map(|(index, map)| map.valid_light.map(|light| (light, index))));
+        }
+        let capacity = capacity.saturating_sub(self.layers.len());
         let mut counts = [0_u32; LightClass::COUNT];
         for (index, light) in lights.iter().enumerate() {
             if light.bounding_sphere().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
+                if self.reaching.len() >= capacity {
+                    left_out.push(index);
+                    continue;
+                }
                 let class = LightClass::of(light, shadows).index();
                 counts[class] += 1;
                 self.reaching.push((class, index));
@@ -89,10 +111,6 @@ impl LightTable {
         for (class, count) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
             self.ranges[class] = start..start + count;
             start += count;
-        }
-        if has_several {
-            let maps = views.iter().enumerate().filter(|(_, map)| map.kind() == ViewKind::Shadow);
-            self.layers.extend(maps.map(|(index, map)| map.valid_light.map(|light| (light, index))));
         }
         self.set_origin(view.camera.position, lights, views);
     }

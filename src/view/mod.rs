@@ -35,6 +35,7 @@ mod render_view;
 mod selection_filter;
 mod shadow_maps;
 mod subdivision_level;
+mod table_limits;
 mod triangle_culling;
 mod used_meshes;
 mod visible_set;
@@ -67,6 +68,7 @@ pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
 pub(crate) use selection_filter::SelectionFilter;
 pub use shadow_maps::ShadowMaps;
+pub(crate) use table_limits::TableLimits;
 pub use used_meshes::UsedMeshes;
 #[doc(hidden)] // For this repository's tests and benchmarks.
 pub use visible_set::VisibleSet;

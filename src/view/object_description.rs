@@ -116,7 +116,7 @@ fn nearest_steps(positions: &[Lanes<f64>; 3]) -> [Lanes<i64>; 3] {
 
 /// Why an object cannot be drawn.
 #[cold]
-pub(super) fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> RejectionReason {
+pub(super) fn rejection_reason(scene: &SceneRef<'_>, draw_states: &DrawStates, object: usize) -> RejectionReason {
     let [x, y, z, w] = scene.orientation_column().get(object).to_array();
     // Rounded as where it was found to be invalid.
     let is_rotation = is_unit(x * x + y * y + z * z + w * w);
@@ -130,6 +130,10 @@ pub(super) fn rejection_reason(scene: &SceneRef<'_>, object: usize) -> Rejection
         RejectionReason::StaleMesh
     } else if scene.assets.get(scene.materials[object]).is_err() {
         RejectionReason::StaleMaterial
+    } else if !draw_states.is_drawable(scene.meshes[object].index() as usize) {
+        RejectionReason::UndrawableMesh
+    } else if !draw_states.has_material(scene.materials[object].index() as usize) {
+        RejectionReason::MaterialLimit
     } else {
         RejectionReason::InvalidBounds
     }

@@ -12,7 +12,7 @@ use super::object_block::ObjectBlock;
 use super::object_description::{PacketDescription, rejection_reason};
 use super::packet_columns::GatheredColumns;
 use super::used_meshes::UsedMeshes;
-use super::{BoundingBoxes, GpuObject, Rejections};
+use super::{BoundingBoxes, GpuObject, RejectionReason, Rejections, TableLimits};
 use crate::chunked_array::block_ranges;
 use crate::command::{BinnedSegment, Bins};
 use crate::leaked_guards::unlock;
@@ -33,6 +33,8 @@ pub struct ObjectTable {
     bins: RwLock<Bins>,
     rejections: Rejections,
     length: usize,
+    /// The number of objects of the scene: more than `length` if some are beyond the limits.
+    scene_length: usize,
     /// The culling volume from the next [`ObjectTable::begin_frame`] on.
     culling: CullingVolume,
     /// The culling volume that the blocks' boxes are for.
@@ -87,10 +89,16 @@ impl ObjectTable {
     /// Makes room for a scene's objects, and finds out which of them have to be described, those that changed or all, and which meshes
     /// they use.
     pub fn begin_frame(&mut self, scene: &SceneRef<'_>) {
+        self.begin_frame_within(scene, &TableLimits::NONE);
+    }
+
+    /// The same within limits: leaves out the objects that are beyond them.
+    pub(crate) fn begin_frame_within(&mut self, scene: &SceneRef<'_>, limits: &TableLimits<'_>) {
         unlock(&mut self.bins);
         self.blocks.iter_mut().for_each(unlock);
-        let objects = scene.object_count();
-        let assets_changed = self.draw_states.update(scene.assets);
+        self.scene_length = scene.object_count();
+        let objects = self.scene_length.min(limits.objects);
+        let assets_changed = self.draw_states.update(scene.assets, limits);
         if assets_changed && self.bins.get_mut().len() > MIN_UNUSED_BINS + 2 * objects {
             // Most of them belong to meshes that are gone.
             self.bins.get_mut().clear();
@@ -103,12 +111,19 @@ impl ObjectTable {
         } else {
             self.changed.set_all(objects);
         }
-        self.used_meshes.update(scene, &self.changed);
+        self.used_meshes.update(scene, &self.changed, &self.draw_states);
         self.is_current = false;
         if self.changed.word_count() > 0 || objects != length_before {
             self.epoch += 1;
         }
         self.resize_blocks(length_before);
+    }
+
+    /// Begins the frame that it has begun anew, within other limits. What is rejected already stays so.
+    pub(crate) fn begin_frame_anew(&mut self, scene: &SceneRef<'_>, limits: &TableLimits<'_>) {
+        let rejections = std::mem::take(&mut self.rejections);
+        self.begin_frame_within(scene, limits);
+        self.rejections = rejections;
     }
 
     fn resize_blocks(&mut self, length_before: usize) {
@@ -207,6 +222,7 @@ impl ObjectTable {
     /// Completes the table when all changed objects are described: orders new bins, and counts the objects that are rejected.
     pub fn finish(&self) {
         self.bins.write().sort();
+        self.rejections.count_range(RejectionReason::ObjectLimit, self.length..self.scene_length);
         if self.summary.read().has_rejected {
             let mut has_rejected = false;
             for (index, block) in self.blocks[..self.block_count()].iter().enumerate() {
@@ -263,7 +279,7 @@ impl ObjectTable {
             let gathered = GatheredColumns::new(scene, &[object]);
             let columns = gathered.columns();
             let now = PacketDescription::new(&columns, &self.draw_states).object(&columns, 0, object);
-            now.ok_or_else(|| rejection_reason(scene, object)) == before
+            now.ok_or_else(|| rejection_reason(scene, &self.draw_states, object)) == before
         };
         let unreported = |object: &usize| !self.is_reported(*object);
         (0..self.length).filter(unreported).find(|object| !is_as_before(object))
@@ -277,7 +293,7 @@ impl ObjectTable {
         self.end_frame();
     }
 
-    /// The number of objects.
+    /// The number of objects, without those beyond the backend's limits.
     pub fn len(&self) -> usize {
         self.length
     }

@@ -1,9 +1,14 @@
 //! Counts what a frame leaves out or does not draw as requested.
 
 use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use parking_lot::Mutex;
+
+use crate::handle::Slots;
+use crate::scene::{Mesh, SceneRef};
 
 /// Counts what a frame leaves out or does not draw as requested. Any number of jobs may count at the same time.
 #[derive(Debug, Default)]
@@ -27,31 +32,51 @@ impl Rejections {
         indices.filter(|index| counted.insert((reason, *index))).for_each(|index| self.count(reason, index));
     }
 
-    /// Counts an object, light or material.
+    /// Counts an object, light, material or texture.
     pub fn count(&self, reason: RejectionReason, index: usize) {
-        self.by_reason[reason as usize].count(index);
+        self.by_reason[reason as usize].count(index..index + 1);
     }
 
-    /// The rejections, one for each reason that occurred.
+    /// Counts all of a range.
+    pub(crate) fn count_range(&self, reason: RejectionReason, indices: Range<usize>) {
+        if !indices.is_empty() {
+            self.by_reason[reason as usize].count(indices);
+        }
+    }
+
+    /// The rejections, one for each reason that occurred, without names.
     pub fn list(&self) -> Vec<Rejection> {
-        let rejections = RejectionReason::ALL.into_iter().zip(&self.by_reason).map(|(reason, counts)| Rejection {
-            reason,
-            count: counts.count.load(Ordering::Relaxed) as usize,
-            first: counts.first.load(Ordering::Relaxed) as usize,
+        self.list_with(|_, _| None)
+    }
+
+    /// The rejections of a frame of this scene, with names.
+    pub(crate) fn list_of(&self, scene: &SceneRef<'_>) -> Vec<Rejection> {
+        self.list_with(|reason, first| reason.name_of(first, scene).map(Arc::from))
+    }
+
+    fn list_with(&self, name_of: impl Fn(RejectionReason, usize) -> Option<Arc<str>>) -> Vec<Rejection> {
+        let rejections = RejectionReason::ALL.into_iter().zip(&self.by_reason).filter_map(|(reason, counts)| {
+            let count = counts.count.load(Ordering::Relaxed) as usize;
+            let first = counts.first.load(Ordering::Relaxed) as usize;
+            (count > 0).then(|| Rejection { reason, count, first, name: name_of(reason, first) })
         });
-        rejections.filter(|rejection| rejection.count > 0).collect()
+        rejections.collect()
     }
 }
 
-/// Objects, lights or materials that a frame rejected for one reason.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Objects, lights, materials or textures that a frame rejected for one reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rejection {
     /// The reason.
     pub reason: RejectionReason,
     /// The number of them.
     pub count: usize,
-    /// The lowest of their indices.
+    /// The lowest of their indices: among the scene's objects or lights, or the slot of a
+    /// [handle](crate::handle::Handle::index) to a material or texture.
     pub first: usize,
+    /// The name of the material or texture at that index; of an object that of its mesh, or of its material where that is the reason.
+    /// `None` for a light, and for what was removed.
+    pub name: Option<Arc<str>>,
 }
 
 /// Why a frame leaves something out, or does not draw it as requested.
@@ -89,6 +114,20 @@ pub enum RejectionReason {
     NotResident,
     /// A material's texture is not on the device yet, or not loaded yet; the material's plain colour is used.
     TextureNotResident,
+    /// An object is beyond the number that the backend [can hold](crate::backend::SceneLimits::max_objects), or that a frame can name.
+    ObjectLimit,
+    /// An object's mesh [cannot be drawn](crate::backend::Backend::check_mesh) by the backend: as a rule, it is larger than the
+    /// device's buffers. A warning names each such mesh, with the reason.
+    UndrawableMesh,
+    /// An object's material, or its values of the engine's own, are beyond what the backend
+    /// [can hold](crate::backend::SceneLimits::binding_bytes).
+    MaterialLimit,
+    /// A light reaches a view, and is beyond what the backend [can hold](crate::backend::SceneLimits::max_lights) for that view. Other views
+    /// may have it.
+    LightLimit,
+    /// A texture is wider or higher than [`Texture::MAX_DETAIL`](crate::scene::Texture::MAX_DETAIL), and drawn with less detail than it
+    /// was given with.
+    ReducedTexture,
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
     /// objects are drawn as it says.
     UnknownObject,
@@ -99,7 +138,7 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 20] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -113,6 +152,11 @@ impl RejectionReason {
         Self::TextureLimit,
         Self::NotResident,
         Self::TextureNotResident,
+        Self::ObjectLimit,
+        Self::UndrawableMesh,
+        Self::MaterialLimit,
+        Self::LightLimit,
+        Self::ReducedTexture,
         Self::UnknownObject,
         Self::HalfFloatBlending,
     ];
@@ -133,8 +177,42 @@ impl RejectionReason {
             Self::TextureLimit => "texture beyond the device's limits",
             Self::NotResident => "object with a mesh or material that is yet to arrive",
             Self::TextureNotResident => "material with a texture that is yet to arrive",
+            Self::ObjectLimit => "object beyond the capacity of the device's buffers",
+            Self::UndrawableMesh => "object with a mesh that the backend cannot draw",
+            Self::MaterialLimit => "object with a material beyond the capacity of the device's buffers",
+            Self::LightLimit => "light beyond the capacity of the device's buffers",
+            Self::ReducedTexture => "texture with more pixels than are drawn",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
             Self::HalfFloatBlending => "blended object in half floats, because the device does not blend floats",
+        }
+    }
+
+    /// The name of what has this index in the scene: see [`Rejection::name`].
+    fn name_of<'a>(self, index: usize, scene: &SceneRef<'a>) -> Option<&'a str> {
+        fn at<T>(slots: &Slots<T>, index: usize) -> Option<&T> {
+            slots.get_with_revision(u32::try_from(index).ok()?).map(|(_, found)| found)
+        }
+        let assets = scene.assets;
+        match self {
+            Self::InvalidTransform
+            | Self::InvalidBounds
+            | Self::OutOfReach
+            | Self::StaleMesh
+            | Self::CoarseEdges
+            | Self::NotResident
+            | Self::ObjectLimit
+            | Self::UndrawableMesh
+            | Self::HalfFloatBlending => assets.get(*scene.meshes.get(index)?).ok().map(Mesh::name),
+            Self::StaleMaterial | Self::MaterialLimit => {
+                assets.get(*scene.materials.get(index)?).ok().map(|material| material.name.as_str())
+            }
+            Self::StaleTexture | Self::TextureNotResident => {
+                at(&assets.materials, index).map(|material| material.name.as_str())
+            }
+            Self::TextureLimit | Self::ReducedTexture => at(&assets.textures, index).map(|texture| texture.name()),
+            Self::DarkLight | Self::LightOutOfReach | Self::InvalidLight | Self::LightLimit | Self::UnknownObject => {
+                None
+            }
         }
     }
 }
@@ -153,9 +231,10 @@ impl Default for RejectionCount {
 }
 
 impl RejectionCount {
-    fn count(&self, index: usize) {
+    fn count(&self, indices: Range<usize>) {
+        let saturated = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         // Relaxed: the counts are read after the frame's jobs have ended.
-        self.count.fetch_add(1, Ordering::Relaxed);
-        self.first.fetch_min(u32::try_from(index).unwrap_or(u32::MAX), Ordering::Relaxed);
+        self.count.fetch_add(saturated(indices.len()), Ordering::Relaxed);
+        self.first.fetch_min(saturated(indices.start), Ordering::Relaxed);
     }
 }

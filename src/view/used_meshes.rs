@@ -1,6 +1,7 @@
 //! The meshes that objects have, among those of the assets.
 
 use super::changed_objects::{ChangedObjects, ChangedWord};
+use super::draw_states::DrawStates;
 use super::set_bits;
 use crate::handle::Handle;
 use crate::scene::{Assets, Mesh, SceneRef};
@@ -11,9 +12,9 @@ use crate::scene::{Assets, Mesh, SceneRef};
 /// A frame looks at the objects that changed, and at none while all meshes of the assets are used.
 #[derive(Debug, Default)]
 pub struct UsedMeshes {
-    /// The identity and revision of the meshes; `None` before the first update.
-    version: Option<(u64, u64)>,
-    /// By slot: each mesh of the assets.
+    /// The identity and revision of the meshes, and that of the draw states; `None` before the first update.
+    version: Option<(u64, u64, u64)>,
+    /// By slot: each mesh of the assets that can be drawn.
     meshes: Vec<Option<Handle<Mesh>>>,
     /// By slot: whether there is a mesh that is not used. A frame in which all objects changed looks here for each of them.
     is_unused: Vec<bool>,
@@ -35,6 +36,12 @@ impl UsedMeshes {
         self.meshes.get(slot).is_some_and(Option::is_some) && !self.is_unused[slot]
     }
 
+    /// Whether there is a mesh in a slot that can be drawn, used or not.
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn can_be_used(&self, slot: u32) -> bool {
+        self.meshes.get(slot as usize).is_some_and(Option::is_some)
+    }
+
     /// A counter that grows whenever a mesh becomes used.
     pub fn revision(&self) -> u64 {
         self.revision
@@ -42,8 +49,8 @@ impl UsedMeshes {
 
     /// Adds the meshes of the objects that changed. Those of the others are among the used ones already: an object that has not changed
     /// cannot have a mesh that is new.
-    pub(super) fn update(&mut self, scene: &SceneRef<'_>, changed: &ChangedObjects) {
-        self.update_assets(scene.assets);
+    pub(super) fn update(&mut self, scene: &SceneRef<'_>, changed: &ChangedObjects, draw_states: &DrawStates) {
+        self.update_assets(scene.assets, draw_states);
         let unused_before = self.unused;
         for ChangedWord { word, mask } in (0..changed.word_count()).map(|index| changed.word(index)) {
             if self.unused == 0 {
@@ -59,8 +66,8 @@ impl UsedMeshes {
         self.revision += u64::from(self.unused < unused_before);
     }
 
-    fn update_assets(&mut self, assets: &Assets) {
-        let version = Some((assets.meshes.identity(), assets.meshes.revision()));
+    fn update_assets(&mut self, assets: &Assets, draw_states: &DrawStates) {
+        let version = Some((assets.meshes.identity(), assets.meshes.revision(), draw_states.limits_revision()));
         if self.version == version {
             return;
         }
@@ -68,6 +75,9 @@ impl UsedMeshes {
         let mut is_unused = vec![false; assets.meshes.slot_count()];
         for (mesh, _) in assets.iter::<Mesh>() {
             let slot = mesh.index() as usize;
+            if !draw_states.is_drawable(slot) {
+                continue;
+            }
             meshes[slot] = Some(mesh);
             is_unused[slot] = !self.contains(mesh);
         }

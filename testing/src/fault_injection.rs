@@ -11,7 +11,7 @@ use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
 use drawloom::task::Worker;
 
-use crate::forwarded_calls::forward_unchanged_calls;
+use crate::forwarded_calls::{forward_limits, forward_unchanged_calls};
 
 /// Passes calls on to another backend, counts them, and fails one of them.
 ///
@@ -207,6 +207,8 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     type Part = B::Part;
     type Commands = B::Commands;
     type Submission = B::Submission;
+
+    forward_limits!();
 
     forward_unchanged_calls!();
 

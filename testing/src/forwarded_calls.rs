@@ -82,4 +82,21 @@ macro_rules! forward_unchanged_calls {
     };
 }
 
-pub(crate) use forward_unchanged_calls;
+/// Those of them that say what the backend can hold.
+macro_rules! forward_limits {
+    () => {
+        fn limits(&self) -> ::drawloom::backend::SceneLimits {
+            self.inner.limits()
+        }
+
+        fn check_mesh(
+            &self,
+            mesh: &::drawloom::scene::Mesh,
+            vertices: ::drawloom::quality::VertexFormat,
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.check_mesh(mesh, vertices)
+        }
+    };
+}
+
+pub(crate) use {forward_limits, forward_unchanged_calls};

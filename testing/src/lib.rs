@@ -13,6 +13,7 @@ mod forwarded_calls;
 pub mod graph_oracle;
 pub mod hills;
 pub mod light_sums;
+pub mod limited;
 pub mod mip_levels;
 pub mod obj_files;
 pub mod precision;

@@ -13,7 +13,7 @@ use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
 use drawloom::task::Worker;
 
-use crate::forwarded_calls::forward_unchanged_calls;
+use crate::forwarded_calls::{forward_limits, forward_unchanged_calls};
 
 /// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
 /// Its passes take equal shares of that time.
@@ -106,6 +106,8 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
     type Part = B::Part;
     type Commands = B::Commands;
     type Submission = B::Submission;
+
+    forward_limits!();
 
     forward_unchanged_calls!();
 

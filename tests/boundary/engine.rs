@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use drawloom::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, Picture, ReadBack, SoftwareBackend,
-    TargetMemory, ViewQueue, ViewRequest,
+    Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, Picture, ReadBack, SceneLimits,
+    SoftwareBackend, TargetMemory, ViewQueue, ViewRequest,
 };
 use drawloom::command::DrawState;
 use drawloom::fence::DeviceProgress;
@@ -16,8 +16,9 @@ use drawloom::process::{
     CpuShader, Declare, Draws, FramePlan, FullScreen, FullScreenCpuShader, FullScreenPixel, PassInputs, RenderProcess,
     ShaderResource,
 };
-use drawloom::quality::Quality;
+use drawloom::quality::{Quality, VertexFormat};
 use drawloom::raster::{Real, Vector4};
+use drawloom::scene::Mesh;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::timeline::{Labels, TuningChoice};
 use drawloom::{CpuNode, NodeAccesses, NodeFrame};
@@ -91,6 +92,16 @@ impl<B: Backend> Backend for OwnBackend<B> {
     fn uploaded_bytes(&self) -> u64 {
         backend("uploaded_bytes");
         self.inner.uploaded_bytes()
+    }
+
+    fn limits(&self) -> SceneLimits {
+        backend("limits");
+        self.inner.limits()
+    }
+
+    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
+        backend("check_mesh");
+        self.inner.check_mesh(mesh, vertices)
     }
 
     fn prepare_pipelines(

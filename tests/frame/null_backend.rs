@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use drawloom::Granularity;
-use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest};
+use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest, SceneLimits};
 use drawloom::command::{Bucket, DrawList};
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass, SampledViews};
 use drawloom::quality::Quality;
@@ -47,6 +47,7 @@ fn broken_rule(
         list_capacity: objects.len(),
         generated: &[],
         quality: &Quality::balanced(),
+        limits: SceneLimits::NONE,
         rejections: &Rejections::default(),
     };
     let frame = NullBackend.begin(&request).unwrap();

@@ -259,7 +259,7 @@ fn listed_objects_that_the_scene_lacks_are_counted_once_and_warned_of() {
     let warning = frame(&scene);
     assert!(warning.contains("object that a filter lists and the scene does not have"), "{warning}");
     assert_eq!(frame(&scene), "", "nothing new");
-    assert_eq!(rejections, [Rejection { reason: RejectionReason::UnknownObject, count: 3, first: 10 }]);
+    assert_eq!(rejections, [Rejection { reason: RejectionReason::UnknownObject, count: 3, first: 10, name: None }]);
 }
 
 #[test]

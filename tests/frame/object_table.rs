@@ -38,7 +38,7 @@ fn the_first_rejected_object_is_named_by_its_number_in_the_scene() {
     }
     let mut table = ObjectTable::default();
     table.update(&SceneRef { positions: &positions, ..scene });
-    let [rejection] = table.rejections().list()[..] else { panic!("{:?}", table.rejections().list()) };
+    let [rejection] = &table.rejections().list()[..] else { panic!("{:?}", table.rejections().list()) };
     assert_eq!((rejection.reason, rejection.count, rejection.first), (RejectionReason::InvalidTransform, 3, 300));
 }
 

@@ -337,7 +337,7 @@ fn pieces_that_contradict_each_other_are_errors_and_the_next_frame_is_right() {
     assert_eq!(shared.to_string(), "object 7 is in the pieces \"row 0\" and \"row 2\", and can be in one only");
     rows.scene.pieces[2].objects = ObjectSet::new([1000]);
     let recorded = rows.renderer.record(rows.scene.as_scene_ref()).unwrap();
-    let rejection = recorded.statistics().rejections[0];
+    let rejection = &recorded.statistics().rejections[0];
     assert_eq!((rejection.reason, rejection.count, rejection.first), (RejectionReason::UnknownObject, 1, 1000));
     rows.scene.pieces[2].name = "row 4".to_owned();
     let FrameError::Scene(SceneError::RepeatedPiece { piece }) = error(&mut rows) else { panic!("another error") };

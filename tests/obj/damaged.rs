@@ -11,6 +11,7 @@ use crate::trial;
 pub fn trials() -> Vec<Trial> {
     vec![
         trial("damaged::a_malformed_line_is_left_out_and_the_others_are_read", a_malformed_line_is_left_out),
+        trial("damaged::one_bad_element_loses_no_other", one_bad_element_loses_no_other),
         trial("damaged::a_number_ends_where_it_stops_being_one", a_number_ends_where_it_stops_being_one),
         trial("damaged::a_file_may_end_anywhere", a_file_may_end_anywhere),
         trial("damaged::unknown_statements_are_counted_and_named", unknown_statements_are_counted_and_named),
@@ -47,6 +48,30 @@ fn a_malformed_line_is_left_out() {
     let vertices = mesh(&imported, 0).vertices();
     assert_eq!((vertices[0].normal, vertices[0].uv), ([0.0, 0.0, 1.0], [0.0, 0.0]));
     assert_eq!((vertices[1].normal, vertices[1].uv), ([0.0, 0.6, 0.8], [0.5, 0.75]));
+}
+
+fn one_bad_element_loses_no_other() {
+    let elements = [
+        // Objects too far or too large for numbers of 32 bits, and one whose middle is no number.
+        "o far\nv 1e300 0 0\nv 1e300 1e299 0\nv 1e300 0 1e299\nf -1 -2 -3\n",
+        "o large\nv -3e38 0 0\nv 3e38 0 0\nv 0 3e38 0\nf -1 -2 -3\n",
+        "o nowhere\nv inf 0 0\nv -inf 0 0\nv 0 nan 0\nf -1 -2 -3\n",
+        "o flat\nv 0 0 0\nv 0 0 0\nv 0 0 0\nf -1 -2 -3\n",
+        // A face, a material, a library, a texture.
+        "f 0 0 0\n",
+        "f 1 2\n",
+        "usemtl missing\nf 1 2 3\n",
+        "mtllib missing.mtl\nusemtl wood\nf 1 2 3\n",
+        "vn nan nan nan\nvt inf\nf 1/1/1 2/1/1 3/1/1\n",
+        "cstype bezier\nsurf 0 1 0 1 1 2 3\n",
+    ];
+    for element in elements {
+        for text in [format!("{TRIANGLE}{element}"), format!("{TRIANGLE}{element}{TRIANGLE}")] {
+            let imported = load(&text);
+            assert!(imported.triangles > 0 && imported.triangles >= text.matches(TRIANGLE).count(), "{text}");
+            assert!(!imported.warnings.is_empty() || imported.degenerate_triangles > 0, "{text}");
+        }
+    }
 }
 
 fn a_number_ends_where_it_stops_being_one() {

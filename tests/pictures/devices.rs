@@ -22,7 +22,7 @@ pub const CASES: &[Case] = &[
     ("timing_passes_without_timestamps_is_refused_naming_the_feature", no_timestamps),
     ("a_panic_of_wgpu_over_indirect_draws_is_an_error", indirect_draws_on_noop),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
-    ("too_many_objects_for_a_storage_buffer_are_refused_and_later_frames_are_drawn", many_objects),
+    ("objects_beyond_a_storage_buffer_are_counted_and_named", many_objects),
     ("more_shadow_maps_than_texture_layers_are_refused_and_later_frames_are_drawn", many_shadow_maps),
     ("a_lost_device_is_an_error", lost_device),
     ("textures_beyond_the_devices_layers_are_counted", many_textures),
@@ -123,17 +123,20 @@ fn many_objects() -> Result<(), Failed> {
         Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
     let (few, mut many) = (field(1000), field(1000));
     many.duplicate_objects(WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64 / 1000 + 1);
-    for scene in [&few, &many, &many, &few] {
-        let refused = match renderer.record(scene.as_scene_ref()) {
-            Ok(recorded) => {
-                submitter.submit(recorded)?;
-                false
-            }
-            Err(FrameError::Backend(BackendError::Limit { limit, .. })) => limit.contains("storage_buffer"),
-            Err(other) => return Err(other.into()),
-        };
-        if refused != (scene.object_count() > 1000) {
-            return Err(format!("{} objects, refused: {refused}", scene.object_count()).into());
+    let capacity = WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64;
+    for scene in [&few, &many, &few] {
+        let statistics = submitter.submit(renderer.record(scene.as_scene_ref())?)?.statistics;
+        let beyond = scene.object_count().saturating_sub(capacity);
+        let first_beyond = scene.as_scene_ref().meshes.get(capacity);
+        let name = first_beyond.and_then(|mesh| Some(scene.assets().get(*mesh).ok()?.name()));
+        let found: Vec<_> = statistics
+            .rejections
+            .iter()
+            .map(|known| (known.reason, known.count, known.first, known.name.as_deref()))
+            .collect();
+        let expected = [(RejectionReason::ObjectLimit, beyond, capacity, name)];
+        if found != expected[..usize::from(beyond > 0)] || statistics.objects != scene.object_count() {
+            return Err(format!("{} objects: {found:?}", scene.object_count()).into());
         }
     }
     Ok(())

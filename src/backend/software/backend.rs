@@ -11,6 +11,8 @@ use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
 use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, ViewQueue, ViewRequest};
+use crate::quality::VertexFormat;
+use crate::scene::Mesh;
 use crate::task::{Scheduler, Worker};
 
 /// Draws on the CPU.
@@ -90,6 +92,11 @@ impl Backend for SoftwareBackend {
 
     fn forget_histories(&self) {
         self.rasterizer.forget_histories();
+    }
+
+    fn check_mesh(&self, mesh: &Mesh, _vertices: VertexFormat) -> Result<(), BackendError> {
+        let can_see = mesh.has_triangles() || mesh.generated_geometry().is_some();
+        can_see.then_some(()).ok_or_else(|| BackendError::ImportedMesh { mesh: mesh.name().to_owned() })
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<SoftwareFrame, BackendError> {

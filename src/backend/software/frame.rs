@@ -27,6 +27,7 @@ use crate::command::Batch;
 use crate::process::ShaderColumns;
 use crate::quality::{TransformPrecision, VertexFormat};
 use crate::scene::{ColumnLayout, GeneratedContents, Mesh};
+use crate::unwind::hold_events;
 
 /// A frame in one precision, from `begin` until it was submitted.
 pub(super) struct TypedFrame<R: Precision> {
@@ -56,7 +57,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
     }
 
     fn prepare(&self, &PassRequest { frame: request, list, .. }: &PassRequest<'_>) -> Result<(), BackendError> {
-        let make = |mesh| Ok(Arc::new(as_fetched(mesh, self.vertices)));
+        let make = |mesh| Ok(Some(Arc::new(as_fetched(mesh, self.vertices))));
         self.context.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
             self.subdivided.lock().insert(key, mesh);
         })
@@ -79,10 +80,20 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
     fn submit(
         self: Box<Self>,
         queues: Vec<ViewQueue<SoftwareCommands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<SoftwareSubmission, BackendError> {
+        hold_events(|| self.draw_all(queues, fences))
+    }
+}
+
+impl<R: Precision> TypedFrame<R> {
+    fn draw_all(
+        self,
+        queues: Vec<ViewQueue<SoftwareCommands>>,
         mut fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
         let mut generated = self.context.drawing.lock();
-        let meshes = generated.update(&self.generated, &self.meshes)?;
+        let meshes = generated.update(&self.generated, &self.meshes);
         for (before, (pass, commands)) in queues.iter().flat_map(|queue| &queue.passes).enumerate() {
             FrameFence::set_up_to(before, &mut fences);
             let known = self.passes.iter().find(|known| known.pass == *pass);
@@ -97,9 +108,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         fences.into_iter().for_each(|fence| fence.setter.set());
         Ok(SoftwareSubmission::new(Arc::clone(&self.targets) as _))
     }
-}
 
-impl<R: Precision> TypedFrame<R> {
     fn draw(&self, pass: &SoftwarePass<R>, commands: &SoftwareCommands, meshes: &Meshes) -> Result<(), BackendError> {
         let view = &self.views[pass.pass.view_index];
         let context = PassContext {
@@ -115,7 +124,7 @@ impl<R: Precision> TypedFrame<R> {
                 let mesh_of = |batch: &Batch| {
                     let mesh = match batch.state.subdivision_level() {
                         0 => meshes.get(batch.mesh as usize).and_then(Option::as_ref),
-                        _ => subdivided.get(&subdivision_of(batch)).map(|mesh| &mesh.geometry),
+                        _ => subdivided.get(&subdivision_of(batch)).and_then(|mesh| mesh.geometry.as_ref()),
                     };
                     mesh.cloned().ok_or_else(missing_mesh_error)
                 };

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::mip_chain::MipChain;
+use crate::backend::mip_generation::reduced_textures;
 use crate::process::{Materials, ShaderMaterial};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Assets, Blend, Material, MaterialValues};
@@ -20,8 +21,9 @@ pub(super) struct MaterialCache {
     /// Identities and revisions of the materials and textures in the table.
     current: Option<[(u64, u64); 2]>,
     table: Arc<MaterialTable>,
-    /// The materials whose texture was removed, which every frame reports.
-    stale: Vec<(RejectionReason, usize)>,
+    /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures of less detail than they
+    /// were given with.
+    rejected: Vec<(RejectionReason, usize)>,
 }
 
 impl MaterialCache {
@@ -36,8 +38,8 @@ impl MaterialCache {
             self.rebuild(assets);
             self.current = Some(wanted);
         }
-        for &(reason, material) in &self.stale {
-            rejections.count(reason, material);
+        for &(reason, slot) in &self.rejected {
+            rejections.count(reason, slot);
         }
         Arc::clone(&self.table)
     }
@@ -52,7 +54,8 @@ impl MaterialCache {
             let revision = assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
             chain.take_if(|(kept, _)| Some(*kept) != revision);
         }
-        self.stale.clear();
+        self.rejected.clear();
+        self.rejected.extend(reduced_textures(assets).map(|texture| (RejectionReason::ReducedTexture, texture)));
         let mut slots = vec![None; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let slot = handle.index() as usize;
@@ -61,7 +64,7 @@ impl MaterialCache {
                     let is_pending = assets.is_pending(texture);
                     let reason =
                         if is_pending { RejectionReason::TextureNotResident } else { RejectionReason::StaleTexture };
-                    self.stale.push((reason, slot));
+                    self.rejected.push((reason, slot));
                     return None;
                 }
                 self.chain(assets, texture.index())

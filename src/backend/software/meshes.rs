@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::backend::BackendError;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::UsedMeshes;
@@ -22,24 +21,12 @@ pub(super) struct MeshCache {
 
 impl MeshCache {
     /// Those of the assets' meshes that are used, with the vertices that a device would fetch.
-    ///
-    /// # Errors
-    /// If one of them is in buffers of a device.
-    pub(super) fn update(
-        &mut self,
-        assets: &Assets,
-        used: &UsedMeshes,
-        vertices: VertexFormat,
-    ) -> Result<Meshes, BackendError> {
+    pub(super) fn update(&mut self, assets: &Assets, used: &UsedMeshes, vertices: VertexFormat) -> Meshes {
         let wanted = (assets.meshes.identity(), assets.meshes.revision(), used.revision(), vertices);
         if self.version == wanted {
-            return Ok(Arc::clone(&self.meshes));
+            return Arc::clone(&self.meshes);
         }
         let used = || assets.meshes.iter_with_revision().filter(|(handle, ..)| used.contains(*handle));
-        if let Some((.., mesh)) = used().find(|(.., mesh)| !mesh.has_triangles() && mesh.generated_geometry().is_none())
-        {
-            return Err(BackendError::ImportedMesh { mesh: mesh.name().to_owned() });
-        }
         let mut before = std::mem::take(&mut self.kept);
         if (self.version.0, self.version.3) != (wanted.0, wanted.3) {
             before.clear();
@@ -52,7 +39,7 @@ impl MeshCache {
         }
         self.version = wanted;
         self.meshes = self.kept.iter().map(|kept| kept.as_ref().map(|(_, mesh)| Arc::clone(mesh))).collect();
-        Ok(Arc::clone(&self.meshes))
+        Arc::clone(&self.meshes)
     }
 }
 

@@ -77,7 +77,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         self.context.subdivisions.begin_frame(scene.assets);
         // The reference draws the scene's own vertices.
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
-        let meshes = self.meshes.lock().update(scene.assets, request.objects.used_meshes(), vertices)?;
+        let meshes = self.meshes.lock().update(scene.assets, request.objects.used_meshes(), vertices);
         let materials = self.materials.lock().update(scene.assets, rejections);
         let column = |&layout: &_| Some((layout, Box::from(scene.column(layout)?.bytes())));
         let columns = plan.columns().iter().filter_map(column).collect();

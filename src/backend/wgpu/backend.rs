@@ -211,8 +211,8 @@ impl WgpuBackend {
     ///
     /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the device, if the budget has
     /// room for both, and meshes that are subdivided for paraboloids. Otherwise a mesh or texture that is replaced is drawn until the new one
-    /// has arrived, or left out if not even evictions make room for both. What is larger than the budget of its kind, or than the device's
-    /// largest buffer, is left out, counted, and warned of by name. When the format of vertices changes, or a plan first reads a vertex
+    /// has arrived, or left out if not even evictions make room for both. What is larger than the budget of its kind is
+    /// left out, counted, and warned of by name. When the format of vertices changes, or a plan first reads a vertex
     /// attribute, all meshes come anew. Scenes at rest, once everything is there, have the pictures that they have without streaming. Views that [not every
     /// frame draws](crate::scene::Redraw) are not drawn anew because something arrived: they need a frame of
     /// [`Redraw::EveryFrame`](crate::scene::Redraw::EveryFrame) then.

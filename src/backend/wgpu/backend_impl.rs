@@ -13,17 +13,19 @@ use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
 use super::recording::{
     cached_bundle, encode_after_segments, encode_pass, encode_passes, encode_segment, record_bundle,
 };
+use super::resources::check_mesh;
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::streaming::Streamer;
 use super::submission::WgpuSubmission;
 use super::uploaded_picture::upload_picture;
 use crate::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, TargetMemory, ViewQueue,
-    ViewRequest,
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, SceneLimits, TargetMemory,
+    ViewQueue, ViewRequest,
 };
 use crate::command::{DrawList, DrawState};
 use crate::process::{Draws, FramePlan, ShaderResource};
-use crate::quality::Quality;
+use crate::quality::{Quality, VertexFormat};
+use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::view::RejectionReason;
@@ -81,6 +83,16 @@ impl Backend for WgpuBackend {
         Ok(())
     }
 
+    fn limits(&self) -> SceneLimits {
+        let limits = self.device.limits();
+        let (buffer_bytes, binding_bytes) = (limits.max_buffer_size, limits.max_storage_buffer_binding_size);
+        SceneLimits { buffer_bytes, binding_bytes: binding_bytes.min(buffer_bytes) }
+    }
+
+    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
+        check_mesh(&self.device, mesh, vertices)
+    }
+
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let imports = mem::take(&mut *self.imports.lock());
         // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that does not compile leave
@@ -96,7 +108,10 @@ impl Backend for WgpuBackend {
         let targets = with_error_scope(&self.device, "targets", update).inspect_err(|_| self.clear())??;
         self.begin_frame(request, pipelines, targets).inspect_err(|error| {
             self.fail_frame(error);
-            self.clear();
+            // If a limit is exceeded, the frame asks too much of its own buffers. Meshes, materials and textures are as they should be.
+            if !matches!(error, BackendError::Limit { .. }) {
+                self.clear();
+            }
         })
     }
 
@@ -168,6 +183,9 @@ impl Backend for WgpuBackend {
         if !created.is_empty() {
             pipelines.insert(created);
             pipelines.share();
+        }
+        if pipelines.has_unreadable() {
+            count_unreadable(frame, request, (pipelines, list));
         }
         Ok(())
     }
@@ -371,6 +389,17 @@ fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
             if frame_use.mark_material(material) {
                 request.rejections.count_once(RejectionReason::TextureNotResident, material as usize);
             }
+        }
+    }
+}
+
+/// Counts the objects of a list with meshes of which the process's shader cannot read an attribute.
+fn count_unreadable(frame: &WgpuFrame, request: &FrameRequest<'_>, (pipelines, list): (&ProcessPipelines, &DrawList)) {
+    for batch in &list.batches {
+        if pipelines.is_unreadable(&PipelineVariant::of_batch(&frame.meshes, batch)) {
+            let objects = &list.objects[batch.first as usize..][..batch.count as usize];
+            let objects = objects.iter().map(|object| *object as usize);
+            request.rejections.count_all_once(RejectionReason::UndrawableMesh, objects);
         }
     }
 }

@@ -8,7 +8,7 @@ use super::error_scope::with_error_scope;
 use super::frame::{BundleKey, GeneratedUploads, PendingUploads, WgpuFrame, WgpuPassState};
 use super::pass_bind_groups::update_bind_groups;
 use super::pipelines::ProcessPipelines;
-use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets};
+use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets, fits_in_buffers};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
 use super::streaming::{FrameUse, OnDevice, StreamedResources};
 use crate::backend::mip_schedule::MipSchedule;
@@ -92,7 +92,7 @@ impl WgpuBackend {
     /// # Errors
     /// If the device has no room.
     fn update_resources(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
-        let FrameRequest { plan, scene, rejections, .. } = *request;
+        let FrameRequest { plan, scene, limits, rejections, .. } = *request;
         let (mut meshes, mut materials) = (self.meshes.lock(), self.materials.lock());
         if let Some(streamer) = &self.streamer {
             let (device, uploads) = (&self.device, &self.uploads);
@@ -102,7 +102,7 @@ impl WgpuBackend {
         let (used, vertices) = (request.objects.used_meshes(), request.quality.vertices);
         let meshes = meshes.update(&self.device, &self.uploads, scene.assets, used, vertices)?;
         let types = plan.material_types();
-        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, rejections)?;
+        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, (limits, rejections))?;
         Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
     }
 
@@ -185,10 +185,13 @@ impl WgpuBackend {
         request: &FrameRequest<'_>,
         list: &DrawList,
     ) -> Result<(), BackendError> {
-        let vertices = request.quality.vertices;
+        let (vertices, limits) = (request.quality.vertices, request.limits);
         let make = |mesh: Mesh| {
+            if !fits_in_buffers(&mesh, vertices, limits.buffer_bytes) {
+                return Ok(None);
+            }
             let attributes = self.meshes.lock().attributes_of(&self.device, &self.uploads, &mesh)?;
-            SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices, attributes)
+            SubdividedMesh::new(&self.device, &self.uploads, &mesh, vertices, attributes).map(Some)
         };
         self.subdivisions.collect(request, list, vertices, make, |key, mesh| {
             frame.buffers.subdivided().write().insert(key, mesh);

@@ -10,6 +10,7 @@ use parking_lot::{Mutex, RwLock};
 use super::allotment::allot;
 use super::material_buffer::MaterialBuffer;
 use super::object_buffers::ObjectBuffers;
+use super::object_lists::ObjectLists;
 use super::pass_state::{FrameRanges, PassName, WgpuPassState};
 use super::resource_bytes::ResourceBytes;
 use super::view_ranges::ViewRanges;
@@ -62,6 +63,7 @@ impl BufferPool {
         for buffers in &self.free.lock().buffers {
             sizes.extend(buffers.all().map(GrowingBuffer::size));
             sizes.extend(buffers.objects.sizes());
+            sizes.extend(buffers.object_lists.sizes());
             sizes.extend(buffers.bytes.sizes());
             sizes.push(buffers.materials.size());
             sizes.extend(buffers.passes.iter().map(|pass| pass.partial_indices.read().size()));
@@ -151,18 +153,14 @@ impl FrameBuffers {
         self.held_epoch = mem::take(&mut buffers.objects_epoch);
         self.objects_epoch = request.objects.epoch();
         buffers.set_passes(request);
-        let limits = device.limits();
-        let objects = request.scene.object_count().max(1);
+        let objects = request.objects.len().max(1);
         let listed = request.list_capacity.max(1);
         let light_bytes = request.light_tables.iter().map(|lights| size_of_val(lights.gpu_lights())).max().unwrap_or(0);
-        for bytes in [listed * 4, light_bytes] {
+        for bytes in [listed * size_of::<u32>(), light_bytes] {
             check_storage_binding_size(device, bytes)?;
         }
-        buffers.set_views(request, limits.max_storage_buffer_binding_size)?;
-        let object_lists = buffers.allot_object_lists(limits.max_buffer_size / (listed as u64 * 4));
-        let max_stride =
-            limits.max_storage_buffer_binding_size.min(limits.max_buffer_size / object_lists.max(1) as u64);
-        buffers.object_indices_stride = size_with_headroom(buffers.object_indices_stride, listed * 4, max_stride);
+        buffers.set_views(request)?;
+        let lists = buffers.allot_object_lists(ObjectLists::max_in_one_buffer(listed, request.limits));
 
         let mut reallocated = buffers.objects.reserve(device, request.plan.columns(), objects)?;
         if reallocated {
@@ -172,7 +170,7 @@ impl FrameBuffers {
         let processes = request.plan.processes().iter().zip(request.draws);
         let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
         buffers.bytes.update(device, uploads, bytes)?;
-        let lost_lists = buffers.object_indices.reserve(device, object_lists * buffers.object_indices_stride)?;
+        let lost_lists = buffers.object_lists.reserve(device, (lists, listed), request.limits)?;
         reallocated |= lost_lists;
         for mirrored in [&mut buffers.views, &mut buffers.lights] {
             reallocated |= mirrored.upload(device, uploads)?;
@@ -305,7 +303,7 @@ impl FrameBuffers {
                     continue;
                 }
                 let bytes = bytemuck::cast_slice(&list.objects[objects.clone()]);
-                self.buffers.object_indices.write(uploads, start + objects.start * size_of::<u32>(), bytes);
+                self.buffers.object_lists.write(uploads, start, objects.start * size_of::<u32>(), bytes);
             }
         }
     }
@@ -326,8 +324,8 @@ struct Buffers {
     views: MirroredBuffer,
     /// The lights that reach each view, relative to its camera.
     lights: MirroredBuffer,
-    /// For each pass of commands the objects that it draws, `object_indices_stride` bytes apart.
-    object_indices: GrowingBuffer,
+    /// For each pass of commands the objects that it draws.
+    object_lists: ObjectLists,
     /// Each pass's parameters.
     parameters: MirroredBuffer,
     /// What processes read of the engine's own.
@@ -335,7 +333,6 @@ struct Buffers {
     passes: Vec<WgpuPassState>,
     /// By view index.
     view_ranges: Vec<ViewRanges>,
-    object_indices_stride: usize,
     subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
     timestamps: Option<Timestamps>,
     /// For how many frames no frame has taken them.
@@ -352,12 +349,11 @@ impl Buffers {
             materials: MaterialBuffer::new(),
             views: MirroredBuffer::new("views", BufferUsages::UNIFORM),
             lights: MirroredBuffer::new("lights", BufferUsages::STORAGE),
-            object_indices: GrowingBuffer::new("object indices", BufferUsages::STORAGE),
+            object_lists: ObjectLists::new(),
             parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
             bytes: ResourceBytes::default(),
             passes: Vec::new(),
             view_ranges: Vec::new(),
-            object_indices_stride: 0,
             subdivided: RwLock::default(),
             timestamps: None,
             unused: 0,
@@ -365,10 +361,10 @@ impl Buffers {
         }
     }
 
-    /// All but those of objects and materials, and the bytes of the engine's own.
-    fn all(&self) -> [&GrowingBuffer; 4] {
-        let Self { views, lights, object_indices, parameters, .. } = self;
-        [&views.on_device, &lights.on_device, object_indices, &parameters.on_device]
+    /// All but those of objects, their lists and materials, and the bytes of the engine's own.
+    fn all(&self) -> [&GrowingBuffer; 3] {
+        let Self { views, lights, parameters, .. } = self;
+        [&views.on_device, &lights.on_device, &parameters.on_device]
     }
 
     /// Sets the passes of this frame, and collects their parameters. A pass that the latest frame with these buffers had keeps what it has
@@ -404,20 +400,31 @@ impl Buffers {
     }
 
     /// Allots each view its ranges, and collects the views and their lights. A view that the latest frame with these buffers had keeps its
-    /// ranges, whatever its index; a new view takes those of one of its kind that is gone. `max` is the largest size of a binding.
+    /// ranges, whatever its index; a new view takes those of one of its kind that is gone.
     ///
     /// # Errors
     /// If a camera is out of reach.
-    fn set_views(&mut self, request: &FrameRequest<'_>, max: u64) -> Result<(), BackendError> {
-        let FrameRequest { views, light_tables, .. } = *request;
+    fn set_views(&mut self, request: &FrameRequest<'_>) -> Result<(), BackendError> {
+        let FrameRequest { views, light_tables, limits, .. } = *request;
         let ranges = &mut self.view_ranges;
         ViewRanges::keep(ranges, views);
         for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
             // The layout requires a binding even if no light reaches the view.
-            ranges.lights_length = size_with_headroom(ranges.lights.len(), size_of_val(lights.gpu_lights()), max);
+            let needed = size_of_val(lights.gpu_lights());
+            ranges.lights_length = size_with_headroom(ranges.lights.len(), needed, limits.binding_bytes);
         }
         let end_of_views = allot(ranges, |ranges| &mut ranges.view, |_| GPU_VIEW_BYTES);
-        let end_of_lights = allot(ranges, |ranges| &mut ranges.lights, |ranges| ranges.lights_length);
+        let allot_lights =
+            |ranges: &mut [ViewRanges]| allot(ranges, |ranges| &mut ranges.lights, |ranges| ranges.lights_length);
+        let mut end_of_lights = allot_lights(ranges);
+        if end_of_lights as u64 > limits.buffer_bytes {
+            // Without headroom, and without what belongs to nobody.
+            for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
+                ranges.lights = 0..0;
+                ranges.lights_length = size_of_val(lights.gpu_lights()).max(1).next_multiple_of(ALIGNMENT);
+            }
+            end_of_lights = allot_lights(ranges);
+        }
         let (view_bytes, light_bytes) = (self.views.rewrite(), self.lights.rewrite());
         view_bytes.resize(end_of_views, 0);
         light_bytes.resize(end_of_lights, 0);
@@ -449,10 +456,7 @@ impl Buffers {
     fn frame_ranges(&self, pass: usize) -> FrameRanges {
         let state = &self.passes[pass];
         let ViewRanges { view, lights, .. } = &self.view_ranges[state.pass.view_index];
-        let stride = self.object_indices_stride;
-        let lists = &state.object_list;
-        // The layout requires a binding even if the pass draws no commands; it reads nothing from it.
-        let object_indices = if lists.is_empty() { 0..ALIGNMENT } else { lists.start * stride..lists.end * stride };
+        let object_indices = self.object_lists.bytes_of(&state.object_list);
         FrameRanges { view: view.clone(), lights: lights.clone(), object_indices }
     }
 
@@ -465,7 +469,7 @@ impl Buffers {
         let bindings = [
             self.views.on_device.binding(view.start, size_of::<GpuView>()),
             self.objects.gpu_objects(),
-            self.object_indices.binding(object_indices.start, object_indices.len()),
+            self.object_lists.binding(object_indices),
             self.lights.on_device.binding(lights.start, lights.len()),
         ];
         let entries: Vec<_> = (0..)

@@ -8,6 +8,7 @@ mod generated_uploads;
 mod indirect_arguments;
 mod material_buffer;
 mod object_buffers;
+mod object_lists;
 mod pass_state;
 mod pass_statistics;
 mod pending_uploads;

@@ -21,6 +21,7 @@ use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology};
 use crate::tuning::Tuner;
+use crate::unwind::emit_unlocked;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.
 pub(crate) struct ProcessPipelines {
@@ -34,6 +35,8 @@ pub(crate) struct ProcessPipelines {
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
     variants: RwLock<HashMap<PipelineVariant, wgpu::RenderPipeline>>,
+    /// The variants of meshes of which the shader cannot read an attribute.
+    unreadable: RwLock<HashSet<PipelineVariant>>,
     /// `None` if the backend shares no pipelines.
     library: Option<SharedPipelines>,
     /// The tuner of each view's pass.
@@ -75,6 +78,7 @@ impl ProcessPipelines {
             attribute_defaults: OnceLock::new(),
             shader,
             variants: RwLock::default(),
+            unreadable: RwLock::default(),
             library: library.cloned(),
             tuners: Mutex::default(),
         };
@@ -84,23 +88,43 @@ impl ProcessPipelines {
         Ok(pipelines)
     }
 
-    /// Creates the missing ones of these pipelines. [Insert](Self::insert) them only if the device reports no error.
+    /// Creates the missing ones of these pipelines, but for those of meshes of which the shader cannot read an attribute.
+    /// [Insert](Self::insert) them only if the device reports no error.
     ///
     /// # Errors
-    /// If the shader cannot read an attribute of a mesh.
+    /// If a resource cannot be made.
     pub(crate) fn create_missing(
         &self,
         device: &wgpu::Device,
         variants: impl Iterator<Item = PipelineVariant>,
     ) -> Result<HashMap<PipelineVariant, wgpu::RenderPipeline>, BackendError> {
-        let is_missing = |variant: &PipelineVariant| !self.variants().contains_key(variant);
+        let is_missing =
+            |variant: &PipelineVariant| !self.variants().contains_key(variant) && !self.is_unreadable(variant);
         // No lock is held while the driver compiles, so that frames go on meanwhile.
         let missing: HashSet<_> = variants.filter(is_missing).collect();
         let mut created = HashMap::new();
         for variant in missing {
-            created.extend(self.create(device, variant)?);
+            match self.create(device, variant.clone()) {
+                Err(problem @ BackendError::AttributeFormatMismatch { .. }) => {
+                    self.unreadable.write().insert(variant);
+                    emit_unlocked(move || {
+                        tracing::warn!(target: "drawloom", %problem, "objects with this mesh are left out by this process");
+                    });
+                }
+                found => created.extend(found?),
+            }
         }
         Ok(created)
+    }
+
+    /// Whether the shader cannot read an attribute of meshes with such a layout, so that there is no such pipeline.
+    pub(crate) fn is_unreadable(&self, variant: &PipelineVariant) -> bool {
+        variant.layout.is_some() && self.unreadable.read().contains(variant)
+    }
+
+    /// Whether there is such a layout.
+    pub(crate) fn has_unreadable(&self) -> bool {
+        !self.unreadable.read().is_empty()
     }
 
     /// Adds created pipelines.

@@ -44,9 +44,15 @@ impl<'a> BatchRecorder<'a> {
         let meshes = &self.frame.meshes;
         for run in self.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
             let variant = PipelineVariant::of_batch(meshes, &run[0]);
-            let pipeline = self.pipelines.get(&variant);
-            encoder.set_pipeline(pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?);
             let end = start + run.len();
+            let Some(pipeline) = self.pipelines.get(&variant) else {
+                if !self.frame.pipelines(self.pass.pass).is_unreadable(&variant) {
+                    return Err(broken_rule("a pipeline is created before it is used"));
+                }
+                start = end;
+                continue;
+            };
+            encoder.set_pipeline(pipeline);
             if variant.layout.is_some() {
                 self.draw_imported_meshes(encoder, run)?;
                 bound = None;
@@ -150,7 +156,7 @@ impl<'a> BatchRecorder<'a> {
         for batch in run {
             let mesh = self.subdivided.get(&subdivision_of(batch));
             let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
-            let mesh = &mesh.geometry;
+            let Some(mesh) = &mesh.geometry else { continue };
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
             for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
                 encoder.set_vertex_buffer(slot, Some(attribute_of(&mesh.attributes, attribute.layout)?.slice(..)));

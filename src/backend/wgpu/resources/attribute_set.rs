@@ -59,11 +59,6 @@ impl AttributeSet {
         self.attributes.iter().map(|attribute| attribute.layout.format.bytes() as u64).sum()
     }
 
-    /// The size of the largest of these values.
-    pub(crate) fn max_bytes_per_vertex(&self) -> u64 {
-        self.attributes.iter().map(|attribute| attribute.layout.format.bytes() as u64).max().unwrap_or(0)
-    }
-
     /// The attributes of a mesh in buffers of its own.
     ///
     /// # Errors

@@ -8,7 +8,6 @@ use wgpu::util::{DeviceExt, RenderEncoder};
 
 use super::buffers::new_buffer;
 use crate::backend::BackendError;
-use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 use crate::process::DeclaredAttribute;
 use crate::scene::{
     GeneratedGeometry, GeneratedSource, IndexBuffer, IndexSource, Mesh, MeshBuffers, NORMAL, POSITION, StreamAttribute,
@@ -99,10 +98,10 @@ pub(crate) struct ImportedMeshes {
 }
 
 impl ImportedMeshes {
-    /// The imported meshes among `meshes`. Unchanged ones keep their entries; the buffers of new ones are checked to be of this device.
+    /// The imported meshes among `meshes`, which the device [can draw](super::mesh_check::check_mesh). Unchanged ones keep their entries.
     ///
     /// # Errors
-    /// If a buffer is not one of this device, or the mesh exceeds a limit of the device.
+    /// If the device has no room.
     pub(crate) fn updated<'a>(
         &self,
         device: &wgpu::Device,
@@ -121,8 +120,6 @@ impl ImportedMeshes {
                             (new_buffers(device, generated)?, Some(Arc::clone(generated)))
                         }
                     };
-                    check_limits(device, mesh.name(), &buffers)?;
-                    check_device(device, mesh.name(), &buffers)?;
                     let layout = VertexStreamLayouts::new(mesh, &buffers);
                     let mut others = self.meshes.values().chain(updated.meshes.values());
                     let same = others.find(|other| *other.layout == layout).map(|other| Arc::clone(&other.layout));
@@ -238,45 +235,4 @@ fn new_buffers(device: &wgpu::Device, generated: &GeneratedGeometry) -> Result<A
         vertex_count: u32::try_from(vertices.layout.capacity).unwrap_or(u32::MAX),
         indices: Some(IndexBuffer { buffer: index_buffer, offset: 0, format: wgpu::IndexFormat::Uint32, count }),
     }))
-}
-
-/// Checks that pipelines of this device can read the streams of a mesh.
-///
-/// # Errors
-/// If there are too many, or a vertex of one has too many bytes.
-fn check_limits(device: &wgpu::Device, mesh: &str, buffers: &MeshBuffers) -> Result<(), BackendError> {
-    let limits = device.limits();
-    let refused = |problem: String| BackendError::Validation { label: format!("mesh `{mesh}`"), message: problem };
-    let (streams, most) = (buffers.streams.len(), limits.max_vertex_buffers as usize);
-    if streams > most {
-        return Err(refused(format!("it has {streams} streams, and the device allows {most} vertex buffers")));
-    }
-    let most = u64::from(limits.max_vertex_buffer_array_stride);
-    match buffers.streams.iter().map(|stream| stream.layout.stride).find(|stride| *stride > most) {
-        Some(stride) => Err(refused(format!("it has vertices of {stride} bytes, and the device allows {most}"))),
-        None => Ok(()),
-    }
-}
-
-/// Checks that buffers belong to `device`: wgpu checks that only when a command uses them.
-///
-/// # Errors
-/// If one does not.
-fn check_device(device: &wgpu::Device, mesh: &str, buffers: &MeshBuffers) -> Result<(), BackendError> {
-    let label = format!("the buffers of mesh `{mesh}`");
-    let check = || {
-        let mut encoder = device.create_render_bundle_encoder(&wgpu::RenderBundleEncoderDescriptor {
-            color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
-            sample_count: 1,
-            ..wgpu::RenderBundleEncoderDescriptor::default()
-        });
-        for stream in &buffers.streams {
-            encoder.set_vertex_buffer(0, Some(stream.buffer.slice(..)));
-        }
-        if let Some(indices) = &buffers.indices {
-            encoder.set_index_buffer(indices.buffer.slice(..), indices.format);
-        }
-        encoder.finish(&wgpu::RenderBundleDescriptor::default())
-    };
-    with_error_scope(device, &label, || catch_wgpu_panic(&label, check)).flatten().map(|_| ())
 }

@@ -7,7 +7,8 @@ use super::gpu_material::GpuMaterial;
 use super::snapshot_lifetimes::SnapshotToken;
 use super::texture_arrays::{TextureArrays, TextureLocation};
 use super::upload_queue::UploadQueue;
-use crate::backend::BackendError;
+use crate::backend::mip_generation::reduced_textures;
+use crate::backend::{BackendError, SceneLimits};
 use crate::scene::{Assets, Material, MaterialLayout};
 use crate::view::{RejectionReason, Rejections};
 
@@ -46,12 +47,15 @@ pub(crate) struct MaterialCache {
     /// Rejections that making the snapshot found. Every frame that uses the snapshot reports them.
     rejected_textures: Vec<(RejectionReason, usize)>,
     rejected_materials: Vec<(RejectionReason, usize)>,
+    /// The slots of the textures with more pixels than their arrays have.
+    reduced_textures: Vec<usize>,
 }
 
 struct Current {
     /// Identity and revision of the snapshot's materials, and of its textures.
     materials: (u64, u64),
     textures: (u64, u64),
+    limits: SceneLimits,
     /// How often texture arrays had moved.
     moves: u64,
     snapshot: MaterialSnapshot,
@@ -68,10 +72,10 @@ impl MaterialCache {
         uploads: &UploadQueue,
         assets: &Assets,
         types: &[MaterialLayout],
-        rejections: &Rejections,
+        (limits, rejections): (SceneLimits, &Rejections),
     ) -> Result<MaterialSnapshot, BackendError> {
         let textures = (assets.textures.identity(), assets.textures.revision());
-        self.update_snapshot(device, assets, types, rejections, textures, |cache| {
+        self.update_snapshot(device, assets, types, (limits, rejections), textures, |cache| {
             cache.rejected_textures.clear();
             cache.textures.update(device, uploads, assets, &mut cache.rejected_textures)
         })
@@ -83,12 +87,12 @@ impl MaterialCache {
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
-        rejections: &Rejections,
+        (limits, rejections): (SceneLimits, &Rejections),
     ) -> (MaterialSnapshot, Arc<[bool]>) {
         // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on the device.
         let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
         let Ok(snapshot) =
-            self.update_snapshot(device, assets, types, rejections, textures, |_| Ok::<_, Infallible>(()));
+            self.update_snapshot(device, assets, types, (limits, rejections), textures, |_| Ok::<_, Infallible>(()));
         (snapshot, Arc::clone(&self.lacks_texture))
     }
 
@@ -101,35 +105,37 @@ impl MaterialCache {
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
-        rejections: &Rejections,
+        (limits, rejections): (SceneLimits, &Rejections),
         textures: (u64, u64),
         update_textures: impl FnOnce(&mut Self) -> Result<(), E>,
     ) -> Result<MaterialSnapshot, E> {
         let materials = (assets.materials.identity(), assets.materials.revision());
-        let mut snapshot = match self.current.take() {
+        let mut snapshot = match self.current.take().filter(|current| current.limits == limits) {
             Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
             Some(current) if current.textures == textures => {
-                MaterialSnapshot { materials: self.materials(assets), values: Vec::new(), ..current.snapshot }
+                MaterialSnapshot { materials: self.materials(assets, limits), values: Vec::new(), ..current.snapshot }
             }
             before => {
                 let before = before.map(|current| (current.moves, current.snapshot.textures));
                 update_textures(self)?;
+                self.reduced_textures = reduced_textures(assets).collect();
                 let same_arrays = before.filter(|(moves, _)| *moves == self.textures.moves());
                 let textures = same_arrays.map_or_else(|| self.bound_textures(device), |(_, textures)| textures);
                 let token = self.textures.begin_snapshot();
-                MaterialSnapshot { token, materials: self.materials(assets), textures, values: Vec::new() }
+                MaterialSnapshot { token, materials: self.materials(assets, limits), textures, values: Vec::new() }
             }
         };
         for layout in types {
             if snapshot.values(*layout).is_none() {
-                snapshot.values.push((*layout, values_of(assets, *layout)));
+                snapshot.values.push((*layout, values_of(assets, *layout, limits)));
             }
         }
         let moves = self.textures.moves();
-        self.current = Some(Current { materials, textures, moves, snapshot: snapshot.clone() });
+        self.current = Some(Current { materials, textures, limits, moves, snapshot: snapshot.clone() });
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             rejections.count(reason, index);
         }
+        self.reduced_textures.iter().for_each(|slot| rejections.count(RejectionReason::ReducedTexture, *slot));
         Ok(snapshot)
     }
 
@@ -141,15 +147,18 @@ impl MaterialCache {
         Arc::new(MaterialTextures { arrays: self.textures.views(device).into(), samplers })
     }
 
-    fn materials(&mut self, assets: &Assets) -> Arc<[u8]> {
+    /// A [`GpuMaterial`] for each slot within the limits.
+    fn materials(&mut self, assets: &Assets, limits: SceneLimits) -> Arc<[u8]> {
         self.rejected_materials.clear();
-        let mut materials = vec![GpuMaterial::default(); assets.materials.slot_count().max(1)];
+        let mut materials = vec![GpuMaterial::default(); element_count(assets, size_of::<GpuMaterial>(), limits)];
         let mut lacks_texture = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let texture = self.texture_location(assets, handle.index(), material);
             let is_loaded = material.texture.is_some_and(|texture| assets.get(texture).is_ok());
             lacks_texture[handle.index() as usize] = is_loaded && texture.is_none();
-            materials[handle.index() as usize] = GpuMaterial::new(material, texture);
+            if let Some(on_device) = materials.get_mut(handle.index() as usize) {
+                *on_device = GpuMaterial::new(material, texture);
+            }
         }
         self.lacks_texture = lacks_texture.into();
         bytemuck::cast_slice(&materials).into()
@@ -167,15 +176,23 @@ impl MaterialCache {
     }
 }
 
-/// The values of a type, for each slot; all zeros for materials of another type.
-fn values_of(assets: &Assets, layout: MaterialLayout) -> Arc<[u8]> {
-    let mut bytes = vec![0; assets.materials.slot_count().max(1) * layout.stride];
-    for (handle, material) in assets.iter::<Material>() {
+/// The values of a type, for each slot within the limits; all zeros for materials of another type.
+fn values_of(assets: &Assets, layout: MaterialLayout, limits: SceneLimits) -> Arc<[u8]> {
+    let count = element_count(assets, layout.stride, limits);
+    let mut bytes = vec![0; count * layout.stride];
+    for (handle, material) in assets.iter::<Material>().filter(|(handle, _)| (handle.index() as usize) < count) {
         if let Some(values) = material.values.as_ref().filter(|values| values.layout() == layout) {
             bytes[handle.index() as usize * layout.stride..][..layout.stride].copy_from_slice(values.bytes());
         }
     }
     bytes.into()
+}
+
+/// How many elements of `stride` bytes an array has that has one for each slot of the materials, within the limits. No object is drawn with a
+/// material that is beyond them.
+fn element_count(assets: &Assets, stride: usize, limits: SceneLimits) -> usize {
+    let allowed = usize::try_from(limits.binding_bytes / stride.max(1) as u64).unwrap_or(usize::MAX);
+    assets.materials.slot_count().min(allowed).max(1)
 }
 
 fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {

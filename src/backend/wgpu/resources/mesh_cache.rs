@@ -131,6 +131,7 @@ impl MeshCache {
         self.free_unread();
         self.upload_missing(device, uploads, assets, used)?;
         let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
+        let meshes = meshes.filter(|(slot, _)| used.can_be_used(*slot));
         self.imported_meshes = self.imported_meshes.updated(device, meshes)?;
         let snapshot = Arc::new(self.new_snapshot());
         self.current = Some(requested);

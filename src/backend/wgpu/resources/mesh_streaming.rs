@@ -5,11 +5,10 @@ use std::iter;
 use std::sync::Arc;
 
 use super::mesh_cache::{MeshCache, MeshVersion};
-use super::mesh_pages::{INDEX, MeshLocation, MeshTarget, PageSizes, index_count};
+use super::mesh_pages::{MeshLocation, MeshTarget, PageSizes};
 use super::mesh_snapshot::MeshSnapshot;
 use super::snapshot_lifetimes::LastReader;
 use super::upload_queue::UploadQueue;
-use super::vertex_layout::vertex_stride;
 use crate::backend::BackendError;
 use crate::handle::Handle;
 use crate::quality::VertexFormat;
@@ -94,6 +93,7 @@ impl MeshCache {
         let missing: BTreeSet<_> = (0..self.meshes.len() as u32).filter(is_missing).collect();
         self.missing = missing;
         let imported = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
+        let imported = imported.filter(|(slot, _)| used.can_be_used(*slot));
         self.imported_meshes = self.imported_meshes.updated(device, imported)?;
         // Meshes in the engine's own buffers may have come or gone.
         self.snapshot = None;
@@ -156,7 +156,7 @@ impl MeshCache {
         evictions: &mut usize,
     ) -> Result<Result<Placed<MeshTarget>, Unplaced>, BackendError> {
         let max_buffer_size = device.limits().max_buffer_size;
-        if let Some(too_large) = self.exceeded_limit(mesh, budget, max_buffer_size) {
+        if let Some(too_large) = self.exceeded_limit(mesh, budget) {
             return Ok(Err(too_large));
         }
         let sizes = PageSizes { min: 1 << 16, max: (budget / 16).clamp(1 << 16, (4 << 20).min(max_buffer_size)) };
@@ -180,15 +180,10 @@ impl MeshCache {
         Ok(Ok(Placed { target, last_reader }))
     }
 
-    fn exceeded_limit(&self, mesh: &Mesh, budget: u64, max_buffer_size: u64) -> Option<Unplaced> {
+    /// A frame uses no mesh that is larger than a buffer of the device, but it may be larger than the budget.
+    fn exceeded_limit(&self, mesh: &Mesh, budget: u64) -> Option<Unplaced> {
         let bytes = self.pages.bytes_of(mesh).total();
-        if bytes > budget {
-            return Some(Unplaced::TooLarge { bytes, limit: "mesh_bytes", allowed: budget });
-        }
-        let stride = vertex_stride(self.pages.format).max(self.pages.attributes.max_bytes_per_vertex());
-        let longest = (mesh.vertices().len() as u64 * stride).max(index_count(mesh) as u64 * INDEX);
-        let limit = "max_buffer_size";
-        (longest > max_buffer_size).then_some(Unplaced::TooLarge { bytes: longest, limit, allowed: max_buffer_size })
+        (bytes > budget).then_some(Unplaced::TooLarge { bytes, limit: "mesh_bytes", allowed: budget })
     }
 
     /// The slots of the meshes on the device, with their bytes.
@@ -307,13 +302,11 @@ mod tests {
     use crate::scene::{Topology, Vertex};
 
     #[test]
-    fn a_mesh_is_too_large_for_the_budget_or_for_the_largest_buffer_by_name() {
+    fn a_mesh_is_too_large_for_the_budget_by_name() {
         let mesh = Mesh::new("sheet", Topology::TriangleList, vec![Vertex::default(); 100], vec![0; 300]).unwrap();
         let cache = MeshCache::default();
-        let too_large = |bytes, limit, allowed| Some(Unplaced::TooLarge { bytes, limit, allowed });
-        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3200), None);
-        assert_eq!(cache.exceeded_limit(&mesh, 4399, 3200), too_large(4400, "mesh_bytes", 4399));
-        // Vertices and indices have buffers of their own.
-        assert_eq!(cache.exceeded_limit(&mesh, 4400, 3199), too_large(3200, "max_buffer_size", 3199));
+        let too_large = Unplaced::TooLarge { bytes: 4400, limit: "mesh_bytes", allowed: 4399 };
+        assert_eq!(cache.exceeded_limit(&mesh, 4400), None);
+        assert_eq!(cache.exceeded_limit(&mesh, 4399), Some(too_large));
     }
 }

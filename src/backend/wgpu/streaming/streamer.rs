@@ -94,7 +94,7 @@ impl Streamer {
             on_device.device,
             assets,
             request.plan.material_types(),
-            request.rejections,
+            (request.limits, request.rejections),
         );
         frame_use.lacks_texture = lacks_texture;
         // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in flight.

@@ -1,0 +1,42 @@
+//! What a backend can hold of a scene.
+
+use crate::view::{GpuLight, GpuObject};
+
+/// What a backend can hold of a scene: the limits of its device's buffers. A frame draws what is within them, leaves out the rest, and counts
+/// it among its [rejections](crate::FrameStatistics::rejections).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneLimits {
+    /// The size of the largest buffer, in bytes: what the lights of all views can take together.
+    pub buffer_bytes: u64,
+    /// The most bytes of a buffer that a shader can read: all objects, a [column](crate::scene::ObjectColumn), all materials, their values
+    /// of a [type](crate::scene::MaterialType), or the lights of a view. In each of them, every object, material slot or light has an element.
+    pub binding_bytes: u64,
+}
+
+impl SceneLimits {
+    /// No limits but those of memory.
+    pub const NONE: Self = Self { buffer_bytes: u64::MAX, binding_bytes: u64::MAX };
+
+    /// The most objects, where shaders read columns of up to so many bytes for each. Objects take 64 bytes themselves. Objects at higher
+    /// indices are counted as [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
+    pub fn max_objects(&self, column_stride: usize) -> usize {
+        elements(self.binding_bytes, column_stride.max(size_of::<GpuObject>()))
+    }
+
+    /// The most lights that a view can have, each layer of shadow maps counted as another one if a light has several. Lights that come later
+    /// in the scene are counted as [`LightLimit`](crate::view::RejectionReason::LightLimit).
+    pub fn max_lights(&self) -> usize {
+        elements(self.binding_bytes, size_of::<GpuLight>())
+    }
+}
+
+impl Default for SceneLimits {
+    /// [`SceneLimits::NONE`].
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+fn elements(bytes: u64, stride: usize) -> usize {
+    usize::try_from(bytes / stride as u64).unwrap_or(usize::MAX)
+}
