@@ -12,6 +12,7 @@ mod deferred;
 mod determinism;
 mod failing_process;
 mod late_latch;
+mod left_out;
 mod layers;
 mod levels_of_detail;
 mod loading;
