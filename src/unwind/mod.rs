@@ -101,10 +101,14 @@ pub(crate) fn emit(event: impl FnOnce()) {
     }
 }
 
+/// Sends an event.
+#[cfg(any(feature = "wgpu", feature = "software", test))]
+type HeldEvent = Box<dyn FnOnce()>;
+
 #[cfg(any(feature = "wgpu", feature = "software", test))]
 thread_local! {
     /// The events that wait until this thread leaves [`hold_events`]; `None` outside it.
-    static HELD_EVENTS: std::cell::RefCell<Option<Vec<Box<dyn FnOnce()>>>> = const { std::cell::RefCell::new(None) };
+    static HELD_EVENTS: std::cell::RefCell<Option<Vec<HeldEvent>>> = const { std::cell::RefCell::new(None) };
 }
 
 /// Calls `work`, which may hold locks, and only then sends the events of [`emit_unlocked`]: the engine's subscriber may ask for what the locks
