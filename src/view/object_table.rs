@@ -352,7 +352,7 @@ impl ObjectTable {
         (first, RwLockReadGuard::map(self.block(block), |block| &block.gpu_objects[..count]))
     }
 
-    /// A block of objects.
+    /// A block of objects. A guard that is leaked locks it until the next [`ObjectTable::begin_frame`]. Hold none while objects are described.
     ///
     /// # Panics
     /// If `index` is not below [`ObjectTable::block_count`].
@@ -365,7 +365,7 @@ impl ObjectTable {
         self.block_bounds.read()
     }
 
-    /// The bins of the objects.
+    /// The bins of the objects. A guard that is leaked locks them until the next [`ObjectTable::begin_frame`].
     pub fn bins(&self) -> RwLockReadGuard<'_, Bins> {
         self.bins.read()
     }
