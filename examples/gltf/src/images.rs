@@ -30,15 +30,12 @@ struct Decoded {
 impl Decoding {
     /// Starts to decode the images of these indices. Those that cannot be read or are too large are left out, with a
     /// warning.
-    ///
-    /// # Errors
-    /// If a limit is exceeded.
     pub(crate) fn start(
         source: &Source,
         images: impl IntoIterator<Item = usize>,
         scheduler: &Scheduler,
         warnings: &mut Warnings,
-    ) -> Result<Self, Problem> {
+    ) -> Self {
         let all = Limit::new("all_textures_bytes", source.limits.all_textures_bytes);
         let limit = source.limits.texture_bytes;
         let mut jobs = Vec::new();
@@ -50,7 +47,7 @@ impl Decoding {
                 Err(problem) => warnings.add(format!("{name} is left out: {problem}")),
             }
         }
-        Ok(Self(jobs))
+        Self(jobs)
     }
 
     /// How many there are.

@@ -134,7 +134,7 @@ fn read(
     let (primitives, morphs) = primitives_of(source, &meshes, warnings)?;
     warn_of_bumps(&primitives, &materials, warnings);
     let skins = skins_of(source, &nodes, warnings)?;
-    let decoding = Decoding::start(source, uses.images(), scheduler, warnings)?;
+    let decoding = Decoding::start(source, uses.images(), scheduler, warnings);
     // Each is decoded, and then made a layer of a texture array, perhaps several times.
     progress.set_length((decoding.count() + uses.count()) as u64);
     let images = decoding.wait(progress, warnings);
