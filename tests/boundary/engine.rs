@@ -309,6 +309,7 @@ pub struct OwnNode;
 
 impl CpuNode for OwnNode {
     fn name(&self) -> &str {
+        call(Kind::Node, "name");
         "the engine's node"
     }
 
