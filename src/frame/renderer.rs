@@ -67,7 +67,7 @@ use crate::view::{RenderView, possible_draw_states};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Renderer<B: Backend> {
-    backend: GuardedBackend<B>,
+    pub(super) backend: GuardedBackend<B>,
     plans: PlanCache,
     granularity: Granularity,
     instancing: bool,
@@ -494,9 +494,5 @@ impl<B: Backend> Renderer<B> {
     /// The backend.
     pub fn backend(&self) -> &B {
         self.backend.unguarded()
-    }
-
-    pub(super) fn guarded_backend(&self) -> &GuardedBackend<B> {
-        &self.backend
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::meshes::Meshes;
-use crate::scene::{GeneratedContents, Mesh, SceneError};
+use crate::scene::{GeneratedContents, Mesh};
 use crate::unwind::emit_unlocked;
 
 /// What nodes have filled in the frames that were drawn.
@@ -40,7 +40,10 @@ impl GeneratedMeshes {
                     let name = mesh.name().to_owned();
                     self.left_out.insert(name.clone());
                     if !left_out_before.contains(&name) {
-                        emit_unlocked(move || warn(&name, &problem));
+                        emit_unlocked(move || {
+                            let message = "nodes have filled this mesh with what cannot be drawn: it is left out";
+                            tracing::warn!(target: "drawloom", mesh = ?name, %problem, "{message}");
+                        });
                     }
                     None
                 });
@@ -48,8 +51,4 @@ impl GeneratedMeshes {
         };
         meshes.iter().map(|mesh| mesh.as_ref().map(&mut complete)).collect()
     }
-}
-
-fn warn(mesh: &str, problem: &SceneError) {
-    tracing::warn!(target: "drawloom", ?mesh, %problem, "nodes have filled this mesh with what cannot be drawn: it is left out");
 }

@@ -121,7 +121,7 @@ impl PostHelper {
     /// Begins a frame: chooses the results that it shows. Call it right before the frame is [recorded](Renderer::record), so that they are
     /// as new as possible, with the cameras that are recorded. It does not wait for the device, nor, with more than one worker, for the step.
     pub fn begin_frame<B: Backend>(&self, renderer: &Renderer<B>, cameras: &[Camera]) {
-        let backend: Weak<B> = Arc::downgrade(renderer.guarded_backend().unguarded());
+        let backend: Weak<B> = Arc::downgrade(renderer.backend.unguarded());
         let backend: Weak<dyn UploadPicture> = backend;
         self.0.begin_frame(&backend, cameras);
     }
