@@ -24,7 +24,7 @@ use crate::timeline::{Labels, TuningChoice};
 ///
 /// The order within a frame:
 ///
-/// 1. `begin`.
+/// 1. `limits`, `check_mesh` for each mesh that is new, and `begin`.
 /// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and
 ///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
 ///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.

@@ -129,10 +129,9 @@ impl<B: Backend> Renderer<B> {
     /// What is derived from an object is kept for the next frame. [`SceneRef::changes`] says which objects changed since the last
     /// call.
     ///
-    /// Objects, lights, materials and textures that cannot be drawn, among them those that the [device has no room for](Backend::limits),
-    /// are left out, counted and named in the [statistics](FrameStatistics::rejections), and warned of through
-    /// `tracing` when their number changes; everything else is drawn. A process that declares what its [raw pass](crate::process::RawPassResources) never asks for
-    /// is warned of once.
+    /// What cannot be drawn, or [has no room](Backend::limits), is left out, counted and named in the
+    /// [statistics](FrameStatistics::rejections), and warned of when its number changes; everything else is drawn. A
+    /// process that declares what its [raw pass](crate::process::RawPassResources) never asks for is warned of once.
     ///
     /// # Errors
     /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, an invalid
@@ -318,10 +317,9 @@ impl<B: Backend> Renderer<B> {
         let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
         graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::new(self.scheduler.timeline());
-        let separate_shadowed_lights = self.plans.separates_shadowed_lights();
-        let fill_lights = || self.tables.fill_lights(&views, &lights, separate_shadowed_lights, limits);
-        let (left_out, _) = clock.measure(StageGroup::Visibility, fill_lights);
-        ValidLights::count_left_out(scene, &left_out, self.tables.objects.rejections());
+        let separates = self.plans.separates_shadowed_lights();
+        let fill_lights = || self.tables.fill_lights((scene, &lights), &views, separates, limits);
+        clock.measure(StageGroup::Visibility, fill_lights);
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,

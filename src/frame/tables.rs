@@ -9,6 +9,7 @@ use super::list_inputs::ListInputs;
 use super::pieces::{ListConditions, PieceTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::triangle_culling::{CullableMeshes, PassTriangles};
+use super::valid_lights::ValidLights;
 use super::view_levels::ViewLevels;
 use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;
@@ -132,15 +133,15 @@ impl FrameTables {
         Version { frame: self.frames, index }
     }
 
-    /// Finds the lights that reach each view that is drawn, within the limits of the backend: see [`LightTable::fill`]. Returns the indices of
-    /// those that a view has no room for.
+    /// Finds the lights, among the valid ones of the scene, that reach each view that is drawn: see [`LightTable::fill`]. Counts those that
+    /// a view has no room for within the limits of the backend.
     pub(super) fn fill_lights(
         &mut self,
+        (scene, lights): (&SceneRef<'_>, &[Light]),
         views: &[RenderView],
-        lights: &[Light],
         separate_shadowed_lights: bool,
         limits: SceneLimits,
-    ) -> Vec<usize> {
+    ) {
         let (mut left_out, mut room) = (Vec::new(), limits.buffer_bytes);
         for (view, table) in views.iter().zip(&mut self.lights) {
             let lights = if view.is_cached() { &[] } else { lights };
@@ -149,7 +150,7 @@ impl FrameTables {
             // Each view's lights begin where a binding can.
             room = room.saturating_sub((size_of_val(table.gpu_lights()) as u64).next_multiple_of(LIGHT_ALIGNMENT));
         }
-        left_out
+        ValidLights::count_left_out(scene, &left_out, self.objects.rejections());
     }
 }
 
