@@ -24,19 +24,16 @@ pub enum BackendError {
         /// What Drawloom needs.
         needed: u64,
     },
-    /// More views have a layer of one texture than the device's textures can have layers: shadow maps, as a rule, of which a point light has
-    /// six.
+    /// More views have a layer of one texture than the device's textures can have layers: the scene has as many cameras of one kind. Shadow maps
+    /// of lights are never too many.
     #[error(
-        "{views} views, the shadow maps of {lights} lights among them, each have a layer of the target {target:?}, and device limit \
-         max_texture_array_layers is {allowed}"
+        "{views} views each have a layer of the target {target:?}, and device limit max_texture_array_layers is {allowed}"
     )]
     TooManyLayers {
         /// The target.
         target: String,
         /// The views that share it.
         views: u64,
-        /// The lights whose shadow maps are among them.
-        lights: u64,
         /// The layers that the device allows.
         allowed: u64,
     },

@@ -20,7 +20,8 @@ pub struct FrameRequest<'a> {
     pub draws: &'a [Draws<'a>],
     /// The views. The targets of a cached view still hold what an earlier frame drew: see [`RenderView::is_cached`].
     pub views: &'a [RenderView],
-    /// The valid lights of the scene, in its order.
+    /// The valid lights of the scene, in its order. With several main cameras, a directional light that casts shadows is followed by a copy for
+    /// each that has maps of it.
     pub lights: &'a [Light],
     /// The lights that reach each view.
     pub light_tables: &'a [LightTable],
@@ -79,7 +80,7 @@ pub struct ViewRequest<'a> {
     pub light_table: &'a LightTable,
     /// The views of the frame, among them those of the shadow maps that the lights have.
     pub views: &'a [RenderView],
-    /// The valid lights of the scene, in its order.
+    /// See [`FrameRequest::lights`].
     pub lights: &'a [Light],
     /// The scene's ambient light.
     pub ambient: Vec3,

@@ -105,6 +105,7 @@ fn differing_property(one: &Camera, other: &Camera) -> Option<&'static str> {
         ("name", one.name == other.name),
         ("projection", one.projection == other.projection),
         ("shift", one.shift == other.shift),
+        ("whole", one.whole == other.whole),
         ("clip_plane", one.clip_plane == other.clip_plane),
         ("near", one.near == other.near),
         ("far", one.far == other.far),

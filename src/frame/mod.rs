@@ -39,6 +39,7 @@ mod replace_backend;
 mod run_error;
 mod scene_capacity;
 mod scene_check;
+mod shadow_views;
 mod stage;
 mod stage_clock;
 mod stage_graph;

@@ -16,6 +16,7 @@ use super::recorded::{FrameFences, Recorded};
 use super::run_error::error_of_pass;
 use super::scene_capacity::SceneCapacity;
 use super::scene_check::check_scene;
+use super::shadow_views::MapSettings;
 use super::stage_clock::{StageClock, StageGroup};
 use super::stage_graph::StageOptions;
 use super::stage_graph_cache::StageGraphCache;
@@ -294,9 +295,11 @@ impl<B: Backend> Renderer<B> {
         self.tables.blended_object.count_half_floats(self.plans.deferred(), self.tables.objects.rejections());
         self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
         let interval = self.quality.shadows.interval;
-        let requested = FrameViews::new(scene, valid_lights, self.plans.shadow_maps(), interval, &plan)?;
+        let maps = self.plans.shadow_maps().map(|maps| MapSettings { maps, interval, limits });
+        let requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.rejections())?;
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
-        let FrameViews { views, lights, arrays } = self.view_cache.resolve(&plan, requested, is_imported)?;
+        let frame_views = Arc::new(self.view_cache.resolve(&plan, requested, is_imported)?);
+        let FrameViews { views, lights, .. } = &*frame_views;
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
@@ -314,17 +317,17 @@ impl<B: Backend> Renderer<B> {
             has_pieces: !scene.pieces.is_empty(),
         };
         let nodes = self.node_declarations.lend(nodes)?;
-        let graph = self.graphs.get(&plan, &draws, &views, options, nodes)?;
-        graph.begin_frame(&mut self.tables, scene, &views, &self.quality, self.scheduler.workers())?;
+        let graph = self.graphs.get(&plan, &draws, views, options, nodes)?;
+        graph.begin_frame(&mut self.tables, scene, views, &self.quality, self.scheduler.workers())?;
         let clock = StageClock::new(self.scheduler.timeline());
-        let separates = self.plans.separates_shadowed_lights();
-        let fill_lights = || self.tables.fill_lights((scene, &lights), &views, separates, limits);
+        let separate_shadowed_lights = self.plans.separates_shadowed_lights();
+        let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);
         clock.measure(StageGroup::Visibility, fill_lights);
         let request = FrameRequest {
             plan: &plan,
             draws: &draws,
-            views: &views,
-            lights: &lights,
+            views,
+            lights,
             light_tables: &self.tables.lights,
             passes: &graph.passes,
             sampled_views: &graph.sampled_views,
@@ -361,7 +364,7 @@ impl<B: Backend> Renderer<B> {
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
         };
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
-            return Err(error_of_pass(error, graph, self.pass_runs.failures(), &views).into());
+            return Err(error_of_pass(error, graph, self.pass_runs.failures(), views).into());
         }
         if cfg!(debug_assertions) {
             let objects = &self.tables.objects;
@@ -383,30 +386,25 @@ impl<B: Backend> Renderer<B> {
         self.scheduler.timeline().count("bytes uploaded", uploaded as f64);
         self.backend.counters(&mut |name, value| self.scheduler.timeline().count(name, value))?;
         let memory = (uploaded, self.backend.target_memory(&frame)?);
-        let statistics = FrameStatistics::new(&request, &self.tables, memory, clock.times(), tuning);
+        let lights = frame_views.light_count();
+        let statistics = FrameStatistics::new(&request, lights, &self.tables, memory, clock.times(), tuning);
         statistics.count_pieces(self.scheduler.timeline());
         self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);
-        let submission_order = graph.passes.clone();
-        let views = Arc::new(FrameViews { views, lights, arrays });
-        let in_flight = self.view_cache.store(&plan, &views);
-        let views = LatchedViews::new(views, &self.tables.lights, scene.ambient);
-        let backend = self.backend.clone();
-        let fences = FrameFences::default();
-        let recorded = Recorded {
+        let in_flight = self.view_cache.store(&plan, &frame_views);
+        Ok(Recorded {
             queues,
-            submission_order,
+            submission_order: graph.passes.clone(),
             plan,
             frame,
             statistics,
-            backend,
+            backend: self.backend.clone(),
             frame_number,
             in_flight,
-            views,
-            fences,
-        };
-        Ok(recorded)
+            views: LatchedViews::new(frame_views, &self.tables.lights, scene.ambient),
+            fences: FrameFences::default(),
+        })
     }
 
     /// Puts a backend in the place of the one before, and drops what belongs to that one.

@@ -129,9 +129,10 @@ impl FrameStatistics {
         }
     }
 
-    /// The statistics of a frame whose stages have run.
+    /// The statistics of a frame of this many valid lights whose stages have run.
     pub(super) fn new(
         request: &FrameRequest<'_>,
+        lights: usize,
         tables: &FrameTables,
         (uploaded, targets): (u64, TargetMemory),
         stages: StageTimes,
@@ -145,7 +146,7 @@ impl FrameStatistics {
         }
         Self {
             objects: request.scene.object_count(),
-            lights: request.lights.len(),
+            lights,
             views,
             view_times: tables.view_times.times().collect(),
             pieces: tables.pieces.statistics(),

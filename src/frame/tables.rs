@@ -14,6 +14,7 @@ use super::view_levels::ViewLevels;
 use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
+use super::views::FrameViews;
 use crate::backend::SceneLimits;
 use crate::chunked_array::ChunkedArray;
 use crate::command::{
@@ -21,8 +22,8 @@ use crate::command::{
 };
 use crate::leaked_guards::unlock;
 use crate::process::Pass;
-use crate::scene::{Light, SceneError, SceneRef};
-use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RenderView};
+use crate::scene::{SceneError, SceneRef};
+use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RejectionReason, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
@@ -133,24 +134,21 @@ impl FrameTables {
         Version { frame: self.frames, index }
     }
 
-    /// Finds the lights, among the valid ones of the scene, that reach each view that is drawn: see [`LightTable::fill`]. Counts those that
-    /// a view has no room for within the limits of the backend.
-    pub(super) fn fill_lights(
-        &mut self,
-        (scene, lights): (&SceneRef<'_>, &[Light]),
-        views: &[RenderView],
-        separate_shadowed_lights: bool,
-        limits: SceneLimits,
-    ) {
+    /// Finds the lights that reach each view that is drawn, within the limits of the backend: see [`LightTable::fill`]. Counts those that a view
+    /// has no room for.
+    pub(super) fn fill_lights(&mut self, frame: &FrameViews, separate_shadowed_lights: bool, limits: SceneLimits) {
+        let FrameViews { views, lights, main_views, scene_indices, .. } = frame;
         let (mut left_out, mut room) = (Vec::new(), limits.buffer_bytes);
         for (view, table) in views.iter().zip(&mut self.lights) {
-            let lights = if view.is_cached() { &[] } else { lights };
+            let lights = if view.is_cached() { &[] } else { lights.as_slice() };
             let of_view = SceneLimits { binding_bytes: limits.binding_bytes.min(room), ..limits };
-            table.fill_within(view, lights, views, separate_shadowed_lights, (of_view.max_lights(), &mut left_out));
+            let within = (of_view.max_lights(), &mut left_out);
+            table.fill_within(view, (lights, main_views), views, separate_shadowed_lights, within);
             // Each view's lights begin where a binding can.
             room = room.saturating_sub((size_of_val(table.gpu_lights()) as u64).next_multiple_of(LIGHT_ALIGNMENT));
         }
-        ValidLights::count_left_out(scene, &left_out, self.objects.rejections());
+        let left_out = left_out.into_iter().map(|light| scene_indices[light]);
+        self.objects.rejections().count_all_once(RejectionReason::LightLimit, left_out);
     }
 }
 

@@ -32,15 +32,4 @@ impl ValidLights {
         }
         valid
     }
-
-    /// Counts valid lights of `scene`, by their indices among these, that a view has no room for.
-    pub(super) fn count_left_out(scene: &SceneRef<'_>, left_out: &[usize], rejections: &Rejections) {
-        if left_out.is_empty() {
-            return;
-        }
-        // Which lights are valid does not depend on where their ranges are cut off.
-        let valid = Self::new(scene, &Rejections::default(), 0.0);
-        let indices = left_out.iter().filter_map(|light| valid.scene_indices.get(*light).copied());
-        rejections.count_all_once(RejectionReason::LightLimit, indices);
-    }
 }

@@ -77,10 +77,10 @@ impl ViewCache {
         let names = drawn.views.iter().map(|view| (view.kind(), view.name()));
         let kept = kept_views(names, &requested.views);
         let loses_layer = views_without_their_layers(&drawn, &requested);
-        let FrameViews { views, lights, .. } = &mut requested;
+        let FrameViews { views, lights, scene_indices, .. } = &mut requested;
         let mut cached: Vec<Option<usize>> = Vec::with_capacity(views.len());
         for ((index, view), kept) in views.iter().enumerate().zip(kept) {
-            let is_turn = turns.take(view);
+            let is_turn = turns.take(view, view.valid_light.map(|light| MapSet::of(light, scene_indices)));
             let Some(KeptView { index: kept, is_same: true }) = kept else {
                 cached.push(None);
                 continue;
@@ -100,7 +100,7 @@ impl ViewCache {
             let is_valid = !is_light_map || keeps_light_maps && covers(before, view);
             cached.push((!is_needed && keeps_targets && is_valid).then_some(kept));
         }
-        // The maps of a light are drawn together: where faces or cascades meet, different ages would show.
+        // The maps of a set are drawn together: where faces or cascades meet, different ages would show.
         let is_drawn = |(view, cached): (&RenderView, &Option<usize>)| view.valid_light.filter(|_| cached.is_none());
         let drawn_lights: HashSet<usize> = views.iter().zip(&cached).filter_map(is_drawn).collect();
         for ((view, cached), kept_from) in views.iter_mut().zip(cached).zip(&mut self.kept_from) {
@@ -113,8 +113,7 @@ impl ViewCache {
                 lights[light] = with_brightness_of(drawn.lights[drawn_with], &lights[light]);
             }
             let camera = Camera { redraw: view.camera.redraw, ..before.camera.clone() };
-            let (valid_light, layer, age) = (view.valid_light, view.layer, before.age.saturating_add(1));
-            *view = RenderView { camera, frustum: before.frustum.clone(), valid_light, layer, age };
+            (view.camera, view.frustum, view.age) = (camera, before.frustum.clone(), before.age.saturating_add(1));
             *kept_from = Some(Arc::clone(&drawn_by[index]));
         }
         Ok(requested)
@@ -170,37 +169,59 @@ impl Drop for InFlight {
     }
 }
 
+/// The maps of a light that are drawn together: for one main camera, if it is directional.
+#[derive(Clone, Copy)]
+struct MapSet {
+    /// The light's index in the scene.
+    light: usize,
+    /// How many sets of the light there are before this one.
+    rank: u64,
+}
+
+impl MapSet {
+    /// That of a light of the frame, given the index in the scene of each.
+    fn of(light: usize, scene_indices: &[usize]) -> Self {
+        let before = scene_indices[..light].iter().rev().take_while(|index| **index == scene_indices[light]);
+        // The light itself, whose copies have the sets of several main cameras, has none then.
+        Self { light: scene_indices[light], rank: before.count().saturating_sub(1) as u64 }
+    }
+}
+
 /// Whose turn it is among the views of each interval.
 struct Turns {
     /// The frame's number.
     frame: u64,
-    /// How many views of each interval had their turn so far. The maps of a light count as one.
+    /// How many views of each interval there were so far. The maps of a light count as one.
     counts: Vec<(u32, u64)>,
-    /// The light of the view before, and whether it was its turn.
-    latest_light: Option<(usize, bool)>,
+    /// The light of the map before, by its index in the scene, and how many views of its interval there were before it.
+    latest_light: Option<(usize, u64)>,
 }
 
 impl Turns {
     /// Views of one interval are drawn in at most this many of its frames: each set of drawn views is a stage graph of its own.
     const MAX_GROUPS: u32 = 8;
 
-    /// Whether it is the turn of the next view, if that has an interval.
-    fn take(&mut self, view: &RenderView) -> bool {
+    /// Whether it is the turn of the next view, if that has an interval. `maps` are the maps that it is one of. Which turn those of one main
+    /// camera have does not depend on the cameras after it.
+    fn take(&mut self, view: &RenderView, maps: Option<MapSet>) -> bool {
         let Redraw::Interval(interval) = view.camera.redraw else { return false };
-        if let Some((_, is_turn)) = self.latest_light.filter(|(light, _)| view.valid_light == Some(*light)) {
-            return is_turn;
-        }
+        let of_light = self.latest_light.filter(|(light, _)| maps.is_some_and(|maps| maps.light == *light));
+        let place = of_light.map_or_else(|| self.count(interval), |(_, place)| place);
+        self.latest_light = maps.map(|maps| (maps.light, place));
+        let groups = u64::from(interval.min(Self::MAX_GROUPS));
+        let offset = (place + maps.map_or(0, |maps| maps.rank)) % groups * u64::from(interval) / groups;
+        (self.frame + offset).is_multiple_of(u64::from(interval))
+    }
+
+    /// Counts a view of an interval: how many there were before it.
+    fn count(&mut self, interval: u32) -> u64 {
         let known = self.counts.iter().position(|(known, _)| *known == interval).unwrap_or_else(|| {
             self.counts.push((interval, 0));
             self.counts.len() - 1
         });
         let (_, count) = &mut self.counts[known];
-        let groups = u64::from(interval.min(Self::MAX_GROUPS));
-        let offset = *count % groups * u64::from(interval) / groups;
         *count += 1;
-        let is_turn = (self.frame + offset).is_multiple_of(u64::from(interval));
-        self.latest_light = view.valid_light.map(|light| (light, is_turn));
-        is_turn
+        *count - 1
     }
 }
 

@@ -1,22 +1,28 @@
 //! The views of a frame: one for each camera, and one for each shadow map.
 
 use super::FrameError;
+use super::shadow_views::{MapSettings, ShadowViews};
 use super::valid_lights::ValidLights;
 use crate::process::{FramePlan, SampledShape, ViewArray};
-use crate::scene::{Camera, Light, Redraw, SceneRef, ViewKind};
-use crate::view::{RenderView, ShadowMaps};
+use crate::scene::{Light, SceneRef, ViewKind};
+use crate::view::{Rejections, RenderView};
 
 /// The views of a frame, and the valid lights that light them.
 pub(super) struct FrameViews {
     pub(super) views: Vec<RenderView>,
+    /// See [`ShadowViews::lights`].
     pub(super) lights: Vec<Light>,
+    /// See [`ShadowViews::main_views`].
+    pub(super) main_views: Vec<Option<usize>>,
+    /// For each light, its index in the scene.
+    pub(super) scene_indices: Vec<usize>,
     /// The views whose targets are layers of textures.
     pub(super) arrays: Vec<ViewArray>,
 }
 
 impl FrameViews {
     /// The views that a scene requests: one for each camera in the scene's order, then, if `maps` is given, those of the shadow maps
-    /// of each light that casts shadows and reaches what a camera may see. Maps are drawn every `interval` frames.
+    /// of each light that casts shadows and reaches what a camera may see.
     ///
     /// # Errors
     /// If there are too many views, or those whose targets are layers of one texture differ in size, or are faces of a cube map and not
@@ -24,26 +30,16 @@ impl FrameViews {
     pub(super) fn new(
         scene: &SceneRef<'_>,
         valid: ValidLights,
-        maps: Option<&ShadowMaps>,
-        interval: u32,
+        maps: Option<MapSettings<'_>>,
         plan: &FramePlan,
+        rejections: &Rejections,
     ) -> Result<Self, FrameError> {
         let mut views: Vec<_> = scene.cameras.iter().map(RenderView::new).collect();
-        if let Some(maps) = maps {
-            let cameras: Vec<_> = views.iter().filter(|view| view.kind() != ViewKind::Shadow).cloned().collect();
-            for (index, (light, scene_index)) in valid.lights.iter().zip(&valid.scene_indices).enumerate() {
-                let is_reached = |(center, radius)| {
-                    cameras.iter().any(|view: &RenderView| view.frustum.intersects_sphere(center, radius))
-                };
-                if !light.casts_shadow() || !light.bounding_sphere().is_none_or(is_reached) {
-                    continue;
-                }
-                for camera in maps.cameras(&format!("shadow of light {scene_index}"), light, scene.cameras) {
-                    let camera = Camera { redraw: Redraw::Interval(interval), ..camera };
-                    views.push(RenderView { valid_light: Some(index), ..RenderView::new(&camera) });
-                }
-            }
-        }
+        let ShadowViews { lights, main_views, scene_indices, views: of_maps } = match maps {
+            Some(settings) => ShadowViews::new(scene, valid, &mut views, settings, rejections),
+            None => ShadowViews::without_maps(valid),
+        };
+        views.extend(of_maps);
         if views.len() > FrameError::MAX_VIEWS {
             return Err(FrameError::TooManyViews { views: views.len() });
         }
@@ -55,7 +51,12 @@ impl FrameViews {
         }
         let arrays = plan.view_arrays(&views);
         check_layers(plan, &views, &arrays)?;
-        Ok(Self { views, lights: valid.lights, arrays })
+        Ok(Self { views, lights, main_views, scene_indices, arrays })
+    }
+
+    /// The number of lights, without copies.
+    pub(super) fn light_count(&self) -> usize {
+        self.main_views.iter().filter(|copy| copy.is_none()).count()
     }
 
     /// Whether a frame may leave out one of the views.

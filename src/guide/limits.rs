@@ -23,4 +23,7 @@
 //!   A texture of any shape takes the memory of a square with sides of 256, 512, 1024 or 2048 pixels.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how many frames it keeps.
 //! - **Recursion by itself.** A mirror in a mirror, or a portal in a portal, is as deep as the engine has cameras for it. Each has one clip
-//!   plane, and none without perspective. A directional light's shadow map covers what main cameras see, not what only mirrors show.
+//!   plane, and none without perspective. A directional light's shadow maps cover what main cameras see, not what only mirrors show.
+//! - **Any number of shadow maps.** A frame has as many as a texture has layers, 256 on most devices: a point light takes six, and a directional
+//!   one a cascade for each main camera. Lights beyond that shine without a shadow, and are counted: see
+//!   [`ShadowMaps`](crate::view::ShadowMaps).

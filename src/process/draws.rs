@@ -38,9 +38,15 @@ pub struct CommandDraws<'a> {
     pub shader: &'a str,
     /// The fragment entry point; `None` draws only depth.
     pub fragment: Option<&'a str>,
+    /// The fragment entry point that takes the place of `fragment` in the maps of directional lights on devices without
+    /// [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES). There `clip_position` clamps corners in front of the near plane
+    /// onto it, and this entry point writes each pixel's own depth, at most 1. With `None`, a triangle that crosses the plane has wrong depths.
+    pub clamped_fragment: Option<&'a str>,
     /// The entry points for objects whose material [is a mask](crate::scene::Material::is_masked), in place of `vertex` and `fragment`;
     /// `None` draws these objects like others.
     pub masked: Option<MaskedEntryPoints<'a>>,
+    /// What `clamped_fragment` is for `fragment`, for the fragment entry point of `masked`.
+    pub clamped_masked_fragment: Option<&'a str>,
     /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides what is behind it
     /// from culling. [Masked](crate::scene::Material::is_masked) objects never do. A shader that does so unsaid is warned of.
     pub discards: bool,
@@ -74,7 +80,9 @@ impl Default for CommandDraws<'_> {
         Self {
             shader: "",
             fragment: Some("fragment"),
+            clamped_fragment: None,
             masked: None,
+            clamped_masked_fragment: None,
             discards: false,
             deformation: None,
             selection: Selection::OPAQUE,

@@ -19,10 +19,9 @@ pub struct ShadowQuality {
     pub bias: f32,
     /// Maps are drawn every `interval` frames, at least 1, those of different lights in turns: a map is a view that is
     /// [redrawn](crate::scene::Redraw) every so many frames. They are also drawn at once if a light with a map is added
-    /// or removed, or if the quality or the plan changes; those of a directional light, if one no longer fits what cameras see:
-    /// if its centre is off by a quarter of its radius, or its radius is a quarter too small. In between, a light with
-    /// a map keeps its position, direction and range, so if it becomes brighter, it still ends where its old brightness
-    /// fell to [`light_cut_off`](super::Quality::light_cut_off), and the bound of that is exceeded.
+    /// or removed, or if the quality or the plan changes; those of a directional light for a main camera, if one no longer fits what that
+    /// sees: if its centre is off by a quarter of its radius, or its radius is a quarter too small; those of other lights, if their range
+    /// grows by more than an eighth. In between, a light with a map keeps its position, direction and range.
     ///
     /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` −
     /// 1)·v·Δt metres. Cost: the maps' share of a frame, divided by this.

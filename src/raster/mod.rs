@@ -23,7 +23,7 @@ pub(crate) use pixel_bounds::PixelBounds;
 pub use real::Real;
 pub(crate) use silhouettes::Silhouettes;
 #[cfg(feature = "software")]
-pub(crate) use triangle::Triangle;
+pub(crate) use triangle::{NearPlane, Triangle};
 pub use triangle_culling::CulledTriangles;
 pub(crate) use triangle_culling::{CullVertex, cull_triangles};
 pub use vector::{Quaternion, Vector, Vector2, Vector3, Vector4};

@@ -5,6 +5,7 @@ mod edge;
 
 use std::array::from_fn;
 
+pub use self::clip::NearPlane;
 use self::clip::{ClipCorner, Overlap};
 use self::edge::Edge;
 use super::grid::{self, MAX_PICTURE_SIZE, Winding};
@@ -22,7 +23,7 @@ pub struct Triangle<R, const V: usize> {
     bounds: PixelBounds,
     /// 1 ÷ twice the area in square steps.
     inverse_area: R,
-    /// The corners' depths, from 0 to 1.
+    /// The corners' depths: from 0 to 1, or more if the near plane clamps.
     depths: [R; 3],
     /// The corners' 1 ÷ w, times the least w: that of the nearest corner is 1.
     inverse_w: [R; 3],
@@ -46,22 +47,23 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// height in pixels, and appends it to `triangles`: several triangles if it is clipped, none if it covers no pixel.
     /// `culled` is the winding to cull.
     ///
-    /// Depth is reversed: visible points have 0 ≤ z ≤ w. The far plane is at z = 0, may be at infinity, and clips, as
+    /// Depth is reversed: visible points have 0 ≤ z ≤ w, or any z from 0 if the near plane clamps. The far plane is at z = 0, may be at infinity, and clips, as
     /// in wgpu. Nothing is appended if a corner is not finite, or if the picture is larger than [`MAX_PICTURE_SIZE`].
     pub fn set_up(
         corners: &[(Vector4<R>, [R; V]); 3],
         picture: [usize; 2],
         culled: Option<Winding>,
+        near_plane: NearPlane,
         triangles: &mut Vec<Self>,
     ) {
         if picture.iter().any(|&side| side > MAX_PICTURE_SIZE) {
             return;
         }
-        match clip::classify(corners) {
+        match clip::classify(corners, near_plane) {
             Overlap::Outside => (),
             Overlap::Inside => triangles.extend(Self::new(corners.each_ref(), picture, culled)),
             Overlap::Across => {
-                let polygon = clip::clip(corners);
+                let polygon = clip::clip(corners, near_plane);
                 let parts = polygon.array_windows().skip(1).map(|[one, other]| [&polygon[0], one, other]);
                 triangles.extend(parts.filter_map(|corners| Self::new(corners, picture, culled)));
             }
@@ -76,7 +78,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// Calls `visit` with the column and row, and the depth, of each covered pixel within some bounds: row by row from
     /// the top, each from left to right.
     ///
-    /// Depth is z ÷ w, linear in the picture. It is bit-identical for any bounds, lies between the depths of the
+    /// Depth is z ÷ w, linear in the picture, and at most 1. It is bit-identical for any bounds, lies between the depths of the
     /// nearest and the farthest corner, and differs by at most 8 unit roundoffs (2⁻²⁴ of it each, in f32) from the
     /// exact interpolation between the snapped corners: it is the sum of each corner's depth times its barycentric
     /// weight, where no term is negative, so no error grows by cancellation. A weight is an exact integer rounded once
@@ -132,7 +134,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
             edges: [Edge::new(b, c), Edge::new(c, a), Edge::new(a, b)],
             bounds,
             inverse_area: R::one() / R::of_integer(area.abs()),
-            depths: corners.map(|(clip, _)| (clip[2] / clip[3]).max(R::zero()).min(R::one())),
+            depths: corners.map(|(clip, _)| (clip[2] / clip[3]).max(R::zero())),
             inverse_w: corners.map(|(clip, _)| min_w / clip[3]),
             varyings: corners.map(|(_, varyings)| *varyings),
         })
@@ -150,7 +152,7 @@ impl<R: Real, const V: usize> Triangle<R, V> {
         // Clamps rounding errors. Nothing here is NaN, so these closures suffice and are faster than `min` and `max`.
         let min = |a, b| if a < b { a } else { b };
         let max = |a, b| if a > b { a } else { b };
-        min(max(depth, min(min(a, b), c)), max(max(a, b), c))
+        min(max(depth, min(min(a, b), c)), min(max(max(a, b), c), R::one()))
     }
 
     /// The perspective-correct weights of the second and third corners at a pixel's centre; `None` behind the camera.

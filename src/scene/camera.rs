@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
 use super::transform::is_unit;
-use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Redraw, SceneError};
+use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, WholePicture};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +20,8 @@ pub struct Camera {
     /// height: the lens shift of an off-centre frustum. 0 for most cameras, and always without perspective.
     /// [`Camera::tile`] and [`Camera::jittered`] set it.
     pub shift: Vec2,
+    /// The picture of which it draws a part; `None` if it draws a whole one. [`Camera::tile`] and [`Camera::jittered`] set it.
+    pub whole: Option<WholePicture>,
     /// Only what is in front of this plane is drawn: an oblique near plane. `None` for most cameras, and always without perspective.
     pub clip_plane: Option<ClipPlane>,
     /// The distance of the near plane, in metres, 1e-27 or more.
@@ -51,40 +53,6 @@ pub struct Camera {
     pub late_latch: Option<CameraMotion>,
 }
 
-/// How positions are projected onto the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Projection {
-    /// Central projection.
-    Perspective {
-        /// The vertical field of view, in radians, from 0.0001° to just below π.
-        field_of_view: f32,
-    },
-    /// Parallel projection.
-    ///
-    /// In a [`ViewKind::Shadow`] view, depth is clamped to the near plane: an object in front of it still casts a
-    /// shadow.
-    Orthographic {
-        /// The height of the view volume, in metres, 1e-6 or more.
-        height: f32,
-    },
-    /// Paraboloid projection: the half space before the camera becomes a disc as wide as the picture (Brabec et al.
-    /// 2002; the shadow map of L 4.2.2). Rasterised edges are straight although the projection curves them, so meshes
-    /// are subdivided as far as the angle of their edges requires. Only for [`ViewKind::Shadow`].
-    Paraboloid,
-}
-
-impl Projection {
-    /// Half the picture's height, in metres; in perspective at a distance of 1.
-    pub(crate) fn half_height(self) -> f64 {
-        match self {
-            Self::Perspective { field_of_view } => (f64::from(field_of_view) * 0.5).tan(),
-            Self::Orthographic { height } => f64::from(height) * 0.5,
-            Self::Paraboloid => 1.0,
-        }
-    }
-}
-
 /// The purpose of a view (M listing 10.4). If two views do not depend on each other, the earlier kind comes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ViewKind {
@@ -92,7 +60,8 @@ pub enum ViewKind {
     Shadow,
     /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred) draws in it what
     /// it draws in a main view, as far as others [sample](crate::process::Declare::samples_view) it. Shadow maps of directional lights cover
-    /// what main views see, so elsewhere nothing is in their shadow.
+    /// what a main view sees, so elsewhere nothing is in their shadow: the main view that it is [named](Camera::child_name) after, as
+    /// `main/mirror` is after `main`, or else the scene's first one.
     Reflection,
     /// The picture on the screen.
     #[default]
@@ -133,6 +102,7 @@ impl Camera {
             orientation: DQuat::from_mat3(&axes).normalize().as_quat(),
             projection: Projection::Perspective { field_of_view: 60_f32.to_radians() },
             shift: Vec2::ZERO,
+            whole: None,
             clip_plane: None,
             near: 0.05,
             far: f32::INFINITY,
@@ -158,6 +128,17 @@ impl Camera {
         self.size[0] as f32 / self.size[1] as f32
     }
 
+    /// The whole of this picture.
+    pub(super) fn as_whole(&self) -> WholePicture {
+        let (projection, shift, aside) = (self.projection, self.shift, Vec2::ZERO);
+        self.whole.unwrap_or(WholePicture { projection, shift, aside })
+    }
+
+    /// The picture of which it draws a part, unless it sees more than that.
+    pub(crate) fn whole_picture(&self) -> Option<WholePicture> {
+        self.whole.filter(|whole| whole.contains(self.projection))
+    }
+
     /// Checks all fields but `size`: a size of 0 × 0, as of a minimised window, has an error of its own,
     /// `FrameError::EmptyTarget`.
     ///
@@ -174,6 +155,8 @@ impl Camera {
             "its far plane is not beyond its near plane"
         } else if !self.shift.is_finite() || self.shift.abs().max_element() > MAX_SHIFT {
             "its shift is not between -65536 and 65536"
+        } else if self.whole.is_some_and(|whole| !(whole.shift.is_finite() && whole.aside.is_finite())) {
+            "the shift or the position of its whole picture is not finite"
         } else if !(self.level_of_detail_scale >= 0.0 && self.level_of_detail_scale.is_finite()) {
             "its level_of_detail_scale is negative or not finite"
         } else if let Some(reason) = self.clip_plane.and_then(|plane| plane.problem()) {

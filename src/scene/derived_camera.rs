@@ -10,7 +10,7 @@ use super::{Camera, ClipPlane, Projection, ViewKind};
 impl Camera {
     /// The camera of one tile of this camera's picture, which is divided into `count` × `count` tiles. Tile `[0, 0]` is the upper left
     /// one. Each has this camera's `size`, so the tiles put together are a picture with `count` times as many pixels a row (M 10.1). The
-    /// name is this camera's with the tile's column and row.
+    /// name is this camera's with the tile's column and row. All tiles have the same shadows, also those of different frames.
     ///
     /// ```
     /// use drawloom::glam::DVec3;
@@ -28,7 +28,8 @@ impl Camera {
         // From the whole picture's centre to the tile's, in halves of the tile.
         let middle = |index: u32| 2.0 * index as f32 + 1.0;
         let offset = Vec2::new(middle(column) - count as f32, count as f32 - middle(row));
-        let mut camera = Self { name: format!("{}, tile {column} {row}", self.name), ..self.clone() };
+        let (name, whole) = (format!("{}, tile {column} {row}", self.name), Some(self.as_whole()));
+        let mut camera = Self { name, whole, ..self.clone() };
         match &mut camera.projection {
             Projection::Perspective { field_of_view } => {
                 let tangent = (f64::from(*field_of_view) * 0.5).tan() / f64::from(count);
@@ -50,7 +51,7 @@ impl Camera {
     /// paraboloid.
     pub fn jittered(&self, offset: Vec2) -> Self {
         let halves = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
-        let mut camera = self.clone();
+        let mut camera = Self { whole: Some(self.as_whole()), ..self.clone() };
         match self.projection {
             Projection::Perspective { .. } => camera.shift += offset / halves,
             Projection::Orthographic { height } => camera.move_aside(offset * (0.5 * height / halves.y)),
@@ -62,6 +63,9 @@ impl Camera {
     /// Moves the camera to the right and up, in metres.
     fn move_aside(&mut self, metres: Vec2) {
         self.position += self.orientation.as_dquat().normalize() * metres.as_dvec2().extend(0.0);
+        if let Some(whole) = &mut self.whole {
+            whole.aside -= metres;
+        }
         self.late_latch = self.late_latch.map(|motion| motion.at_distance(metres.length()));
     }
 
@@ -97,6 +101,7 @@ impl Camera {
             position: self.position - normal * (2.0 * plane.distance(self.position)),
             orientation: DQuat::from_mat3(&axes).normalize().as_quat(),
             shift: self.shift * Vec2::new(-1.0, 1.0),
+            whole: None,
             clip_plane: self.clips().then_some(plane),
             kind: ViewKind::Reflection,
             ..self.clone()
@@ -118,6 +123,7 @@ impl Camera {
             name: self.child_name(portal),
             position: exit.0 + turn * (self.position - entry.0),
             orientation: (turn * self.orientation.as_dquat()).as_quat().normalize(),
+            whole: None,
             clip_plane: self.clips().then_some(clip_plane),
             kind: ViewKind::Reflection,
             ..self.clone()

@@ -59,15 +59,18 @@ impl LightTable {
     /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their own,
     /// and the shadow maps that `views` draw of them. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
-        self.fill_within(view, lights, views, shadows, (usize::MAX, &mut Vec::new()));
+        self.fill_within(view, (lights, &[]), views, shadows, (usize::MAX, &mut Vec::new()));
     }
 
     /// The same with at most `capacity` of [`LightTable::gpu_lights`], as long as the layers of shadow maps are not more. The first lights of the
     /// scene have room. Adds the indices of the others that reach the view to `left_out`.
+    ///
+    /// Lights for which `main_views` has a main view are copies of the last one before them that is none. A copy takes the place of its light in
+    /// views that [have](RenderView::main_view) the maps of that main view.
     pub(crate) fn fill_within(
         &mut self,
         view: &RenderView,
-        lights: &[Light],
+        (lights, main_views): (&[Light], &[Option<usize>]),
         views: &[RenderView],
         shadows: bool,
         (capacity, left_out): (usize, &mut Vec<usize>),
@@ -96,6 +99,9 @@ impl LightTable {
         let capacity = capacity.saturating_sub(self.layers.len());
         let mut counts = [0_u32; LightClass::COUNT];
         for (index, light) in lights.iter().enumerate() {
+            if !is_for_view(main_views, index, view.main_view) {
+                continue;
+            }
             if light.bounding_sphere().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius)) {
                 if self.reaching.len() >= capacity {
                     left_out.push(index);
@@ -168,6 +174,15 @@ impl LightTable {
     /// The range of a class within [`LightTable::gpu_lights`].
     pub fn range(&self, class: LightClass) -> Range<u32> {
         self.ranges[class.index()].clone()
+    }
+}
+
+/// Whether a view with the maps of this main view is lit by a light or, of its copies, by this one.
+fn is_for_view(main_views: &[Option<usize>], light: usize, main_view: Option<usize>) -> bool {
+    match main_views.get(light) {
+        Some(Some(copy)) => main_view == Some(*copy),
+        Some(None) => !main_views[light + 1..].iter().map_while(|copy| *copy).any(|copy| main_view == Some(copy)),
+        None => true,
     }
 }
 
@@ -245,6 +260,20 @@ mod tests {
         // With a map for each light at most, there are only the lights.
         table.fill(&main, &lights, &views[..4], true);
         assert_eq!((table.gpu_lights().len(), table.layer_sources()), (2, [].as_slice()));
+    }
+
+    #[test]
+    fn a_copy_of_a_light_takes_its_place_in_the_views_of_its_main_view() {
+        let lights = [point(-4.0), spot(-3.0, true), spot(-3.0, true), spot(-3.0, true), point(-6.0)];
+        let main_views = [None, None, Some(3), Some(7), None];
+        for (main_view, expected) in [(None, 1), (Some(3), 2), (Some(7), 3), (Some(4), 1)] {
+            let main = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
+            let view = RenderView { main_view, ..main };
+            let mut table = LightTable::default();
+            table.fill_within(&view, (&lights, &main_views), &[view.clone()], true, (usize::MAX, &mut Vec::new()));
+            let found: Vec<_> = table.sources().map(|(light, _)| light).collect();
+            assert_eq!(found, [0, 4, expected], "{main_view:?}");
+        }
     }
 
     #[test]

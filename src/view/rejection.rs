@@ -103,6 +103,9 @@ pub enum RejectionReason {
     /// A light is farther from the world's origin than
     /// [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     LightOutOfReach,
+    /// A light that casts shadows has no shadow map, or not for every main camera, because the frame has as many as the device's textures have
+    /// layers. There it is drawn without a shadow: see [`ShadowMaps`](super::ShadowMaps).
+    ShadowMapLimit,
     /// A light's intensity, position, direction, range or angles are invalid.
     InvalidLight,
     /// A material's texture was removed; the material's plain colour is used.
@@ -138,7 +141,7 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    const ALL: [Self; 20] = [
+    const ALL: [Self; 21] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -147,6 +150,7 @@ impl RejectionReason {
         Self::CoarseEdges,
         Self::DarkLight,
         Self::LightOutOfReach,
+        Self::ShadowMapLimit,
         Self::InvalidLight,
         Self::StaleTexture,
         Self::TextureLimit,
@@ -172,6 +176,7 @@ impl RejectionReason {
             Self::CoarseEdges => "object too near to a hemispherical light for its long edges",
             Self::DarkLight => "light without intensity",
             Self::LightOutOfReach => "light too far from the origin",
+            Self::ShadowMapLimit => "light without a shadow, as there are too many shadow maps",
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
             Self::TextureLimit => "texture beyond the device's limits",
@@ -210,9 +215,12 @@ impl RejectionReason {
                 at(&assets.materials, index).map(|material| material.name.as_str())
             }
             Self::TextureLimit | Self::ReducedTexture => at(&assets.textures, index).map(|texture| texture.name()),
-            Self::DarkLight | Self::LightOutOfReach | Self::InvalidLight | Self::LightLimit | Self::UnknownObject => {
-                None
-            }
+            Self::DarkLight
+            | Self::LightOutOfReach
+            | Self::InvalidLight
+            | Self::LightLimit
+            | Self::ShadowMapLimit
+            | Self::UnknownObject => None,
         }
     }
 }

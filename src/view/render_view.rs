@@ -16,6 +16,9 @@ pub struct RenderView {
     pub frustum: Frustum,
     /// The light whose shadow map the view draws: its index among the frame's valid lights.
     pub valid_light: Option<usize>,
+    /// The main view whose maps of directional lights light it, by index: see [`ShadowMaps`](super::ShadowMaps). `None` for the views of
+    /// maps, and without a main view.
+    pub main_view: Option<usize>,
     /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
     /// How many frames before this one the view was drawn: 0 if this frame draws it. Camera, frustum and light are those that it was drawn
@@ -26,7 +29,14 @@ pub struct RenderView {
 impl RenderView {
     /// The view of `camera`.
     pub fn new(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), frustum: Frustum::new(camera), valid_light: None, layer: 0, age: 0 }
+        Self {
+            camera: camera.clone(),
+            frustum: Frustum::new(camera),
+            valid_light: None,
+            main_view: None,
+            layer: 0,
+            age: 0,
+        }
     }
 
     /// The camera's name, which reports use.
@@ -49,6 +59,11 @@ impl RenderView {
     /// invisible from wherever the camera may be.
     pub fn may_be_replaced(&self) -> bool {
         self.camera.late_latch.is_some()
+    }
+
+    /// Whether what is in front of the near plane is drawn as if it were on it: in the map of a directional light, where it casts a shadow.
+    pub fn clamps_depth(&self) -> bool {
+        matches!(self.camera.projection, Projection::Orthographic { .. }) && self.kind() == ViewKind::Shadow
     }
 
     /// Which of the objects that a process draws it draws in this view.

@@ -4,30 +4,38 @@ use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 
 use super::FixedPosition;
 use super::cascades::{cascade_slice, visible_sphere};
+use super::map_owners::MapOwners;
 use crate::scene::{Camera, LayerMask, Light, ObjectFilter, Projection, Redraw, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 ///
 /// So a frame has at most as many maps as the device's textures have layers: 256, unless the device was requested with a higher limit. That
-/// is 42 point lights whose range a camera sees. A frame with more is
-/// [`BackendError::TooManyLayers`](crate::backend::BackendError::TooManyLayers).
+/// is 42 point lights whose range a camera sees. Lights beyond that are drawn without a shadow, and counted as
+/// [`RejectionReason::ShadowMapLimit`](super::RejectionReason::ShadowMapLimit): main cameras take maps one after the other in the scene's order,
+/// each for the lights that reach what it sees in the scene's order, if all maps of the light fit. So what one camera shows does not depend
+/// on the cameras after it.
+///
+/// # Several main cameras
+///
+/// A directional light has maps of its own for each main camera, so that none sees coarser shadows because of where another one is. Main cameras
+/// that need the same maps share them: tiles, and the jittered cameras of one picture. A view that is no main camera's has the maps of the one
+/// that it is [named](Camera::child_name) after, as `main/mirror` is after `main`, or else those of the scene's first main camera. Maps of other
+/// lights are the same for all views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
     /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a
     /// hemispherical light, 2·d·tan(angle)/side for a spot light, and 2·d/(side − 2·`filter` − 2) for a point light,
     /// where d is along the axis of the cube's face. For a directional light it is as wide as the diameter of the sphere
-    /// around what main cameras see of the map's slice, divided by `side`: at 60° and 16:9 and with one cascade some 2.4·`max_distance`/side.
+    /// around what the main camera sees of the map's slice, divided by `side`: at 60° and 16:9 and with one cascade some 2.4·`max_distance`/side.
     pub side: u32,
-    /// The distance from the main cameras, in metres, up to which a directional light's maps cover their views; at most
-    /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow. The maps are for all main cameras: the
-    /// farther these are apart, the coarser they are.
+    /// The distance from a main camera, in metres, up to which a directional light's maps cover its view; at most
+    /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow.
     ///
-    /// Towards the light, a map reaches sixteen times the radius of the sphere around what it covers. An object beyond that casts its shadow
-    /// all the same, but one with a triangle that reaches from within to beyond it, such as a side of a box a hundred times as large as the
-    /// sphere, casts a wrong one: depth is clamped at the triangle's corners.
+    /// Towards the light, a map reaches sixteen times the radius of the sphere around what it covers. Whatever is beyond that casts its shadow
+    /// all the same.
     pub max_distance: f32,
-    /// The number of maps of a directional light, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers a slice of what
-    /// main cameras see, between two distances, and a point is looked up in the finest map that contains it. A shadow's
+    /// The number of maps of a directional light for a main camera, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers a slice of what
+    /// the camera sees, between two distances, and a point is looked up in the finest map that contains it. A shadow's
     /// edge is as sharp as the slice's sphere is small. Each map is a view.
     pub cascades: u32,
     /// Where the slices end, from 0, equal depths, to 1, equal ratios of the distances: the λ of the practical split
@@ -71,13 +79,14 @@ impl ShadowMaps {
 
     /// The cameras of a light's shadow maps, the layers of which follow each other in this order: a perspective camera
     /// for a spot light, a paraboloid for a hemispherical light, six perspective cameras for a point light, and for a
-    /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what the main
-    /// cameras among `cameras` see. A light has all its maps or none: none if it casts no shadow, and a directional
-    /// light if there is no main camera, if no finite sphere is around what they see, or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
+    /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what a main
+    /// camera sees: those of the first main camera among `cameras`, then those of each further one that does not share them. A light has all
+    /// its maps or none: none if it casts no shadow, and a directional light for a main camera if no finite sphere is around what that sees,
+    /// or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
     /// invalid: a renderer with such maps is [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
     ///
     /// The only map of a light is called `name`, the faces of a cube `name, +X` and so on, and cascades `name, cascade
-    /// 1` and so on.
+    /// 1` and so on. Those of a further main camera `second` are called `name for second` and so on.
     ///
     /// # The error of a point light's maps
     ///
@@ -110,7 +119,28 @@ impl ShadowMaps {
                 let projection = Projection::Paraboloid;
                 vec![Camera { projection, ..self.camera(name.to_owned(), position, direction, range) }]
             }
-            Light::Directional { direction, .. } => self.cascade_cameras(name, direction, cameras).unwrap_or_default(),
+            Light::Directional { direction, .. } => {
+                let owners = self.map_owners(cameras);
+                let maps_of = |owner: usize| {
+                    let (name, owner) = (owners.map_name(name, owner, cameras), &cameras[owner]);
+                    self.cascade_cameras(&name, direction, owner).unwrap_or_default()
+                };
+                owners.owners().iter().flat_map(|owner| maps_of(*owner)).collect()
+            }
+        }
+    }
+
+    /// Which main cameras have maps of directional lights of their own, and whose maps light what the others show.
+    pub(crate) fn map_owners(&self, cameras: &[Camera]) -> MapOwners {
+        MapOwners::new(cameras, |camera| self.cascade_spheres(camera))
+    }
+
+    /// How many maps a light has; a directional one for a main camera.
+    pub(crate) fn map_count(&self, light: &Light) -> usize {
+        match light {
+            Light::Directional { .. } => self.cascades as usize,
+            Light::Point { .. } => CUBE_FACES.len(),
+            Light::Spot { .. } | Light::Hemispherical { .. } => 1,
         }
     }
 
@@ -122,6 +152,7 @@ impl ShadowMaps {
             orientation: looking_along(direction),
             projection: Projection::Paraboloid,
             shift: Vec2::ZERO,
+            whole: None,
             clip_plane: None,
             near: (range * NEAR_PLANE_SHARE).max(f32::MIN_POSITIVE),
             far: range.max(f32::MIN_POSITIVE * 2.0),
@@ -148,14 +179,12 @@ impl ShadowMaps {
         half / (1.0 - 2.0 * f64::from(pixels) / f64::from(self.side)).max(0.25)
     }
 
-    /// The cameras of a directional light's maps; `None` if there is no main camera or if one would be out of reach.
-    fn cascade_cameras(&self, name: &str, direction: Vec3, cameras: &[Camera]) -> Option<Vec<Camera>> {
+    /// What the maps of directional lights cover for a main camera: a sphere for each cascade. `None` if one would be invalid.
+    fn cascade_spheres(&self, main: &Camera) -> Option<Vec<(DVec3, f64)>> {
+        let far = self.max_distance.min(main.far);
         let spheres = (0..self.cascades).map(|cascade| {
-            let slice = |camera: &Camera| {
-                let far = self.max_distance.min(camera.far);
-                cascade_slice([camera.near, far], self.split_lambda, cascade, self.cascades)
-            };
-            let (center, radius) = visible_sphere(cameras, slice)?;
+            let slice = cascade_slice([main.near, far], self.split_lambda, cascade, self.cascades);
+            let (center, radius) = visible_sphere(main, slice)?;
             // Snapping moves the map by less than a pixel, so it is a pixel larger on every side. With several cascades it is also
             // larger by what the filter reads, so that no point of the slice falls through to the coarser map.
             let radius = match self.cascades {
@@ -164,7 +193,12 @@ impl ShadowMaps {
             };
             Some((center, radius))
         });
-        let spheres = spheres.collect::<Option<Vec<_>>>()?;
+        spheres.collect()
+    }
+
+    /// The cameras of a directional light's maps for a main camera; `None` if one would be out of reach.
+    fn cascade_cameras(&self, name: &str, direction: Vec3, main: &Camera) -> Option<Vec<Camera>> {
+        let spheres = self.cascade_spheres(main)?;
         let (_, largest) = *spheres.last()?;
         let orientation = looking_along(direction);
         let camera = |(cascade, (center, radius)): (usize, (DVec3, f64))| {
@@ -189,8 +223,8 @@ impl ShadowMaps {
     }
 
     /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to
-    /// frame and shadows do not crawl when the camera moves. They do where the radius changes: when main cameras move relative to each
-    /// other, or the frustum of one that is off centre does.
+    /// frame and shadows do not crawl when the camera moves. They do where the radius changes: when the field of view does, or the shift of a
+    /// camera that is off centre, other than by [`Camera::jittered`].
     fn snapped_to_texels(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
         let pixel = 2.0 * radius / f64::from(self.side);
         let local = orientation.inverse() * center;
@@ -220,8 +254,7 @@ const CUBE_FACES: [(Vec3, &str); 6] =
 /// The near plane of a light's map, as a share of its range.
 const NEAR_PLANE_SHARE: f32 = 1e-5;
 
-/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. A triangle that
-/// crosses the near plane is drawn with a wrong slope, since depth is clamped there. The larger the distance, the more
+/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. The larger the distance, the more
 /// f32 rounds: here to within a hundredth of a pixel of 1024.
 const CASTER_DISTANCE: f64 = 16.0;
 
@@ -238,235 +271,4 @@ fn looking_along(direction: Vec3) -> Quat {
 }
 
 #[cfg(test)]
-mod tests {
-    use glam::Vec2;
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::scene::CameraMotion;
-    use crate::view::RenderView;
-
-    fn sun() -> Light {
-        let direction = Vec3::new(0.3, -0.8, -0.5).normalize();
-        Light::Directional { direction, illuminance: Vec3::ONE, casts_shadow: true }
-    }
-
-    proptest! {
-        /// All that a main camera sees within the maximum distance is in the sun's map of its cascade, before its far
-        /// plane, and so far inside that the filter reads no pixel outside.
-        #[test]
-        fn a_cascade_covers_what_main_cameras_see_of_its_slice(
-            placements in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
-            pixel in prop::array::uniform2(prop_oneof![-1.0..1.0_f32, Just(-1.0), Just(1.0)]),
-            share in 0.0..1.0_f32,
-            is_at_an_end in any::<bool>(),
-            cascades in 1..=ShadowMaps::MAX_CASCADES,
-            split_lambda in 0.0..=1.0_f32,
-            filter in 0..=ShadowMaps::MAX_FILTER,
-            side in 24..200_u32,
-        ) {
-            let maps = ShadowMaps { cascades, split_lambda, filter, side, ..ShadowMaps::default() };
-            let cameras: Vec<_> = placements
-                .into_iter()
-                .map(|(position, degrees)| Camera {
-                    projection: Projection::Perspective { field_of_view: degrees.to_radians() },
-                    ..Camera::looking_at("main", DVec3::from(position), DVec3::ZERO)
-                })
-                .collect();
-            let of_sun = maps.cameras("sun", &sun(), &cameras);
-            prop_assert_eq!(of_sun.len(), cascades as usize);
-            let [near, far] = [cameras[0].near.max(maps.max_distance * 1e-3), maps.max_distance].map(f64::from);
-            let end = |cascade: u32| {
-                let share = f64::from(cascade) / f64::from(cascades);
-                let [equal_ratio, equal_depth] = [near * (far / near).powf(share), near + (far - near) * share];
-                equal_depth + (equal_ratio - equal_depth) * f64::from(split_lambda)
-            };
-            let slice = (share * cascades as f32) as u32;
-            let [begin, end] = [if slice == 0 { 0.0 } else { end(slice) }, end(slice + 1)];
-            let distance = if is_at_an_end { end } else { begin + (end - begin) * f64::from(share) } as f32;
-            let map = RenderView::new(&of_sun[slice as usize]);
-            let outside = if cascades == 1 { 0.0 } else { (2.0 * filter as f32 + 1.0) / side as f32 };
-            for camera in &cameras {
-                let [right, up, forward] = RenderView::new(camera).picture_axes();
-                let seen = (right * pixel[0] + up * pixel[1] + forward) * distance;
-                let point = camera.position + seen.as_dvec3() - map.camera.position;
-                let clip = map.clip_from_relative() * point.as_vec3().extend(1.0);
-                prop_assert!(clip.truncate().truncate().abs().max_element() <= 1.0 - outside + 1e-4, "{clip}");
-                prop_assert!((-1e-4..=1.0 + 1e-4).contains(&clip.z), "{clip}");
-            }
-        }
-    }
-
-    proptest! {
-        /// All that a camera sees within the maximum distance is in the sun's map, wherever it is when the frame is submitted.
-        #[test]
-        fn the_maps_cover_what_a_camera_sees_that_moves_until_submission(
-            position in prop::array::uniform3(-1e4..1e4_f64),
-            degrees in 1.0..160_f32,
-            distance in 0.0..10_f32,
-            angle in prop_oneof![0.0..0.2_f32, 0.0..3.2_f32],
-            step in prop::array::uniform3(-1.0..1.0_f64),
-            axis in prop::array::uniform3(-1.0..1.0_f32),
-            pixel in prop::array::uniform2(prop_oneof![-1.0..1.0_f32, Just(-1.0), Just(1.0)]),
-            share in prop_oneof![0.0..1.0_f32, Just(1.0)],
-            cascades in 1..=ShadowMaps::MAX_CASCADES,
-        ) {
-            let maps = ShadowMaps { cascades, ..ShadowMaps::default() };
-            let camera = Camera {
-                projection: Projection::Perspective { field_of_view: degrees.to_radians() },
-                late_latch: Some(CameraMotion { distance, angle }),
-                ..Camera::looking_at("main", DVec3::from(position), DVec3::ZERO)
-            };
-            let of_sun = maps.cameras("sun", &sun(), std::slice::from_ref(&camera));
-            let turn = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
-            let moved = Camera {
-                position: camera.position + DVec3::from(step).normalize_or_zero() * f64::from(distance),
-                orientation: (turn * camera.orientation).normalize(),
-                ..camera
-            };
-            let [right, up, forward] = RenderView::new(&moved).picture_axes();
-            let seen = (right * pixel[0] + up * pixel[1] + forward) * (maps.max_distance * share);
-            let is_covered = of_sun.iter().map(RenderView::new).any(|map| {
-                let point = moved.position + seen.as_dvec3() - map.camera.position;
-                let clip = map.clip_from_relative() * point.as_vec3().extend(1.0);
-                clip.truncate().truncate().abs().max_element() <= 1.0 + 1e-4 && (-1e-4..=1.0 + 1e-4).contains(&clip.z)
-            });
-            prop_assert!(is_covered, "{moved:?}");
-        }
-    }
-
-    #[test]
-    fn a_map_reaches_from_the_casters_to_the_end_of_its_slice() {
-        let main = Camera { near: 1e-5, ..Camera::looking_at("main", DVec3::Y, DVec3::ZERO) };
-        let is_near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 1e-6;
-        let mut limited = 0;
-        for (cascades, split_lambda) in (1..=ShadowMaps::MAX_CASCADES).flat_map(|count| [(count, 0.5), (count, 1.0)]) {
-            let maps = ShadowMaps {
-                cascades,
-                split_lambda,
-                filter: 3,
-                side: 100,
-                max_distance: 0.01,
-                ..ShadowMaps::default()
-            };
-            // A pixel on each side with one cascade, and with more of them 5 of 50 from the centre.
-            let margin = if cascades == 1 { 1.04 } else { 1.0 / 0.9 };
-            let radius = |cascade| {
-                let slice = |_: &Camera| cascade_slice([1e-5, 0.01], split_lambda, cascade, cascades);
-                visible_sphere(std::slice::from_ref(&main), slice).unwrap().1 * margin
-            };
-            let of_sun = maps.cameras("sun", &sun(), std::slice::from_ref(&main));
-            for (cascade, map) in (0..).zip(&of_sun) {
-                let (radius, largest) = (radius(cascade), radius(cascades - 1));
-                let Projection::Orthographic { height } = map.projection else { panic!("it has perspective") };
-                assert!(is_near(height, 2.0 * radius) && is_near(map.near, radius), "{map:?}");
-                let casters = (16.0 * largest).min(128.0 * radius);
-                assert!(is_near(map.far, casters + 3.0 * radius), "{} {casters} {radius}", map.far);
-                limited += usize::from(16.0 * largest > 128.0 * radius);
-            }
-        }
-        assert!((1..10).contains(&limited), "{limited} maps reach 128 of their radii");
-        let (position, direction, intensity) = (DVec3::ZERO, Vec3::X, Vec3::ONE);
-        let lamp = Light::Hemispherical { position, direction, intensity, range: 0.5, casts_shadow: true };
-        assert_eq!(ShadowMaps::default().cameras("lamp", &lamp, &[])[0].far, 0.5);
-    }
-
-    #[test]
-    fn directional_maps_move_by_whole_pixels() {
-        let maps = ShadowMaps { side: 64, cascades: 3, ..ShadowMaps::default() };
-        let pixels_of_origin = |x: f64| {
-            let camera = Camera::looking_at("main", DVec3::new(x, 1.0, 2.0), DVec3::new(x, 1.0, -9.0));
-            let pixel = |map: &Camera| {
-                let map = RenderView::new(map);
-                let clip = map.clip_from_relative() * (-map.camera.position).as_vec3().extend(1.0);
-                Vec2::new(clip.x, clip.y) * 32.0
-            };
-            maps.cameras("sun", &sun(), &[camera]).iter().map(pixel).collect::<Vec<_>>()
-        };
-        let first = pixels_of_origin(0.0);
-        for step in 1..20 {
-            for (now, first) in pixels_of_origin(f64::from(step) * 0.37).into_iter().zip(&first) {
-                let moved = now - first;
-                assert!((moved - moved.round()).abs().max_element() < 1e-3, "{moved}");
-            }
-        }
-    }
-
-    #[test]
-    fn main_cameras_that_are_invalid_or_too_far_apart_have_no_map_of_the_sun() {
-        let main = || Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
-        let at = |x: f64| Camera { position: DVec3::X * x, ..main() };
-        let invalid = [
-            vec![Camera { size: [0, 0], ..main() }],
-            vec![Camera { projection: Projection::Perspective { field_of_view: f32::NAN }, ..main() }],
-            vec![Camera { far: 0.0, ..main() }],
-            vec![Camera { far: -1.0, ..main() }],
-            vec![at(1e200), at(0.0), at(-1e200)],
-        ];
-        for cascades in 1..=ShadowMaps::MAX_CASCADES {
-            let maps = ShadowMaps { cascades, ..ShadowMaps::default() };
-            assert_eq!(maps.cameras("sun", &sun(), &[main()]).len(), cascades as usize);
-            for (case, cameras) in invalid.iter().enumerate() {
-                assert!(maps.cameras("sun", &sun(), cameras).is_empty(), "case {case} with {cascades} cascades");
-            }
-        }
-    }
-
-    #[test]
-    fn maps_are_named_after_their_light_and_what_they_show() {
-        let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
-        let names = |cascades: u32, light: Light| -> Vec<String> {
-            let maps = ShadowMaps { cascades, ..ShadowMaps::default() };
-            maps.cameras("light", &light, std::slice::from_ref(&main)).into_iter().map(|map| map.name).collect()
-        };
-        let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: true };
-        assert_eq!(names(1, sun()), ["light"]);
-        assert_eq!(names(3, sun()), ["light, cascade 1", "light, cascade 2", "light, cascade 3"]);
-        let faces = ["light, +X", "light, -X", "light, +Y", "light, -Y", "light, +Z", "light, -Z"];
-        assert_eq!(names(3, lamp), faces);
-    }
-
-    #[test]
-    fn a_light_has_all_its_maps_or_none() {
-        let maps = ShadowMaps { cascades: 4, max_distance: 1e6, ..ShadowMaps::default() };
-        let of_sun = |x: f64| {
-            let main = Camera { far: 1e7, ..Camera::looking_at("main", DVec3::X * x, DVec3::ZERO) };
-            maps.cameras("sun", &sun(), &[main]).len()
-        };
-        assert_eq!([of_sun(1.0), of_sun(-FixedPosition::MAX_COORDINATE * 0.9999)], [4, 0]);
-    }
-
-    #[test]
-    fn invalid_maps_have_no_cameras() {
-        let good = ShadowMaps { cascades: 2, ..ShadowMaps::default() };
-        let main = [Camera::looking_at("main", DVec3::Z, DVec3::ZERO)];
-        let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: true };
-        let counts = |maps: ShadowMaps| [sun(), lamp].map(|light| maps.cameras("light", &light, &main).len());
-        assert_eq!(counts(good), [2, 6]);
-        for maps in [
-            ShadowMaps { side: 0, ..good },
-            ShadowMaps { max_distance: -1.0, ..good },
-            ShadowMaps { max_distance: f32::NAN, ..good },
-            ShadowMaps { cascades: 0, ..good },
-            ShadowMaps { cascades: u32::MAX, ..good },
-            ShadowMaps { split_lambda: f32::NAN, ..good },
-            ShadowMaps { bias: -1.0, ..good },
-            ShadowMaps { filter: u32::MAX, ..good },
-        ] {
-            assert_eq!(counts(maps), [0, 0], "{maps:?}");
-        }
-    }
-
-    #[test]
-    fn a_light_that_casts_no_shadow_has_no_map() {
-        let maps = ShadowMaps::default();
-        let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
-        let map = |light: Light, cameras: &[Camera]| maps.cameras("map", &light, cameras);
-        let point = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
-        assert_eq!(map(point, std::slice::from_ref(&main)), []);
-        assert_eq!(map(sun(), &[]), []);
-        let Light::Directional { direction, illuminance, .. } = sun() else { unreachable!() };
-        let moon = Light::Directional { direction, illuminance, casts_shadow: false };
-        assert_eq!(map(moon, &[main]), []);
-    }
-}
+mod tests;

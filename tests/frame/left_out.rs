@@ -24,7 +24,7 @@ use drawloom_testing::scenes::field;
 use crate::reported;
 
 /// Room for 128 vertices in a buffer, and for 64 objects.
-const LIMITS: SceneLimits = SceneLimits { buffer_bytes: 4096, binding_bytes: 4096 };
+const LIMITS: SceneLimits = SceneLimits { buffer_bytes: 4096, binding_bytes: 4096, ..SceneLimits::NONE };
 
 fn mesh(name: &str, vertices: usize) -> Mesh {
     Mesh::new(name, Topology::TriangleList, vec![Vertex::default(); vertices], vec![0, 1, 2]).unwrap()

@@ -62,7 +62,7 @@ fn lamp() -> Light {
     Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 9.0, casts_shadow: false }
 }
 
-/// Two cameras, followed by the shadow views of two lights.
+/// Two cameras, followed by the shadow views of two lights: of the spot, and of the sun for each camera.
 fn two_lights() -> Scene {
     let mut scene = field(300);
     scene.lights = vec![spot(3.0), sun()];
@@ -72,10 +72,10 @@ fn two_lights() -> Scene {
 #[test]
 fn shadow_maps_are_drawn_every_nth_frame_in_turns() {
     let expected: [&[&[usize]]; 4] = [
-        &[&[2, 3], &[2, 3], &[2, 3], &[2, 3], &[2, 3]],
-        &[&[2, 3], &[3], &[2], &[3], &[2]],
-        &[&[2, 3], &[], &[3], &[2], &[], &[3], &[2]],
-        &[&[2, 3], &[], &[], &[3], &[2], &[], &[], &[3], &[2]],
+        &[&[2, 3, 4], &[2, 3, 4], &[2, 3, 4], &[2, 3, 4], &[2, 3, 4]],
+        &[&[2, 3, 4], &[3], &[2, 4], &[3], &[2, 4]],
+        &[&[2, 3, 4], &[4], &[3], &[2], &[4], &[3], &[2]],
+        &[&[2, 3, 4], &[], &[4], &[3], &[2], &[], &[4], &[3], &[2]],
     ];
     for (interval, expected) in (1..).zip(expected) {
         let (scene, mut fixture) = (two_lights(), Fixture::new(interval));
@@ -104,7 +104,7 @@ fn lights_with_several_maps_have_all_of_them_cached() {
     fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
     let mut scene = two_lights();
     scene.lights.push(Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 9.0, casts_shadow: true });
-    let all: Vec<_> = (2..12).collect();
+    let all: Vec<_> = (2..15).collect();
     assert_eq!(fixture.drawn(&scene), all);
     assert!(fixture.drawn(&scene).is_empty());
     // A lamp keeps its maps while it moves.
@@ -115,9 +115,9 @@ fn lights_with_several_maps_have_all_of_them_cached() {
     // The camera leaves the finest cascade, but not what a single map would have covered.
     let step = 12.0;
     scene.cameras.truncate(1);
+    assert_eq!(fixture.drawn(&scene), (1..11).collect::<Vec<_>>());
     // Behind the main view and the spot's map.
     let of_sun = [2, 3, 4];
-    assert_eq!(fixture.drawn(&scene), of_sun);
     scene.cameras[0].position.x += step;
     assert_eq!(fixture.drawn(&scene), of_sun);
     let mut single = Fixture::new(100);
@@ -126,12 +126,12 @@ fn lights_with_several_maps_have_all_of_them_cached() {
     assert!(single.drawn(&scene).is_empty());
     // One light more shifts no layer of those before it, but all are drawn.
     scene.lights.push(sun());
-    assert_eq!(fixture.drawn(&scene).len(), all.len() + 3);
+    assert_eq!(fixture.drawn(&scene).len(), 1 + 3 + 6 + 3);
 }
 
 #[test]
 fn a_cached_map_costs_no_culling_and_no_commands() {
-    let (scene, mut fixture) = (two_lights(), Fixture::new(3));
+    let (scene, mut fixture) = (two_lights(), Fixture::new(4));
     fixture.drawn(&scene);
     assert!(fixture.renderer.draw_list("shadow casters", 2).is_some());
     let recorded = fixture.renderer.record(scene.as_scene_ref()).unwrap();
@@ -146,7 +146,7 @@ fn a_cached_map_costs_no_culling_and_no_commands() {
 #[test]
 fn movements_do_not_draw_cached_maps_early() {
     let (mut scene, mut fixture) = (two_lights(), Fixture::new(100));
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     let handle = scene.objects().next().unwrap();
     let object = scene.object(handle).unwrap();
     let moves: [&dyn Fn(&mut Scene); 4] = [
@@ -162,20 +162,25 @@ fn movements_do_not_draw_cached_maps_early() {
 }
 
 #[test]
-fn a_change_of_lights_draws_all_maps_at_once_and_one_of_cameras_none() {
+fn a_change_of_maps_draws_all_of_them_at_once() {
     let (mut scene, mut fixture) = (two_lights(), Fixture::new(100));
     fixture.drawn(&scene);
     type Change<'a> = &'a dyn Fn(&mut Scene);
-    let changes: [(&str, Change<'_>, &[usize]); 9] = [
-        ("another plan", &|scene| scene.lights.push(lamp()), &[2, 3]),
-        ("a light added", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4]),
-        ("a light in between", &|scene| scene.lights.insert(0, lamp()), &[2, 3, 4]),
-        ("two lights swapped", &|scene| scene.lights.swap(1, 2), &[2, 3, 4]),
-        ("a light removed", &|scene| _ = scene.lights.pop(), &[2, 3]),
-        ("another light added", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4]),
-        ("a camera added", &|scene| scene.cameras.push(scene.cameras[0].clone()), &[]),
-        ("a camera removed", &|scene| _ = scene.cameras.pop(), &[]),
-        ("one more light casts shadows", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5]),
+    let changes: [(&str, Change<'_>, &[usize]); 10] = [
+        ("another plan", &|scene| scene.lights.push(lamp()), &[2, 3, 4]),
+        ("a light added", &|scene| scene.lights.push(spot(-3.0)), &[2, 3, 4, 5]),
+        ("a light in between", &|scene| scene.lights.insert(0, lamp()), &[2, 3, 4, 5]),
+        ("two lights swapped", &|scene| scene.lights.swap(1, 2), &[2, 3, 4, 5]),
+        ("a light removed", &|scene| _ = scene.lights.pop(), &[2, 3, 4]),
+        ("another light added", &|scene| scene.lights.push(spot(8.0)), &[2, 3, 4, 5]),
+        (
+            "a camera added that shares the maps of another one",
+            &|scene| scene.cameras.push(scene.cameras[0].clone()),
+            &[],
+        ),
+        ("that camera removed", &|scene| _ = scene.cameras.pop(), &[]),
+        ("one more light casts shadows", &|scene| scene.lights[0] = sun(), &[2, 3, 4, 5, 6, 7]),
+        ("a camera removed that had maps", &|scene| _ = scene.cameras.pop(), &[1, 2, 3, 4]),
     ];
     for (what, change, drawn) in changes {
         change(&mut scene);
@@ -189,15 +194,15 @@ fn a_change_of_quality_or_pipeline_draws_all_maps_at_once() {
     let (scene, mut fixture) = (two_lights(), Fixture::new(100));
     fixture.drawn(&scene);
     fixture.renderer.set_quality(quality_with(50)).unwrap();
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     assert!(fixture.drawn(&scene).is_empty());
     let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
     fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     assert!(fixture.drawn(&scene).is_empty());
     fixture.renderer.set_quality(quality_with(1)).unwrap();
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
 }
 
 #[test]
@@ -205,18 +210,18 @@ fn maps_of_frames_that_were_not_submitted_are_not_cached() {
     let (scene, mut fixture) = (two_lights(), Fixture::new(100));
     // A frame that is never submitted.
     drop(fixture.renderer.record(scene.as_scene_ref()).unwrap());
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     // The second frame is recorded before the first one is dropped.
     fixture.renderer.set_quality(quality_with(100)).unwrap();
     let first = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     let second = fixture.renderer.record(scene.as_scene_ref()).unwrap();
     drop(first);
     fixture.submitter.submit(second).unwrap();
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     // A failed frame.
     let mut bad = two_lights();
     bad.cameras[0].position.x = 1e300;
     assert!(fixture.renderer.record(bad.as_scene_ref()).is_err());
-    assert_eq!(fixture.drawn(&scene), [2, 3]);
+    assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     assert!(fixture.drawn(&scene).is_empty());
 }

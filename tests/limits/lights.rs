@@ -79,7 +79,7 @@ fn out_of_reach(device: Device) -> Result<(), Failed> {
 /// The second view has what the first one leaves. Views begin at multiples of 256 bytes.
 fn shared_buffer(device: Device) -> Result<(), Failed> {
     for (buffer_bytes, of_views) in [(8192, [40, 40]), (6144, [40, 35]), (3328, [40, 0]), (2048, [25, 0])] {
-        let limits = SceneLimits { buffer_bytes, binding_bytes: 4096 };
+        let limits = SceneLimits { buffer_bytes, binding_bytes: 4096, ..SceneLimits::NONE };
         let options = Options { limits: Some(limits), ..Options::default() };
         let lights: Vec<_> = (0..40).map(lamp).collect();
         let scene = lit_by(lights.clone());

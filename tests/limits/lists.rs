@@ -27,7 +27,7 @@ fn several_buffers(device: Device) -> Result<(), Failed> {
     for has_pieces in [false, true] {
         scene.pieces = if has_pieces { vec![Piece::new("some", ObjectSet::new(10..60))] } else { Vec::new() };
         for buffer_bytes in [80 * 64, 6 * 1024, 8 * 1024, 1 << 20] {
-            let limits = SceneLimits { buffer_bytes, binding_bytes: 80 * 64 };
+            let limits = SceneLimits { buffer_bytes, binding_bytes: 80 * 64, ..SceneLimits::NONE };
             let options = Options { shadows: true, limits: Some(limits), ..Options::default() };
             let mut frames = renderer(device, options)?;
             for frame in 0..2 {

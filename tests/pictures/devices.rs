@@ -1,11 +1,14 @@
 //! Devices that draw nothing, lack features, or have low limits.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use drawloom::backend::{BackendError, EncodingStrategy, RecordingStrategy, WgpuBackend};
+use drawloom::backend::{
+    Backend, BackendError, EncodingStrategy, NullBackend, RecordingStrategy, SoftwareBackend, WgpuBackend,
+};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::Light;
+use drawloom::scene::{Camera, Light, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{Rejection, RejectionReason, ShadowMaps};
 use drawloom::{FrameError, Granularity, Renderer, wgpu};
@@ -23,7 +26,8 @@ pub const CASES: &[Case] = &[
     ("a_panic_of_wgpu_over_indirect_draws_is_an_error", indirect_draws_on_noop),
     ("a_picture_beyond_the_devices_limit_is_refused", large_picture),
     ("objects_beyond_a_storage_buffer_are_counted_and_named", many_objects),
-    ("more_shadow_maps_than_texture_layers_are_refused_and_later_frames_are_drawn", many_shadow_maps),
+    ("lights_beyond_the_devices_layers_have_no_shadow_map_and_are_counted", many_shadow_maps),
+    ("shadow_cameras_of_an_engine_beyond_the_devices_layers_are_refused", many_shadow_cameras),
     ("a_lost_device_is_an_error", lost_device),
     ("textures_beyond_the_devices_layers_are_counted", many_textures),
 ];
@@ -144,35 +148,110 @@ fn many_objects() -> Result<(), Failed> {
 
 fn many_shadow_maps() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
-    let layers = device.limits().max_texture_array_layers as usize;
-    let scheduler = Arc::new(Scheduler::new(2)?);
+    if device.limits().max_texture_array_layers != 256 {
+        return Err("the device has other limits than WebGPU requires".into());
+    }
+    count_shadow_maps(WgpuBackend::new(device, queue)?, 256)?;
+    let (device, queue) = noop_with(wgpu::Limits { max_texture_array_layers: 600, ..WgpuBackend::REQUIRED_LIMITS })?;
+    count_shadow_maps(WgpuBackend::new(device, queue)?, 600)?;
+    count_shadow_maps(NullBackend, 256)?;
+    count_shadow_maps(SoftwareBackend::new(Arc::new(Scheduler::new(1)?)), 256)
+}
+
+/// Records scenes of many lights, whose cameras all see what they reach. Which lights have maps is told by taking the cameras and, for each, the
+/// lights one after the other.
+fn count_shadow_maps<B: Backend>(backend: B, layers: usize) -> Result<(), Failed> {
+    let cascades = 2;
+    let maps = ShadowMaps { side: 1, cascades: 2, ..ShadowMaps::default() };
+    let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+    let (mut renderer, submitter) =
+        Renderer::builder(backend).deferred(deferred).build(Arc::new(Scheduler::new(2)?))?;
+    let lamp = Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 20.0, casts_shadow: true };
+    let unshadowed = Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 20.0, casts_shadow: false };
+    let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
+    let full = layers / 6;
+    let cases: [(usize, Vec<(Light, usize)>); 11] = [
+        (1, vec![(SPOT, layers)]),
+        (1, vec![(SPOT, layers + 1)]),
+        (1, vec![(SPOT, layers % 6), (lamp, full)]),
+        (1, vec![(SPOT, layers % 6 + 1), (lamp, full)]),
+        (1, vec![(lamp, full + 1), (SPOT, 9), (sun, 1)]),
+        (1, vec![(unshadowed, 5), (lamp, full), (unshadowed, 5), (sun, 3), (SPOT, 1)]),
+        (2, vec![(sun, layers / cascades / 2 + 1)]),
+        (3, vec![(lamp, full), (sun, 1), (SPOT, layers % 6)]),
+        (3, vec![(sun, 2), (lamp, full + 3)]),
+        (100, vec![(sun, 2), (SPOT, 100)]),
+        (1, vec![(sun, 1)]),
+    ];
+    for (index, (players, lights)) in cases.into_iter().enumerate() {
+        let mut scene = field(3);
+        scene.lights = lights.into_iter().flat_map(|(light, count)| vec![light; count]).collect();
+        let camera = Camera { near: 1.0, ..scene.cameras[0].clone() };
+        let player = |player: usize| Camera {
+            name: format!("player {player}"),
+            near: 0.5 + 0.001 * player as f32,
+            ..camera.clone()
+        };
+        scene.cameras = (0..players).map(player).collect();
+        let (mut room, mut without, mut with) = (layers, BTreeSet::new(), BTreeSet::new());
+        for player in 0..players {
+            for (index, light) in scene.lights.iter().enumerate().filter(|(_, light)| light.casts_shadow()) {
+                let (needed, key) = match light {
+                    Light::Directional { .. } => (cascades, (index, player)),
+                    Light::Point { .. } => (6, (index, 0)),
+                    _ => (1, (index, 0)),
+                };
+                if with.contains(&key) {
+                    continue;
+                }
+                if needed <= room {
+                    room -= needed;
+                    with.insert(key);
+                } else {
+                    without.insert(index);
+                }
+            }
+        }
+        let recorded = renderer.record(scene.as_scene_ref())?;
+        let statistics = recorded.statistics();
+        let found = statistics.views.iter().filter(|view| view.kind == ViewKind::Shadow).count();
+        let first = without.first().copied();
+        let expected =
+            first.map(|first| Rejection { reason: RejectionReason::ShadowMapLimit, count: without.len(), first });
+        if found != layers - room || statistics.rejections != expected.into_iter().collect::<Vec<_>>() {
+            let rejections = &statistics.rejections;
+            return Err(format!("case {index}: {found} of {} maps, {rejections:?}", layers - room).into());
+        }
+        if statistics.lights != scene.lights.len() {
+            return Err(format!("case {index}: {} lights", statistics.lights).into());
+        }
+        submitter.submit(recorded)?;
+    }
+    Ok(())
+}
+
+fn many_shadow_cameras() -> Result<(), Failed> {
+    let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let maps = ShadowMaps { side: 1, ..ShadowMaps::default() };
     let deferred = Deferred::to_picture().shadow_maps(Some(maps));
     let (mut renderer, submitter) =
-        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(deferred).build(scheduler)?;
-    let mut scene = field(3);
-    // Lamps have six maps each, all or none.
-    let (full, spots) = (layers / 6, layers % 6);
-    let lamp = Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 20.0, casts_shadow: true };
-    for (lamps, spots) in [(0, layers), (0, layers + 1), (0, layers + 1), (full, spots), (full, spots + 1), (0, layers)]
-    {
-        scene.lights = [vec![SPOT; spots], vec![lamp; lamps]].concat();
-        let maps = 6 * lamps + spots;
+        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(deferred).build(Arc::new(Scheduler::new(2)?))?;
+    for (own, expected) in [(250, 6), (256, 0), (257, 0), (10, 7)] {
+        let mut scene = field(3);
+        scene.cameras.truncate(1);
+        let camera = Camera { size: [1, 1], kind: ViewKind::Shadow, ..scene.cameras[0].clone() };
+        scene.cameras.extend((0..own).map(|index| Camera { name: format!("own {index}"), ..camera.clone() }));
+        scene.lights = vec![SPOT; 7];
         match renderer.record(scene.as_scene_ref()) {
-            Ok(recorded) if maps == layers => {
+            Ok(recorded) if own <= 256 => {
+                let maps = recorded.statistics().views.len() - 1 - own;
+                if maps != expected {
+                    return Err(format!("{maps} maps beside {own} cameras of the engine's own").into());
+                }
                 submitter.submit(recorded)?;
             }
-            Err(FrameError::Backend(error @ BackendError::TooManyLayers { allowed, views, lights: of_lights, .. }))
-                if (allowed, views, of_lights) == (layers as u64, layers as u64 + 1, (lamps + spots) as u64)
-                    && maps > layers =>
-            {
-                let expected = format!("the shadow maps of {} lights", lamps + spots);
-                let message = error.to_string();
-                if !(message.contains(&expected) && message.contains("max_texture_array_layers is 256")) {
-                    return Err(message.into());
-                }
-            }
-            other => return Err(format!("{maps} maps: {:?}", other.err()).into()),
+            Err(FrameError::Backend(BackendError::TooManyLayers { allowed: 256, views: 257, .. })) if own == 257 => {}
+            other => return Err(format!("{own} cameras of the engine's own: {:?}", other.err()).into()),
         }
     }
     Ok(())

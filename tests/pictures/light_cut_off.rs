@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::Quality;
+use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Light, Scene};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -14,6 +14,7 @@ use crate::shadows::{MAPS, camera, hemisphere, spot};
 
 pub const CASES: &[Case] = &[
     ("a_cut_off_removes_at_most_the_documented_illuminance", bound),
+    ("a_cut_off_removes_little_from_a_light_that_brightens_while_its_map_is_kept", brightening),
     ("a_cut_off_shortens_the_reach_of_lights", reach),
 ];
 
@@ -81,6 +82,52 @@ fn bound() -> Result<(), Failed> {
         // The bound is tight.
         if worst < 0.95 * bound {
             return Err(format!("{worst} of {bound} in light {kind}").into());
+        }
+    }
+    Ok(())
+}
+
+/// A white floor below a light that becomes brighter after its map was drawn.
+fn brightening() -> Result<(), Failed> {
+    let cut_off = 0.125_f32;
+    let kept = |light_cut_off| {
+        let shadows = ShadowQuality { interval: 1000, ..Quality::balanced().shadows };
+        let quality = Quality { light_cut_off, shadows, ..Quality::balanced() };
+        Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    };
+    // 1.125² times the bound of a light that does not change.
+    let bound = 1.089 * 1.125 * 1.125 * f64::from(cut_off) / std::f64::consts::PI;
+    for (kind, growth) in [(0, 1.2), (0, 1.3), (1, 1.25), (1, 4.0), (2, 100.0)] {
+        for share in [0.6, 0.9, 1.0, 1.1, 1.5] {
+            let end = 3.0;
+            let mut light = scene().lights[kind];
+            let mut set = |factor: f32| {
+                if let Light::Point { position, intensity, casts_shadow, .. }
+                | Light::Spot { position, intensity, casts_shadow, .. }
+                | Light::Hemispherical { position, intensity, casts_shadow, .. } = &mut light
+                {
+                    (*position, *casts_shadow) = (DVec3::Y * end * share, true);
+                    *intensity = Vec3::splat(factor * cut_off * (end * end) as f32);
+                }
+                if let Light::Spot { direction, .. } | Light::Hemispherical { direction, .. } = &mut light {
+                    *direction = Vec3::NEG_Y;
+                }
+                let floor = Panel::facing(DVec3::ZERO, DVec3::Y, 2.0);
+                let panel_scene = PanelScene { panels: vec![floor], lights: vec![light], maps: MAPS };
+                panel_scene.scene(&[camera(DVec3::new(0.5, 2.0, 1.0), DVec3::ZERO, 60.0)])
+            };
+            let (before, after) = (set(1.0)?, set(growth)?);
+            let mut ending = kept(cut_off)?;
+            radiance_of(&mut ending, &before)?;
+            let (expected, found) = (radiance_of(&mut kept(0.0)?, &after)?, radiance_of(&mut ending, &after)?);
+            for (expected, found) in expected.iter().flatten().zip(found.iter().flatten()) {
+                // Both are half floats.
+                let rounding = 2.0 * 2_f64.powi(-11) * expected;
+                if (expected - found).abs() > bound + rounding {
+                    let context = format!("light {kind}, {growth} times as bright, at {share} of where it ended");
+                    return Err(format!("{found} for {expected}: {context}").into());
+                }
+            }
         }
     }
     Ok(())

@@ -68,6 +68,7 @@ mod shadows;
 mod shared_encoders;
 mod slow_cases;
 mod software;
+mod split_screen;
 mod stencil;
 mod strategies;
 mod streaming;
@@ -145,6 +146,7 @@ fn main() {
         (sampled_views::CASES, Needs::Adapter),
         (determinism::CASES, Needs::Adapter),
         (determinism::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
+        (split_screen::CASES, Needs::Adapter),
         (stencil::CASES, Needs::Adapter),
         (shared_encoders::CASES, Needs::Adapter),
         (strategies::CASES, Needs::Adapter),

@@ -180,9 +180,16 @@ impl PanelScene {
     ) -> Result<Counts, Failed> {
         let mut counts = Counts::default();
         for (view, camera) in cameras.iter().enumerate() {
-            self.compare(&radiance_of(view)?, camera, cameras, &mut counts)
+            self.compare(&radiance_of(view)?, camera, &mut counts)
                 .map_err(|problem| format!("view {view}: {problem}"))?;
         }
+        Ok(counts)
+    }
+
+    /// Fails if a pixel of a camera's picture differs from the ray cast result.
+    pub fn compare_with(&self, camera: &Camera, found: &[[f64; 3]]) -> Result<Counts, Failed> {
+        let mut counts = Counts::default();
+        self.compare(found, camera, &mut counts)?;
         Ok(counts)
     }
 
@@ -193,19 +200,13 @@ impl PanelScene {
         hits.min_by(|one, other| one.0.total_cmp(&other.0))
     }
 
-    fn compare(
-        &self,
-        found: &[[f64; 3]],
-        camera: &Camera,
-        cameras: &[Camera],
-        counts: &mut Counts,
-    ) -> Result<(), String> {
+    fn compare(&self, found: &[[f64; 3]], camera: &Camera, counts: &mut Counts) -> Result<(), String> {
         let rays = Rays {
             ray_camera: RayCamera::new(camera),
             camera,
             faces: self.panels.iter().map(Face::new).collect(),
             lights: &self.lights,
-            map_pixels: self.lights.iter().map(|light| map_pixels(light, &self.maps, cameras)).collect(),
+            map_pixels: self.lights.iter().map(|light| map_pixels(light, &self.maps, camera)).collect(),
             slice_ends: slice_ends(&self.maps, camera),
             filter: self.maps.filter,
         };
@@ -378,20 +379,19 @@ fn slice_ends(maps: &ShadowMaps, camera: &Camera) -> Vec<f64> {
 
 /// The width of a pixel of a light's maps: in metres for a directional light, for each of its cascades, and at a distance
 /// of 1 m for others, as the documentation of [`ShadowMaps`] defines it.
-fn map_pixels(light: &Light, maps: &ShadowMaps, cameras: &[Camera]) -> Vec<f64> {
+fn map_pixels(light: &Light, maps: &ShadowMaps, camera: &Camera) -> Vec<f64> {
     let side = f64::from(maps.side);
     let pixel = match *light {
         Light::Point { .. } => 2.0 / (side - 2.0 * f64::from(maps.filter) - 2.0),
         Light::Spot { outer_angle, .. } => 2.0 * f64::from(outer_angle.min(1.4835)).tan() / side,
         // Straight edges of 5° are off by half a pixel of 1024.
         Light::Hemispherical { .. } => 4.0 / side + 1.0 / 1024.0,
-        // The pixel of a map for several cameras depends on all of them.
         Light::Directional { .. } => {
             let pixel = |map: &Camera| match map.projection {
                 Projection::Orthographic { height } => f64::from(height) / side,
                 _ => f64::NAN,
             };
-            let pixels: Vec<_> = maps.cameras("", light, cameras).iter().map(pixel).collect();
+            let pixels: Vec<_> = maps.cameras("", light, std::slice::from_ref(camera)).iter().map(pixel).collect();
             return if pixels.is_empty() { vec![0.0] } else { pixels };
         }
         _ => 0.0,
@@ -475,6 +475,8 @@ struct RayCamera {
     position: DVec3,
     axes: [DVec3; 3],
     size: [f64; 2],
+    /// The picture's centre, in halves of its width and height.
+    shift: [f64; 2],
     /// Half of the picture's height: in perspective at 1 m.
     half: f64,
     perspective: bool,
@@ -492,6 +494,7 @@ impl RayCamera {
             position: camera.position,
             axes: [DVec3::X, DVec3::Y, DVec3::NEG_Z].map(|axis| orientation * axis),
             size: camera.size.map(f64::from),
+            shift: camera.shift.to_array().map(f64::from),
             half,
             perspective,
         }
@@ -501,8 +504,8 @@ impl RayCamera {
     fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let [right, up, forward] = self.axes;
         let [width, height] = self.size;
-        let across = right * ((x / width * 2.0 - 1.0) * self.half * width / height)
-            + up * ((1.0 - y / height * 2.0) * self.half);
+        let across = right * ((x / width * 2.0 - 1.0 + self.shift[0]) * self.half * width / height)
+            + up * ((1.0 - y / height * 2.0 + self.shift[1]) * self.half);
         if self.perspective { (self.position, across + forward) } else { (self.position + across, forward) }
     }
 }

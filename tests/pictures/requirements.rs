@@ -44,7 +44,8 @@ const MAPS: ShadowMaps = ShadowMaps {
 const BYTES_OF_A_MAP: i64 = 128 * 128 * 4;
 /// A list, a mirrored list, and a double-sided strip, which subdivision converts to a list.
 const OPAQUE_STATES: i64 = 3;
-const OPAQUE_STATES_IN_MAPS: i64 = 4;
+/// Also that list for hemispherical lights, and those of the sun's map, which clamps depth.
+const OPAQUE_STATES_IN_MAPS: i64 = 4 + OPAQUE_STATES;
 const GLASS_STATES: i64 = 3;
 
 fn deferred() -> Deferred {
@@ -80,6 +81,8 @@ fn no_light_of_a_class(shadowed: bool) -> Result<(), Failed> {
             saved = Cost { passes: 1 + maps, target_bytes: maps * BYTES_OF_A_MAP, shadow_views: maps, ..saved };
             // Only hemispherical lights see the strip subdivided.
             saved.pipelines += i64::from(class.kind == LightKind::Hemispherical);
+            // Only its maps clamp depth.
+            saved.pipelines += if class.kind == LightKind::Directional { OPAQUE_STATES } else { 0 };
         }
         expect_saved(&full, &name, &scene_without(class), deferred().leave_out(&name), saved)?;
     }

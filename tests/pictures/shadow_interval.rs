@@ -1,9 +1,10 @@
 //! Shadow maps that are drawn once every few frames.
 
+use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
-use drawloom::scene::{Light, Scene, SceneError};
+use drawloom::scene::{Camera, Light, Scene, SceneError};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
@@ -17,6 +18,7 @@ pub const CASES: &[Case] = &[
     ("the_shadow_of_a_moved_object_lags_and_catches_up", moved_casters),
     ("a_moved_light_lags_together_with_its_shadow", moved_light),
     ("shadows_stay_in_the_world_when_the_camera_moves", moved_camera),
+    ("another_main_camera_does_not_change_when_maps_are_drawn", another_camera),
     ("a_dropped_frame_loses_no_shadow_map", dropped),
     ("no_old_shadow_remains_when_lights_or_views_are_added_or_removed", other_lists),
 ];
@@ -125,6 +127,31 @@ fn moved_camera() -> Result<(), Failed> {
     }
     // The sun's new map has its pixels at other positions.
     assert_alike(&fixture.draw(&scene)?, &fixture_every(1)?.draw(&scene)?)
+}
+
+/// Objects move, and the second camera stands still or leaps.
+fn another_camera() -> Result<(), Failed> {
+    let frames = |leap: f64| -> Result<Vec<Picture>, Failed> {
+        let mut scene = scene();
+        scene.cameras.truncate(1);
+        let second = Camera { name: "second".to_owned(), ..scene.cameras[0].clone() };
+        scene.cameras.push(Camera { near: 0.5, ..second });
+        let mut fixture = fixture_every(3)?;
+        (0..7)
+            .map(|_| {
+                shift(&mut scene, DVec3::new(0.1, 0.0, 0.2))?;
+                scene.cameras[1].position.x += leap;
+                fixture.draw(&scene)
+            })
+            .collect()
+    };
+    let expected = frames(0.0)?;
+    for leap in [3.0, 70.0, 1e5] {
+        if let Some(frame) = frames(leap)?.iter().zip(&expected).position(|(found, expected)| found != expected) {
+            return Err(format!("frame {frame} differs when the second camera leaps {leap} m").into());
+        }
+    }
+    Ok(())
 }
 
 fn dropped() -> Result<(), Failed> {

@@ -1,14 +1,20 @@
 //! Shadows are where ray casting finds them, to within the filter and a pixel of the map.
 
+use std::sync::Arc;
+
+use drawloom::backend::SoftwareBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, LayerMask, Light, Projection};
+use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
+use drawloom::wgpu;
+use drawloom_testing::adapter;
 use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, radiance};
+use crate::fixture::{Fixture, draw_on_processor, half_floats, radiance};
 use crate::rays::{Counts, Panel, PanelScene};
 
 pub const CASES: &[Case] = &[
@@ -19,6 +25,9 @@ pub const CASES: &[Case] = &[
     ("a_wall_close_behind_a_hemisphere_casts_no_shadow_in_front_of_it", close_behind),
     ("a_distant_object_blocks_a_directional_light", far_towards_the_sun),
     ("a_tower_shadows_what_is_close_behind_it", tower),
+    ("a_box_a_hundred_times_as_large_as_what_is_seen_casts_its_shadow", || across_the_near_plane(NearPlane::Default)),
+    ("without_depth_clip_control_a_large_box_casts_its_shadow", || across_the_near_plane(NearPlane::WithoutFeature)),
+    ("software_casts_the_shadow_of_a_large_box", || across_the_near_plane(NearPlane::Software)),
     ("surfaces_beyond_a_maps_distance_are_lit", beyond_the_reach),
     ("each_light_has_its_own_shadow", several_lights),
     ("maps_of_one_and_two_pixels_only_darken", smallest_maps),
@@ -287,6 +296,60 @@ fn tower() -> Result<(), Failed> {
         let view = camera(DVec3::new(0.3, 2.0, 5.0), DVec3::new(1.5, 3.0, -0.5), 70.0);
         let counts = panel_scene.expect(&mut fixture, &[view]).map_err(|failed| with_context(failed, height))?;
         expect(counts, 0.05, 0.1).map_err(|failed| with_context(failed, height))?;
+    }
+    Ok(())
+}
+
+/// What draws triangles that reach from within a map to beyond its near plane.
+#[derive(Clone, Copy, PartialEq)]
+enum NearPlane {
+    Default,
+    WithoutFeature,
+    Software,
+}
+
+/// The sphere around what the camera sees has a radius of some 9 m, and the map reaches 16 radii towards the sun. Each triangle of the boxes
+/// extends from the ground to far beyond that.
+fn across_the_near_plane(near_plane: NearPlane) -> Result<(), Failed> {
+    let view = camera(DVec3::new(0.5, 2.0, 5.0), DVec3::new(0.5, 0.0, -1.5), 70.0);
+    for cascades in [1, 3] {
+        let maps = ShadowMaps { cascades, ..MAPS };
+        let deferred = Deferred::to_picture().shadow_maps(Some(maps));
+        let mut fixture = match near_plane {
+            NearPlane::WithoutFeature => {
+                let device = adapter::device_without(wgpu::Features::DEPTH_CLIP_CONTROL)?;
+                Fixture::on(device, 2, |builder| builder.deferred(deferred.clone()))?
+            }
+            _ => fixture_with(maps)?,
+        };
+        for (size, direction) in [
+            (1.0, DVec3::new(-0.6, -0.8, 0.0)),
+            (100.0, DVec3::new(-0.6, -0.8, 0.0)),
+            (900.0, DVec3::new(-0.7, -0.9, 0.3)),
+            (900.0, DVec3::new(-0.2, -1.0, 0.1)),
+            (1800.0, DVec3::new(-0.9, -0.5, 0.2)),
+        ] {
+            // Its shadow falls to the left, from x = 2, and begins at z = -0.5.
+            let half = DVec3::new(size, size, 2.0 * size);
+            let mut panels = Panel::closed_box(DVec3::new(2.0 + size, size - 1.0, 2.0 * size - 0.5), half);
+            // A pillar of nothing but sides, which stands free.
+            let pillar = DVec3::new(0.15, size, 0.15);
+            panels.extend(Panel::closed_box(DVec3::new(0.3, size - 1.0, -2.5), pillar));
+            panels.push(Panel::facing(DVec3::ZERO, DVec3::Y, 6.0));
+            let panel_scene = panel_scene(panels, vec![sun(direction.normalize())], maps);
+            let context = format!("{cascades} cascades, {size} m, {direction}");
+            let counts = if near_plane == NearPlane::Software {
+                let scheduler = Arc::new(Scheduler::new(2)?);
+                let backend = SoftwareBackend::new(Arc::clone(&scheduler));
+                let scene = panel_scene.scene(std::slice::from_ref(&view))?;
+                let found = draw_on_processor((backend, scheduler), deferred.clone(), &scene, "radiance")?;
+                panel_scene.compare_with(&view, &half_floats(&found))
+            } else {
+                panel_scene.expect(&mut fixture, std::slice::from_ref(&view))
+            };
+            let counts = counts.map_err(|failed| with_context(failed, &context))?;
+            expect(counts, 0.05, 0.1).map_err(|failed| with_context(failed, &context))?;
+        }
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::process::{ShaderLight, ShaderObject, ShaderView};
 use crate::quality::TransformPrecision;
 use crate::raster::{Quaternion, Real, Vector, Vector3};
-use crate::scene::{Light, LightKind, Projection, SceneRef, ViewKind};
+use crate::scene::{Light, LightKind, Projection, SceneRef};
 use crate::view::{FixedPosition, GpuLight, GpuObject, GpuView, ObjectTable, RenderView};
 
 /// A camera's position in the world.
@@ -137,7 +137,7 @@ pub(super) fn view_as_uploaded(view: &RenderView, gpu_view: &GpuView) -> ShaderV
         far: gpu_view.far,
         size: size_of(view),
         projection: view.camera.projection,
-        clamps_near: clamps_near(view),
+        clamps_near: view.clamps_depth(),
         ambient: axis(gpu_view.ambient),
     }
 }
@@ -157,17 +157,13 @@ pub(super) fn exact_view(view: &RenderView, ambient: Vec3) -> ShaderView<f64> {
         far: f64::from(camera.far),
         size: size_of(view),
         projection: camera.projection,
-        clamps_near: clamps_near(view),
+        clamps_near: view.clamps_depth(),
         ambient: Vector3::of_single(ambient),
     }
 }
 
 fn size_of(view: &RenderView) -> [usize; 2] {
     view.camera.size.map(|pixels| pixels as usize)
-}
-
-fn clamps_near(view: &RenderView) -> bool {
-    matches!(view.camera.projection, Projection::Orthographic { .. }) && view.kind() == ViewKind::Shadow
 }
 
 /// A light as a device gets it.

@@ -11,7 +11,7 @@ use crate::process::{
     DeclaredAttribute, FaceCulling, MAX_ATTRIBUTES, ObjectCpuShader, PassInputs, ShaderObject, VertexInput,
     VertexOutput,
 };
-use crate::raster::{PixelBounds, Real, Triangle, Vector, Vector4, Winding};
+use crate::raster::{NearPlane, PixelBounds, Real, Triangle, Vector, Vector4, Winding};
 use crate::scene::{Blend, Mesh, VERTEX_COLOR};
 
 /// A range of one object's triangles.
@@ -120,6 +120,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
         object_of: impl Fn(u32) -> Option<ShaderObject<R>>,
     ) -> Self {
         let mut setup = Self { triangles: Vec::new(), states: Vec::new(), bins: Vec::new(), unbinned: Vec::new() };
+        let near_plane = if pass.view.clamps_near { NearPlane::Clamps } else { NearPlane::Clips };
         for range in chunk {
             // Every object that is drawn was uploaded.
             let Some(object) = object_of(range.object) else { continue };
@@ -133,7 +134,7 @@ impl<R: Precision, const V: usize> TriangleSetup<R, V> {
             let mut cache = PostTransformCache::new(shader, pass, &object, &range.mesh, attributes);
             range.each_triangle(|indices| {
                 let corners = indices.map(|index| cache.vertex(index));
-                Triangle::set_up(&corners, tiling.size(), culled, &mut setup.triangles);
+                Triangle::set_up(&corners, tiling.size(), culled, near_plane, &mut setup.triangles);
             });
             setup.states.resize(setup.triangles.len(), state);
         }

@@ -80,6 +80,11 @@ impl WgpuBackend {
     /// [`RadianceSum`](crate::quality::RadianceSum).
     pub const BLENDING_FEATURES: wgpu::Features = wgpu::Features::FLOAT32_BLENDABLE;
 
+    /// The feature with which what is in front of a directional light's shadow map casts shadows at no cost. Without it, a fragment shader that
+    /// writes depth draws these maps, and processes of an engine's own need a
+    /// [`clamped_fragment`](crate::process::CommandDraws::clamped_fragment).
+    pub const DEPTH_CLIP_FEATURES: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL;
+
     /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it only for such
     /// devices: see [`WgpuBackend::optional_features`].
     pub const MAPPING_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -88,8 +93,8 @@ impl WgpuBackend {
     /// [`WgpuBackend::REQUIRED_FEATURES`].
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         let mapping = if shares_memory(&adapter.get_info()) { Self::MAPPING_FEATURES } else { wgpu::Features::empty() };
-        let formats = Self::STENCIL_FEATURES | Self::BLENDING_FEATURES;
-        adapter.features() & (Self::OPTIONAL_FEATURES | formats | Self::TIMING_FEATURES | mapping)
+        let of_drawing = Self::STENCIL_FEATURES | Self::BLENDING_FEATURES | Self::DEPTH_CLIP_FEATURES;
+        adapter.features() & (Self::OPTIONAL_FEATURES | of_drawing | Self::TIMING_FEATURES | mapping)
     }
 
     /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times

@@ -22,7 +22,7 @@ use crate::backend::{
     Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, SceneLimits, TargetMemory,
     ViewQueue, ViewRequest,
 };
-use crate::command::{DrawList, DrawState};
+use crate::command::{Batch, DrawList, DrawState};
 use crate::process::{Draws, FramePlan, ShaderResource};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
@@ -57,13 +57,13 @@ impl Backend for WgpuBackend {
         quality: &Quality,
     ) -> Result<(), BackendError> {
         for ((planned, draws), states) in plan.processes().iter().zip(draws).zip(states) {
-            let variants = || states.iter().map(|state| PipelineVariant::of_pages(*state));
             let label = shader_label(&planned.name);
             let found = self.pipelines.lock().find(plan, planned, draws, quality).cloned();
             // No lock is held while the driver compiles, so that frames go on meanwhile.
             match found {
                 Some(pipelines) => {
-                    let create = || pipelines.create_missing(&self.device, variants());
+                    let variants = states.iter().flat_map(|state| pipelines.variants_of(*state));
+                    let create = || pipelines.create_missing(&self.device, variants);
                     pipelines.insert(with_error_scope(&self.device, &label, create).flatten()?);
                     pipelines.share();
                 }
@@ -71,7 +71,8 @@ impl Backend for WgpuBackend {
                     let create = || {
                         let (device, layouts, library) = (&self.device, &self.layouts, self.library.as_ref());
                         let made = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
-                        made.insert(made.create_missing(&self.device, variants())?);
+                        let variants = states.iter().flat_map(|state| made.variants_of(*state));
+                        made.insert(made.create_missing(&self.device, variants)?);
                         Ok(made)
                     };
                     let made = with_error_scope(&self.device, &label, create).flatten()?;
@@ -86,7 +87,8 @@ impl Backend for WgpuBackend {
     fn limits(&self) -> SceneLimits {
         let limits = self.device.limits();
         let (buffer_bytes, binding_bytes) = (limits.max_buffer_size, limits.max_storage_buffer_binding_size);
-        SceneLimits { buffer_bytes, binding_bytes: binding_bytes.min(buffer_bytes) }
+        let texture_layers = limits.max_texture_array_layers;
+        SceneLimits { buffer_bytes, binding_bytes: binding_bytes.min(buffer_bytes), texture_layers }
     }
 
     fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
@@ -172,7 +174,8 @@ impl Backend for WgpuBackend {
                 RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
             }
             let runs = list.batches.chunk_by(|one, next| frame.meshes.share_pipeline(one, next));
-            pipelines.create_missing(&self.device, runs.map(|run| PipelineVariant::of_batch(&frame.meshes, &run[0])))
+            let variant = |run: &[Batch]| PipelineVariant::of_batch(&frame.meshes, &run[0]).clamping(pass.clamps_depth);
+            pipelines.create_missing(&self.device, runs.map(variant))
         })
         .flatten()
         // Some of the resources just created may be unusable.

@@ -155,6 +155,7 @@ impl WgpuBackend {
                 (index, is_trial) = pipelines
                     .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
             }
+            pass.clamps_depth = request.views[view].clamps_depth() && pipelines.has_clamped_pipelines();
             pass.set_strategy(strategies[index], index, is_trial);
             pass.can_share_encoder =
                 pass.strategy.encoding != EncodingStrategy::OnSubmit && pass.is_small(&request.draws[process]);
@@ -168,6 +169,7 @@ impl WgpuBackend {
                     engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
                     meshes: meshes.number(),
                     pipelines: Arc::clone(pipelines),
+                    clamps_depth: pass.clamps_depth,
                 });
             }
         }

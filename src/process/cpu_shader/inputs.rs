@@ -195,7 +195,7 @@ pub struct ShaderView<R> {
     pub size: [usize; 2],
     /// How it is projected.
     pub projection: Projection,
-    /// Whether geometry in front of the near plane is clamped onto it: only for an orthographic shadow map.
+    /// Whether what is in front of the near plane is drawn as if it were on it: only in an orthographic shadow map.
     pub clamps_near: bool,
     /// The scene's ambient light.
     pub ambient: Vector3<R>,

@@ -30,14 +30,8 @@ impl<R: Real> ShaderView<R> {
     pub fn clip_position(&self, relative: Vector3<R>) -> Vector4<R> {
         let [right, up, back, origin] = self.clip_from_relative;
         let [x, y, z] = relative.0;
-        let mut clip = right * x + up * y + back * z + origin;
-        if self.projection == Projection::Paraboloid {
-            return self.paraboloid_position(rgb(clip));
-        }
-        if self.clamps_near {
-            clip[2] = clip[2].min(R::one());
-        }
-        clip
+        let clip = right * x + up * y + back * z + origin;
+        if self.projection == Projection::Paraboloid { self.paraboloid_position(rgb(clip)) } else { clip }
     }
 
     /// From the camera's axes to clip space, by a paraboloid mapping (Brabec et al. 2002).
@@ -275,15 +269,6 @@ mod tests {
         assert_eq!(behind[2], -1.0);
         // The light's own position has no direction.
         assert!(view.clip_position(Vector::zero()).0.iter().all(|value| value.is_finite()));
-    }
-
-    #[test]
-    fn a_directional_shadow_map_clamps_geometry_to_its_near_plane() {
-        let mut view = view_values::<f64>(&views()[1]);
-        let before = view.forward * -5.0;
-        assert!(view.clip_position(before)[2] > 1.0);
-        view.clamps_near = true;
-        assert_eq!(view.clip_position(before)[2], 1.0);
     }
 
     #[test]

@@ -46,7 +46,6 @@ pub(in crate::process) fn paraboloid() -> Camera {
 
 pub(in crate::process) fn view_values<R: Real>(view: &RenderView) -> ShaderView<R> {
     let [right, up, forward] = view.picture_axes().map(Vector3::of_single);
-    let is_orthographic = matches!(view.camera.projection, Projection::Orthographic { .. });
     let number = |value: f32| R::of(f64::from(value));
     ShaderView {
         name: view.name().into(),
@@ -59,7 +58,7 @@ pub(in crate::process) fn view_values<R: Real>(view: &RenderView) -> ShaderView<
         far: number(view.camera.far),
         size: view.camera.size.map(|pixels| pixels as usize),
         projection: view.camera.projection,
-        clamps_near: is_orthographic && view.kind() == ViewKind::Shadow,
+        clamps_near: view.clamps_depth(),
         ambient: Vector3::of_single(Vec3::new(0.1, 0.2, 0.3)),
     }
 }

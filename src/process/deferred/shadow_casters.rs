@@ -7,7 +7,7 @@ use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, Re
 use crate::scene::ViewKind;
 
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
-/// [`ViewKind::Shadow`], which has a layer for each light.
+/// [`ViewKind::Shadow`], which has a layer for each map.
 ///
 /// Objects whose material [is a mask](crate::scene::Material::is_masked) cast shadows of the mask's shape, also if the material has a
 /// [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its `texture` at the vertices' first
@@ -51,7 +51,9 @@ impl RenderProcess for ShadowCasters {
         Draws::Commands(CommandDraws {
             shader,
             fragment: self.hemispheres.then_some("fragment"),
+            clamped_fragment: Some("clamped_fragment"),
             masked: Some(MaskedEntryPoints { vertex: "masked_vertex", fragment: "masked_fragment" }),
+            clamped_masked_fragment: Some("clamped_masked_fragment"),
             ..CommandDraws::default()
         })
     }

@@ -39,7 +39,7 @@ struct View {
 
 const PERSPECTIVE: u32 = 0u;
 const ORTHOGRAPHIC: u32 = 1u;
-// Geometry in front of the near plane is clamped onto it.
+// What is in front of the near plane is drawn as if it were on it.
 const ORTHOGRAPHIC_SHADOW: u32 = 2u;
 const PARABOLOID: u32 = 3u;
 
@@ -158,12 +158,18 @@ fn relative_position(object: Object, position: vec3<f32>) -> vec3<f32> {
 
 // Shaders that must draw at exactly the same depth both call this, and mark their position `@invariant`.
 fn clip_position(relative: vec3<f32>) -> vec4<f32> {
-    var clip = view.clip_from_relative * vec4<f32>(relative, 1.0);
+    var clip = unclamped_clip_position(relative);
+    if CLAMPS_CORNERS && view.projection == ORTHOGRAPHIC_SHADOW {
+        clip.z = min(clip.z, 1.0);
+    }
+    return clip;
+}
+
+// The same where a pixel's depth is clamped to the near plane, and not that of corners.
+fn unclamped_clip_position(relative: vec3<f32>) -> vec4<f32> {
+    let clip = view.clip_from_relative * vec4<f32>(relative, 1.0);
     if view.projection == PARABOLOID {
         return paraboloid_position(clip.xyz);
-    }
-    if view.projection == ORTHOGRAPHIC_SHADOW {
-        clip.z = min(clip.z, 1.0);
     }
     return clip;
 }

@@ -14,6 +14,7 @@ use crate::scene::AttributeLayout;
 /// `deform` is the process's own if it [has one](crate::process::CommandDraws::deformation).
 pub const SHADER_PRELUDE: &str = concat!(
     include_str!("drawloom.wgsl"),
+    "\nconst CLAMPS_CORNERS: bool = true;\n",
     "\n",
     include_str!("light_volume.wgsl"),
     "\n",
@@ -21,9 +22,10 @@ pub const SHADER_PRELUDE: &str = concat!(
     include_str!("no_deformation.wgsl")
 );
 
-/// The prelude for a process that reads these attributes. With a deformation, the process brings the function `deform`.
+/// The prelude for a process that reads these attributes. With a deformation, the process brings the function `deform`. `clamps_corners` says
+/// whether corners in front of the near plane of a directional light's map are moved onto it: not if its pipelines clamp pixels instead.
 #[cfg(feature = "wgpu")]
-pub(crate) fn prelude_with(attributes: &[AttributeLayout], has_deformation: bool) -> String {
+pub(crate) fn prelude_with(attributes: &[AttributeLayout], has_deformation: bool, clamps_corners: bool) -> String {
     let vertex_input = include_str!("vertex_input.wgsl");
     let fields = (FIRST_OWN_LOCATION..).zip(attributes).map(|(location, AttributeLayout { name, format })| {
         format!("    @location({location}) {name}: {},\n", format.wgsl_type())
@@ -31,7 +33,17 @@ pub(crate) fn prelude_with(attributes: &[AttributeLayout], has_deformation: bool
     let vertex_input =
         vertex_input.replace(END_OF_FIELDS, &fields.chain([END_OF_FIELDS.to_owned()]).collect::<String>());
     let deformation = if has_deformation { "" } else { include_str!("no_deformation.wgsl") };
-    [include_str!("drawloom.wgsl"), "\n", include_str!("light_volume.wgsl"), "\n", &vertex_input, deformation].concat()
+    let clamps_corners = format!("\nconst CLAMPS_CORNERS: bool = {clamps_corners};\n");
+    [
+        include_str!("drawloom.wgsl"),
+        &clamps_corners,
+        "\n",
+        include_str!("light_volume.wgsl"),
+        "\n",
+        &vertex_input,
+        deformation,
+    ]
+    .concat()
 }
 
 /// The location of the first attribute of the engine's own, behind those of `VertexInput`.

@@ -7,6 +7,15 @@ use crate::raster::{Real, Vector4};
 /// A corner: its clip-space position, and the varyings to interpolate.
 pub(super) type ClipCorner<R, const V: usize> = (Vector4<R>, [R; V]);
 
+/// What becomes of the part of a triangle that is in front of the near plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NearPlane {
+    /// It is not drawn.
+    Clips,
+    /// Its pixels are drawn with the depth of the plane: a device's `unclipped_depth`.
+    Clamps,
+}
+
 /// How a triangle lies relative to the planes of clip space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Overlap {
@@ -27,10 +36,11 @@ const GUARD_BAND: f64 = 64.0;
 const PLANES: usize = 6;
 
 /// Classifies a triangle. One with a corner that is not finite is outside.
-pub(super) fn classify<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> Overlap {
+pub(super) fn classify<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3], near_plane: NearPlane) -> Overlap {
     let is_finite = |(clip, _): &ClipCorner<R, V>| clip.0.iter().all(|number| number.is_finite());
-    let outside_all = |band| corners.iter().fold(u32::MAX, |planes, (clip, _)| planes & outside_planes(clip, band));
-    let outside_any = |band| corners.iter().fold(0, |planes, (clip, _)| planes | outside_planes(clip, band));
+    let outside = |clip, band| outside_planes(clip, band, near_plane);
+    let outside_all = |band| corners.iter().fold(u32::MAX, |planes, (clip, _)| planes & outside(clip, band));
+    let outside_any = |band| corners.iter().fold(0, |planes, (clip, _)| planes | outside(clip, band));
     if !corners.iter().all(is_finite) || outside_all(1.0) != 0 {
         Overlap::Outside
     } else if outside_any(GUARD_BAND) == 0 {
@@ -44,10 +54,13 @@ pub(super) fn classify<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3])
 ///
 /// An intersection does not depend on the edge's direction, so two triangles with a common edge are clipped at
 /// bit-identical points.
-pub(super) fn clip<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> Vec<ClipCorner<R, V>> {
+pub(super) fn clip<R: Real, const V: usize>(
+    corners: &[ClipCorner<R, V>; 3],
+    near_plane: NearPlane,
+) -> Vec<ClipCorner<R, V>> {
     let mut polygon = corners.to_vec();
     let mut clipped = Vec::with_capacity(3 + PLANES);
-    for plane in 0..PLANES {
+    for plane in first_plane(near_plane)..PLANES {
         clipped.clear();
         let distance = |corner: &ClipCorner<R, V>| distances(&corner.0, GUARD_BAND)[plane];
         for (index, end) in polygon.iter().enumerate() {
@@ -67,9 +80,19 @@ pub(super) fn clip<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3]) -> 
     polygon
 }
 
+/// The first of the planes that clip.
+fn first_plane(near_plane: NearPlane) -> usize {
+    match near_plane {
+        NearPlane::Clips => 0,
+        NearPlane::Clamps => 1,
+    }
+}
+
 /// A mask of the planes that a point is outside of.
-fn outside_planes<R: Real>(clip: &Vector4<R>, band: f64) -> u32 {
-    distances(clip, band).iter().fold(0, |planes, &distance| planes << 1 | u32::from(distance < R::zero()))
+fn outside_planes<R: Real>(clip: &Vector4<R>, band: f64, near_plane: NearPlane) -> u32 {
+    distances(clip, band)[first_plane(near_plane)..]
+        .iter()
+        .fold(0, |planes, &distance| planes << 1 | u32::from(distance < R::zero()))
 }
 
 /// A point's distances inside all planes, the side planes scaled by `band`. The signs are exact, because `band` is a

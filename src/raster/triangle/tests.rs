@@ -195,7 +195,7 @@ fn the_far_edge_of_a_triangle_that_begins_at_the_camera_has_its_varyings() {
 #[test]
 fn an_edge_is_clipped_between_numbers_whose_difference_overflows() {
     let corner = |z: f32, varying: f32| (Vector([0.0, 0.0, z, 1.0]), [varying]);
-    let polygon = clip::clip(&[corner(0.5, f32::MAX), corner(2.5, -f32::MAX), corner(0.5, f32::MAX)]);
+    let polygon = clip::clip(&[corner(0.5, f32::MAX), corner(2.5, -f32::MAX), corner(0.5, f32::MAX)], NearPlane::Clips);
     let shares: Vec<f32> = polygon.iter().map(|(_, [varying])| varying / f32::MAX).collect();
     let expected: [f32; 4] = [1.0, 0.5, 0.5, 1.0];
     assert_eq!(shares.len(), expected.len());
@@ -215,7 +215,7 @@ fn triangles_in_the_near_and_the_far_plane_are_drawn() {
 fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
     for (width, count) in [(MAX_PICTURE_SIZE, 1), (MAX_PICTURE_SIZE + 1, 0)] {
         let mut triangles = Vec::new();
-        Triangle::set_up(&around_the_picture(0.5), [width, 4], None, &mut triangles);
+        Triangle::set_up(&around_the_picture(0.5), [width, 4], None, NearPlane::Clips, &mut triangles);
         assert_eq!(triangles.len(), count);
         assert!(triangles.iter().all(|triangle| triangle.bounds() == PixelBounds::of_picture([width, 4])));
     }
@@ -224,7 +224,7 @@ fn the_largest_picture_is_drawn_and_a_larger_one_is_not() {
 #[test]
 fn an_edge_is_clipped_from_the_corner_that_is_nearer_to_the_plane() {
     let corner = |z: f32, varying: f32| (Vector([0.0, 0.0, z, 1.0]), [varying]);
-    let polygon = clip::clip(&[corner(0.0, 3.0), corner(1e30, 1e30), corner(0.0, 3.0)]);
+    let polygon = clip::clip(&[corner(0.0, 3.0), corner(1e30, 1e30), corner(0.0, 3.0)], NearPlane::Clips);
     let varyings: Vec<f32> = polygon.iter().map(|(_, [varying])| *varying).collect();
     assert_eq!(varyings, [3.0, 4.0, 4.0, 3.0]);
 }
@@ -238,7 +238,13 @@ fn an_edge_to_a_corner_beyond_the_guard_band_keeps_its_direction() {
         let corner = |x: f64, y: f64| (Vector([x, y, 0.5, 1.0]), []);
         let mut triangles: Vec<Triangle<f64, 0>> = Vec::new();
         // The edge from the middle of the picture; the third corner is to its left.
-        Triangle::set_up(&[corner(0.0, 0.0), corner(x, y), corner(-y * 0.2, x * 0.2)], picture, None, &mut triangles);
+        Triangle::set_up(
+            &[corner(0.0, 0.0), corner(x, y), corner(-y * 0.2, x * 0.2)],
+            picture,
+            None,
+            NearPlane::Clips,
+            &mut triangles,
+        );
         let is_covered = |x: f64, y: f64| {
             let [left, top] = [half + x * half, half - y * half].map(|pixels| pixels as usize);
             let pixel = PixelBounds { left, top, right: left + 1, bottom: top + 1 };
@@ -293,7 +299,7 @@ fn check_any<R: Real>(numbers: [R; 12], picture: [usize; 2]) {
         (clip, [R::one(), clip[0]])
     });
     let mut triangles = Vec::new();
-    Triangle::set_up(&corners, picture, None, &mut triangles);
+    Triangle::set_up(&corners, picture, None, NearPlane::Clips, &mut triangles);
     assert!(triangles.is_empty() || numbers.iter().all(|number| number.is_finite()));
     let within = [0, MAX_PICTURE_SIZE / 2 - 4, MAX_PICTURE_SIZE - 8];
     for triangle in &triangles {
@@ -353,7 +359,7 @@ fn around_the_camera(radii: &[f64]) -> impl Iterator<Item = [DVec3; 3]> {
 
 fn set_up<R: Real, const V: usize>(corners: &[ClipCorner<R, V>; 3], culled: Option<Winding>) -> Vec<Triangle<R, V>> {
     let mut triangles = Vec::new();
-    Triangle::set_up(corners, PICTURE, culled, &mut triangles);
+    Triangle::set_up(corners, PICTURE, culled, NearPlane::Clips, &mut triangles);
     triangles
 }
 
@@ -455,5 +461,27 @@ fn no_product_of_coordinates_overflows() {
             ]);
             assert_eq!(edge.at(column, row), expected);
         }
+    }
+}
+
+#[test]
+fn what_is_in_front_of_a_near_plane_that_clamps_has_its_depth() {
+    // Depth is 4 at the left edge of the picture, and falls by a quarter a column.
+    let corner = |x: i64, y: i64| {
+        let depth = 4.0 - 0.25 * x as f64;
+        corner_at::<f64, 0>([x * STEPS_PER_PIXEL, y * STEPS_PER_PIXEL], [depth, 1.0])
+    };
+    let mut covered = BTreeMap::new();
+    for corners in [[corner(0, 0), corner(0, 16), corner(16, 0)], [corner(16, 0), corner(0, 16), corner(16, 16)]] {
+        let mut triangles = Vec::new();
+        Triangle::set_up(&corners, PICTURE, None, NearPlane::Clamps, &mut triangles);
+        for triangle in triangles {
+            triangle.rasterize(PixelBounds::of_picture(PICTURE), |pixel, depth| _ = covered.insert(pixel, depth));
+        }
+    }
+    assert_eq!(covered.len(), 16 * 16);
+    for ([column, _], depth) in covered {
+        let expected = (4.0 - 0.25 * (column as f64 + 0.5)).min(1.0);
+        assert!((depth - expected).abs() < 1e-15, "{depth} in column {column}");
     }
 }

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::raster::grid::{HALF_PIXEL, STEPS_PER_PIXEL};
-use crate::raster::{PixelBounds, Real, Triangle, Vector};
+use crate::raster::{NearPlane, PixelBounds, Real, Triangle, Vector};
 
 const PICTURE: [usize; 2] = [1024, 512];
 const WINDINGS: [Option<Winding>; 3] = [None, Some(Winding::Clockwise), Some(Winding::CounterClockwise)];
@@ -191,7 +191,7 @@ fn cull(clip: &[Vector4<f64>], triangles: &[[u32; 3]], culled: Option<Winding>) 
 fn covers_any<R: Real>(corners: [Vector4<f64>; 3], culled: Option<Winding>) -> bool {
     let corners = corners.map(|corner| (Vector(corner.0.map(R::of)), []));
     let (mut triangles, mut covers) = (Vec::new(), false);
-    Triangle::<R, 0>::set_up(&corners, PICTURE, culled, &mut triangles);
+    Triangle::<R, 0>::set_up(&corners, PICTURE, culled, NearPlane::Clips, &mut triangles);
     for triangle in triangles {
         triangle.rasterize(PixelBounds::of_picture(PICTURE), |_, _| covers = true);
     }

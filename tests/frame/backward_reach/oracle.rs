@@ -242,6 +242,10 @@ fn shadow_views(world: &World) -> Vec<String> {
             _ => 1,
         };
         views.extend((0..maps).map(|_| format!("shadow of light {index}")));
+        // Further main cameras have maps of their own.
+        let main = world.cameras.iter().filter(|camera| !camera.is_reflection).skip(1);
+        let main = main.filter(|_| light.kind == LightKindSpec::Directional);
+        views.extend(main.map(|camera| format!("shadow of light {index} for {}", camera.name)));
     }
     views
 }

@@ -23,6 +23,8 @@ pub(crate) struct BundleKey {
     /// replayed with another snapshot.
     pub(crate) meshes: u64,
     pub(crate) pipelines: Arc<ProcessPipelines>,
+    /// See [`WgpuPassState`](super::WgpuPassState).
+    pub(crate) clamps_depth: bool,
 }
 
 impl PartialEq for BundleKey {
@@ -31,7 +33,7 @@ impl PartialEq for BundleKey {
             && self.materials_bind_group == other.materials_bind_group
             && self.process_bind_group == other.process_bind_group
             && self.engine_bind_group == other.engine_bind_group
-            && self.meshes == other.meshes
+            && (self.meshes, self.clamps_depth) == (other.meshes, other.clamps_depth)
             && Arc::ptr_eq(&self.pipelines, &other.pipelines)
     }
 }

@@ -57,6 +57,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) label: String,
     /// Whether it draws commands.
     pub(crate) draws_commands: bool,
+    /// Whether it draws what is in front of the near plane as if it were on it, with pipelines of its own.
+    pub(crate) clamps_depth: bool,
     /// The place of its list of objects in their buffer: a range of one place, empty for a pass without commands.
     pub(super) object_list: Range<usize>,
     /// Its index among the timed passes; `None` for a pass that is not timed.
@@ -101,6 +103,7 @@ impl Default for WgpuPassState {
             name: PassName::default(),
             label: String::new(),
             draws_commands: false,
+            clamps_depth: false,
             object_list: 0..0,
             timed_pass_index: None,
             parameters: 0..0,

@@ -32,7 +32,8 @@ impl CompiledShader {
         draws: &Draws<'_>,
     ) -> Result<Self, BackendError> {
         let PipelineInputs { name, key, attributes, .. } = inputs;
-        let before = key.prelude(attributes.iter().map(|attribute| attribute.layout));
+        let clamps_corners = !(inputs.has_clamped_pipelines() && inputs.clamps_pixels());
+        let before = key.prelude(attributes.iter().map(|attribute| attribute.layout), clamps_corners);
         let module = compile_shader(device, name, &before, &key.own_shaders())?;
         warn_of_unused_bindings(name, declaration, &before, &key.own_shaders());
         warn_of_unsaid_discards(name, draws, &before, &key.own_shaders());

@@ -1,10 +1,11 @@
 //! What all pipelines of a process are made from.
 
 use super::attachment_formats::AttachmentFormats;
-use super::pipeline_key::PipelineKey;
+use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::binding_type;
 use crate::process::{Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
+use crate::scene::ViewKind;
 
 /// What all pipelines of a process are made from: what it declares, and what it draws in frames of one quality. Pipelines of equal inputs
 /// are equal on one device.
@@ -19,6 +20,8 @@ pub(super) struct PipelineInputs {
     pub(super) array_count: usize,
     /// What it says about its resources.
     pub(super) resources: Vec<wgpu::BindingType>,
+    /// Whether it draws in shadow maps.
+    draws_maps: bool,
     features: wgpu::Features,
 }
 
@@ -37,8 +40,22 @@ impl PipelineInputs {
             attributes: planned.declaration.attributes.clone(),
             array_count: array_count(&planned.declaration),
             resources: draws.resources().iter().map(|resource| binding_type(features, resource)).collect(),
+            draws_maps: draws_maps(&planned.declaration),
             features,
         }
+    }
+
+    /// Whether there are pipelines of their own for views that [clamp depth](crate::view::RenderView::clamps_depth).
+    pub(super) fn has_clamped_pipelines(&self) -> bool {
+        let has_geometry = matches!(self.key.vertices, VertexSource::Meshes(_) | VertexSource::Procedural(_));
+        // What is beyond the far plane is clamped too, and only a depth test leaves it out.
+        let draws_depth = has_geometry && self.draws_maps && self.attachments.depth.is_some();
+        draws_depth && (self.clamps_pixels() || self.key.clamped_fragments[0].is_some())
+    }
+
+    /// Whether the device clamps the depth of pixels.
+    pub(super) fn clamps_pixels(&self) -> bool {
+        self.features.contains(wgpu::Features::DEPTH_CLIP_CONTROL)
     }
 
     /// Whether a process of this plan can use their pipelines for these draws, in frames of this quality.
@@ -49,6 +66,7 @@ impl PipelineInputs {
     /// Whether they still fit what a process of this plan declares.
     pub(super) fn fit_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
+            && self.draws_maps == draws_maps(&planned.declaration)
             && self.array_count == array_count(&planned.declaration)
             && self.attributes == planned.declaration.attributes
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
@@ -76,6 +94,10 @@ impl PipelineInputs {
         let resources = draws.resources().iter().map(|resource| binding_type(self.features, resource));
         resources.eq(self.resources.iter().copied())
     }
+}
+
+fn draws_maps(declaration: &Declaration) -> bool {
+    declaration.views == ViewKind::Shadow
 }
 
 fn array_count(declaration: &Declaration) -> usize {

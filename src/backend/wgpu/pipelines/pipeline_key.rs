@@ -16,6 +16,8 @@ pub(crate) struct PipelineKey<'a> {
     pub(crate) fragment: Option<Cow<'a, str>>,
     /// The vertex and the fragment entry point of masked objects, if they have their own.
     pub(crate) masked: Option<[Cow<'a, str>; 2]>,
+    /// Those of the fragments of unmasked and of masked objects where corners are clamped.
+    pub(crate) clamped_fragments: [Option<Cow<'a, str>>; 2],
     pub(crate) parameter_bytes: usize,
     pub(crate) writes_depth: bool,
     pub(crate) face_culling: FaceCulling,
@@ -59,6 +61,7 @@ impl<'a> PipelineKey<'a> {
                 vertices,
                 fragment,
                 masked: None,
+                clamped_fragments: [None, None],
                 parameter_bytes,
                 writes_depth,
                 face_culling,
@@ -72,8 +75,10 @@ impl<'a> PipelineKey<'a> {
             Draws::Commands(draws) => {
                 let key = with(draws.shader, VertexSource::Meshes(format), draws.fragment, draws.writes_depth);
                 let masked = draws.masked.map(|masked| [masked.vertex, masked.fragment].map(Cow::Borrowed));
+                let clamped_fragments = [draws.clamped_fragment, draws.clamped_masked_fragment];
+                let clamped_fragments = clamped_fragments.map(|entry_point| entry_point.map(Cow::Borrowed));
                 let deformation = draws.deformation.map(Cow::Borrowed);
-                Self { deformation, masked, face_culling: draws.face_culling, ..key }
+                Self { deformation, masked, clamped_fragments, face_culling: draws.face_culling, ..key }
             }
             Draws::FullScreen(draws) => with(draws.shader, VertexSource::FullScreen, Some("fragment"), false),
             Draws::Lights(draws) => with(draws.shader, VertexSource::LightVolumes, Some("fragment"), false),
@@ -95,14 +100,16 @@ impl<'a> PipelineKey<'a> {
         let owned = |text: Cow<'a, str>| Cow::Owned(text.into_owned());
         let [deformation, fragment] = [self.deformation, self.fragment].map(|text| text.map(owned));
         let masked = self.masked.map(|entry_points| entry_points.map(owned));
+        let clamped_fragments = self.clamped_fragments.map(|text| text.map(owned));
         let blend_equations = Cow::Owned(self.blend_equations.into_owned());
-        PipelineKey { shader: owned(self.shader), deformation, fragment, masked, blend_equations, ..self }
+        let shader = owned(self.shader);
+        PipelineKey { shader, deformation, fragment, masked, clamped_fragments, blend_equations, ..self }
     }
 
-    /// What goes before the process's own WGSL, which reads these attributes.
-    pub(crate) fn prelude(&self, attributes: impl Iterator<Item = AttributeLayout>) -> String {
+    /// What goes before the process's own WGSL, which reads these attributes and may [clamp corners](prelude_with).
+    pub(crate) fn prelude(&self, attributes: impl Iterator<Item = AttributeLayout>, clamps_corners: bool) -> String {
         let is_absolute = self.transforms == TransformPrecision::Absolute;
-        let prelude = prelude_with(&attributes.collect::<Vec<_>>(), self.deformation.is_some());
+        let prelude = prelude_with(&attributes.collect::<Vec<_>>(), self.deformation.is_some(), clamps_corners);
         format!("const ABSOLUTE_TRANSFORMS: bool = {is_absolute};\n{prelude}\n")
     }
 

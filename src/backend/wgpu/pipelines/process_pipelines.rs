@@ -16,7 +16,7 @@ use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout, process_layout};
 use crate::backend::wgpu::strategy::StrategySet;
-use crate::command::Cull;
+use crate::command::{Cull, DrawState};
 use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology};
@@ -83,9 +83,23 @@ impl ProcessPipelines {
             tuners: Mutex::default(),
         };
         if let Some(state) = pipelines.inputs.key.state {
-            pipelines.insert(pipelines.create(device, PipelineVariant::of_pages(state))?);
+            for variant in pipelines.variants_of(state) {
+                pipelines.insert(pipelines.create(device, variant)?);
+            }
         }
         Ok(pipelines)
+    }
+
+    /// The pipelines for a state, and meshes in the crate's pages, in all kinds of views that it draws in.
+    pub(crate) fn variants_of(&self, state: DrawState) -> impl Iterator<Item = PipelineVariant> {
+        let variant = PipelineVariant::of_pages(state);
+        let clamped = self.has_clamped_pipelines().then(|| variant.clone().clamping(true));
+        std::iter::once(variant).chain(clamped)
+    }
+
+    /// Whether there are pipelines of their own for views that [clamp depth](crate::view::RenderView::clamps_depth).
+    pub(crate) fn has_clamped_pipelines(&self) -> bool {
+        self.inputs.has_clamped_pipelines()
     }
 
     /// Creates the missing ones of these pipelines, but for those of meshes of which the shader cannot read an attribute.
@@ -242,6 +256,10 @@ impl ProcessPipelines {
                 (wgpu::PrimitiveTopology::TriangleStrip, format)
             }
         };
+        let clamps_pixels = variant.clamps_depth && self.inputs.clamps_pixels();
+        let [clamped, clamped_masked] = &key.clamped_fragments;
+        let clamped = if masked.is_some() { clamped_masked } else { clamped };
+        let fragment = clamped.as_ref().filter(|_| variant.clamps_depth && !clamps_pixels).or(fragment);
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: None,
             layout: Some(&shader.layout),
@@ -260,6 +278,7 @@ impl ProcessPipelines {
                     Cull::Front => Some(wgpu::Face::Front),
                     Cull::Nothing => None,
                 },
+                unclipped_depth: clamps_pixels,
                 ..wgpu::PrimitiveState::default()
             },
             depth_stencil: attachments.depth.map(|depth| {
@@ -315,7 +334,6 @@ mod tests {
 
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
-    use crate::command::DrawState;
     use crate::process::{GeometryBuffer, GeometryFormats};
 
     #[test]

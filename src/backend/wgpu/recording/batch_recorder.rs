@@ -43,7 +43,7 @@ impl<'a> BatchRecorder<'a> {
         let mut start = batches.start;
         let meshes = &self.frame.meshes;
         for run in self.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
-            let variant = PipelineVariant::of_batch(meshes, &run[0]);
+            let variant = PipelineVariant::of_batch(meshes, &run[0]).clamping(self.pass.clamps_depth);
             let end = start + run.len();
             let Some(pipeline) = self.pipelines.get(&variant) else {
                 if !self.frame.pipelines(self.pass.pass).is_unreadable(&variant) {

@@ -95,7 +95,7 @@ pub(crate) fn record_without_commands(
     let Pass { process_index: process, view_index: view } = pass.pass;
     let draws = &request.draws[process];
     let pipelines = frame.pipelines(pass.pass).variants();
-    let variant = fixed_state(draws).map(PipelineVariant::of_pages);
+    let variant = fixed_state(draws).map(|state| PipelineVariant::of_pages(state).clamping(pass.clamps_depth));
     let pipeline = variant.and_then(|variant| pipelines.get(&variant));
     let pipeline = pipeline.ok_or_else(|| broken_rule("a pipeline is created before it is used"))?;
     let (list, subdivided) = (DrawList::default(), SubdividedMeshes::new());

@@ -1,6 +1,6 @@
 //! The cache of the views' targets.
 
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 
 use super::imported_target::ResolvedImport;
@@ -452,11 +452,9 @@ impl TargetCache {
         }
         let allowed = device.limits().max_texture_array_layers;
         if layers > allowed {
-            let lights: HashSet<_> = sharing_views().filter_map(|view| view.valid_light).collect();
             return Err(BackendError::TooManyLayers {
                 target: planned.name.clone(),
                 views: u64::from(layers),
-                lights: lights.len() as u64,
                 allowed: u64::from(allowed),
             });
         }

@@ -2,13 +2,15 @@ struct Caster {
     @builtin(position) clip: vec4<f32>,
     // For a paraboloid, the cosine between the camera's direction and the position's; otherwise 1.
     @location(0) forward: f32,
+    // Not clamped to the near plane.
+    @location(1) depth: f32,
 }
 
 @vertex
 fn vertex(in: VertexInput) -> Caster {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, deform(in, object).position);
-    return Caster(clip_position(relative), forward_of(relative));
+    return Caster(clip_position(relative), forward_of(relative), unclamped_clip_position(relative).z);
 }
 
 // Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across
@@ -20,11 +22,18 @@ fn fragment(in: Caster) {
     }
 }
 
+// The depth of what is in front of the near plane is that of the plane.
+@fragment
+fn clamped_fragment(in: Caster) -> @builtin(frag_depth) f32 {
+    return clamp(in.depth, 0.0, 1.0);
+}
+
 struct MaskedCaster {
     @builtin(position) clip: vec4<f32>,
     @location(0) forward: f32,
-    @location(1) uv: vec2<f32>,
-    @location(2) @interpolate(flat) material: u32,
+    @location(1) depth: f32,
+    @location(2) uv: vec2<f32>,
+    @location(3) @interpolate(flat) material: u32,
 }
 
 @vertex
@@ -32,7 +41,8 @@ fn masked_vertex(in: VertexInput) -> MaskedCaster {
     let object = drawn_object(in.instance);
     let deformed = deform(in, object);
     let relative = relative_position(object, deformed.position);
-    return MaskedCaster(clip_position(relative), forward_of(relative), bounded_uv(deformed.uv), object.material);
+    let depth = unclamped_clip_position(relative).z;
+    return MaskedCaster(clip_position(relative), forward_of(relative), depth, bounded_uv(deformed.uv), object.material);
 }
 
 @fragment
@@ -40,6 +50,14 @@ fn masked_fragment(in: MaskedCaster) {
     if in.forward < -RIM_MARGIN || is_cut_out(materials[in.material], in.uv) {
         discard;
     }
+}
+
+@fragment
+fn clamped_masked_fragment(in: MaskedCaster) -> @builtin(frag_depth) f32 {
+    if is_cut_out(materials[in.material], in.uv) {
+        discard;
+    }
+    return clamp(in.depth, 0.0, 1.0);
 }
 
 fn forward_of(relative: vec3<f32>) -> f32 {
