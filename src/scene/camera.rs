@@ -130,13 +130,27 @@ impl Camera {
 
     /// The whole of this picture.
     pub(super) fn as_whole(&self) -> WholePicture {
-        let (projection, shift, aside) = (self.projection, self.shift, Vec2::ZERO);
-        self.whole.unwrap_or(WholePicture { projection, shift, aside })
+        let (projection, shift, position) = (self.projection, self.shift, self.position);
+        self.whole.unwrap_or(WholePicture { projection, shift, position })
     }
 
-    /// The picture of which it draws a part, unless it sees more than that.
+    /// The picture of which it draws a part, unless it sees more than that, by more than the pixel of a jitter.
     pub(crate) fn whole_picture(&self) -> Option<WholePicture> {
-        self.whole.filter(|whole| whole.contains(self.projection))
+        let whole = self.whole?;
+        let is_part = match (self.projection, whole.projection) {
+            (Projection::Perspective { .. }, Projection::Perspective { .. }) => {
+                self.projection.half_height() <= whole.projection.half_height() * (1.0 + 1e-6)
+            }
+            (Projection::Orthographic { height }, Projection::Orthographic { height: of_whole }) => {
+                let aside = self.orientation.as_dquat().normalize().inverse() * (self.position - whole.position);
+                let pixel = f64::from(height) / f64::from(self.size[1]);
+                let room = (f64::from(of_whole) - f64::from(height)) * 0.5;
+                let room = DVec3::new(room * f64::from(self.aspect()), room, 0.0) + pixel;
+                aside.abs().cmple(room).all()
+            }
+            _ => false,
+        };
+        is_part.then_some(whole)
     }
 
     /// Checks all fields but `size`: a size of 0 × 0, as of a minimised window, has an error of its own,
@@ -155,7 +169,7 @@ impl Camera {
             "its far plane is not beyond its near plane"
         } else if !self.shift.is_finite() || self.shift.abs().max_element() > MAX_SHIFT {
             "its shift is not between -65536 and 65536"
-        } else if self.whole.is_some_and(|whole| !(whole.shift.is_finite() && whole.aside.is_finite())) {
+        } else if self.whole.is_some_and(|whole| !(whole.shift.is_finite() && whole.position.is_finite())) {
             "the shift or the position of its whole picture is not finite"
         } else if !(self.level_of_detail_scale >= 0.0 && self.level_of_detail_scale.is_finite()) {
             "its level_of_detail_scale is negative or not finite"

@@ -63,9 +63,6 @@ impl Camera {
     /// Moves the camera to the right and up, in metres.
     fn move_aside(&mut self, metres: Vec2) {
         self.position += self.orientation.as_dquat().normalize() * metres.as_dvec2().extend(0.0);
-        if let Some(whole) = &mut self.whole {
-            whole.aside -= metres;
-        }
         self.late_latch = self.late_latch.map(|motion| motion.at_distance(metres.length()));
     }
 

@@ -73,7 +73,7 @@ fn recorded_slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64
             let half = f64::from(height) * 0.5;
             let depth = end - begin;
             let radius = (half * half * (1.0 + aspect * aspect) + depth * depth * 0.25).sqrt();
-            let position = whole.map_or(camera.position, |whole| whole.position(camera.position, camera.orientation));
+            let position = whole.map_or(camera.position, |whole| whole.position);
             (position + forward * ((begin + end) * 0.5), radius)
         }
         Projection::Paraboloid => (camera.position, end),

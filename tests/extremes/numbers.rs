@@ -2,10 +2,10 @@
 
 use drawloom::FrameError;
 use drawloom::backend::BackendError;
-use drawloom::glam::{DVec3, Quat, Vec3};
+use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
 use drawloom::scene::{
     Bounds, Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology,
-    Vertex,
+    Vertex, WholePicture,
 };
 use drawloom::view::RejectionReason;
 use drawloom_testing::scenes::{sized, square};
@@ -232,6 +232,19 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
             |test, number| {
                 let point = DVec3::new(0.0, 0.0, number);
                 test.camera().clip_plane = Some(ClipPlane { point, normal: Vec3::NEG_Z });
+            },
+            |number: f64| if number.is_finite() { Expected::Drawn } else { Expected::InvalidCamera },
+        )],
+    )?;
+    check(
+        harness,
+        &SPECIAL_POSITIONS,
+        &[(
+            "position of a camera's whole picture",
+            |test, number| {
+                let projection = test.camera().projection;
+                let position = DVec3::new(0.0, number, 0.0);
+                test.camera().whole = Some(WholePicture { projection, shift: Vec2::ZERO, position });
             },
             |number: f64| if number.is_finite() { Expected::Drawn } else { Expected::InvalidCamera },
         )],

@@ -151,6 +151,7 @@ const EXTREMES: &[&str] = &[
     "scene::Camera::position",
     "scene::Camera::shift",
     "scene::Camera::looking_at",
+    "scene::WholePicture::",
     "scene::ClipPlane::",
     "scene::Material::",
     "scene::RenderObject::",
