@@ -96,11 +96,8 @@ impl Format {
 
     /// Whether it holds negative numbers.
     pub fn is_signed(self) -> bool {
-        match self {
-            Self::Rgba16Float | Self::Rg16Float | Self::R16Float => true,
-            Self::Rgba32Float | Self::Rgba32FloatBlendable | Self::R32Float => true,
-            _ => false,
-        }
+        let is_half = matches!(self, Self::Rgba16Float | Self::Rg16Float | Self::R16Float);
+        is_half || matches!(self, Self::Rgba32Float | Self::Rgba32FloatBlendable | Self::R32Float)
     }
 
     /// Channels per pixel, as shaders sample them.
