@@ -63,7 +63,7 @@ pub struct CommandDraws<'a> {
     /// Which faces of the objects are drawn.
     pub face_culling: FaceCulling,
     /// The blend equation of each colour target, in the order declared; if empty, each object's material decides. Another number of
-    /// equations is an [error](super::ProcessError::BlendEquationCount).
+    /// equations is an [error](super::ProcessError::BlendEquationCount). Objects that are drawn by equations hide nothing from culling.
     pub blend_equations: Vec<BlendEquation>,
     /// Whether depth is written. Objects with a blending material write none, unless there are `blend_equations`.
     pub writes_depth: bool,
@@ -105,19 +105,21 @@ impl Default for CommandDraws<'_> {
 /// let draws = CommandDraws {
 ///     shader: "
 ///         @vertex
-///         fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
+///         fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
 ///             return clip_position(relative_position(drawn_object(in.instance), in.position));
 ///         }
 ///
 ///         struct Corner {
-///             @builtin(position) position: vec4<f32>,
+///             @invariant @builtin(position) position: vec4<f32>,
 ///             @location(0) uv: vec2<f32>,
 ///             @location(1) @interpolate(flat) material: u32,
 ///         }
 ///
 ///         @vertex
 ///         fn masked_vertex(in: VertexInput) -> Corner {
-///             return Corner(vertex(in), bounded_uv(in.uv), drawn_object(in.instance).material);
+///             let object = drawn_object(in.instance);
+///             let position = clip_position(relative_position(object, in.position));
+///             return Corner(position, bounded_uv(in.uv), object.material);
 ///         }
 ///
 ///         @fragment

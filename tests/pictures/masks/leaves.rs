@@ -6,7 +6,8 @@ use drawloom::Granularity;
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, EulerRot, Quat, Vec3};
 use drawloom::process::{
-    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, PassInputs, ShaderObject, VertexInput,
+    CommandDraws, CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, Draws, Format, MaskedEntryPoints,
+    PassInputs, RenderProcess, ShaderObject, VertexInput,
 };
 use drawloom::quality::Quality;
 use drawloom::raster::Real;
@@ -14,7 +15,7 @@ use drawloom::scene::{
     Blend, Camera, LayerMask, LevelOfDetail, Material, Mesh, Piece, Projection, RenderObject, Scene, Topology,
     VERTEX_COLOR, Vertex, obj,
 };
-use drawloom_testing::scenes::{culled, sized, with_meshes};
+use drawloom_testing::scenes::{cube, culled, sized, with_meshes};
 use fastrand::Rng;
 use image::{ImageFormat, Rgb, RgbImage};
 use libtest_mimic::Failed;
@@ -188,6 +189,68 @@ pub(super) fn any_order() -> Result<(), Failed> {
                 return Err(format!("{backend}: order {order} or another pipeline changes the picture").into());
             }
         }
+    }
+    Ok(())
+}
+
+/// Draws depth with a vertex and a fragment shader of its own for masked objects.
+struct OwnPrePass;
+
+impl RenderProcess for OwnPrePass {
+    fn name(&self) -> &str {
+        "own pre-pass"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth("depth", Format::Depth32Float);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: "
+                @vertex
+                fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
+                    return clip_position(relative_position(drawn_object(in.instance), in.position));
+                }
+
+                struct Corner {
+                    @invariant @builtin(position) position: vec4<f32>,
+                    @location(0) uv: vec2<f32>,
+                    @location(1) @interpolate(flat) material: u32,
+                }
+
+                @vertex
+                fn masked_vertex(in: VertexInput) -> Corner {
+                    let object = drawn_object(in.instance);
+                    let position = clip_position(relative_position(object, in.position));
+                    return Corner(position, bounded_uv(in.uv), object.material);
+                }
+
+                @fragment
+                fn masked_fragment(in: Corner) {
+                    if is_cut_out(materials[in.material], in.uv) {
+                        discard;
+                    }
+                }
+            ",
+            fragment: None,
+            masked: Some(MaskedEntryPoints { vertex: "masked_vertex", fragment: "masked_fragment" }),
+            ..CommandDraws::default()
+        })
+    }
+}
+
+/// A pre-pass of the engine's, whose depth the shipped geometry buffer must match.
+pub(super) fn own_pre_pass() -> Result<(), Failed> {
+    let mut scene = leaf_objects(&Leaf::crossing(20))?;
+    let stone = scene.add(Material::default())?;
+    let mesh = scene.add(cube())?;
+    scene.add_object(RenderObject::new(mesh, stone, DVec3::ZERO))?;
+    let deferred = || colored().depth_pre_pass(true);
+    let drawn = |deferred: Deferred| Fixture::with(2, |builder| builder.deferred(deferred))?.draw(&scene);
+    let expected = drawn(deferred())?;
+    if drawn(deferred().replace("depth pre-pass", OwnPrePass))? != expected {
+        return Err("the engine's pre-pass changes the picture".into());
     }
     Ok(())
 }
