@@ -9,6 +9,7 @@ use super::stage_clock::StageGroup;
 use super::{CpuNode, Granularity, NodeFrame};
 use crate::backend::Backend;
 use crate::graph::{Node, NodeError};
+use crate::scene::run_node_job;
 use crate::task::Worker;
 
 /// A node of the frame's stage graph.
@@ -71,7 +72,8 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
             Self::Cpu(index) => {
                 let (node, node_frame) = index.get(frame);
                 let count = items.len();
-                let (result, took) = frame.clock.measure(StageGroup::Nodes, || node.run(&node_frame, items, worker));
+                let (result, took) =
+                    frame.clock.measure(StageGroup::Nodes, || run_node_job(|| node.run(&node_frame, items, worker)));
                 if frame.granularity == Granularity::Adaptive && node.items_per_job().is_none() {
                     frame.costs.add_sample(index.node, count, took);
                 }

@@ -72,11 +72,11 @@ impl<'a> NodeFrame<'a> {
     /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with elements that
     /// [count](Self::set_count) must be filled in each frame.
     ///
-    /// Other jobs that access the chunk wait while it is held, so hold one at a time.
+    /// Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so hold one at a time.
     ///
     /// # Errors
-    /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk, or if somebody, such as
-    /// this job, holds it for a second.
+    /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk, or if nobody lets go of
+    /// it: this job holds it, or one that waits for another chunk, or one that has leaked it.
     pub fn fill<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
@@ -90,7 +90,7 @@ impl<'a> NodeFrame<'a> {
     ///
     /// # Errors
     /// If the node does not declare that it reads the buffer, if no node of the frame fills it, or not this chunk, if there is no such chunk, or if
-    /// somebody fills it for a second.
+    /// nobody lets go of it.
     pub fn filled<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
@@ -202,7 +202,7 @@ pub enum NodeAccessError {
         /// The chunk.
         chunk: usize,
     },
-    /// The chunk was held for a second: by the same job, or by one that waits for it.
+    /// Nobody lets go of the chunk: the same job holds it, or one that waits for another chunk, or one that has leaked it.
     #[error("chunk {chunk} of {resource:?} is held by a job that does not let go of it")]
     HeldChunk {
         /// The buffer.

@@ -9,7 +9,6 @@ use super::list_inputs::ListInputs;
 use super::pieces::{ListConditions, PieceTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::triangle_culling::{CullableMeshes, PassTriangles};
-use super::valid_lights::ValidLights;
 use super::view_levels::ViewLevels;
 use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;

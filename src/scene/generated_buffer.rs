@@ -6,13 +6,13 @@ use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use bytemuck::Pod;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 #[cfg(any(feature = "wgpu", feature = "software", test))]
 use super::Topology;
+use super::chunk_holder::ChunkHolder;
 use crate::leaked_guards::unlock;
 
 /// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
@@ -169,9 +169,6 @@ impl GeneratedLayout {
 /// Free contents that are kept for frames to come: as many as were in flight at most, as a rule.
 const MAX_FREE_CONTENTS: usize = 3;
 
-/// How long a job waits for a chunk that another one holds. Who waits longer waits for itself, or for a job that waits for it.
-const MAX_WAIT: Duration = Duration::from_secs(1);
-
 /// Where the contents of a buffer come from: they are used again when the frames that had them are gone.
 pub(crate) struct GeneratedSource {
     pub(crate) layout: GeneratedLayout,
@@ -229,6 +226,8 @@ impl fmt::Debug for GeneratedSource {
 pub struct GeneratedContents {
     layout: GeneratedLayout,
     chunks: Vec<RwLock<Chunk>>,
+    /// By chunk.
+    holders: Vec<ChunkHolder>,
     count: Mutex<usize>,
 }
 
@@ -269,7 +268,8 @@ impl GeneratedContents {
             let words = (layout.chunk_range(index).len() * layout.stride).div_ceil(size_of::<u128>());
             chunks.push(RwLock::new(Chunk { words: vec![0; words].into(), is_filled: false }));
         }
-        Some(Self { layout, chunks, count: Mutex::new(layout.capacity) })
+        let holders = chunks.iter().map(|_| ChunkHolder::default()).collect();
+        Some(Self { layout, chunks, holders, count: Mutex::new(layout.capacity) })
     }
 
     fn reset(&mut self) {
@@ -303,14 +303,14 @@ impl GeneratedContents {
     /// A chunk to fill.
     ///
     /// # Errors
-    /// If there is no such chunk, or somebody holds it for too long.
+    /// If there is no such chunk, or nobody lets go of it.
     ///
     /// # Panics
     /// If the elements are not of this type.
     pub(crate) fn fill<T: Pod>(&self, chunk: usize) -> Result<impl DerefMut<Target = [T]> + use<'_, T>, ChunkError> {
         let elements = self.layout.chunk_range(chunk).len();
         let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
-        let mut guard = lock.try_write_for(MAX_WAIT).ok_or(ChunkError::Held)?;
+        let mut guard = self.holders[chunk].wait(|time| lock.try_write_for(time)).ok_or(ChunkError::Held)?;
         guard.is_filled = true;
         let bytes = elements * self.layout.stride;
         Ok(RwLockWriteGuard::map(guard, move |chunk| {
@@ -321,7 +321,7 @@ impl GeneratedContents {
     /// The elements of a chunk that is filled, of those that count.
     ///
     /// # Errors
-    /// If there is no such chunk, nobody has filled it in this frame, or somebody fills it for too long.
+    /// If there is no such chunk, nobody has filled it in this frame, or nobody lets go of it.
     ///
     /// # Panics
     /// If the elements are not of this type.
@@ -329,7 +329,7 @@ impl GeneratedContents {
         let range = self.layout.chunk_range(chunk);
         let elements = range.end.min(self.count()).saturating_sub(range.start);
         let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
-        let guard = lock.try_read_for(MAX_WAIT).ok_or(ChunkError::Held)?;
+        let guard = self.holders[chunk].wait(|time| lock.try_read_for(time)).ok_or(ChunkError::Held)?;
         if elements > 0 && !guard.is_filled {
             return Err(ChunkError::Unfilled);
         }

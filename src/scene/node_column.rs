@@ -3,12 +3,12 @@
 use std::fmt;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use glam::{DVec3, Quat, Vec3};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::Bounds;
+use super::chunk_holder::ChunkHolder;
 
 /// A column of a scene that [CPU nodes](crate::CpuNode) write while the frame is recorded, before the stages read it: positions that an
 /// animation moves, or a simulation. The engine lends its own storage, so nothing is copied, and has it back when
@@ -41,6 +41,7 @@ pub struct NodeColumn<'a, T> {
 /// A chunk: lent for writing until it is read for the first time.
 struct Chunk<'a, T> {
     writable: Mutex<Option<&'a mut [T]>>,
+    holder: ChunkHolder,
     readable: OnceLock<&'a [T]>,
 }
 
@@ -51,7 +52,11 @@ impl<'a, T> NodeColumn<'a, T> {
     /// A column with these values.
     pub fn new(values: &'a mut [T]) -> Self {
         let length = values.len();
-        let chunk = |values| Chunk { writable: Mutex::new(Some(values)), readable: OnceLock::new() };
+        let chunk = |values| Chunk {
+            writable: Mutex::new(Some(values)),
+            holder: ChunkHolder::default(),
+            readable: OnceLock::new(),
+        };
         Self { chunks: values.chunks_mut(Self::CHUNK).map(chunk).collect(), length }
     }
 
@@ -70,16 +75,18 @@ impl<'a, T> NodeColumn<'a, T> {
         self.chunks.len()
     }
 
-    /// A chunk to write, by index. Other jobs that access the chunk wait while it is held, so hold one at a time.
+    /// A chunk to write, by index. Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so
+    /// hold one at a time.
     ///
     /// # Errors
     /// If it has been read in this frame, because the node does not declare that it writes [`FrameData::Transforms`](crate::FrameData::Transforms);
-    /// or if somebody, such as this job, holds it for a second.
+    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it.
     ///
     /// # Panics
     /// If there is no such chunk.
     pub fn write(&self, chunk: usize) -> Result<ColumnChunk<'_, 'a, T>, ChunkInUse> {
-        let values = self.chunks[chunk].writable.try_lock_for(MAX_WAIT).filter(|values| values.is_some());
+        let Chunk { writable, holder, .. } = &self.chunks[chunk];
+        let values = holder.wait(|time| writable.try_lock_for(time)).filter(|values| values.is_some());
         let values = values.ok_or(ChunkInUse { chunk })?;
         Ok(ColumnChunk { values, first: chunk * Self::CHUNK })
     }
@@ -87,11 +94,12 @@ impl<'a, T> NodeColumn<'a, T> {
     /// The values of a chunk, by index. Nobody writes it from now on.
     ///
     /// # Panics
-    /// If there is no such chunk, or somebody, such as this job, holds it for a second.
+    /// If there is no such chunk, or nobody lets go of it: see [`write`](Self::write).
     pub fn read(&self, chunk: usize) -> &[T] {
-        let Chunk { writable, readable } = &self.chunks[chunk];
+        let Chunk { writable, holder, readable } = &self.chunks[chunk];
         let freeze = || {
-            let mut writable = writable.try_lock_for(MAX_WAIT).expect("a job holds a chunk that is read");
+            let mut writable =
+                holder.wait(|time| writable.try_lock_for(time)).expect("a job holds a chunk that is read");
             writable.take().map_or(&[][..], |values| values)
         };
         readable.get_or_init(freeze)
@@ -157,9 +165,6 @@ pub struct ChunkInUse {
     /// The chunk.
     pub chunk: usize,
 }
-
-/// How long a job waits for a chunk that another one holds. Who waits longer waits for itself, or for a job that waits for it.
-const MAX_WAIT: Duration = Duration::from_secs(1);
 
 /// A [`NodeColumn`] as a scene lends it.
 pub trait WrittenColumn<T>: fmt::Debug + Sync + sealed::Sealed {

@@ -275,7 +275,7 @@ impl Worker {
     /// Runs jobs, and sleeps while there are none, until the exit condition holds. Does not unwind.
     pub(super) fn work(&self, until: ExitCondition) {
         let mut idle = Idle::default();
-        // Kept from one background job to the next.
+        // Kept from one background job to the next, and by a thread that ends.
         let mut has_slot = false;
         let sees_more_work = |priorities: &[Priority]| self.sees_jobs(priorities);
         loop {
@@ -302,7 +302,6 @@ impl Worker {
             self.free_background_slot(&mut has_slot);
             idle.pause(self.index, &self.shared, until.wake_for(), || self.sees_work(until));
         }
-        self.free_background_slot(&mut has_slot);
         idle.end(self.index, &self.shared, sees_more_work);
     }
 
@@ -357,8 +356,7 @@ impl Worker {
             }
     }
 
-    /// Whether there is a job of these priorities that this worker could take, outside of its own queues. Without a free slot it
-    /// could take no background job.
+    /// Whether this worker could take a job of these priorities, outside of its own queues: without a free slot none of the background.
     fn sees_jobs(&self, priorities: &[Priority]) -> bool {
         let shared = &self.shared;
         let takes =
