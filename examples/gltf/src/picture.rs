@@ -4,13 +4,14 @@ use std::error::Error;
 use std::sync::Arc;
 
 use drawloom::backend::{Picture, WgpuBackend};
-use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::process::{Deferred, Fxaa, RenderProcess, ToneMapping};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, wgpu};
 
 use crate::deformation::SkinsAndMorphs;
 use crate::device_textures::upload;
+use crate::surface_kind::SurfaceKind;
 use crate::surfaces::Surfaces;
 use crate::world::World;
 
@@ -52,11 +53,23 @@ pub fn draw(
     if has_deformed {
         deferred = deferred.deformation(deformation(0));
     }
+    // Without a light that casts shadows, nothing else would clear the maps into which masked surfaces are drawn.
+    if world.surfaces.iter().any(|&(kind, _)| kind == SurfaceKind::Masked) {
+        deferred = deferred.keep("shadow casters");
+    }
+    // The last shipped process that draws shadow maps.
+    let last = deferred.names().into_iter().rfind(|name| name.ends_with("shadow casters"));
     let mut builder = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(deferred);
-    let mut previous = None;
+    let (mut previous, mut previous_casters) = (None, last);
     for &(kind, is_deformed) in &world.surfaces {
-        let surfaces = Surfaces::new(kind, is_deformed.then(|| deformation(1)), &textures, previous);
-        previous = Some(drawloom::process::RenderProcess::name(&surfaces).to_owned());
+        let draw = |kind, after| Surfaces::new(kind, is_deformed.then(|| deformation(1)), &textures, after);
+        if kind == SurfaceKind::Masked {
+            let casters = draw(SurfaceKind::MaskedCasters, previous_casters);
+            previous_casters = Some(casters.name().to_owned());
+            builder = builder.process(casters);
+        }
+        let surfaces = draw(kind, previous);
+        previous = Some(surfaces.name().to_owned());
         builder = builder.process(surfaces);
     }
     let (mut renderer, submitter) = builder.build(scheduler)?;

@@ -89,13 +89,17 @@ impl Surface {
         }
     }
 
-    /// Drawloom's material with these values, apart from them what its own processes read.
+    /// Drawloom's material with these values, apart from them what its own processes read. Those leave the shadows of holes
+    /// to a process of the example.
     pub(crate) fn into_material(self, name: String) -> Material {
         let material_type = if self.is_masked() { MASKED_SURFACE } else { SURFACE };
         Material {
             name,
             blend: if self.is_blended() { Blend::Alpha } else { Blend::None },
             double_sided: self.flags & DOUBLE_SIDED != 0,
+            // No alpha reaches the cutoff.
+            opacity: if self.is_masked() { 0.0 } else { 1.0 },
+            alpha_cutoff: self.is_masked().then_some(1.0),
             values: Some(material_type.values(self)),
             ..Material::default()
         }

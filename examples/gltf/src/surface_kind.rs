@@ -7,6 +7,15 @@ pub(crate) enum SurfaceKind {
     Opaque,
     /// With holes.
     Masked,
+    /// The same, in shadow maps.
+    MaskedCasters,
     /// Blended over what is behind them.
     Blended,
+}
+
+impl SurfaceKind {
+    /// Whether its surfaces have holes.
+    pub(crate) fn has_holes(self) -> bool {
+        matches!(self, Self::Masked | Self::MaskedCasters)
+    }
 }

@@ -62,7 +62,11 @@ impl RenderProcess for Surfaces {
                 declare.at(Place::AfterTransparency);
                 declare.tests_depth("depth");
             }
-            _ => {
+            SurfaceKind::MaskedCasters => {
+                declare.views(ViewKind::Shadow);
+                declare.draws_depth(ShadowCasters::TARGET);
+            }
+            SurfaceKind::Opaque | SurfaceKind::Masked => {
                 declare.at(Place::AfterLighting);
                 declare.draws_depth("depth");
             }
@@ -70,14 +74,16 @@ impl RenderProcess for Surfaces {
         if let Some(previous) = &self.previous {
             declare.after(previous);
         }
-        declare.draws_over("radiance");
-        declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        if self.kind != SurfaceKind::MaskedCasters {
+            declare.draws_over("radiance");
+            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        }
         if let Some(deformation) = &self.deformation {
             deformation.declare(declare);
         } else {
             declare.reads_attribute(TANGENT, [0.0; 4]);
         }
-        declare.reads_materials(if self.kind == SurfaceKind::Masked { MASKED_SURFACE } else { SURFACE });
+        declare.reads_materials(if self.kind.has_holes() { MASKED_SURFACE } else { SURFACE });
         declare.reads_attribute(SECOND_UV, [0.0; 2]);
         declare.reads_attribute(COLOR, [1.0; 4]);
     }
@@ -85,14 +91,15 @@ impl RenderProcess for Surfaces {
     fn draws(&self) -> Draws<'_> {
         let selection = match self.kind {
             SurfaceKind::Opaque => Selection::OPAQUE.of_material_type(SURFACE),
-            SurfaceKind::Masked => Selection::OPAQUE.of_material_type(MASKED_SURFACE),
+            SurfaceKind::Masked | SurfaceKind::MaskedCasters => Selection::OPAQUE.of_material_type(MASKED_SURFACE),
             SurfaceKind::Blended => Selection::BLENDED.of_material_type(SURFACE),
         };
         Draws::Commands(CommandDraws {
             shader: &self.shader,
             deformation: self.deformation.as_ref().map(Deformation::shader),
             selection: selection.in_layers(if self.deformation.is_some() { DEFORMED } else { RIGID }),
-            discards: self.kind == SurfaceKind::Masked,
+            fragment: Some(if self.kind == SurfaceKind::MaskedCasters { "caster" } else { "fragment" }),
+            discards: self.kind.has_holes(),
             writes_depth: self.kind != SurfaceKind::Blended,
             resources: self.resources.clone(),
             ..CommandDraws::default()

@@ -71,6 +71,23 @@ struct AllCoordinates {
     second: Coordinates,
 }
 
+// The shadows of surfaces with holes.
+@fragment
+fn caster(in: Corner) {
+    if is_hole(in, gltf_materials[in.material]) {
+        discard;
+    }
+}
+
+// Whether there is no surface. Alpha is that of the whole image: its mean over a mip level may be below the cut-off
+// everywhere, so that what is far away would vanish.
+fn is_hole(in: Corner, material: GltfMaterial) -> bool {
+    let first = Coordinates(in.uv, vec2<f32>(0.0), vec2<f32>(0.0));
+    let second = Coordinates(in.second_uv, vec2<f32>(0.0), vec2<f32>(0.0));
+    let texel = color_texel(material.base_color_texture, AllCoordinates(first, second));
+    return material.base_color.a * in.color.a * texel.a < material.alpha_cutoff;
+}
+
 @fragment
 fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let material = gltf_materials[in.material];
@@ -82,7 +99,7 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let coordinates = AllCoordinates(first, second);
 
     let base = material.base_color * in.color * color_texel(material.base_color_texture, coordinates);
-    if base.a < material.alpha_cutoff {
+    if material.alpha_cutoff > 0.0 && is_hole(in, material) {
         discard;
     }
     let opacity = select(1.0, clamp(base.a, 0.0, 1.0), (material.flags & BLENDED) != 0u);

@@ -58,9 +58,6 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
                 (false, true) => SurfaceKind::Blended,
                 (false, false) => SurfaceKind::Opaque,
             };
-            if kind == SurfaceKind::Masked {
-                warnings.add(format!("{name}: its holes cast shadows, too"));
-            }
             let added = scene.add(surface.into_material(name.clone())).map_err(Problem::of_scene(name));
             let added = warnings.keep(added, "a material is left out")?;
             materials.extend(added.map(|material| (index, (material, kind))));
