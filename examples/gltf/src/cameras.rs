@@ -10,7 +10,7 @@ use crate::transforms::decompose;
 use crate::warnings::Warnings;
 
 /// The fields of view that are drawn, in radians.
-const FIELDS_OF_VIEW: [f32; 2] = [1e-4, 3.14];
+const FIELDS_OF_VIEW: [f32; 2] = [1e-4, std::f32::consts::PI - 1e-3];
 
 /// A camera of a node, for a picture of a size.
 ///

@@ -250,8 +250,8 @@ fn warn_of_bumps(
     warnings: &mut Warnings,
 ) {
     let has_bumps = |primitive: &&Primitive| materials.get(&primitive.material).is_some_and(|(_, it)| it.has_bumps());
-    let with_bumps = primitives.values().flatten().filter(has_bumps);
-    if let Some(primitive) = with_bumps.into_iter().find(|primitive| !primitive.has_tangents) {
+    let mut with_bumps = primitives.values().flatten().filter(has_bumps);
+    if let Some(primitive) = with_bumps.find(|primitive| !primitive.has_tangents) {
         let reason = "has no tangents for its texture of normals: they are derived from the picture, not by MikkTSpace";
         warnings.add(format!("{} {reason}", primitive.mesh.name()));
     }

@@ -173,7 +173,7 @@ fn local_transform(node: &Element<'_>) -> Result<LocalTransform, Problem> {
         return Ok(LocalTransform { matrix: Some(DAffine3::from_mat4(matrix)), ..AT_PARENT });
     }
     let rotation = node.numbers::<4>("rotation")?.map_or(DQuat::IDENTITY, DQuat::from_array);
-    if !(rotation.length_squared() >= 1e-12) || !rotation.length_squared().is_finite() {
+    if !rotation.length_squared().is_finite() || rotation.length_squared() < 1e-12 {
         return Err(refused("has a rotation without a direction"));
     }
     Ok(LocalTransform {

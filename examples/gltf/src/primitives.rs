@@ -50,7 +50,7 @@ struct PrimitiveReader<'a, 'r> {
     count: usize,
 }
 
-impl<'a> PrimitiveReader<'a, '_> {
+impl PrimitiveReader<'_, '_> {
     fn read(&mut self, morphs: &mut Vec<f32>, warnings: &mut Warnings) -> Result<Option<Primitive>, Problem> {
         let (accessors, primitive) = (self.accessors, self.primitive);
         let Some(attributes) = primitive.object("attributes")? else { return Err(primitive.lacks("attributes")) };

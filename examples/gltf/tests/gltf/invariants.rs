@@ -49,7 +49,7 @@ pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), Failed> {
         let is_finite = vertices.iter().all(|vertex| vertex.position.iter().all(|number| number.is_finite()));
         expect(is_finite, || format!("{} is not finite", mesh.name()))?;
         let is_in_range = indices.iter().all(|&index| (index as usize) < vertices.len());
-        expect(is_in_range && indices.len() % 3 == 0, || format!("{} has wrong indices", mesh.name()))?;
+        expect(is_in_range && indices.len().is_multiple_of(3), || format!("{} has wrong indices", mesh.name()))?;
     }
     expect(geometry <= limits.geometry_bytes, || format!("{geometry} bytes of geometry"))?;
     let resources = world.resource_bytes() as u64;

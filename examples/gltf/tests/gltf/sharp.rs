@@ -53,7 +53,7 @@ fn squares(image: &RgbaImage, samplers: &[serde_json::Value], repeats: f32, othe
 
 fn nearest() -> Result<(), Failed> {
     const SIDE: u32 = 4;
-    let is_white = |x: u32, y: u32| (x * 7 + y * 3 + x * y) % 3 == 0;
+    let is_white = |x: u32, y: u32| (x * 7 + y * 3 + x * y).is_multiple_of(3);
     let image =
         RgbaImage::from_fn(SIDE, SIDE, |x, y| if is_white(x, y) { Rgba([255; 4]) } else { Rgba([0, 0, 0, 255]) });
     let sampler = json!({"magFilter": 9728, "minFilter": 9728});
@@ -75,7 +75,7 @@ fn nearest() -> Result<(), Failed> {
 
 fn shared() -> Result<(), Failed> {
     let image = RgbaImage::from_fn(8, 8, |x, y| {
-        let bright = if (x + y) % 3 == 0 { 255 } else { 40 };
+        let bright = if (x + y).is_multiple_of(3) { 255 } else { 40 };
         Rgba([bright, (x * 36) as u8, (y * 36) as u8, 255])
     });
     let mut samplers = Vec::new();

@@ -172,7 +172,7 @@ fn add_nodes(builder: &mut Builder, rng: &mut Rng, meshes: &[usize]) {
         .collect();
     let mut skin = json!({"joints": joints});
     if rng.bool() {
-        let identity: [f32; 16] = std::array::from_fn(|index| if index % 5 == 0 { 1.0 } else { 0.0 });
+        let identity: [f32; 16] = std::array::from_fn(|index| if usize::is_multiple_of(index, 5) { 1.0 } else { 0.0 });
         let view = builder.view(bytemuck::cast_slice(&[identity; JOINTS]));
         let accessor = json!({"bufferView": view, "componentType": 5126, "count": JOINTS, "type": "MAT4"});
         skin["inverseBindMatrices"] = builder.push("accessors", accessor).into();
