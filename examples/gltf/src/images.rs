@@ -19,7 +19,9 @@ use crate::text::excerpt;
 use crate::warnings::Warnings;
 
 /// Images that are being decoded, with their names in messages.
-pub(crate) struct Decoding(Vec<(usize, String, BackgroundJob<Result<Decoded, String>>)>);
+pub(crate) struct Decoding(Vec<(usize, String, DecodingJob)>);
+
+type DecodingJob = BackgroundJob<Result<Decoded, String>>;
 
 struct Decoded {
     image: RgbaImage,

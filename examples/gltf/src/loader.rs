@@ -92,6 +92,9 @@ pub fn load_bytes(
     }
 }
 
+/// The primitives of meshes, by the index of each mesh.
+pub(crate) type PrimitivesOfMeshes = BTreeMap<usize, Vec<Primitive>>;
+
 /// What is read of a file before the world is built of it.
 pub(crate) struct Parts<'a> {
     pub(crate) source: &'a Source,
@@ -104,7 +107,7 @@ pub(crate) struct Parts<'a> {
     /// The number of morph targets of each mesh.
     pub(crate) target_counts: Vec<usize>,
     /// The primitives of each mesh that the scene has.
-    pub(crate) primitives: BTreeMap<usize, Vec<Primitive>>,
+    pub(crate) primitives: PrimitivesOfMeshes,
     /// The skins of the nodes of the scene. Those with which something is wrong are missing.
     pub(crate) skins: BTreeMap<usize, Skin>,
     /// By index; `None` for the default material.
@@ -210,7 +213,7 @@ fn primitives_of(
     source: &Source,
     meshes: &BTreeMap<usize, Element<'_>>,
     warnings: &mut Warnings,
-) -> Result<(BTreeMap<usize, Vec<Primitive>>, Vec<f32>), Problem> {
+) -> Result<(PrimitivesOfMeshes, Vec<f32>), Problem> {
     let (mut of_meshes, mut morphs) = (BTreeMap::new(), Vec::new());
     for (&index, mesh) in meshes {
         let mut primitives = Vec::new();
@@ -245,7 +248,7 @@ fn skins_of(
 
 /// Tangents that a file leaves out are those of MikkTSpace, by the specification; here the shader derives them.
 fn warn_of_bumps(
-    primitives: &BTreeMap<usize, Vec<Primitive>>,
+    primitives: &PrimitivesOfMeshes,
     materials: &BTreeMap<Option<usize>, (String, Surface)>,
     warnings: &mut Warnings,
 ) {
