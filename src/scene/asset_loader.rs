@@ -123,6 +123,8 @@ impl AssetLoader {
     /// Has a background job call `load`, those with a higher priority first, and returns the handle of what it will return. `name` is for
     /// errors. The asset has the same priority in [streaming](Assets::set_priority) when it arrives.
     ///
+    /// As many assets are loaded at once as [workers run background jobs](Scheduler::set_background_workers).
+    ///
     /// With a single worker, no job runs in the background: then each call of [`Assets::receive`] loads one asset. If the scheduler is gone,
     /// each call of this function loads one, the most urgent of those that wait.
     pub fn load<T: Asset, E: Into<BoxedError>>(

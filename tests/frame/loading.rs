@@ -205,6 +205,7 @@ fn a_loader_whose_scheduler_is_gone_loads_at_once() {
 #[test]
 fn a_slow_load_does_not_hold_up_another_one_while_workers_idle() {
     let mut engine = Engine::new(3);
+    engine.scheduler.set_background_workers(2);
     let (other_has_begun, begun) = mpsc::channel::<()>();
     engine.loader.load("slow", 0, move || {
         // It ends only when the other one has begun; if that never comes, this is an error.
