@@ -4,7 +4,8 @@ use std::mem;
 
 use parking_lot::RwLock;
 
-/// Unlocks a lock that nobody can use meanwhile: who borrowed the guard that still locks it has leaked that. The value stays.
+/// Unlocks a lock that nobody can use meanwhile: who borrowed the guard that still locks it has leaked that. The value
+/// stays.
 pub(crate) fn unlock<T: Default>(lock: &mut RwLock<T>) {
     if lock.is_locked() {
         *lock = RwLock::new(mem::take(lock.get_mut()));

@@ -72,8 +72,9 @@
 //! worker that runs chunks of the node enters the span and exits it before the node counts as done. The span closes before
 //! any dependent of the node begins. It is exited after an error or a panic, too.
 //!
-//! Workers are threads of their own. A subscriber that is to hear of all of them is the global default, or is set on each by
-//! [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the span or event is lost, and nothing else.
+//! Workers are threads of their own. A subscriber that is to hear of all of them is the global default, or is set on
+//! each by [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the span or event is lost,
+//! and nothing else.
 
 // Each module uses only modules above it; `tests/architecture` fails otherwise.
 mod sync;

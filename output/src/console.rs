@@ -14,7 +14,8 @@ pub fn path_text(path: &Path) -> String {
     text(path.display())
 }
 
-/// What a file holds, such as a name, as text on one line. Control characters are escaped, so that none reaches a terminal.
+/// What a file holds, such as a name, as text on one line. Control characters are escaped, so that none reaches a
+/// terminal.
 pub fn text(text: impl Display) -> String {
     let mut escaped = String::new();
     for character in text.to_string().chars() {
@@ -34,8 +35,9 @@ fn push_escaped(text: &mut String, character: char, keeps_lines: bool) {
 
 /// Prints a line on the standard output. Control characters in it are escaped, except line feeds and tabs.
 ///
-/// That its reader has closed the pipe is no error: it wants no more, and what the program does beside printing goes on. Any other error, of a
-/// full disk for example, is kept until the program ends, so that it first writes its files: [`exit_code`] tells it.
+/// That its reader has closed the pipe is no error: it wants no more, and what the program does beside printing goes
+/// on. Any other error, of a full disk for example, is kept until the program ends, so that it first writes its files:
+/// [`exit_code`] tells it.
 pub fn print_line(line: impl Display) {
     let written = io::stdout().write_all(line_of(line).as_bytes());
     if let Err(error) = or_unread(written) {
@@ -43,7 +45,8 @@ pub fn print_line(line: impl Display) {
     }
 }
 
-/// Prints a line on the standard error output, escaped as [`print_line`] does. If that fails there is nowhere to say so.
+/// Prints a line on the standard error output, escaped as [`print_line`] does. If that fails there is nowhere to say
+/// so.
 pub fn print_diagnostic(line: impl Display) {
     let _ = io::stderr().write_all(line_of(line).as_bytes());
 }
@@ -72,8 +75,8 @@ macro_rules! print_diagnostic {
     };
 }
 
-/// The standard error output for events, escaped as [`print_diagnostic`] does. Writing never fails: that events cannot be printed is no reason to
-/// stop.
+/// The standard error output for events, escaped as [`print_diagnostic`] does. Writing never fails: that events cannot
+/// be printed is no reason to stop.
 pub fn diagnostics() -> impl io::Write {
     Diagnostics
 }

@@ -1,4 +1,5 @@
-//! A program that prints and writes a file, with outputs that nobody reads, that are full, or that are closed. It is this program itself.
+//! A program that prints and writes a file, with outputs that nobody reads, that are full, or that are closed. It is
+//! this program itself.
 
 use std::error::Error;
 use std::fs;

@@ -32,7 +32,8 @@ use crate::timeline::{Labels, TuningChoice};
 /// 4. `replace_view`, as often as the engine replaces a camera, and `read_back`.
 /// 5. Later, on the device thread, `submit`.
 ///
-/// A panic of a method fails the frame with an error that names the method or the stage of the pass, and the next frame is not affected.
+/// A panic of a method fails the frame with an error that names the method or the stage of the pass, and the next frame
+/// is not affected.
 ///
 /// What a backend must honour:
 ///
@@ -64,8 +65,8 @@ pub trait Backend: Send + Sync + 'static {
         0
     }
 
-    /// Whether targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) can be drawn into. Without them, some
-    /// of [`RadianceSum`](crate::quality::RadianceSum) falls back to half floats.
+    /// Whether targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) can be drawn
+    /// into. Without them, some of [`RadianceSum`](crate::quality::RadianceSum) falls back to half floats.
     fn can_blend_floats(&self) -> bool {
         false
     }
@@ -106,10 +107,10 @@ pub trait Backend: Send + Sync + 'static {
         SceneLimits::NONE
     }
 
-    /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or not, before the first
-    /// frame with it, and again after another backend or format was set. Objects with a mesh that cannot be drawn are left out, and counted
-    /// as [`UndrawableMesh`](crate::view::RejectionReason::UndrawableMesh); the error becomes a warning. `begin` never sees such a mesh
-    /// among the used ones.
+    /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or
+    /// not, before the first frame with it, and again after another backend or format was set. Objects with a mesh that
+    /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::RejectionReason::UndrawableMesh);
+    /// the error becomes a warning. `begin` never sees such a mesh among the used ones.
     ///
     /// # Errors
     /// If it cannot be drawn, as it exceeds a limit of the device, or is in buffers that the backend cannot read.

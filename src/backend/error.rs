@@ -24,8 +24,8 @@ pub enum BackendError {
         /// What Drawloom needs.
         needed: u64,
     },
-    /// More views have a layer of one texture than the device's textures can have layers: the scene has as many cameras of one kind. Shadow maps
-    /// of lights are never too many.
+    /// More views have a layer of one texture than the device's textures can have layers: the scene has as many cameras
+    /// of one kind. Shadow maps of lights are never too many.
     #[error(
         "{views} views each have a layer of the target {target:?}, and device limit max_texture_array_layers is {allowed}"
     )]
@@ -126,7 +126,8 @@ pub enum BackendError {
         /// The type of number in the shader.
         expected: &'static str,
     },
-    /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see: objects with it are left out.
+    /// A mesh [in wgpu buffers](crate::scene::Mesh), whose triangles the software backend cannot see: objects with it
+    /// are left out.
     #[error("mesh `{mesh}` is in wgpu buffers, which the software backend cannot draw")]
     ImportedMesh {
         /// The mesh.

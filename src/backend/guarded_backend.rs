@@ -35,11 +35,11 @@ pub(crate) fn guarded<R>(call: &'static str, method: impl FnOnce() -> R) -> Resu
     catch(method).map_err(|JobPanic { message }| CallPanic { call, message })
 }
 
-/// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's code. The rest of the
-/// crate has no other way to a backend, so no call of it can unwind.
+/// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's
+/// code. The rest of the crate has no other way to a backend, so no call of it can unwind.
 ///
-/// The methods are those of [`Backend`]. Those that can fail already return the panic as a [`BackendError`] where the caller cannot tell it
-/// from other errors, and as a [`CallPanic`] elsewhere.
+/// The methods are those of [`Backend`]. Those that can fail already return the panic as a [`BackendError`] where the
+/// caller cannot tell it from other errors, and as a [`CallPanic`] elsewhere.
 pub(crate) struct GuardedBackend<B> {
     // Whoever drops the last reference may be a thread of a frame loop.
     backend: Contained<Arc<B>>,
@@ -56,7 +56,8 @@ impl<B> GuardedBackend<B> {
         Self { backend: Contained::new(backend) }
     }
 
-    /// The backend itself, for the engine, and for calls in jobs of the frame: their run catches panics, and its error names the node.
+    /// The backend itself, for the engine, and for calls in jobs of the frame: their run catches panics, and its error
+    /// names the node.
     pub(crate) fn unguarded(&self) -> &Arc<B> {
         &self.backend
     }

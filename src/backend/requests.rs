@@ -20,8 +20,8 @@ pub struct FrameRequest<'a> {
     pub draws: &'a [Draws<'a>],
     /// The views. The targets of a cached view still hold what an earlier frame drew: see [`RenderView::is_cached`].
     pub views: &'a [RenderView],
-    /// The valid lights of the scene, in its order. With several main cameras, a directional light that casts shadows is followed by a copy for
-    /// each that has maps of it.
+    /// The valid lights of the scene, in its order. With several main cameras, a directional light that casts shadows
+    /// is followed by a copy for each that has maps of it.
     pub lights: &'a [Light],
     /// The lights that reach each view.
     pub light_tables: &'a [LightTable],
@@ -39,8 +39,8 @@ pub struct FrameRequest<'a> {
     pub generated: &'a [Arc<GeneratedContents>],
     /// The frame's accuracy.
     pub quality: &'a Quality,
-    /// The backend's [limits](super::Backend::limits). What is beyond them is not drawn: a backend that keeps arrays of the scene's lights or
-    /// materials may cut them off there.
+    /// The backend's [limits](super::Backend::limits). What is beyond them is not drawn: a backend that keeps arrays of
+    /// the scene's lights or materials may cut them off there.
     pub limits: SceneLimits,
     /// Counts what the backend leaves out.
     pub rejections: &'a Rejections,

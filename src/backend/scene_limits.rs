@@ -2,14 +2,15 @@
 
 use crate::view::{GpuLight, GpuObject};
 
-/// What a backend can hold of a scene: the limits of its device's buffers and textures. A frame draws what is within them, leaves out the rest, and counts
-/// it among its [rejections](crate::FrameStatistics::rejections).
+/// What a backend can hold of a scene: the limits of its device's buffers and textures. A frame draws what is within
+/// them, leaves out the rest, and counts it among its [rejections](crate::FrameStatistics::rejections).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneLimits {
     /// The size of the largest buffer, in bytes: what the lights of all views can take together.
     pub buffer_bytes: u64,
-    /// The most bytes of a buffer that a shader can read: all objects, a [column](crate::scene::ObjectColumn), all materials, their values
-    /// of a [type](crate::scene::MaterialType), or the lights of a view. In each of them, every object, material slot or light has an element.
+    /// The most bytes of a buffer that a shader can read: all objects, a [column](crate::scene::ObjectColumn), all
+    /// materials, their values of a [type](crate::scene::MaterialType), or the lights of a view. In each of them, every
+    /// object, material slot or light has an element.
     pub binding_bytes: u64,
     /// The most layers of a texture: what shadow maps can take together. Lights without room for theirs are counted as
     /// [`ShadowMapLimit`](crate::view::RejectionReason::ShadowMapLimit).
@@ -20,14 +21,14 @@ impl SceneLimits {
     /// No limits but those of memory, and 256 layers of a texture, as most devices have.
     pub const NONE: Self = Self { buffer_bytes: u64::MAX, binding_bytes: u64::MAX, texture_layers: 256 };
 
-    /// The most objects, where shaders read columns of up to so many bytes for each. Objects take 64 bytes themselves. Objects at higher
-    /// indices are counted as [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
+    /// The most objects, where shaders read columns of up to so many bytes for each. Objects take 64 bytes themselves.
+    /// Objects at higher indices are counted as [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
     pub fn max_objects(&self, column_stride: usize) -> usize {
         elements(self.binding_bytes, column_stride.max(size_of::<GpuObject>()))
     }
 
-    /// The most lights that a view can have, each layer of shadow maps counted as another one if a light has several. Lights that come later
-    /// in the scene are counted as [`LightLimit`](crate::view::RejectionReason::LightLimit).
+    /// The most lights that a view can have, each layer of shadow maps counted as another one if a light has several.
+    /// Lights that come later in the scene are counted as [`LightLimit`](crate::view::RejectionReason::LightLimit).
     pub fn max_lights(&self) -> usize {
         elements(self.binding_bytes, size_of::<GpuLight>())
     }

@@ -90,8 +90,8 @@ impl<T> SubdivisionCache<T> {
         self.meshes.lock().clear();
     }
 
-    /// Calls `emit` with each subdivided mesh that a list draws. `create` makes the geometry of missing ones, or `None` if it exceeds the
-    /// backend's limits. Counts objects without geometry, and those whose edges stay too long.
+    /// Calls `emit` with each subdivided mesh that a list draws. `create` makes the geometry of missing ones, or `None`
+    /// if it exceeds the backend's limits. Counts objects without geometry, and those whose edges stay too long.
     ///
     /// # Errors
     /// If there is no such mesh, or `create` fails.

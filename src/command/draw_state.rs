@@ -2,8 +2,8 @@
 
 use crate::scene::{Blend, LevelOfDetail, Topology};
 
-/// Topology, culling, blending, mask, subdivision level and level of detail in two bytes (M listing 10.1). With the process that draws, it
-/// determines a command's pipeline; with the mesh, its triangles.
+/// Topology, culling, blending, mask, subdivision level and level of detail in two bytes (M listing 10.1). With the
+/// process that draws, it determines a command's pipeline; with the mesh, its triangles.
 ///
 /// ```text
 /// bit   11 10  9        | 8  7  6     | 5    | 4  3 | 2  1 | 0

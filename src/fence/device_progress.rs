@@ -11,7 +11,8 @@ pub trait DeviceProgress: Send + Sync + 'static {
     /// it has done.
     ///
     /// # Errors
-    /// Returns the device's message if it has failed, so that the fence will never be set. A panic counts as such a failure.
+    /// Returns the device's message if it has failed, so that the fence will never be set. A panic counts as such a
+    /// failure.
     fn advance(&self, limit: Duration) -> Result<(), String>;
 }
 

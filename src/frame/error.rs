@@ -102,18 +102,19 @@ pub enum FrameError {
         /// Why.
         source: NodeError,
     },
-    /// A stage panicked, in the code of a process, of a node, of a backend, or in Drawloom's own; or a call of the backend beside the stages.
-    /// Where the program is built with `panic = "abort"` the program ends instead, as no panic can be caught.
+    /// A stage panicked, in the code of a process, of a node, of a backend, or in Drawloom's own; or a call of the
+    /// backend beside the stages. Where the program is built with `panic = "abort"` the program ends instead, as no
+    /// panic can be caught.
     #[error("{stage} panicked: {message}")]
     Panicked {
-        /// The process, the view and the stage; the stage alone where it is the whole frame's; the name of the node; or the call, such as
-        /// "the backend's begin".
+        /// The process, the view and the stage; the stage alone where it is the whole frame's; the name of the node; or
+        /// the call, such as "the backend's begin".
         stage: String,
         /// What the panic said.
         message: String,
     },
-    /// A frame failed, and the backend panicked when it was told to discard what the engine has set for that frame. The next frame may still
-    /// have that.
+    /// A frame failed, and the backend panicked when it was told to discard what the engine has set for that frame. The
+    /// next frame may still have that.
     #[error("{error}; then the backend's discard_frame panicked: {message}")]
     DiscardPanicked {
         /// Why the frame failed.
@@ -311,8 +312,8 @@ pub enum SubmitError {
     /// since.
     #[error("the frame was recorded by another renderer, or for another backend")]
     ForeignFrame,
-    /// The frame keeps a [view](crate::scene::Redraw) that an earlier frame was to draw, and that one was dropped, refused, or not submitted before
-    /// this one. A frame that is recorded later draws the view anew.
+    /// The frame keeps a [view](crate::scene::Redraw) that an earlier frame was to draw, and that one was dropped,
+    /// refused, or not submitted before this one. A frame that is recorded later draws the view anew.
     #[error("the frame shows view {view:?} as an earlier frame draws it, and that frame was not submitted")]
     LostView {
         /// The view.

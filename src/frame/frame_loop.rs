@@ -107,9 +107,10 @@ where
     /// Begins a frame: waits until fewer frames are in flight than the buffering allows, and returns a slot for one, with the frames that
     /// finished since the last call, in their order. A frame that is dropped instead of submitted frees its slot.
     ///
-    /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of the device, allow. A slot
-    /// that the engine holds counts as a frame in flight: to begin another frame while it holds all of them is to wait for itself. A thread of
-    /// the loop, which calls [what follows a submission](FrameSlot::submit_then) and callbacks of fences, never waits here.
+    /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of
+    /// the device, allow. A slot that the engine holds counts as a frame in flight: to begin another frame while it
+    /// holds all of them is to wait for itself. A thread of the loop, which calls [what follows a
+    /// submission](FrameSlot::submit_then) and callbacks of fences, never waits here.
     pub fn begin(&mut self) -> (FrameSlot<B>, Vec<FinishedFrame<B>>) {
         let start = Instant::now();
         let finished = self.queues.take_slot(!self.is_on_own_thread());
@@ -152,8 +153,8 @@ where
     /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since the last
     /// [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is dropped.
     ///
-    /// A thread of the loop cannot wait for itself: if it calls this, or drops the loop, it goes on with the frames in flight afterwards, and
-    /// nobody is told of those.
+    /// A thread of the loop cannot wait for itself: if it calls this, or drops the loop, it goes on with the frames in
+    /// flight afterwards, and nobody is told of those.
     pub fn finish(mut self) -> (Renderer<B>, Vec<FinishedFrame<B>>) {
         self.end_threads();
         let renderer = self.renderer.take().expect("nothing takes it before");
@@ -210,7 +211,8 @@ where
     queues.end_submission();
 }
 
-/// Submits a frame, and calls what the engine does afterwards. If the submission fails, that is dropped, and not called.
+/// Submits a frame, and calls what the engine does afterwards. If the submission fails, that is dropped, and not
+/// called.
 fn submit_then<B: Backend>(
     submitter: &Submitter<B>,
     mut recorded: Recorded<B>,
@@ -226,7 +228,8 @@ fn submit_then<B: Backend>(
     Ok((submitted, drawn, called))
 }
 
-/// Does a part of a frame's work on a thread of the loop, where a panic would leave all frames behind this one waiting for ever.
+/// Does a part of a frame's work on a thread of the loop, where a panic would leave all frames behind this one waiting
+/// for ever.
 fn caught<R>(work: impl FnOnce() -> Result<R, FrameLoopError>) -> Result<R, FrameLoopError> {
     catch(work).unwrap_or_else(|JobPanic { message }| Err(FrameLoopError::Panicked { message }))
 }

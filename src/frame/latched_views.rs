@@ -99,8 +99,8 @@ fn check(recorded: &Camera, motion: CameraMotion, camera: &Camera) -> Result<(),
     Ok(())
 }
 
-/// The first property in which cameras differ that must not: all but position, orientation, the motion, and the whole picture, which moves with
-/// the camera.
+/// The first property in which cameras differ that must not: all but position, orientation, the motion, and the whole
+/// picture, which moves with the camera.
 fn differing_property(one: &Camera, other: &Camera) -> Option<&'static str> {
     let properties = [
         ("name", one.name == other.name),

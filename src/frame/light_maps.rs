@@ -16,8 +16,8 @@ pub(super) fn have_same_maps(before: &FrameViews, requested: &FrameViews) -> boo
     maps(before).eq(maps(requested))
 }
 
-/// Whether a directional light's map, which covers what a main camera sees, still covers most of that. Other maps move with their
-/// lights, which keep their range with them: it must be most of the one that a brighter light has.
+/// Whether a directional light's map, which covers what a main camera sees, still covers most of that. Other maps move
+/// with their lights, which keep their range with them: it must be most of the one that a brighter light has.
 pub(super) fn covers(cached: &RenderView, requested: &RenderView) -> bool {
     let (Projection::Orthographic { height }, Projection::Orthographic { height: requested_height }) =
         (cached.camera.projection, requested.camera.projection)
@@ -33,8 +33,8 @@ pub(super) fn covers(cached: &RenderView, requested: &RenderView) -> bool {
     requested_height <= height * 1.25 && center(cached).distance(center(requested)) <= f64::from(height) * 0.125
 }
 
-/// So much farther may a light reach than its cached map. Its brightness is then at most the square of this times that which the map was drawn
-/// with, and so is what it misses of the [cut-off](crate::quality::Quality::light_cut_off).
+/// So much farther may a light reach than its cached map. Its brightness is then at most the square of this times that
+/// which the map was drawn with, and so is what it misses of the [cut-off](crate::quality::Quality::light_cut_off).
 const MAX_RANGE_GROWTH: f32 = 1.125;
 
 /// A cached light with its current brightness.

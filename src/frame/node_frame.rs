@@ -72,11 +72,12 @@ impl<'a> NodeFrame<'a> {
     /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with elements that
     /// [count](Self::set_count) must be filled in each frame.
     ///
-    /// Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so hold one at a time.
+    /// Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so hold one at a
+    /// time.
     ///
     /// # Errors
-    /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk, or if nobody lets go of
-    /// it: this job holds it, or one that waits for another chunk, or one that has leaked it.
+    /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk,
+    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it.
     pub fn fill<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
@@ -202,7 +203,8 @@ pub enum NodeAccessError {
         /// The chunk.
         chunk: usize,
     },
-    /// Nobody lets go of the chunk: the same job holds it, or one that waits for another chunk, or one that has leaked it.
+    /// Nobody lets go of the chunk: the same job holds it, or one that waits for another chunk, or one that has leaked
+    /// it.
     #[error("chunk {chunk} of {resource:?} is held by a job that does not let go of it")]
     HeldChunk {
         /// The buffer.

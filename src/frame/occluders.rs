@@ -5,7 +5,8 @@ use crate::process::{Access, Draws, FramePlan, Pass};
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// The objects that may occlude others in a view, as the selections of the passes that draw them. Those of them with a mask do not.
+/// The objects that may occlude others in a view, as the selections of the passes that draw them. Those of them with a
+/// mask do not.
 ///
 /// `None` where a hidden object could still be visible in the picture, so that no object may be removed:
 /// - in shadow maps, which show objects that are hidden from elsewhere;

@@ -118,7 +118,8 @@ const NO_PIECE: u32 = u32::MAX;
 const MAX_SELECTIONS: usize = 32;
 
 impl PieceTable {
-    /// Begins a frame of so many objects, in which passes with bins have these selections: decides which pieces are recorded, and which ones this frame records.
+    /// Begins a frame of so many objects, in which passes with bins have these selections: decides which pieces are
+    /// recorded, and which ones this frame records.
     ///
     /// # Errors
     /// If two pieces have the same name or share an object.

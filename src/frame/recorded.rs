@@ -18,10 +18,10 @@ use crate::unwind::{CaughtSpan, Contained};
 use crate::view::RenderView;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
-/// dropped without being submitted, the next frame draws all of its views, also those that it would have [cached](crate::scene::Redraw).
-/// Frames that were recorded before it is dropped, and that keep a view which it draws, are [refused](SubmitError::LostView).
-/// With wgpu, the thread that drops it then hands its uploads to the device, which may call back for work that has finished: hold no lock
-/// that such a callback takes.
+/// dropped without being submitted, the next frame draws all of its views, also those that it would have
+/// [cached](crate::scene::Redraw). Frames that were recorded before it is dropped, and that keep a view which it draws,
+/// are [refused](SubmitError::LostView). With wgpu, the thread that drops it then hands its uploads to the device,
+/// which may call back for work that has finished: hold no lock that such a callback takes.
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.
@@ -244,10 +244,12 @@ impl<B: Backend> Submitter<B> {
     /// which they were recorded; that is checked only where a frame keeps a view that an earlier one draws.
     ///
     /// # Errors
-    /// If the frame is another renderer's, or another backend's, if the device refuses it, if a frame that draws a view which it keeps was
-    /// not submitted, or if a fence that it [waits for](Recorded::submit_after) is not set. If the device is lost, that is the error.
+    /// If the frame is another renderer's, or another backend's, if the device refuses it, if a frame that draws a view
+    /// which it keeps was not submitted, or if a fence that it [waits for](Recorded::submit_after) is not set. If the
+    /// device is lost, that is the error.
     pub fn submit(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {
-        // Calls of the engine's code are caught one by one. Should one have been forgotten, the frame fails all the same.
+        // Calls of the engine's code are caught one by one. Should one have been forgotten, the frame fails all the
+        // same.
         let submitted = catch(|| self.submit_frame(recorded));
         submitted.unwrap_or_else(|JobPanic { message }| Err(SubmitError::Panicked { message }))
     }

@@ -154,7 +154,8 @@ impl<B: Backend> Renderer<B> {
         transparency: bool,
     ) -> Result<Recorded<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
-        // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned all the same.
+        // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned
+        // all the same.
         let recorded = catch(|| {
             let recorded = self.record_frame(scene, nodes, choices, transparency)?;
             self.background_work.start(&self.backend, &self.scheduler)?;
@@ -172,7 +173,8 @@ impl<B: Backend> Renderer<B> {
         }
     }
 
-    /// Ends a frame that failed, at whatever point: the next one relies on nothing that this one was told or has derived.
+    /// Ends a frame that failed, at whatever point: the next one relies on nothing that this one was told or has
+    /// derived.
     fn abandon_frame(&mut self, error: FrameError) -> FrameError {
         self.tables.abandon_frame();
         self.graphs.discard_costs();
@@ -236,7 +238,8 @@ impl<B: Backend> Renderer<B> {
         let preparation = self.preparation(&scene)?;
         let job = self.scheduler.background(preparation);
         if self.scheduler.workers() == 1 {
-            // Nobody may ever run it: the job and all that it owns would stay in the queue of the scheduler, which it may own as well.
+            // Nobody may ever run it: the job and all that it owns would stay in the queue of the scheduler, which it
+            // may own as well.
             job.run();
         }
         Ok(job)

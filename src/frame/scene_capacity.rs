@@ -11,7 +11,8 @@ use crate::view::{ObjectTable, TableLimits};
 /// What a frame can hold of its scene, as the object table asks for it.
 #[derive(Debug, Default)]
 pub(super) struct SceneCapacity {
-    /// The limits of the backend, and what else decides which meshes can be drawn; `None` before the first frame with a backend.
+    /// The limits of the backend, and what else decides which meshes can be drawn; `None` before the first frame with a
+    /// backend.
     conditions: Option<(SceneLimits, VertexFormat)>,
     /// Counts how often the conditions changed.
     revision: u64,
@@ -49,7 +50,8 @@ impl SceneCapacity {
         })
     }
 
-    /// The plan reads these columns. If they are wider than those of the plan before, fewer objects may have room; if they are narrower, more.
+    /// The plan reads these columns. If they are wider than those of the plan before, fewer objects may have room; if
+    /// they are narrower, more.
     pub(super) fn set_columns(&mut self, columns: &[ColumnLayout], scene: &SceneRef<'_>, objects: &mut ObjectTable) {
         self.column_stride = columns.iter().map(|column| column.stride).max().unwrap_or(0);
         // The table knows which meshes can be drawn.

@@ -8,8 +8,8 @@ use crate::view::{MapOwners, RejectionReason, Rejections, RenderView, ShadowMaps
 
 /// The lights of a frame, and the views of their shadow maps.
 pub(super) struct ShadowViews {
-    /// In the scene's order. If several main cameras have maps of their own, a directional light is followed by a copy for each that has maps of
-    /// it.
+    /// In the scene's order. If several main cameras have maps of their own, a directional light is followed by a copy
+    /// for each that has maps of it.
     pub(super) lights: Vec<Light>,
     /// For each light, the main view that a copy is for.
     pub(super) main_views: Vec<Option<usize>>,
@@ -44,8 +44,9 @@ impl ShadowViews {
         Self { main_views: vec![None; lights.len()], lights, scene_indices, views: Vec::new() }
     }
 
-    /// The maps of each light that casts shadows and reaches what one of `views` may see; `views` are those of the scene's cameras, and get
-    /// their [main views](RenderView::main_view). Lights whose maps do not fit have none, and are counted as rejections.
+    /// The maps of each light that casts shadows and reaches what one of `views` may see; `views` are those of the
+    /// scene's cameras, and get their [main views](RenderView::main_view). Lights whose maps do not fit have none, and
+    /// are counted as rejections.
     pub(super) fn new(
         scene: &SceneRef<'_>,
         valid: ValidLights,
@@ -83,7 +84,8 @@ impl ShadowViews {
     }
 }
 
-/// The maps of the lights, in their order. Main cameras take what they need one after the other, and each of them for one light after the other.
+/// The maps of the lights, in their order. Main cameras take what they need one after the other, and each of them for
+/// one light after the other.
 fn maps_that_fit(
     scene: &SceneRef<'_>,
     valid: &ValidLights,
@@ -133,14 +135,16 @@ fn maps_that_fit(
     maps
 }
 
-/// How many maps there may be beside these views, the cameras of a scene, some of which may draw maps of the engine's own.
+/// How many maps there may be beside these views, the cameras of a scene, some of which may draw maps of the engine's
+/// own.
 fn room_for_maps(views: &[RenderView], limits: SceneLimits) -> usize {
     let own = views.iter().filter(|view| view.kind() == ViewKind::Shadow).count();
     let layers = (limits.texture_layers as usize).saturating_sub(own);
     layers.min(FrameError::MAX_VIEWS.saturating_sub(views.len()))
 }
 
-/// The rank of the first owner of maps that sees what a light reaches, itself or by a view that has its maps; `None` if no view does.
+/// The rank of the first owner of maps that sees what a light reaches, itself or by a view that has its maps; `None` if
+/// no view does.
 fn rank_of_first_reached(light: &Light, views: &[RenderView], owners: &MapOwners) -> Option<usize> {
     let (center, radius) = light.bounding_sphere()?;
     let mut first = None;

@@ -133,8 +133,8 @@ impl FrameTables {
         Version { frame: self.frames, index }
     }
 
-    /// Finds the lights that reach each view that is drawn, within the limits of the backend: see [`LightTable::fill`]. Counts those that a view
-    /// has no room for.
+    /// Finds the lights that reach each view that is drawn, within the limits of the backend: see [`LightTable::fill`].
+    /// Counts those that a view has no room for.
     pub(super) fn fill_lights(&mut self, frame: &FrameViews, separate_shadowed_lights: bool, limits: SceneLimits) {
         let FrameViews { views, lights, main_views, scene_indices, .. } = frame;
         let (mut left_out, mut room) = (Vec::new(), limits.buffer_bytes);

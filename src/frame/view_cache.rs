@@ -201,8 +201,8 @@ impl Turns {
     /// Views of one interval are drawn in at most this many of its frames: each set of drawn views is a stage graph of its own.
     const MAX_GROUPS: u32 = 8;
 
-    /// Whether it is the turn of the next view, if that has an interval. `maps` are the maps that it is one of. Which turn those of one main
-    /// camera have does not depend on the cameras after it.
+    /// Whether it is the turn of the next view, if that has an interval. `maps` are the maps that it is one of. Which
+    /// turn those of one main camera have does not depend on the cameras after it.
     fn take(&mut self, view: &RenderView, maps: Option<MapSet>) -> bool {
         let Redraw::Interval(interval) = view.camera.redraw else { return false };
         let of_light = self.latest_light.filter(|(light, _)| maps.is_some_and(|maps| maps.light == *light));

@@ -16,8 +16,8 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
-    /// Warns of the rejections of a frame that are not reported yet. Some of them only drawing finds, so a frame with cached views finds a part
-    /// of these: that many or more were reported.
+    /// Warns of the rejections of a frame that are not reported yet. Some of them only drawing finds, so a frame with
+    /// cached views finds a part of these: that many or more were reported.
     pub(super) fn report(&mut self, rejections: &[Rejection], has_cached_views: bool) {
         let is_partial = |reason| {
             use RejectionReason::{CoarseEdges, LightLimit, UndrawableMesh};

@@ -20,7 +20,8 @@ pub(super) struct Suspended<S> {
 }
 
 impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
-    /// Runs all nodes. If that takes longer than the limit, measured by the given stopwatch, it returns where it stopped.
+    /// Runs all nodes. If that takes longer than the limit, measured by the given stopwatch, it returns where it
+    /// stopped.
     pub(super) fn run_serial(
         &self,
         worker: &Worker,

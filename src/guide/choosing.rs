@@ -41,7 +41,8 @@
 //! | the device, in pixels | `opaque_order` with 10 bits or `depth_pre_pass`, a `light_cut_off`, smaller shadow maps |
 //! | memory bandwidth | `normals: Octahedral8`, `diffuse: Srgb8` |
 //!
-//! A scene with hundreds of lights, or of panes, at one pixel loses light in half floats: set [`Quality::radiance_sum`].
+//! A scene with hundreds of lights, or of panes, at one pixel loses light in half floats: set
+//! [`Quality::radiance_sum`].
 //!
 //! [`FrameStatistics::tuning`]: crate::FrameStatistics::tuning
 //! [`Granularity::Adaptive`]: crate::Granularity::Adaptive

@@ -100,9 +100,9 @@ impl Declare {
     /// all channels of the format are 0: a target with an alpha that is written as 1 tells whether it has a history. The price is a
     /// copy of the target at the end of each frame. A raw pass finds it as the target [`previous_name`].
     ///
-    /// A history that is mixed with a share a of each frame ends within r/a of the mean of what it is mixed with, as a fraction of it. Here r
-    /// is what a write in the target's format loses: 2⁻¹⁰ for half floats and 2⁻²³ for floats if the device truncates, half of that if it
-    /// rounds. So a share of 1/100 needs [`Format::Rgba32Float`].
+    /// A history that is mixed with a share a of each frame ends within r/a of the mean of what it is mixed with, as a
+    /// fraction of it. Here r is what a write in the target's format loses: 2⁻¹⁰ for half floats and 2⁻²³ for floats if
+    /// the device truncates, half of that if it rounds. So a share of 1/100 needs [`Format::Rgba32Float`].
     pub fn samples_previous(&mut self, target: &str) {
         self.access(&previous_name(target), Access::SamplePrevious);
     }

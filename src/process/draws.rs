@@ -39,16 +39,18 @@ pub struct CommandDraws<'a> {
     /// The fragment entry point; `None` draws only depth.
     pub fragment: Option<&'a str>,
     /// The fragment entry point that takes the place of `fragment` in the maps of directional lights on devices without
-    /// [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES). There `clip_position` clamps corners in front of the near plane
-    /// onto it, and this entry point writes each pixel's own depth, at most 1. With `None`, a triangle that crosses the plane has wrong depths.
+    /// [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES). There `clip_position` clamps corners
+    /// in front of the near plane onto it, and this entry point writes each pixel's own depth, at most 1. With `None`,
+    /// a triangle that crosses the plane has wrong depths.
     pub clamped_fragment: Option<&'a str>,
-    /// The entry points for objects whose material [is a mask](crate::scene::Material::is_masked), in place of `vertex` and `fragment`;
-    /// `None` draws these objects like others.
+    /// The entry points for objects whose material [is a mask](crate::scene::Material::is_masked), in place of `vertex`
+    /// and `fragment`; `None` draws these objects like others.
     pub masked: Option<MaskedEntryPoints<'a>>,
     /// What `clamped_fragment` is for `fragment`, for the fragment entry point of `masked`.
     pub clamped_masked_fragment: Option<&'a str>,
-    /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides what is behind it
-    /// from culling. [Masked](crate::scene::Material::is_masked) objects never do. A shader that does so unsaid is warned of.
+    /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides
+    /// what is behind it from culling. [Masked](crate::scene::Material::is_masked) objects never do. A shader that does
+    /// so unsaid is warned of.
     pub discards: bool,
     /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
     /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped
@@ -62,8 +64,9 @@ pub struct CommandDraws<'a> {
     pub selection: Selection,
     /// Which faces of the objects are drawn.
     pub face_culling: FaceCulling,
-    /// The blend equation of each colour target, in the order declared; if empty, each object's material decides. Another number of
-    /// equations is an [error](super::ProcessError::BlendEquationCount). Objects that are drawn by equations hide nothing from culling.
+    /// The blend equation of each colour target, in the order declared; if empty, each object's material decides.
+    /// Another number of equations is an [error](super::ProcessError::BlendEquationCount). Objects that are drawn by
+    /// equations hide nothing from culling.
     pub blend_equations: Vec<BlendEquation>,
     /// Whether depth is written. Objects with a blending material write none, unless there are `blend_equations`.
     pub writes_depth: bool,

@@ -82,8 +82,9 @@ impl<T: NoUninit> Parameters<T> {
         *self.0.value.lock() = value;
     }
 
-    /// Changes them, for frames that are recorded from now on: `change` gets a copy, which takes the place of the value when it returns. Other
-    /// threads that change them wait for that; nobody waits to read them. If `change` panics, they stay.
+    /// Changes them, for frames that are recorded from now on: `change` gets a copy, which takes the place of the value
+    /// when it returns. Other threads that change them wait for that; nobody waits to read them. If `change` panics,
+    /// they stay.
     pub fn update<R>(&self, change: impl FnOnce(&mut T) -> R) -> R {
         let _updates = self.0.updates.lock();
         let mut value = self.get();

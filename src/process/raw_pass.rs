@@ -32,8 +32,8 @@ pub trait RawPass: Send + Sync {
 /// resource. The next frame is not affected. `tracing` warns, once, of what the process declares and the pass has not asked for in the
 /// first 60 frames that encode it: a declaration orders processes, and keeps those that write the target.
 ///
-/// Textures and buffers that a pass destroys are made anew for a later frame: histories and buffers without what they held. The frame itself
-/// fails, and so do those that were recorded before its submission.
+/// Textures and buffers that a pass destroys are made anew for a later frame: histories and buffers without what they
+/// held. The frame itself fails, and so do those that were recorded before its submission.
 ///
 /// Nothing checks how a pass uses what it gets: wgpu has no textures that can only be read, so no error tells of a pass that writes a
 /// target which its process only [reads](super::Declare::reads).

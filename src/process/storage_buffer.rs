@@ -24,8 +24,8 @@ impl<T: Pod> StorageBuffer<T> {
     /// A buffer of this name with this many elements. Two buffers of one name are the same buffer.
     ///
     /// # Panics
-    /// If its size is 0 or no `u64`, or that of `T` not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
-    /// the compiler.
+    /// If its size is 0 or no `u64`, or that of `T` not a multiple of 4 bytes, which no storage buffer can have. For a
+    /// constant, that is an error of the compiler.
     pub const fn new(name: &'static str, count: u32) -> Self {
         assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
         assert!(count > 0, "a buffer has elements");
@@ -69,8 +69,8 @@ impl<T: Pod> StorageBuffer<T> {
         GeneratedBuffer::of_storage(self.layout.name, self.layout.bytes as usize / size_of::<T>())
     }
 
-    /// The place of an element: of the arguments of an indirect draw or dispatch. A frame that draws by it is refused if the buffer has no such
-    /// element.
+    /// The place of an element: of the arguments of an indirect draw or dispatch. A frame that draws by it is refused
+    /// if the buffer has no such element.
     ///
     /// # Panics
     /// If its offset in bytes is no `u64`.

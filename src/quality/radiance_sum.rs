@@ -2,10 +2,11 @@
 
 /// How lights and blended objects are added to the target `radiance`, which has half floats.
 ///
-/// A sum of n terms in a format is rounded n times, each time by up to the format's step at the sum so far. A term below half of that step
-/// vanishes, and if a device truncates, a term below the whole of it. So a half float stops growing at some 2,000 to 4,000 equal terms: 1,000
-/// lights that add up to one lose up to a third, and 10,000 nearly all. The error of each value is that of
-/// [`max_light_error`](Self::max_light_error) and [`max_blended_error`](Self::max_blended_error).
+/// A sum of n terms in a format is rounded n times, each time by up to the format's step at the sum so far. A term
+/// below half of that step vanishes, and if a device truncates, a term below the whole of it. So a half float stops
+/// growing at some 2,000 to 4,000 equal terms: 1,000 lights that add up to one lose up to a third, and 10,000 nearly
+/// all. The error of each value is that of [`max_light_error`](Self::max_light_error) and
+/// [`max_blended_error`](Self::max_blended_error).
 ///
 /// Emitted and ambient light is stored in half floats too: once, with an error of 2⁻¹⁰ of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -15,36 +16,38 @@ pub enum RadianceSum {
     /// Cost: 8 bytes per pixel, read and written for every light that reaches it.
     #[default]
     HalfFloat,
-    /// One by one, in floats: lights in a target of their own, blended objects in another. Each target is added to `radiance` once.
+    /// One by one, in floats: lights in a target of their own, blended objects in another. Each target is added to
+    /// `radiance` once.
     ///
-    /// Cost: 16 bytes per pixel, read and written for every light that reaches it, and up to two targets of that size. It needs a device
-    /// that [blends floats](crate::backend::Backend::can_blend_floats). Without one, lights are summed as by [`Self::Shader`], and blended
-    /// objects as by [`Self::HalfFloat`], which frames count as
+    /// Cost: 16 bytes per pixel, read and written for every light that reaches it, and up to two targets of that size.
+    /// It needs a device that [blends floats](crate::backend::Backend::can_blend_floats). Without one, lights are
+    /// summed as by [`Self::Shader`], and blended objects as by [`Self::HalfFloat`], which frames count as
     /// [`HalfFloatBlending`](crate::view::RejectionReason::HalfFloatBlending).
     Float,
-    /// Lights by a shader that adds them in batches of 32, these in batches of 32, and then to `radiance` once. On every device. Blended
-    /// objects as by [`Self::Float`].
+    /// Lights by a shader that adds them in batches of 32, these in batches of 32, and then to `radiance` once. On
+    /// every device. Blended objects as by [`Self::Float`].
     ///
-    /// Cost: every pixel tests the lights that may reach its tile of 32 × 32 pixels, which a pass before it marks: for many small lights, that
-    /// is slower than [`Self::Float`]. No bytes per light, and one per pixel. Mesa's llvmpipe ends a pixel's loops after 65,535 iterations:
-    /// of more than 50,000 lights that reach one tile it leaves out the last.
+    /// Cost: every pixel tests the lights that may reach its tile of 32 × 32 pixels, which a pass before it marks: for
+    /// many small lights, that is slower than [`Self::Float`]. No bytes per light, and one per pixel. Mesa's llvmpipe
+    /// ends a pixel's loops after 65,535 iterations: of more than 50,000 lights that reach one tile it leaves out the
+    /// last.
     Shader,
 }
 
 impl RadianceSum {
-    /// The maximum error of the light that this number of lights adds to a pixel, as a fraction of what the pixel's radiance becomes: in
-    /// addition to the error of each light by itself.
+    /// The maximum error of the light that this number of lights adds to a pixel, as a fraction of what the pixel's
+    /// radiance becomes: in addition to the error of each light by itself.
     ///
-    /// Let h be 2⁻¹⁰ and u 2⁻²³: what an addition in half floats and in floats loses of the sum if a device truncates, and twice what it
-    /// loses if it rounds to nearest. No partial sum exceeds the last one, so
+    /// Let h be 2⁻¹⁰ and u 2⁻²³: what an addition in half floats and in floats loses of the sum if a device truncates,
+    /// and twice what it loses if it rounds to nearest. No partial sum exceeds the last one, so
     ///
     /// - n blends in half floats lose nh, and h for the conversion of each light. None loses more than its own light, so all lose at most 1;
     /// - n blends in floats lose nu, the conversion of each light u, and the addition to `radiance` h;
     /// - in a shader each light is one of up to 32 terms, their sum one of up to 32, and that one of n/1024. The last two additions, the
     ///   division by π and the product with the diffuse colour make 5u more.
     ///
-    /// Beside it, a half float is off by up to 2⁻²⁴ per addition to it, in absolute terms: its smallest step. A sum above 60,000 counts as
-    /// 60,000.
+    /// Beside it, a half float is off by up to 2⁻²⁴ per addition to it, in absolute terms: its smallest step. A sum
+    /// above 60,000 counts as 60,000.
     pub fn max_light_error(self, lights: u32) -> f64 {
         let n = f64::from(lights);
         match self {
@@ -55,13 +58,13 @@ impl RadianceSum {
         }
     }
 
-    /// The maximum error of the radiance of a pixel that this number of blended objects covers: as a fraction of the radiance that it would
-    /// have if they were opaque to nothing and all added, on a device that [blends floats](crate::backend::Backend::can_blend_floats).
-    /// On others every value has the error of [`Self::HalfFloat`].
+    /// The maximum error of the radiance of a pixel that this number of blended objects covers: as a fraction of the
+    /// radiance that it would have if they were opaque to nothing and all added, on a device that [blends
+    /// floats](crate::backend::Backend::can_blend_floats). On others every value has the error of [`Self::HalfFloat`].
     ///
-    /// No partial sum exceeds that radiance. A blend has two products, of colour and opacity and of transmittance and sum, an addition, and
-    /// the conversion of its colour: 4h in half floats, 4u in floats, where the opacity that is left is off by 3u in addition. The
-    /// addition to `radiance` loses h, and 2u for its product.
+    /// No partial sum exceeds that radiance. A blend has two products, of colour and opacity and of transmittance and
+    /// sum, an addition, and the conversion of its colour: 4h in half floats, 4u in floats, where the opacity that is
+    /// left is off by 3u in addition. The addition to `radiance` loses h, and 2u for its product.
     pub fn max_blended_error(self, objects: u32) -> f64 {
         let n = f64::from(objects);
         match self {

@@ -94,14 +94,16 @@ pub struct Quality {
     ///
     /// Error: at any point, the illuminance of each light differs by at most 1.089 times this. A light of intensity I
     /// is drawn up to r = √(I / cut-off), and windowed by (1 − (d/r)⁴)². With s = d/r the difference from I/d² is the
-    /// cut-off times 2s² − s⁶ up to s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. A light that becomes brighter
-    /// while its shadow map is [kept](ShadowQuality::interval) still ends up to a ninth too early: there it is 1.38 times. Cost: the pixels
-    /// within the lights' reach.
+    /// cut-off times 2s² − s⁶ up to s = 1, whose maximum is at s⁴ = 2/3, and less than the cut-off beyond. A light that
+    /// becomes brighter while its shadow map is [kept](ShadowQuality::interval) still ends up to a ninth too early:
+    /// there it is 1.38 times. Cost: the pixels within the lights' reach.
     pub light_cut_off: f32,
-    /// How lights and blended objects are added to the target `radiance` of a [`Deferred`](crate::process::Deferred) pipeline.
+    /// How lights and blended objects are added to the target `radiance` of a [`Deferred`](crate::process::Deferred)
+    /// pipeline.
     ///
-    /// Error: a fraction of the light that is added, by the number of lights or objects: see [`RadianceSum::max_light_error`] and
-    /// [`RadianceSum::max_blended_error`]. Cost: bytes per pixel and light, or every pixel tests the lights of its tile.
+    /// Error: a fraction of the light that is added, by the number of lights or objects: see
+    /// [`RadianceSum::max_light_error`] and [`RadianceSum::max_blended_error`]. Cost: bytes per pixel and light, or
+    /// every pixel tests the lights of its tile.
     pub radiance_sum: RadianceSum,
     /// The tone mapping curve.
     ///

@@ -19,17 +19,18 @@ pub struct ShadowQuality {
     pub bias: f32,
     /// Maps are drawn every `interval` frames, at least 1, those of different lights in turns: a map is a view that is
     /// [redrawn](crate::scene::Redraw) every so many frames. They are also drawn at once if a light with a map is added
-    /// or removed, or if the quality or the plan changes; those of a directional light for a main camera, if one no longer fits what that
-    /// sees: if its centre is off by a quarter of its radius, or its radius is a quarter too small; those of other lights, if their range
-    /// grows by more than an eighth. In between, a light with a map keeps its position, direction and range.
+    /// or removed, or if the quality or the plan changes; those of a directional light for a main camera, if one no
+    /// longer fits what that sees: if its centre is off by a quarter of its radius, or its radius is a quarter too
+    /// small; those of other lights, if their range grows by more than an eighth. In between, a light with a map keeps
+    /// its position, direction and range.
     ///
     /// Error: shadows are up to `interval` − 1 frames old, so those of objects that move at v m/s lag by (`interval` −
     /// 1)·v·Δt metres. Cost: the maps' share of a frame, divided by this.
     pub interval: u32,
     /// The largest angle, in degrees, under which a hemispherical light sees an edge that its map draws as a straight
     /// line, above 0 and up to 90: longer edges are subdivided. The error of a straight edge is 39 pixels of a map of
-    /// 1024 at 45°, 7.8 at 20°, 1.95 at 10°, 0.49 at 5° and 0.08 at 2° (Brabec et al. 2002); that of a mask's holes, which lie
-    /// between edges, is up to a third larger. Cost: each subdivision level multiplies triangles by four.
+    /// 1024 at 45°, 7.8 at 20°, 1.95 at 10°, 0.49 at 5° and 0.08 at 2° (Brabec et al. 2002); that of a mask's holes,
+    /// which lie between edges, is up to a third larger. Cost: each subdivision level multiplies triangles by four.
     pub widest_edge: f32,
 }
 

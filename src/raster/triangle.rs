@@ -47,8 +47,9 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// height in pixels, and appends it to `triangles`: several triangles if it is clipped, none if it covers no pixel.
     /// `culled` is the winding to cull.
     ///
-    /// Depth is reversed: visible points have 0 ≤ z ≤ w, or any z from 0 if the near plane clamps. The far plane is at z = 0, may be at infinity, and clips, as
-    /// in wgpu. Nothing is appended if a corner is not finite, or if the picture is larger than [`MAX_PICTURE_SIZE`].
+    /// Depth is reversed: visible points have 0 ≤ z ≤ w, or any z from 0 if the near plane clamps. The far plane is at
+    /// z = 0, may be at infinity, and clips, as in wgpu. Nothing is appended if a corner is not finite, or if the
+    /// picture is larger than [`MAX_PICTURE_SIZE`].
     pub fn set_up(
         corners: &[(Vector4<R>, [R; V]); 3],
         picture: [usize; 2],
@@ -78,11 +79,11 @@ impl<R: Real, const V: usize> Triangle<R, V> {
     /// Calls `visit` with the column and row, and the depth, of each covered pixel within some bounds: row by row from
     /// the top, each from left to right.
     ///
-    /// Depth is z ÷ w, linear in the picture, and at most 1. It is bit-identical for any bounds, lies between the depths of the
-    /// nearest and the farthest corner, and differs by at most 8 unit roundoffs (2⁻²⁴ of it each, in f32) from the
-    /// exact interpolation between the snapped corners: it is the sum of each corner's depth times its barycentric
-    /// weight, where no term is negative, so no error grows by cancellation. A weight is an exact integer rounded once
-    /// (1 unit), the product (1), two sums (2), 1 ÷ area (2), and the product with it (1).
+    /// Depth is z ÷ w, linear in the picture, and at most 1. It is bit-identical for any bounds, lies between the
+    /// depths of the nearest and the farthest corner, and differs by at most 8 unit roundoffs (2⁻²⁴ of it each, in f32)
+    /// from the exact interpolation between the snapped corners: it is the sum of each corner's depth times its
+    /// barycentric weight, where no term is negative, so no error grows by cancellation. A weight is an exact integer
+    /// rounded once (1 unit), the product (1), two sums (2), 1 ÷ area (2), and the product with it (1).
     pub fn rasterize(&self, within: PixelBounds, mut visit: impl FnMut([usize; 2], R)) {
         let bounds = self.bounds.intersection(within);
         for row in bounds.top..bounds.bottom {

@@ -20,7 +20,8 @@ pub struct Camera {
     /// height: the lens shift of an off-centre frustum. 0 for most cameras, and always without perspective.
     /// [`Camera::tile`] and [`Camera::jittered`] set it.
     pub shift: Vec2,
-    /// The picture of which it draws a part; `None` if it draws a whole one. [`Camera::tile`] and [`Camera::jittered`] set it.
+    /// The picture of which it draws a part; `None` if it draws a whole one. [`Camera::tile`] and [`Camera::jittered`]
+    /// set it.
     pub whole: Option<WholePicture>,
     /// Only what is in front of this plane is drawn: an oblique near plane. `None` for most cameras, and always without perspective.
     pub clip_plane: Option<ClipPlane>,
@@ -58,10 +59,11 @@ pub struct Camera {
 pub enum ViewKind {
     /// The shadow map of a light.
     Shadow,
-    /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred) draws in it what
-    /// it draws in a main view, as far as others [sample](crate::process::Declare::samples_view) it. Shadow maps of directional lights cover
-    /// what a main view sees, so elsewhere nothing is in their shadow: the main view that it is [named](Camera::child_name) after, as
-    /// `main/mirror` is after `main`, or else the scene's first one.
+    /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred)
+    /// draws in it what it draws in a main view, as far as others [sample](crate::process::Declare::samples_view) it.
+    /// Shadow maps of directional lights cover what a main view sees, so elsewhere nothing is in their shadow: the main
+    /// view that it is [named](Camera::child_name) after, as `main/mirror` is after `main`, or else the scene's first
+    /// one.
     Reflection,
     /// The picture on the screen.
     #[default]

@@ -1,5 +1,5 @@
-//! How long a job waits for a chunk that a job of a CPU node holds: as long as that job works, however slow it is, and whether or not a
-//! debugger has stopped it. A chunk that nobody will let go of is an error after a second.
+//! How long a job waits for a chunk that a job of a CPU node holds: as long as that job works, however slow it is, and
+//! whether or not a debugger has stopped it. A chunk that nobody will let go of is an error after a second.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -30,14 +30,15 @@ thread_local! {
     static THREAD: Arc<NodeThread> = Arc::default();
 }
 
-/// A wait is cut into slices, and the time is counted in them: while a debugger has stopped the whole process, only one passes.
+/// A wait is cut into slices, and the time is counted in them: while a debugger has stopped the whole process, only one
+/// passes.
 const SLICE: Duration = Duration::from_millis(5);
 /// The slices in which nobody works on the chunk, after which nobody ever will.
 const MAX_IDLE_SLICES: u32 = 200;
 
 impl ChunkHolder {
-    /// Takes a chunk with `try_lock`, which waits for a given time. `None` if it is held by this job, by one that has leaked its guard,
-    /// or by one that waits for another chunk itself.
+    /// Takes a chunk with `try_lock`, which waits for a given time. `None` if it is held by this job, by one that has
+    /// leaked its guard, or by one that waits for another chunk itself.
     pub(super) fn wait<G>(&self, try_lock: impl Fn(Duration) -> Option<G>) -> Option<G> {
         let guard = try_lock(Duration::ZERO).or_else(|| self.wait_in_slices(try_lock))?;
         *self.0.lock() = Some(NodeJob::current());

@@ -8,9 +8,10 @@ use super::camera::child_name;
 use super::{Camera, ClipPlane, Projection, ViewKind};
 
 impl Camera {
-    /// The camera of one tile of this camera's picture, which is divided into `count` × `count` tiles. Tile `[0, 0]` is the upper left
-    /// one. Each has this camera's `size`, so the tiles put together are a picture with `count` times as many pixels a row (M 10.1). The
-    /// name is this camera's with the tile's column and row. All tiles have the same shadows, also those of different frames.
+    /// The camera of one tile of this camera's picture, which is divided into `count` × `count` tiles. Tile `[0, 0]` is
+    /// the upper left one. Each has this camera's `size`, so the tiles put together are a picture with `count` times as
+    /// many pixels a row (M 10.1). The name is this camera's with the tile's column and row. All tiles have the same
+    /// shadows, also those of different frames.
     ///
     /// ```
     /// use drawloom::glam::DVec3;

@@ -73,8 +73,8 @@ impl<T: Pod> GeneratedBuffer<T> {
     /// What a chunk has, in bytes, unless the engine chooses another length.
     const CHUNK_BYTES: usize = 16 << 10;
 
-    /// A buffer with room for this many elements. It takes no memory until a frame fills it: a frame for which there is not enough memory fails
-    /// with [`FrameError::GeneratedMemory`](crate::FrameError::GeneratedMemory).
+    /// A buffer with room for this many elements. It takes no memory until a frame fills it: a frame for which there is
+    /// not enough memory fails with [`FrameError::GeneratedMemory`](crate::FrameError::GeneratedMemory).
     ///
     /// # Panics
     /// If it has none, or `T` has no bytes, a size that is not a multiple of 4 bytes, or an alignment of more than 16.
@@ -188,8 +188,8 @@ impl GeneratedSource {
         Self { layout, contents: Mutex::default() }
     }
 
-    /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled. `None` if there is no memory
-    /// for another one.
+    /// The content of a frame that begins: one that no other frame has, with all elements and none of them filled.
+    /// `None` if there is no memory for another one.
     pub(crate) fn begin_frame(&self) -> Option<Arc<GeneratedContents>> {
         let mut contents = self.contents.lock();
         let mut free_count = 0;
@@ -257,8 +257,8 @@ impl GeneratedContents {
     fn new(layout: GeneratedLayout) -> Option<Self> {
         let mut chunks = Vec::new();
         chunks.try_reserve_exact(layout.chunk_count()).ok()?;
-        // The system gives memory away that it does not have, but hardly in one piece. What is too large would otherwise end the process
-        // somewhere among the chunks.
+        // The system gives memory away that it does not have, but hardly in one piece. What is too large would
+        // otherwise end the process somewhere among the chunks.
         let mut all = Vec::<u8>::new();
         all.try_reserve_exact(layout.bytes()).ok()?;
         // Otherwise the compiler may leave out memory that nobody uses.

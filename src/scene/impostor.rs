@@ -16,8 +16,8 @@ impl Camera {
     /// square at `center` with the camera's orientation and a half-width of [`Camera::impostor_half_width`]; from this camera's position it
     /// looks as the original does.
     ///
-    /// `before` is the result of an earlier frame. It is returned again, so that the view need not be drawn again, while
-    /// it has the same name and side and what it shows is displaced, where it is, by at most about `radius` ·
+    /// `before` is the result of an earlier frame. It is returned again, so that the view need not be drawn again,
+    /// while it has the same name and side and what it shows is displaced, where it is, by at most about `radius` ·
     /// `max_angle` metres. This is the sum of three errors: this camera sees the original turned by up to `max_angle`
     /// radians against the picture, from another distance, or with another radius than the picture was drawn for. The
     /// picture of something very small or far away is wider than it, and what its camera rounds displaces it by up to

@@ -31,9 +31,9 @@ pub enum Light {
         intensity: Vec3,
         /// The distance at which the light ends, in metres.
         range: f32,
-        /// Whether objects cast shadows in this light. Its shadow maps are the six faces of a cube, and each is a layer of the texture that
-        /// all shadow maps of a frame share. A device allows 256 layers or more: 42 such lights whose range a camera sees. More are drawn
-        /// without a shadow: see [`ShadowMaps`](crate::view::ShadowMaps).
+        /// Whether objects cast shadows in this light. Its shadow maps are the six faces of a cube, and each is a layer
+        /// of the texture that all shadow maps of a frame share. A device allows 256 layers or more: 42 such lights
+        /// whose range a camera sees. More are drawn without a shadow: see [`ShadowMaps`](crate::view::ShadowMaps).
         casts_shadow: bool,
     },
     /// A cone.

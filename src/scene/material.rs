@@ -22,22 +22,23 @@ pub struct Material {
     pub opacity: f32,
     /// How the surface is blended with what is behind it.
     pub blend: Blend,
-    /// Makes a material without blending a mask, from 0 to 1: where its alpha, which is `opacity` times that of the `texture`, is less,
-    /// there is no surface, in pictures and in shadows; elsewhere the surface is opaque. `None` for no holes. Blended materials do not
-    /// use it. It is glTF's `alphaCutoff` for `alphaMode: MASK`.
+    /// Makes a material without blending a mask, from 0 to 1: where its alpha, which is `opacity` times that of the
+    /// `texture`, is less, there is no surface, in pictures and in shadows; elsewhere the surface is opaque. `None` for
+    /// no holes. Blended materials do not use it. It is glTF's `alphaCutoff` for `alphaMode: MASK`.
     ///
-    /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling. A mask has no holes while its texture
-    /// is not on the device.
+    /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling. A mask has no
+    /// holes while its texture is not on the device.
     ///
-    /// The mask is read at the texture's full resolution, however far away it is: what is left covers as large a share of distant pixels
-    /// as of near ones, where averaged alpha would be below the cutoff everywhere, or nowhere. As with triangles of that size, each pixel
-    /// is covered or not. Devices round when they filter, so an alpha that is less by up to 1/4096 of the cutoff counts as equal.
+    /// The mask is read at the texture's full resolution, however far away it is: what is left covers as large a share
+    /// of distant pixels as of near ones, where averaged alpha would be below the cutoff everywhere, or nowhere. As
+    /// with triangles of that size, each pixel is covered or not. Devices round when they filter, so an alpha that is
+    /// less by up to 1/4096 of the cutoff counts as equal.
     pub alpha_cutoff: Option<f32>,
     /// Whether back faces are drawn too.
     pub double_sided: bool,
-    /// Its values, if it has a [`MaterialType`](super::MaterialType): then the engine's own processes draw it. Of the other fields the
-    /// shipped ones use `blend` and `double_sided`, and the [shadow casters](crate::process::ShadowCasters) use the mask: `alpha_cutoff`,
-    /// `opacity` and `texture`.
+    /// Its values, if it has a [`MaterialType`](super::MaterialType): then the engine's own processes draw it. Of the
+    /// other fields the shipped ones use `blend` and `double_sided`, and the [shadow
+    /// casters](crate::process::ShadowCasters) use the mask: `alpha_cutoff`, `opacity` and `texture`.
     pub values: Option<MaterialValues>,
 }
 
@@ -63,7 +64,8 @@ impl Material {
         self.blend == Blend::None && self.alpha_cutoff.is_some()
     }
 
-    /// The alpha below which shaders leave out a pixel: less than the cutoff by what filtering may round off. 0 without a mask.
+    /// The alpha below which shaders leave out a pixel: less than the cutoff by what filtering may round off. 0 without
+    /// a mask.
     pub(crate) fn least_alpha(&self) -> f32 {
         const ROUNDING: f32 = 1.0 / 4096.0;
         self.alpha_cutoff.filter(|_| self.is_masked()).map_or(0.0, |cutoff| cutoff * (1.0 - ROUNDING))
@@ -95,10 +97,11 @@ pub enum Blend {
 
 /// An RGBA image for a material. Clones share their pixels.
 ///
-/// Backends scale a texture to a square with sides of 256, 512, 1024 or 2048 pixels: to the smallest that is at least as wide and as high,
-/// so that it keeps its detail, or else to the largest. One that has more pixels than [`Texture::MAX_DETAIL`] in a direction is drawn with
-/// that many, filtered when it is uploaded, and counted as [`ReducedTexture`](crate::view::RejectionReason::ReducedTexture) in every
-/// frame: details that are finer become their mean.
+/// Backends scale a texture to a square with sides of 256, 512, 1024 or 2048 pixels: to the smallest that is at least
+/// as wide and as high, so that it keeps its detail, or else to the largest. One that has more pixels than
+/// [`Texture::MAX_DETAIL`] in a direction is drawn with that many, filtered when it is uploaded, and counted as
+/// [`ReducedTexture`](crate::view::RejectionReason::ReducedTexture) in every frame: details that are finer become their
+/// mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     name: String,

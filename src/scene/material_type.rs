@@ -9,9 +9,9 @@ use bytemuck::Pod;
 /// [materials](super::Material::values) bring values for it, and a process [declares](crate::process::Declare::reads_materials) that its
 /// shader reads them and [selects](crate::command::Selection::of_material_type) the objects that have such a material.
 ///
-/// The shipped depth pre-pass, geometry buffer and transparency leave these objects to that process: without one they are not drawn.
-/// Opaque ones cast shadows like others, and those whose material [is a mask](super::Material::is_masked) cast them in its shape: see
-/// [`ShadowCasters`](crate::process::ShadowCasters).
+/// The shipped depth pre-pass, geometry buffer and transparency leave these objects to that process: without one they
+/// are not drawn. Opaque ones cast shadows like others, and those whose material [is a
+/// mask](super::Material::is_masked) cast them in its shape: see [`ShadowCasters`](crate::process::ShadowCasters).
 ///
 /// `T` has the layout of the structure in WGSL, padding included: a `vec3<f32>` begins at a multiple of 16 bytes, and the size of `T` is
 /// a multiple of the greatest alignment of its fields.

@@ -64,8 +64,9 @@ impl Mesh {
     /// it may be missing.
     ///
     /// The CPU does not see its triangles. So it has no [`vertices`](Self::vertices), [`indices`](Self::indices),
-    /// [`attribute`](Self::attribute) or [`longest_edge`](Self::longest_edge), is never an occluder, is neither subdivided for
-    /// paraboloids nor culled by triangle, and the software backend leaves it out. Batches of meshes with equal layouts share pipelines.
+    /// [`attribute`](Self::attribute) or [`longest_edge`](Self::longest_edge), is never an occluder, is neither
+    /// subdivided for paraboloids nor culled by triangle, and the software backend leaves it out. Batches of meshes
+    /// with equal layouts share pipelines.
     ///
     /// # Errors
     /// If it has no triangle, no positions, an attribute twice or in a format that does not fit it, a buffer without the usage for it, a

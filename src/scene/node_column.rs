@@ -75,8 +75,8 @@ impl<'a, T> NodeColumn<'a, T> {
         self.chunks.len()
     }
 
-    /// A chunk to write, by index. Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so
-    /// hold one at a time.
+    /// A chunk to write, by index. Other jobs that access the chunk wait while it is held, as long as the job that
+    /// holds it works, so hold one at a time.
     ///
     /// # Errors
     /// If it has been read in this frame, because the node does not declare that it writes [`FrameData::Transforms`](crate::FrameData::Transforms);

@@ -11,15 +11,16 @@ pub enum Projection {
     },
     /// Parallel projection.
     ///
-    /// In a [`ViewKind::Shadow`](super::ViewKind::Shadow) view, depth is clamped to the near plane: an object in front of it still casts a
-    /// shadow.
+    /// In a [`ViewKind::Shadow`](super::ViewKind::Shadow) view, depth is clamped to the near plane: an object in front
+    /// of it still casts a shadow.
     Orthographic {
         /// The height of the view volume, in metres, 1e-6 or more.
         height: f32,
     },
     /// Paraboloid projection: the half space before the camera becomes a disc as wide as the picture (Brabec et al.
     /// 2002; the shadow map of L 4.2.2). Rasterised edges are straight although the projection curves them, so meshes
-    /// are subdivided as far as the angle of their edges requires. Only for [`ViewKind::Shadow`](super::ViewKind::Shadow).
+    /// are subdivided as far as the angle of their edges requires. Only for
+    /// [`ViewKind::Shadow`](super::ViewKind::Shadow).
     Paraboloid,
 }
 

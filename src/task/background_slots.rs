@@ -2,20 +2,21 @@
 //!
 //! # Memory ordering
 //!
-//! A slot hands no data over: the queues do. So both numbers are relaxed. That no job is left waiting rests on the fences of
-//! [`Sleep`](super::sleep::Sleep): see *Background slots* there.
+//! A slot hands no data over: the queues do. So both numbers are relaxed. That no job is left waiting rests on the
+//! fences of [`Sleep`](super::sleep::Sleep): see *Background slots* there.
 
 use crate::sync::{AtomicUsize, Ordering};
 
-/// The slots of a scheduler. A worker's thread takes one before it looks for background jobs, and keeps it until it finds none or
-/// finds a frame's job.
+/// The slots of a scheduler. A worker's thread takes one before it looks for background jobs, and keeps it until it
+/// finds none or finds a frame's job.
 pub(super) struct BackgroundSlots {
     limit: AtomicUsize,
     taken: AtomicUsize,
 }
 
 impl BackgroundSlots {
-    /// A quarter of the workers, and at least one: a frame that runs beside long background jobs takes a third longer at most.
+    /// A quarter of the workers, and at least one: a frame that runs beside long background jobs takes a third longer
+    /// at most.
     pub(super) fn new(workers: usize) -> Self {
         Self { limit: AtomicUsize::new((workers / 4).max(1)), taken: AtomicUsize::new(0) }
     }

@@ -72,8 +72,8 @@ impl Scheduler {
 }
 
 impl SchedulerBuilder {
-    /// The size of a thread's stack in bytes if [nothing else](Self::stack_size) is set: 16 MiB, room for 4,000 nested scopes even
-    /// without optimisations.
+    /// The size of a thread's stack in bytes if [nothing else](Self::stack_size) is set: 16 MiB, room for 4,000 nested
+    /// scopes even without optimisations.
     pub const DEFAULT_STACK_SIZE: usize = 16 << 20;
     /// The smallest stack of a thread in bytes: 256 KiB, which the scheduler's own code and a few nested scopes need.
     pub const MIN_STACK_SIZE: usize = 256 << 10;
@@ -91,13 +91,13 @@ impl SchedulerBuilder {
         self
     }
 
-    /// Sets the size of each thread's stack in bytes. The system rounds it up to whole pages, reserves it as address space, and
-    /// gives it memory only where it is used. The default is [`DEFAULT_STACK_SIZE`](Self::DEFAULT_STACK_SIZE); less than
-    /// [`MIN_STACK_SIZE`](Self::MIN_STACK_SIZE) counts as that. The stack of the thread that calls the scheduler is the engine's own
-    /// choice.
+    /// Sets the size of each thread's stack in bytes. The system rounds it up to whole pages, reserves it as address
+    /// space, and gives it memory only where it is used. The default is
+    /// [`DEFAULT_STACK_SIZE`](Self::DEFAULT_STACK_SIZE); less than [`MIN_STACK_SIZE`](Self::MIN_STACK_SIZE) counts as
+    /// that. The stack of the thread that calls the scheduler is the engine's own choice.
     ///
-    /// A scope, loop or graph that a job opens runs on top of that job, so scopes that nest need a stack in proportion to their
-    /// depth: 3 to 4 KiB each, beside what the jobs hold.
+    /// A scope, loop or graph that a job opens runs on top of that job, so scopes that nest need a stack in proportion
+    /// to their depth: 3 to 4 KiB each, beside what the jobs hold.
     pub fn stack_size(mut self, bytes: usize) -> Self {
         self.stack_size = Some(bytes);
         self
@@ -153,9 +153,9 @@ impl SchedulerBuilder {
         self
     }
 
-    /// Sets the clock that the [timeline](Scheduler::timeline) reads instead of the system's: the time since some moment, which
-    /// never decreases, on whichever thread it is read. What nodes and stages cost is measured by it too, so a simulated clock makes
-    /// what is chosen by these costs the same in each run.
+    /// Sets the clock that the [timeline](Scheduler::timeline) reads instead of the system's: the time since some
+    /// moment, which never decreases, on whichever thread it is read. What nodes and stages cost is measured by it too,
+    /// so a simulated clock makes what is chosen by these costs the same in each run.
     ///
     /// If the clock panics, it is not called again: time stands still at its latest reading. That is reported to [`tracing`] as an
     /// error, and in [`clock_panic`](crate::timeline::Log::clock_panic) of every log from then on. Jobs are not affected.

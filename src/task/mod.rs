@@ -79,9 +79,10 @@
 //!
 //! # A job in the background
 //!
-//! Work that may take longer than a frame goes into the [background](Scheduler::background). A thread that calls the scheduler for
-//! a frame never takes a background job. Other workers run it while they have nothing else to do, a quarter of all workers
-//! [at once](Scheduler::set_background_workers), so that frames have the rest, however long the jobs are.
+//! Work that may take longer than a frame goes into the [background](Scheduler::background). A thread that calls the
+//! scheduler for a frame never takes a background job. Other workers run it while they have nothing else to do, a
+//! quarter of all workers [at once](Scheduler::set_background_workers), so that frames have the rest, however long the
+//! jobs are.
 //!
 //! ```
 //! use std::time::Duration;
@@ -119,8 +120,8 @@
 //!
 //! Other code of the engine may panic too. The hooks that name, place or start threads fail the
 //! [build](SchedulerBuilder::build). The panic of the hook that stops a thread is reported to [`tracing`]. A
-//! [clock](SchedulerBuilder::timeline_clock) that panics stands still. If a subscriber of `tracing` panics, its event or span is
-//! lost. A panic during the unwinding of another panic, such as that of a destructor, ends the process, as
+//! [clock](SchedulerBuilder::timeline_clock) that panics stands still. If a subscriber of `tracing` panics, its event
+//! or span is lost. A panic during the unwinding of another panic, such as that of a destructor, ends the process, as
 //! in any Rust program.
 //!
 //! # What a thread does while it waits

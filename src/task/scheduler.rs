@@ -144,26 +144,27 @@ impl Scheduler {
     }
 
     /// Queues a job that no frame waits for. It may take longer than a frame, and is not interrupted. It runs on a
-    /// worker other than 0 that has nothing else to do, of which [a few](Self::set_background_workers) do so at once, in
-    /// [`run_background`](Self::run_background), or in [`BackgroundJob::wait`]. With a single worker only the last two run it.
+    /// worker other than 0 that has nothing else to do, of which [a few](Self::set_background_workers) do so at once,
+    /// in [`run_background`](Self::run_background), or in [`BackgroundJob::wait`]. With a single worker only the last
+    /// two run it.
     ///
     /// The scopes and loops that it opens on this scheduler are background work as well. If a thread runs the job by
     /// waiting for it, they are part of that thread's work instead. Jobs that have not begun when the scheduler is
-    /// dropped run only if a thread waits for them. A job that owns its scheduler keeps both in memory until it has run:
-    /// with a single worker for ever, if nobody runs it.
+    /// dropped run only if a thread waits for them. A job that owns its scheduler keeps both in memory until it has
+    /// run: with a single worker for ever, if nobody runs it.
     pub fn background<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> BackgroundJob<T> {
         let job = BackgroundJob::queued(self.shared.background(), job);
         self.shared.wake_for_background();
         job
     }
 
-    /// Sets how many workers run background jobs at once, so that long ones leave the others to frames: at first a quarter of
-    /// the workers, and at least one. With 0 they run only in [`run_background`](Self::run_background) and
-    /// [`BackgroundJob::wait`], which this does not limit. A scheduler of two workers has one thread beside its caller, which a
-    /// background job occupies as long as it runs.
+    /// Sets how many workers run background jobs at once, so that long ones leave the others to frames: at first a
+    /// quarter of the workers, and at least one. With 0 they run only in [`run_background`](Self::run_background) and
+    /// [`BackgroundJob::wait`], which this does not limit. A scheduler of two workers has one thread beside its caller,
+    /// which a background job occupies as long as it runs.
     ///
-    /// An engine that shows a loading screen raises it to [`workers`](Self::workers), and lowers it again when frames count.
-    /// Jobs that have begun then go on.
+    /// An engine that shows a loading screen raises it to [`workers`](Self::workers), and lowers it again when frames
+    /// count. Jobs that have begun then go on.
     pub fn set_background_workers(&self, workers: usize) {
         self.shared.background_slots().set_limit(workers);
         self.shared.wake_for_background();

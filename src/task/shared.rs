@@ -96,15 +96,16 @@ impl<W: JobContext> Shared<W> {
         &self.background_slots
     }
 
-    /// Wakes a worker for background jobs, if one of them may run any. The job, or the free slot, must have been published.
+    /// Wakes a worker for background jobs, if one of them may run any. The job, or the free slot, must have been
+    /// published.
     pub(super) fn wake_for_background(&self) {
         if self.has_background_slot() {
             self.sleep.wake_despite_searchers(Priority::Background);
         }
     }
 
-    /// Whether a worker may take a background job, as seen after all that this thread has published. If it may not, the worker
-    /// that frees a slot sees that.
+    /// Whether a worker may take a background job, as seen after all that this thread has published. If it may not, the
+    /// worker that frees a slot sees that.
     pub(super) fn has_background_slot(&self) -> bool {
         fence(Ordering::SeqCst);
         self.background_slots.is_free()

@@ -372,8 +372,8 @@ fn shuttle_a_background_job_drops_the_last_reference_to_its_scheduler() {
     });
 }
 
-/// Frames take workers from the background and give them back, and the limit changes meanwhile. Nobody waits for the jobs, so a
-/// wake-up that is lost leaves them in the queue for ever.
+/// Frames take workers from the background and give them back, and the limit changes meanwhile. Nobody waits for the
+/// jobs, so a wake-up that is lost leaves them in the queue for ever.
 #[test]
 fn shuttle_background_jobs_beyond_the_limit_run_when_a_worker_is_free() {
     for limits in [[1, 1], [1, 2], [2, 1], [0, 1]] {
@@ -397,8 +397,8 @@ fn shuttle_background_jobs_beyond_the_limit_run_when_a_worker_is_free() {
     }
 }
 
-/// A frame and one of its jobs wait for the background. A worker that turns to that job must hand the rest of the background over to
-/// the one that sleeps.
+/// A frame and one of its jobs wait for the background. A worker that turns to that job must hand the rest of the
+/// background over to the one that sleeps.
 #[test]
 fn shuttle_a_worker_that_turns_to_a_frame_hands_the_background_over() {
     check(|| {

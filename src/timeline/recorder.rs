@@ -194,8 +194,8 @@ impl Timeline {
         log
     }
 
-    /// Takes out one worker's chunks, and its idle intervals from the last log until `now`. Chunks of a run without an index are lost, and
-    /// the run's number is added to `open_runs`.
+    /// Takes out one worker's chunks, and its idle intervals from the last log until `now`. Chunks of a run without an
+    /// index are lost, and the run's number is added to `open_runs`.
     fn drain(
         &self,
         (worker, now): (usize, Duration),

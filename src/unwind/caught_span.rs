@@ -6,7 +6,8 @@ use tracing::Span;
 
 use super::{catch, discard};
 
-/// A span of `tracing`. If the subscriber panics, what it was told is lost, the panic hook gets the message, and nothing else happens.
+/// A span of `tracing`. If the subscriber panics, what it was told is lost, the panic hook gets the message, and
+/// nothing else happens.
 pub(crate) struct CaughtSpan(Option<Span>);
 
 impl CaughtSpan {
@@ -51,8 +52,8 @@ impl Drop for CaughtSpan {
     }
 }
 
-/// A span that this thread has entered. It is exited when this is dropped, even if the subscriber has panicked when it was entered: most
-/// have noted by then that the thread is in it.
+/// A span that this thread has entered. It is exited when this is dropped, even if the subscriber has panicked when it
+/// was entered: most have noted by then that the thread is in it.
 pub(crate) struct EnteredSpan {
     span: CaughtSpan,
     /// It is exited by the thread that has entered it.

@@ -4,7 +4,8 @@ use std::ops::{Deref, DerefMut};
 
 use super::discard;
 
-/// A value of the engine's. If its destructor panics, the panic goes no further, even if the value is dropped while another panic unwinds.
+/// A value of the engine's. If its destructor panics, the panic goes no further, even if the value is dropped while
+/// another panic unwinds.
 pub(crate) struct Contained<T>(Option<T>);
 
 impl<T> Contained<T> {

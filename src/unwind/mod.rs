@@ -1,9 +1,10 @@
-//! The boundary to code of the engine's, which may panic: its backend, nodes, processes, hooks, destructors, clocks, and subscriber of
-//! `tracing`.
+//! The boundary to code of the engine's, which may panic: its backend, nodes, processes, hooks, destructors, clocks,
+//! and subscriber of `tracing`.
 //!
-//! A panic is caught where the engine's code is called, and becomes an error that names the call. Behind these catches stand others around the
-//! recording of a frame, its submission, and the work of each thread on it, for a call that was forgotten. Where an unwind would free memory
-//! that another thread still uses, an [`AbortOnUnwind`] guards the code as well. So soundness does not depend on every call being caught.
+//! A panic is caught where the engine's code is called, and becomes an error that names the call. Behind these catches
+//! stand others around the recording of a frame, its submission, and the work of each thread on it, for a call that was
+//! forgotten. Where an unwind would free memory that another thread still uses, an [`AbortOnUnwind`] guards the code as
+//! well. So soundness does not depend on every call being caught.
 //!
 //! These are all places where such code is called. `tests/boundary` makes each of them panic in turn.
 //!
@@ -45,8 +46,8 @@ pub(crate) use self::contained::Contained;
 #[error("a job panicked: {message}")]
 #[non_exhaustive]
 pub struct JobPanic {
-    /// The message of the panic: its payload if that is a `&str` or a `String`, as with the `panic!` macro, and otherwise a fixed
-    /// text.
+    /// The message of the panic: its payload if that is a `&str` or a `String`, as with the `panic!` macro, and
+    /// otherwise a fixed text.
     pub message: String,
 }
 
@@ -65,7 +66,8 @@ impl JobPanic {
 
 /// Calls `call`, and turns its panic into an error.
 ///
-/// The closure need not be unwind safe: after an error the caller must not use values that the closure has left half-changed.
+/// The closure need not be unwind safe: after an error the caller must not use values that the closure has left
+/// half-changed.
 ///
 /// ```
 /// # use drawloom::task::catch;
@@ -80,21 +82,22 @@ pub fn catch<R>(call: impl FnOnce() -> R) -> Result<R, JobPanic> {
     catch_unwind(AssertUnwindSafe(call)).map_err(JobPanic::new)
 }
 
-/// Drops a value of the engine's, and ignores a panic of its destructor. The payload of that panic is leaked, because dropping it
-/// might panic as well.
+/// Drops a value of the engine's, and ignores a panic of its destructor. The payload of that panic is leaked, because
+/// dropping it might panic as well.
 pub(crate) fn discard<T>(value: T) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(|| drop(value))) {
         mem::forget(payload);
     }
 }
 
-/// [Discards](discard) values one by one, so that a panic of one destructor does not meet that of another, which would end the process.
+/// [Discards](discard) values one by one, so that a panic of one destructor does not meet that of another, which would
+/// end the process.
 pub(crate) fn discard_all<T>(values: impl IntoIterator<Item = T>) {
     values.into_iter().for_each(discard);
 }
 
-/// Calls `event`, which sends an event to the engine's `tracing` subscriber. If the subscriber panics, the event is lost, the panic
-/// hook gets the message, and this function returns as usual.
+/// Calls `event`, which sends an event to the engine's `tracing` subscriber. If the subscriber panics, the event is
+/// lost, the panic hook gets the message, and this function returns as usual.
 pub(crate) fn emit(event: impl FnOnce()) {
     if let Err(payload) = catch_unwind(AssertUnwindSafe(event)) {
         discard(payload);
@@ -111,8 +114,8 @@ thread_local! {
     static HELD_EVENTS: std::cell::RefCell<Option<Vec<HeldEvent>>> = const { std::cell::RefCell::new(None) };
 }
 
-/// Calls `work`, which may hold locks, and only then sends the events of [`emit_unlocked`]: the engine's subscriber may ask for what the locks
-/// guard. `work` must have let go of them when it returns.
+/// Calls `work`, which may hold locks, and only then sends the events of [`emit_unlocked`]: the engine's subscriber may
+/// ask for what the locks guard. `work` must have let go of them when it returns.
 #[cfg(any(feature = "wgpu", feature = "software", test))]
 pub(crate) fn hold_events<R>(work: impl FnOnce() -> R) -> R {
     /// Sends the events when it is dropped, also by an unwind.

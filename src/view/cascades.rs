@@ -25,9 +25,9 @@ pub(super) fn cascade_slice([near, far]: [f32; 2], lambda: f32, cascade: u32, co
     })
 }
 
-/// A sphere around all that a camera sees between the two distances of `slice`, and all that the whole picture shows of which it draws a part:
-/// its centre in the world and its radius, in metres. Its size does not change when the camera moves, turns or is jittered. `None` where no
-/// finite sphere is around what it sees.
+/// A sphere around all that a camera sees between the two distances of `slice`, and all that the whole picture shows of
+/// which it draws a part: its centre in the world and its radius, in metres. Its size does not change when the camera
+/// moves, turns or is jittered. `None` where no finite sphere is around what it sees.
 pub(super) fn visible_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> Option<(DVec3, f64)> {
     let sphere = (end > 0.0 && begin <= end).then(|| slice_sphere(camera, [begin, end]));
     sphere.filter(|(center, radius)| center.is_finite() && radius.is_finite() && *radius > 0.0)

@@ -52,8 +52,8 @@ pub struct GpuView {
     pub ambient: Vec3,
     /// The far plane's distance in metres; infinite for most cameras.
     pub far: f32,
-    /// For each class of lights, by [`LightClass::index`]: where they end among the view's lights. They begin where those of the class before
-    /// end.
+    /// For each class of lights, by [`LightClass::index`]: where they end among the view's lights. They begin where
+    /// those of the class before end.
     pub light_ends: [u32; LightClass::COUNT],
 }
 
@@ -63,7 +63,8 @@ impl GpuView {
         FixedPosition::new(origin(view)).is_some()
     }
 
-    /// The layout of `view` in a scene with this ambient light, whose lights have no classes; `None` if its camera is beyond [`FixedPosition::MAX_COORDINATE`].
+    /// The layout of `view` in a scene with this ambient light, whose lights have no classes; `None` if its camera is
+    /// beyond [`FixedPosition::MAX_COORDINATE`].
     pub fn new(view: &RenderView, ambient: Vec3, light_count: usize) -> Option<Self> {
         let (position, clip_from_relative) = origin_and_matrix(view);
         let (position_low, position_high) = FixedPosition::new(position)?.halves();

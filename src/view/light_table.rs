@@ -62,11 +62,11 @@ impl LightTable {
         self.fill_within(view, (lights, &[]), views, shadows, (usize::MAX, &mut Vec::new()));
     }
 
-    /// The same with at most `capacity` of [`LightTable::gpu_lights`], as long as the layers of shadow maps are not more. The first lights of the
-    /// scene have room. Adds the indices of the others that reach the view to `left_out`.
+    /// The same with at most `capacity` of [`LightTable::gpu_lights`], as long as the layers of shadow maps are not
+    /// more. The first lights of the scene have room. Adds the indices of the others that reach the view to `left_out`.
     ///
-    /// Lights for which `main_views` has a main view are copies of the last one before them that is none. A copy takes the place of its light in
-    /// views that [have](RenderView::main_view) the maps of that main view.
+    /// Lights for which `main_views` has a main view are copies of the last one before them that is none. A copy takes
+    /// the place of its light in views that [have](RenderView::main_view) the maps of that main view.
     pub(crate) fn fill_within(
         &mut self,
         view: &RenderView,
@@ -161,8 +161,8 @@ impl LightTable {
         &self.layers
     }
 
-    /// For each class, by [`LightClass::index`]: where its lights end within [`LightTable::gpu_lights`]. They begin where those of the class
-    /// before end.
+    /// For each class, by [`LightClass::index`]: where its lights end within [`LightTable::gpu_lights`]. They begin
+    /// where those of the class before end.
     pub fn class_ends(&self) -> [u32; LightClass::COUNT] {
         let mut end = 0;
         self.ranges.each_ref().map(|range| {

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::scene::{Camera, ViewKind};
 
-/// Whose maps of directional lights light what each camera sees. An owner is a main camera, the first one that needs the same maps.
+/// Whose maps of directional lights light what each camera sees. An owner is a main camera, the first one that needs
+/// the same maps.
 #[derive(Debug, Default)]
 pub(crate) struct MapOwners {
     /// The indices of the owners among the cameras, in order.
@@ -16,7 +17,8 @@ pub(crate) struct MapOwners {
 }
 
 impl MapOwners {
-    /// `covered` are the spheres that the maps of a main camera cover, `None` if it has no maps: main cameras with the same spheres share maps.
+    /// `covered` are the spheres that the maps of a main camera cover, `None` if it has no maps: main cameras with the
+    /// same spheres share maps.
     pub(super) fn new(cameras: &[Camera], covered: impl Fn(&Camera) -> Option<Vec<(DVec3, f64)>>) -> Self {
         let mut owners = Vec::new();
         let mut owner_of = vec![None; cameras.len()];

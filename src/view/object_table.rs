@@ -352,7 +352,8 @@ impl ObjectTable {
         (first, RwLockReadGuard::map(self.block(block), |block| &block.gpu_objects[..count]))
     }
 
-    /// A block of objects. A guard that is leaked locks it until the next [`ObjectTable::begin_frame`]. Hold none while objects are described.
+    /// A block of objects. A guard that is leaked locks it until the next [`ObjectTable::begin_frame`]. Hold none while
+    /// objects are described.
     ///
     /// # Panics
     /// If `index` is not below [`ObjectTable::block_count`].

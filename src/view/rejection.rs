@@ -74,8 +74,8 @@ pub struct Rejection {
     /// The lowest of their indices: among the scene's objects or lights, or the slot of a
     /// [handle](crate::handle::Handle::index) to a material or texture.
     pub first: usize,
-    /// The name of the material or texture at that index; of an object that of its mesh, or of its material where that is the reason.
-    /// `None` for a light, and for what was removed.
+    /// The name of the material or texture at that index; of an object that of its mesh, or of its material where that
+    /// is the reason. `None` for a light, and for what was removed.
     pub name: Option<Arc<str>>,
 }
 
@@ -103,8 +103,8 @@ pub enum RejectionReason {
     /// A light is farther from the world's origin than
     /// [`FixedPosition::MAX_COORDINATE`](super::FixedPosition::MAX_COORDINATE).
     LightOutOfReach,
-    /// A light that casts shadows has no shadow map, or not for every main camera, because the frame has as many as the device's textures have
-    /// layers. There it is drawn without a shadow: see [`ShadowMaps`](super::ShadowMaps).
+    /// A light that casts shadows has no shadow map, or not for every main camera, because the frame has as many as the
+    /// device's textures have layers. There it is drawn without a shadow: see [`ShadowMaps`](super::ShadowMaps).
     ShadowMapLimit,
     /// A light's intensity, position, direction, range or angles are invalid.
     InvalidLight,
@@ -117,26 +117,27 @@ pub enum RejectionReason {
     NotResident,
     /// A material's texture is not on the device yet, or not loaded yet; the material's plain colour is used.
     TextureNotResident,
-    /// An object is beyond the number that the backend [can hold](crate::backend::SceneLimits::max_objects), or that a frame can name.
+    /// An object is beyond the number that the backend [can hold](crate::backend::SceneLimits::max_objects), or that a
+    /// frame can name.
     ObjectLimit,
-    /// An object's mesh [cannot be drawn](crate::backend::Backend::check_mesh) by the backend: as a rule, it is larger than the
-    /// device's buffers. A warning names each such mesh, with the reason.
+    /// An object's mesh [cannot be drawn](crate::backend::Backend::check_mesh) by the backend: as a rule, it is larger
+    /// than the device's buffers. A warning names each such mesh, with the reason.
     UndrawableMesh,
     /// An object's material, or its values of the engine's own, are beyond what the backend
     /// [can hold](crate::backend::SceneLimits::binding_bytes).
     MaterialLimit,
-    /// A light reaches a view, and is beyond what the backend [can hold](crate::backend::SceneLimits::max_lights) for that view. Other views
-    /// may have it.
+    /// A light reaches a view, and is beyond what the backend [can hold](crate::backend::SceneLimits::max_lights) for
+    /// that view. Other views may have it.
     LightLimit,
-    /// A texture is wider or higher than [`Texture::MAX_DETAIL`](crate::scene::Texture::MAX_DETAIL), and drawn with less detail than it
-    /// was given with.
+    /// A texture is wider or higher than [`Texture::MAX_DETAIL`](crate::scene::Texture::MAX_DETAIL), and drawn with
+    /// less detail than it was given with.
     ReducedTexture,
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
     /// objects are drawn as it says.
     UnknownObject,
     /// A blended object is added in half floats, because the device does not blend floats, although
-    /// [`Quality::radiance_sum`](crate::quality::Quality::radiance_sum) asks for them. It is drawn nevertheless, with the error of
-    /// [`RadianceSum::HalfFloat`](crate::quality::RadianceSum::HalfFloat). One object counts for all.
+    /// [`Quality::radiance_sum`](crate::quality::Quality::radiance_sum) asks for them. It is drawn nevertheless, with
+    /// the error of [`RadianceSum::HalfFloat`](crate::quality::RadianceSum::HalfFloat). One object counts for all.
     HalfFloatBlending,
 }
 

@@ -16,8 +16,8 @@ pub struct RenderView {
     pub frustum: Frustum,
     /// The light whose shadow map the view draws: its index among the frame's valid lights.
     pub valid_light: Option<usize>,
-    /// The main view whose maps of directional lights light it, by index: see [`ShadowMaps`](super::ShadowMaps). `None` for the views of
-    /// maps, and without a main view.
+    /// The main view whose maps of directional lights light it, by index: see [`ShadowMaps`](super::ShadowMaps). `None`
+    /// for the views of maps, and without a main view.
     pub main_view: Option<usize>,
     /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
@@ -61,7 +61,8 @@ impl RenderView {
         self.camera.late_latch.is_some()
     }
 
-    /// Whether what is in front of the near plane is drawn as if it were on it: in the map of a directional light, where it casts a shadow.
+    /// Whether what is in front of the near plane is drawn as if it were on it: in the map of a directional light,
+    /// where it casts a shadow.
     pub fn clamps_depth(&self) -> bool {
         matches!(self.camera.projection, Projection::Orthographic { .. }) && self.kind() == ViewKind::Shadow
     }

@@ -9,34 +9,35 @@ use crate::scene::{Camera, LayerMask, Light, ObjectFilter, Projection, Redraw, V
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 ///
-/// So a frame has at most as many maps as the device's textures have layers: 256, unless the device was requested with a higher limit. That
-/// is 42 point lights whose range a camera sees. Lights beyond that are drawn without a shadow, and counted as
-/// [`RejectionReason::ShadowMapLimit`](super::RejectionReason::ShadowMapLimit): main cameras take maps one after the other in the scene's order,
-/// each for the lights that reach what it sees in the scene's order, if all maps of the light fit. So what one camera shows does not depend
-/// on the cameras after it.
+/// So a frame has at most as many maps as the device's textures have layers: 256, unless the device was requested with
+/// a higher limit. That is 42 point lights whose range a camera sees. Lights beyond that are drawn without a shadow,
+/// and counted as [`RejectionReason::ShadowMapLimit`](super::RejectionReason::ShadowMapLimit): main cameras take maps
+/// one after the other in the scene's order, each for the lights that reach what it sees in the scene's order, if all
+/// maps of the light fit. So what one camera shows does not depend on the cameras after it.
 ///
 /// # Several main cameras
 ///
-/// A directional light has maps of its own for each main camera, so that none sees coarser shadows because of where another one is. Main cameras
-/// that need the same maps share them: tiles, and the jittered cameras of one picture. A view that is no main camera's has the maps of the one
-/// that it is [named](Camera::child_name) after, as `main/mirror` is after `main`, or else those of the scene's first main camera. Maps of other
-/// lights are the same for all views.
+/// A directional light has maps of its own for each main camera, so that none sees coarser shadows because of where
+/// another one is. Main cameras that need the same maps share them: tiles, and the jittered cameras of one picture. A
+/// view that is no main camera's has the maps of the one that it is [named](Camera::child_name) after, as `main/mirror`
+/// is after `main`, or else those of the scene's first main camera. Maps of other lights are the same for all views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowMaps {
     /// The width and height of a map in pixels. At a distance of d metres, a pixel is about 4·d/side metres wide for a
     /// hemispherical light, 2·d·tan(angle)/side for a spot light, and 2·d/(side − 2·`filter` − 2) for a point light,
-    /// where d is along the axis of the cube's face. For a directional light it is as wide as the diameter of the sphere
-    /// around what the main camera sees of the map's slice, divided by `side`: at 60° and 16:9 and with one cascade some 2.4·`max_distance`/side.
+    /// where d is along the axis of the cube's face. For a directional light it is as wide as the diameter of the
+    /// sphere around what the main camera sees of the map's slice, divided by `side`: at 60° and 16:9 and with one
+    /// cascade some 2.4·`max_distance`/side.
     pub side: u32,
     /// The distance from a main camera, in metres, up to which a directional light's maps cover its view; at most
     /// 1,000 km. Beyond it, and where only a reflection or a portal looks, nothing is in shadow.
     ///
-    /// Towards the light, a map reaches sixteen times the radius of the sphere around what it covers. Whatever is beyond that casts its shadow
-    /// all the same.
+    /// Towards the light, a map reaches sixteen times the radius of the sphere around what it covers. Whatever is
+    /// beyond that casts its shadow all the same.
     pub max_distance: f32,
-    /// The number of maps of a directional light for a main camera, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers a slice of what
-    /// the camera sees, between two distances, and a point is looked up in the finest map that contains it. A shadow's
-    /// edge is as sharp as the slice's sphere is small. Each map is a view.
+    /// The number of maps of a directional light for a main camera, from 1 to [`ShadowMaps::MAX_CASCADES`]. Each covers
+    /// a slice of what the camera sees, between two distances, and a point is looked up in the finest map that contains
+    /// it. A shadow's edge is as sharp as the slice's sphere is small. Each map is a view.
     pub cascades: u32,
     /// Where the slices end, from 0, equal depths, to 1, equal ratios of the distances: the λ of the practical split
     /// scheme (Zhang et al. 2006).
@@ -80,10 +81,11 @@ impl ShadowMaps {
     /// The cameras of a light's shadow maps, the layers of which follow each other in this order: a perspective camera
     /// for a spot light, a paraboloid for a hemispherical light, six perspective cameras for a point light, and for a
     /// directional light an orthographic camera for each cascade, from the finest to the coarsest, around what a main
-    /// camera sees: those of the first main camera among `cameras`, then those of each further one that does not share them. A light has all
-    /// its maps or none: none if it casts no shadow, and a directional light for a main camera if no finite sphere is around what that sees,
-    /// or if a map's camera would be beyond [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is
-    /// invalid: a renderer with such maps is [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
+    /// camera sees: those of the first main camera among `cameras`, then those of each further one that does not share
+    /// them. A light has all its maps or none: none if it casts no shadow, and a directional light for a main camera if
+    /// no finite sphere is around what that sees, or if a map's camera would be beyond
+    /// [`FixedPosition::MAX_COORDINATE`]. No light has maps if a setting is invalid: a renderer with such maps is
+    /// [`PlanError::ShadowMaps`](crate::process::PlanError::ShadowMaps).
     ///
     /// The only map of a light is called `name`, the faces of a cube `name, +X` and so on, and cascades `name, cascade
     /// 1` and so on. Those of a further main camera `second` are called `name for second` and so on.
@@ -179,7 +181,8 @@ impl ShadowMaps {
         half / (1.0 - 2.0 * f64::from(pixels) / f64::from(self.side)).max(0.25)
     }
 
-    /// What the maps of directional lights cover for a main camera: a sphere for each cascade. `None` if one would be invalid.
+    /// What the maps of directional lights cover for a main camera: a sphere for each cascade. `None` if one would be
+    /// invalid.
     fn cascade_spheres(&self, main: &Camera) -> Option<Vec<(DVec3, f64)>> {
         let far = self.max_distance.min(main.far);
         let spheres = (0..self.cascades).map(|cascade| {
@@ -223,8 +226,8 @@ impl ShadowMaps {
     }
 
     /// Moves a map's centre by less than a pixel, so that its pixels keep their positions in the world from frame to
-    /// frame and shadows do not crawl when the camera moves. They do where the radius changes: when the field of view does, or the shift of a
-    /// camera that is off centre, other than by [`Camera::jittered`].
+    /// frame and shadows do not crawl when the camera moves. They do where the radius changes: when the field of view
+    /// does, or the shift of a camera that is off centre, other than by [`Camera::jittered`].
     fn snapped_to_texels(&self, center: DVec3, radius: f64, orientation: DQuat) -> DVec3 {
         let pixel = 2.0 * radius / f64::from(self.side);
         let local = orientation.inverse() * center;
@@ -254,8 +257,8 @@ const CUBE_FACES: [(Vec3, &str); 6] =
 /// The near plane of a light's map, as a share of its range.
 const NEAR_PLANE_SHARE: f32 = 1e-5;
 
-/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. The larger the distance, the more
-/// f32 rounds: here to within a hundredth of a pixel of 1024.
+/// How far a directional light's map extends towards the light beyond the visible sphere, in its radii. The larger the
+/// distance, the more f32 rounds: here to within a hundredth of a pixel of 1024.
 const CASTER_DISTANCE: f64 = 16.0;
 
 /// A finer cascade extends as far as the coarsest, up to this many of its own radii: there f32 rounds to within a

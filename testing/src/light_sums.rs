@@ -22,8 +22,9 @@ pub struct SumScene {
     magnitude: Vec<[f64; 3]>,
 }
 
-/// What f32 adds to the error of a light by itself, as a fraction of it: half a unit in the last place for each of less than 256 roundings. The
-/// position of a pixel has some 20, the way from there to the light and its factors some 80, each of which may count twice.
+/// What f32 adds to the error of a light by itself, as a fraction of it: half a unit in the last place for each of less
+/// than 256 roundings. The position of a pixel has some 20, the way from there to the light and its factors some 80,
+/// each of which may count twice.
 const SHADING_ERROR: f64 = 256.0 / 16_777_216.0;
 
 impl SumScene {
@@ -47,7 +48,8 @@ impl SumScene {
     }
 }
 
-/// The exact quality with this value of the knob, and with small shadow maps, because some scenes have a hundred of them.
+/// The exact quality with this value of the knob, and with small shadow maps, because some scenes have a hundred of
+/// them.
 pub fn quality(radiance_sum: RadianceSum) -> Quality {
     let exact = Quality::exact();
     Quality { radiance_sum, shadows: ShadowQuality { side: 64, ..exact.shadows }, ..exact }

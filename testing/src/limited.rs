@@ -11,14 +11,16 @@ use drawloom::task::Worker;
 
 use crate::forwarded_calls::forward_unchanged_calls;
 
-/// Passes calls on to another backend, as if that one had lower limits: what takes gigabytes on a device needs kilobytes here.
+/// Passes calls on to another backend, as if that one had lower limits: what takes gigabytes on a device needs
+/// kilobytes here.
 pub struct LimitedBackend<B> {
     inner: B,
     limits: SceneLimits,
 }
 
 impl<B> LimitedBackend<B> {
-    /// The backend with these limits. A mesh fits if its vertices, at their full size, fit in a buffer, and so do its indices.
+    /// The backend with these limits. A mesh fits if its vertices, at their full size, fit in a buffer, and so do its
+    /// indices.
     pub fn new(inner: B, limits: SceneLimits) -> Self {
         Self { inner, limits }
     }

@@ -1,5 +1,6 @@
-//! What examples and benchmarks write goes through `drawloom-output`: whole, or not at all. What they print does too, so that no output that is closed
-//! or full ends them before their files are there. The library writes to what its callers open, and prints nothing.
+//! What examples and benchmarks write goes through `drawloom-output`: whole, or not at all. What they print does too,
+//! so that no output that is closed or full ends them before their files are there. The library writes to what its
+//! callers open, and prints nothing.
 
 use std::path::Path;
 

@@ -1,11 +1,13 @@
-//! Subscribers of `tracing` are code of the engine's, which may panic: the library calls them only where that is caught.
+//! Subscribers of `tracing` are code of the engine's, which may panic: the library calls them only where that is
+//! caught.
 
 use proc_macro2::TokenTree;
 
 use crate::sources::{Source, read_crate};
 use crate::tokens::{is, trees_of};
 
-/// The macros of `tracing` that call a subscriber, and the ways to enter a span that exit it in a destructor of `tracing`'s own.
+/// The macros of `tracing` that call a subscriber, and the ways to enter a span that exit it in a destructor of
+/// `tracing`'s own.
 const CALLS: [&str; 12] = [
     "trace",
     "debug",

@@ -29,8 +29,8 @@ static BLOWN: Mutex<Option<&'static str>> = Mutex::new(None);
 /// How many values of the engine's are alive.
 static ALIVE: AtomicUsize = AtomicUsize::new(0);
 
-/// Makes a call panic: of those of a kind from now on, that of this index. Its payload is a text, or else something that panics when it is
-/// dropped.
+/// Makes a call panic: of those of a kind from now on, that of this index. Its payload is a text, or else something
+/// that panics when it is dropped.
 pub fn arm(kind: Kind, index: usize, has_text: bool) {
     *BLOWN.lock().unwrap() = None;
     *FUSE.lock().unwrap() = Some(Fuse { kind, left: index, has_text });

@@ -177,7 +177,8 @@ fn a_loop_goes_on_after_a_frame_is_refused_and_its_captures_panic() {
 /// What a thread of the loop does with it.
 type Use = fn(FrameLoop<Backend>);
 
-/// Has a thread of a loop use the loop: the one that submits, or the one that waits for the device. Returns what tells when it has done so.
+/// Has a thread of a loop use the loop: the one that submits, or the one that waits for the device. Returns what tells
+/// when it has done so.
 fn use_on_own_thread(after_submission: bool, frames_before: usize, use_it: Use) -> Receiver<()> {
     let scene = scene();
     let mut frames = new_loop(Buffering::Triple);

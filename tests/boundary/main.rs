@@ -1,6 +1,6 @@
-//! The boundary to code of the engine's: each call of it panics once, in turn, and so does each destructor. Nothing unwinds out of the
-//! crate or hangs, the error names what panicked, nothing stays in memory, and the next frame is that of a renderer which knew no panic. The
-//! changes that the frame before was told of are in it.
+//! The boundary to code of the engine's: each call of it panics once, in turn, and so does each destructor. Nothing
+//! unwinds out of the crate or hangs, the error names what panicked, nothing stays in memory, and the next frame is
+//! that of a renderer which knew no panic. The changes that the frame before was told of are in it.
 //!
 //! The table in `src/unwind/mod.rs` lists the calls. These hold with debug assertions and without.
 

@@ -60,8 +60,8 @@ fn a_panic_of_a_preparation_is_an_error_that_names_it() {
     });
 }
 
-/// Preparations whose handles are dropped leave nothing behind, on any number of workers: neither jobs, nor a scheduler that its own queue
-/// keeps by way of the backend.
+/// Preparations whose handles are dropped leave nothing behind, on any number of workers: neither jobs, nor a scheduler
+/// that its own queue keeps by way of the backend.
 #[test]
 fn preparations_that_nobody_waits_for_are_not_kept() {
     within_time(|| {

@@ -300,7 +300,8 @@ fn tiles(harness: &mut Harness) -> Result<(), Failed> {
         let height = (5.0 * extreme.scale) as f32;
         let parallel =
             Camera { projection: Projection::Orthographic { height }, far: height * 20.0, ..perspective.clone() };
-        // A parallel picture cannot be divided into parts lower than a micrometre, and the parts of a small one are as coarse as positions.
+        // A parallel picture cannot be divided into parts lower than a micrometre, and the parts of a small one are as
+        // coarse as positions.
         let most = if extreme.scale < 1.0 { 64 } else { 4096 };
         let lowest = ((height * 1e6) as u32).min(most);
         for (main, many) in [(perspective, most), (parallel, lowest)] {

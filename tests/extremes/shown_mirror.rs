@@ -126,8 +126,8 @@ fn anywhere(harness: &mut Harness) -> Result<(), Failed> {
         shift_scene(&mut scene, extreme.position)?;
         move_plane(&mut scene, |point| point * extreme.scale + extreme.position);
         let there = harness.draw(&scene).map_err(|failed| with_context(extreme.name, failed))?;
-        // Both pictures have vertices in the wrong place, in the mirror and before it. Positions are rounded to steps of
-        // 2⁻³⁰ m, half a step each for the camera and the object, and f64 to half of a unit in the last place. The
+        // Both pictures have vertices in the wrong place, in the mirror and before it. Positions are rounded to steps
+        // of 2⁻³⁰ m, half a step each for the camera and the object, and f64 to half of a unit in the last place. The
         // nearest object is 5.5 m away before scaling, and the focal length is 55 pixels.
         let ulp = extreme.position.abs().max_element() * 0.5_f64.powi(52);
         let by_steps = 55.0 * (0.5_f64.powi(30) + 3.0 * ulp) / (5.5 * extreme.scale);

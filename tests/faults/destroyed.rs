@@ -173,7 +173,8 @@ fn destroyed() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Frames with a view that is kept, and that is destroyed meanwhile: one more may be refused, which then draws nothing wrong.
+/// Frames with a view that is kept, and that is destroyed meanwhile: one more may be refused, which then draws nothing
+/// wrong.
 fn kept() -> Result<(), Failed> {
     for target in Target::ALL {
         let mut fixture = Fixture::new(target, Redraw::OnCameraChange)?;

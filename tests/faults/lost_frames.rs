@@ -1,5 +1,5 @@
-//! Frames that are lost after others were recorded: dropped, refused, or failed when they are submitted. A frame that shows what a lost one was
-//! to draw is refused; every other is drawn, and what is recorded later is right.
+//! Frames that are lost after others were recorded: dropped, refused, or failed when they are submitted. A frame that
+//! shows what a lost one was to draw is refused; every other is drawn, and what is recorded later is right.
 
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
@@ -263,7 +263,8 @@ fn refusals<S: Subject>(read: Read<S>) -> Result<(), Failed> {
                 expect(mirrors.submit(recorded)? == expected[0], || format!("{name}: a frame that relies on none"))?;
             }
 
-            // The lost frame kept the view itself, from a frame that is submitted. The frame after a lost one draws all views.
+            // The lost frame kept the view itself, from a frame that is submitted. The frame after a lost one draws all
+            // views.
             let recorded = mirrors.record(&scenes[0])?;
             mirrors.submit(recorded)?;
             let lost = mirrors.record(&scenes[0])?;
@@ -401,7 +402,8 @@ fn loop_goes_on() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Frames are recorded ahead of the submission of the ones before, each keeping a view, and one after the other is lost.
+/// Frames are recorded ahead of the submission of the ones before, each keeping a view, and one after the other is
+/// lost.
 fn runs_of_losses() -> Result<(), Failed> {
     let (scene, other) = (Anew::Camera.scene(0)?, Anew::Camera.scene(1)?);
     let mut mirrors = Mirrors::<NullBackend>::new(|_| Ok(Vec::new()))?;

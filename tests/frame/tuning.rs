@@ -16,7 +16,8 @@ use drawloom_testing::scenes::field;
 
 use crate::occlusion::wall_and_cubes;
 
-/// A scheduler whose clock goes on by this much at each reading, so that costs are the same however busy the machine is.
+/// A scheduler whose clock goes on by this much at each reading, so that costs are the same however busy the machine
+/// is.
 fn scheduler(workers: usize, tick: Duration) -> Arc<Scheduler> {
     let readings = AtomicU32::new(0);
     let clock = move || tick * readings.fetch_add(1, Ordering::Relaxed);

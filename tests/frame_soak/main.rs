@@ -1,10 +1,11 @@
-//! Frames of a world in which everything comes and goes, for a given time: objects, lights, views, meshes, materials and textures, which are
-//! streamed; sizes, qualities and bufferings; panics of processes, and faults of the device, after which another one takes its place. CPU
-//! nodes move some objects, others are a static group, and workers compute a bloom while the device draws. Each fault is one error and
-//! nothing else is; memory, threads and files stay as many as they were.
+//! Frames of a world in which everything comes and goes, for a given time: objects, lights, views, meshes, materials
+//! and textures, which are streamed; sizes, qualities and bufferings; panics of processes, and faults of the device,
+//! after which another one takes its place. CPU nodes move some objects, others are a static group, and workers compute
+//! a bloom while the device draws. Each fault is one error and nothing else is; memory, threads and files stay as many
+//! as they were.
 //!
-//! `cargo test` runs it for some seconds, until there are enough rests to judge the memory. This runs it for a quarter of an hour, which is a million frames, and shows the progress and the seed
-//! that repeats a failure:
+//! `cargo test` runs it for some seconds, until there are enough rests to judge the memory. This runs it for a quarter
+//! of an hour, which is a million frames, and shows the progress and the seed that repeats a failure:
 //!
 //! ```sh
 //! DRAWLOOM_SOAK_SECONDS=900 DRAWLOOM_SOAK_SEED=7 cargo test --release --test frame_soak -- --nocapture
@@ -33,8 +34,9 @@ fn setting(name: &str, default: u64) -> u64 {
 const FRAMES_PER_REST: u64 = if cfg!(debug_assertions) { 100 } else { 1_000 };
 /// The rests after which memory no longer grows: caches hold what they ever will.
 const WARM_UP_RESTS: usize = 10;
-/// The rests whose memory is judged, at least. What the stage graphs of the latest worlds take differs from rest to rest, by a sixth of the
-/// memory. So a leak of 400 bytes a frame is noticed in a run of this length, and of less in a longer one.
+/// The rests whose memory is judged, at least. What the stage graphs of the latest worlds take differs from rest to
+/// rest, by a sixth of the memory. So a leak of 400 bytes a frame is noticed in a run of this length, and of less in a
+/// longer one.
 const JUDGED_RESTS: usize = 30;
 /// By how much the memory may grow from the first half of the rests to the second, beside chance.
 const MAX_GROWTH: f64 = 0.01;

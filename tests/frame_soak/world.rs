@@ -106,7 +106,8 @@ impl World {
     /// Something comes, goes or changes. Returns whether it was the size of a picture.
     pub fn change(&mut self, random: &mut Random) -> bool {
         let change = random.below(12);
-        // What comes, goes or gets another material may move other objects to other indices. The others change no object but one.
+        // What comes, goes or gets another material may move other objects to other indices. The others change no
+        // object but one.
         if matches!(change, 0..=4) {
             self.changed = None;
         }

@@ -14,8 +14,8 @@ pub const CASES: &[Case] = &[
     ("lists_of_all_passes_may_exceed_the_devices_largest_buffer", &[Device::Noop], of_the_device),
 ];
 
-/// 80 objects take 320 bytes of a list, and a list lies at a multiple of 256 bytes. The views of two cameras and seven shadow maps
-/// have more than 10 lists.
+/// 80 objects take 320 bytes of a list, and a list lies at a multiple of 256 bytes. The views of two cameras and seven
+/// shadow maps have more than 10 lists.
 fn several_buffers(device: Device) -> Result<(), Failed> {
     let mut scene = small(field(80));
     scene.lights.push(Light::Point {
@@ -43,8 +43,8 @@ fn several_buffers(device: Device) -> Result<(), Failed> {
     Ok(())
 }
 
-/// 600,000 objects take 2.4 MB of each list. The passes of two cameras and of 120 shadow maps have 290 MB of lists; a buffer of
-/// the device has 268 MB at most.
+/// 600,000 objects take 2.4 MB of each list. The passes of two cameras and of 120 shadow maps have 290 MB of lists; a
+/// buffer of the device has 268 MB at most.
 fn of_the_device(device: Device) -> Result<(), Failed> {
     const OBJECTS: usize = 600_000;
     let mut scene = small(field(1));

@@ -1,8 +1,10 @@
 //! What a device has no room for is left out, counted and named, and everything else is drawn.
 //!
-//! The oracle is the scene without what is to be left out, on a backend without limits: the pictures are the same to the byte.
+//! The oracle is the scene without what is to be left out, on a backend without limits: the pictures are the same to
+//! the byte.
 //!
-//! Without an adapter the cases on a device are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
+//! Without an adapter the cases on a device are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing
+//! adapter fails them.
 
 mod fixture;
 mod lights;

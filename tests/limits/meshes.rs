@@ -146,7 +146,8 @@ fn packed(device: Device) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Subdivision makes so much of a floor beside a hemispherical light that its map lacks it; the views of cameras have it.
+/// Subdivision makes so much of a floor beside a hemispherical light that its map lacks it; the views of cameras have
+/// it.
 fn subdivided(_: Device) -> Result<(), Failed> {
     let mut scene = Scene::new();
     let material = scene.add(Material { blend: Blend::None, ..Material::default() })?;

@@ -14,7 +14,8 @@ pub const TINTS: ObjectColumn<[[f32; 4]; 10]> = ObjectColumn::new("wide tint");
 /// The bytes of an object in the column.
 pub const STRIDE: usize = 160;
 
-/// Draws blended objects in their tints, in the place of the pipeline's transparency. The plan has it only while an object is blended.
+/// Draws blended objects in their tints, in the place of the pipeline's transparency. The plan has it only while an
+/// object is blended.
 #[derive(Clone, Copy)]
 pub struct WideTransparency;
 

@@ -1,5 +1,5 @@
-//! Code of the engine's that calls back while it is called: conversions, clocks, subscribers, callbacks of fences. Whatever it asks for, it does
-//! not wait for itself.
+//! Code of the engine's that calls back while it is called: conversions, clocks, subscribers, callbacks of fences.
+//! Whatever it asks for, it does not wait for itself.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};

@@ -1,4 +1,5 @@
-//! Guards that an engine leaks with `mem::forget`. What they locked is usable in the next frame, or the frame is refused with an error.
+//! Guards that an engine leaks with `mem::forget`. What they locked is usable in the next frame, or the frame is
+//! refused with an error.
 
 use std::mem;
 use std::ops::Range;

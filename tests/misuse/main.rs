@@ -1,5 +1,6 @@
-//! What an engine gets wrong in safe code: numbers at their extremes, code that calls back while it is called, and guards that it leaks. Each is
-//! harmless, or an error that names what is wrong. Nothing unwinds, hangs, or does nothing without a word.
+//! What an engine gets wrong in safe code: numbers at their extremes, code that calls back while it is called, and
+//! guards that it leaks. Each is harmless, or an error that names what is wrong. Nothing unwinds, hangs, or does
+//! nothing without a word.
 
 mod code_under_locks;
 mod fixture;

@@ -1,4 +1,5 @@
-//! Every public number that an engine sets has a case in [`numbers`](super::numbers), or is listed here with the reason why it needs none.
+//! Every public number that an engine sets has a case in [`numbers`](super::numbers), or is listed here with the reason
+//! why it needs none.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -123,8 +124,8 @@ const RESULTS: &[&str] = &[
     "process::Format::",
 ];
 
-/// Paths that begin with one of these are tools below the renderer for engines that build their own. They document what an index that is not there
-/// does, and their own tests have their extremes.
+/// Paths that begin with one of these are tools below the renderer for engines that build their own. They document what
+/// an index that is not there does, and their own tests have their extremes.
 const TOOLS: &[&str] = &[
     "chunked_array::",
     "command::",
@@ -140,7 +141,8 @@ const TOOLS: &[&str] = &[
 /// Bytes that shaders read as they are.
 const BYTES: &[&str] = &["parameters", "from_bytes", "DeltaCommands"];
 
-/// Numbers of a scene that `tests/extremes` draws on every backend: in `numbers`, `cameras`, `positions`, `lights` and `qualities`.
+/// Numbers of a scene that `tests/extremes` draws on every backend: in `numbers`, `cameras`, `positions`, `lights` and
+/// `qualities`.
 const EXTREMES: &[&str] = &[
     "scene::Light::",
     "scene::Projection::",

@@ -1,8 +1,8 @@
-//! Files with far more of one thing than a modeller writes are loaded whole, in time and memory in proportion to their size. Each of them
-//! once took time in proportion to the square of its size.
+//! Files with far more of one thing than a modeller writes are loaded whole, in time and memory in proportion to their
+//! size. Each of them once took time in proportion to the square of its size.
 //!
-//! Time is counted in instructions, by callgrind, so the count is the same on a busy machine. This binary starts itself to load a single
-//! file, alone.
+//! Time is counted in instructions, by callgrind, so the count is the same on a busy machine. This binary starts itself
+//! to load a single file, alone.
 
 use std::alloc::System;
 use std::fmt::Write;
@@ -72,14 +72,15 @@ const FILES: [Large; 4] = [
 /// The file that this process loads alone, where it started itself.
 const ALONE: &str = "DRAWLOOM_LOAD_ALONE";
 
-/// How much of its thing the smallest file has. What a process does before and after counts there, and is subtracted from the others.
+/// How much of its thing the smallest file has. What a process does before and after counts there, and is subtracted
+/// from the others.
 const FEW: usize = 8;
-/// How much a file has whose time and memory are compared with those of a file of four times as much. For n·log n steps the quotient of
-/// the times is 4·(1 + log 4 / log 500) = 4.9; for n² it is 16, and for the root of n³ it is 8.
+/// How much a file has whose time and memory are compared with those of a file of four times as much. For n·log n steps
+/// the quotient of the times is 4·(1 + log 4 / log 500) = 4.9; for n² it is 16, and for the root of n³ it is 8.
 const SOME: usize = 500;
 const MAX_QUOTIENT: f64 = 5.0;
-/// The most bytes that are allocated in all for each byte of a file, whether at the same time or one after another. Groups of one triangle
-/// take most: 165 bytes for each byte of their short text.
+/// The most bytes that are allocated in all for each byte of a file, whether at the same time or one after another.
+/// Groups of one triangle take most: 165 bytes for each byte of their short text.
 const MAX_BYTES_PER_BYTE: f64 = 200.0;
 
 pub fn trials() -> Vec<Trial> {
@@ -109,8 +110,8 @@ pub fn trials() -> Vec<Trial> {
     FILES.into_iter().map(whole).chain(FILES.into_iter().map(proportional)).collect()
 }
 
-/// Loads the file for which another process of this binary has started this one, and says what it has allocated. Returns whether there
-/// is one.
+/// Loads the file for which another process of this binary has started this one, and says what it has allocated.
+/// Returns whether there is one.
 pub fn load_alone() -> bool {
     let Some(folder) = env::var_os(ALONE) else { return false };
     drop(load(Path::new(&folder)));

@@ -1,7 +1,8 @@
 //! The OBJ loader: generated and shared scenes, minimal files for one feature each, and mutants.
 //!
-//! Large files are ignored without `DRAWLOOM_SLOW_CASES=1`. Cases that need the shared scenes are ignored if those are missing, or fail with
-//! `DRAWLOOM_REQUIRE_SCENES=1`. So are those that count instructions without valgrind, and `DRAWLOOM_REQUIRE_VALGRIND=1`.
+//! Large files are ignored without `DRAWLOOM_SLOW_CASES=1`. Cases that need the shared scenes are ignored if those are
+//! missing, or fail with `DRAWLOOM_REQUIRE_SCENES=1`. So are those that count instructions without valgrind, and
+//! `DRAWLOOM_REQUIRE_VALGRIND=1`.
 
 mod damaged;
 mod files;

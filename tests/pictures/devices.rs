@@ -158,8 +158,8 @@ fn many_shadow_maps() -> Result<(), Failed> {
     count_shadow_maps(SoftwareBackend::new(Arc::new(Scheduler::new(1)?)), 256)
 }
 
-/// Records scenes of many lights, whose cameras all see what they reach. Which lights have maps is told by taking the cameras and, for each, the
-/// lights one after the other.
+/// Records scenes of many lights, whose cameras all see what they reach. Which lights have maps is told by taking the
+/// cameras and, for each, the lights one after the other.
 fn count_shadow_maps<B: Backend>(backend: B, layers: usize) -> Result<(), Failed> {
     let cascades = 2;
     let maps = ShadowMaps { side: 1, cascades: 2, ..ShadowMaps::default() };

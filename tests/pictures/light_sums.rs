@@ -99,8 +99,8 @@ fn without_float_blending() -> Result<(), Failed> {
     Ok(())
 }
 
-/// In a scene with all kinds of lights, with and without shadows, and all kinds of panes. What all these would add is a bound of what each of
-/// them adds.
+/// In a scene with all kinds of lights, with and without shadows, and all kinds of panes. What all these would add is a
+/// bound of what each of them adds.
 fn every_class() -> Result<(), Failed> {
     let [mut scene, mut all_added] = [(); 2].map(|()| everything());
     let camera = scene.cameras[0].clone();
@@ -137,8 +137,8 @@ fn every_class() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Small lights all over a floor, more than a tile has bits. A sum that misses one differs from the one that draws each in its volume by a
-/// whole light.
+/// Small lights all over a floor, more than a tile has bits. A sum that misses one differs from the one that draws each
+/// in its volume by a whole light.
 fn tiles() -> Result<(), Failed> {
     let (columns, rows) = (130_u32, 60_u32);
     let mut scene = Scene::new();

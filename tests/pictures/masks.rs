@@ -122,8 +122,8 @@ fn glass() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Squares of a random mask, so far away that a pixel is as wide as many of its texels. Each pixel is covered with the probability of a
-/// cell of the mask, so the number of covered ones is within five standard deviations of their mean.
+/// Squares of a random mask, so far away that a pixel is as wide as many of its texels. Each pixel is covered with the
+/// probability of a cell of the mask, so the number of covered ones is within five standard deviations of their mean.
 fn in_the_distance() -> Result<(), Failed> {
     const SIDE: u32 = 64;
     for share in [0.1, 0.3, 0.7] {

@@ -308,8 +308,8 @@ enum NearPlane {
     Software,
 }
 
-/// The sphere around what the camera sees has a radius of some 9 m, and the map reaches 16 radii towards the sun. Each triangle of the boxes
-/// extends from the ground to far beyond that.
+/// The sphere around what the camera sees has a radius of some 9 m, and the map reaches 16 radii towards the sun. Each
+/// triangle of the boxes extends from the ground to far beyond that.
 fn across_the_near_plane(near_plane: NearPlane) -> Result<(), Failed> {
     let view = camera(DVec3::new(0.5, 2.0, 5.0), DVec3::new(0.5, 0.0, -1.5), 70.0);
     for cascades in [1, 3] {

@@ -1,4 +1,5 @@
-//! What one main camera sees does not depend on which others there are, and all that draw parts of one picture have the same shadows.
+//! What one main camera sees does not depend on which others there are, and all that draw parts of one picture have the
+//! same shadows.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -106,7 +106,8 @@ fn a_waiting_thread_sleeps_until_a_running_job_ends() {
     }
 }
 
-/// How many background jobs run at once, while each waits until `go_on` is set. They are queued before the limit is set.
+/// How many background jobs run at once, while each waits until `go_on` is set. They are queued before the limit is
+/// set.
 fn running_at_once(workers: usize, limit: Option<usize>, jobs: usize) -> usize {
     let scheduler = scheduler(workers);
     let [running, most] = [(); 2].map(|()| Arc::new(AtomicUsize::new(0)));

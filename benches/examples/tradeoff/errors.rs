@@ -230,9 +230,9 @@ impl Case<'_> {
 
     /// The greatest difference of a pixel's radiance from that of `exact`, as a fraction of the latter.
     ///
-    /// The error of each is a fraction of what the radiance is, so it is also one of what `exact` makes of it. Each addition to a half float
-    /// may lose 2⁻²⁴ beside that. Blended objects in front of the surface make its error a fraction of more than what is seen, so no bound is
-    /// known with them.
+    /// The error of each is a fraction of what the radiance is, so it is also one of what `exact` makes of it. Each
+    /// addition to a half float may lose 2⁻²⁴ beside that. Blended objects in front of the surface make its error a
+    /// fraction of more than what is seen, so no bound is known with them.
     fn radiance_sum(&self) -> Result<KnobError, Failure> {
         let (own, exact) = (colors(&self.measured.contents.radiance)?, colors(&self.exact.contents.radiance)?);
         let lights = self.scene.lights.len() as u32;

@@ -21,8 +21,8 @@ pub(crate) enum Json {
 }
 
 impl Json {
-    /// Parses JSON in UTF-8. Members named `extras`, which are an application's own, and what is deeper than any element
-    /// of glTF are skipped.
+    /// Parses JSON in UTF-8. Members named `extras`, which are an application's own, and what is deeper than any
+    /// element of glTF are skipped.
     ///
     /// # Errors
     /// If it is not JSON, or has more values than `limit` allows.

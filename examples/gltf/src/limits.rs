@@ -29,7 +29,8 @@ pub struct GltfLimits {
     pub buffer_bytes: u64,
     /// The bytes of all vertices, indices, attributes, morph targets and inverse bind matrices. Default: 1 GiB.
     pub geometry_bytes: u64,
-    /// The bytes of the zeros of accessors without a buffer view, beyond 64 for each value that a sparse accessor replaces. Default: 4 MiB.
+    /// The bytes of the zeros of accessors without a buffer view, beyond 64 for each value that a sparse accessor
+    /// replaces. Default: 4 MiB.
     pub zero_bytes: u64,
     /// The bytes of the keyframes of the animation that is drawn. Default: 256 MiB.
     pub keyframe_bytes: u64,

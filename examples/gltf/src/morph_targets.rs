@@ -10,8 +10,8 @@ use crate::warnings::Warnings;
 /// How many numbers a vertex has for each morph target: the differences of its position, its normal and its tangent.
 pub(crate) const NUMBERS_PER_VERTEX: usize = 9;
 
-/// The greatest number of bytes of all targets. With the weights of objects, which are behind them, they are one binding of the
-/// shader, and WebGPU allows 128 MiB.
+/// The greatest number of bytes of all targets. With the weights of objects, which are behind them, they are one
+/// binding of the shader, and WebGPU allows 128 MiB.
 const MAX_BYTES: u64 = 96 << 20;
 
 /// The morph targets of a primitive. One that changes nothing takes no memory.

@@ -89,8 +89,8 @@ impl Surface {
         }
     }
 
-    /// Drawloom's material with these values, apart from them what its own processes read. Those leave the shadows of holes
-    /// to a process of the example.
+    /// Drawloom's material with these values, apart from them what its own processes read. Those leave the shadows of
+    /// holes to a process of the example.
     pub(crate) fn into_material(self, name: String) -> Material {
         let material_type = if self.is_masked() { MASKED_SURFACE } else { SURFACE };
         Material {

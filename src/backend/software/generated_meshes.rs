@@ -17,9 +17,9 @@ pub(super) struct GeneratedMeshes {
 }
 
 impl GeneratedMeshes {
-    /// Takes over what nodes have filled in the frame that is drawn, and returns its meshes, with the triangles of those
-    /// that nodes make. What none of its meshes needs is dropped. A mesh that is filled with what is no mesh has no
-    /// triangles, and a warning names it.
+    /// Takes over what nodes have filled in the frame that is drawn, and returns its meshes, with the triangles of
+    /// those that nodes make. What none of its meshes needs is dropped. A mesh that is filled with what is no mesh has
+    /// no triangles, and a warning names it.
     pub(super) fn update(&mut self, generated: &[Arc<GeneratedContents>], meshes: &Meshes) -> Meshes {
         self.latest.extend(generated.iter().map(|contents| (contents.layout().identity, Arc::clone(contents))));
         let complete = self.complete(meshes);

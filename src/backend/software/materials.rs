@@ -21,8 +21,8 @@ pub(super) struct MaterialCache {
     /// Identities and revisions of the materials and textures in the table.
     current: Option<[(u64, u64); 2]>,
     table: Arc<MaterialTable>,
-    /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures of less detail than they
-    /// were given with.
+    /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures of less
+    /// detail than they were given with.
     rejected: Vec<(RejectionReason, usize)>,
 }
 

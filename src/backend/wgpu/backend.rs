@@ -55,8 +55,8 @@ pub struct WgpuBackend {
     pub(super) workers: AtomicUsize,
     /// How each pass with commands was recorded in the frame that was submitted last.
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
-    /// Whether a frame has failed because a raw pass destroyed a texture or buffer that it was lent, so that those of the frames to come may
-    /// be among them.
+    /// Whether a frame has failed because a raw pass destroyed a texture or buffer that it was lent, so that those of
+    /// the frames to come may be among them.
     pub(super) has_destroyed: Mutex<bool>,
     /// `None` if passes are not timed.
     pub(super) device_timing: Option<DeviceTiming>,
@@ -76,12 +76,12 @@ impl WgpuBackend {
     /// The feature that targets of [`Format::Depth32FloatStencil8`](crate::process::Format::Depth32FloatStencil8) need.
     pub const STENCIL_FEATURES: wgpu::Features = wgpu::Features::DEPTH32FLOAT_STENCIL8;
 
-    /// The feature that targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) need, and with them some of
-    /// [`RadianceSum`](crate::quality::RadianceSum).
+    /// The feature that targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) need,
+    /// and with them some of [`RadianceSum`](crate::quality::RadianceSum).
     pub const BLENDING_FEATURES: wgpu::Features = wgpu::Features::FLOAT32_BLENDABLE;
 
-    /// The feature with which what is in front of a directional light's shadow map casts shadows at no cost. Without it, a fragment shader that
-    /// writes depth draws these maps, and processes of an engine's own need a
+    /// The feature with which what is in front of a directional light's shadow map casts shadows at no cost. Without
+    /// it, a fragment shader that writes depth draws these maps, and processes of an engine's own need a
     /// [`clamped_fragment`](crate::process::CommandDraws::clamped_fragment).
     pub const DEPTH_CLIP_FEATURES: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL;
 

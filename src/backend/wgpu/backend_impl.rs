@@ -110,7 +110,8 @@ impl Backend for WgpuBackend {
         let targets = with_error_scope(&self.device, "targets", update).inspect_err(|_| self.clear())??;
         self.begin_frame(request, pipelines, targets).inspect_err(|error| {
             self.fail_frame(error);
-            // If a limit is exceeded, the frame asks too much of its own buffers. Meshes, materials and textures are as they should be.
+            // If a limit is exceeded, the frame asks too much of its own buffers. Meshes, materials and textures are as
+            // they should be.
             if !matches!(error, BackendError::Limit { .. }) {
                 self.clear();
             }

@@ -21,8 +21,9 @@ use crate::process::{PostStep, RenderProcess};
 /// The same layer is computed [on a helper](Self::on_cpu), a frame late, and [on the device](Self::on_device), in the same frame. Both
 /// agree up to the rounding of half floats. It is wide and smooth, so a late one is hardly noticed.
 ///
-/// Sums are made in floats. The smaller picture, its blur along rows (on the device), its blur along columns, and the picture with the layer are
-/// stored in half floats, each with an error of 2⁻¹⁰ of itself, and of 2⁻²⁴ at least, however many pixels glow.
+/// Sums are made in floats. The smaller picture, its blur along rows (on the device), its blur along columns, and the
+/// picture with the layer are stored in half floats, each with an error of 2⁻¹⁰ of itself, and of 2⁻²⁴ at least,
+/// however many pixels glow.
 ///
 /// ```
 /// use std::sync::Arc;

@@ -469,8 +469,8 @@ fn finish_together<B: Backend>(
     result
 }
 
-/// The parts of passes that are finished together. When this is dropped, on every path, those that the backend leaves are dropped, and their
-/// memory goes back to the recordings.
+/// The parts of passes that are finished together. When this is dropped, on every path, those that the backend leaves
+/// are dropped, and their memory goes back to the recordings.
 struct TakenParts<'a, B: Backend> {
     parts: [Vec<B::Part>; PassRuns::MAX_PASSES],
     recordings: &'a [PassRecording<B>],

@@ -57,8 +57,8 @@ pub struct PassInputs<'a, R: Real> {
     pub view: &'a ShaderView<R>,
     /// The lights that reach the view.
     pub lights: &'a [ShaderLight<R>],
-    /// For each class of lights, by [`LightClass::index`](crate::view::LightClass::index): where they end among the lights. They begin where
-    /// those of the class before end.
+    /// For each class of lights, by [`LightClass::index`](crate::view::LightClass::index): where they end among the
+    /// lights. They begin where those of the class before end.
     pub light_ends: &'a [usize; LightClass::COUNT],
     /// By layer of the shadow maps, the light that the layer belongs to, as that map shows it; empty unless a light has several
     /// maps.

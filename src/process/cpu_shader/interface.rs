@@ -54,8 +54,9 @@ pub trait ObjectCpuShader<R: Real>: Send + Sync {
         true
     }
 
-    /// Whether `fragment` runs for objects whose material [is a mask](crate::scene::Material::is_masked), which
-    /// [have entry points of their own](crate::process::CommandDraws::masked) in WGSL. By default it does if it runs for others.
+    /// Whether `fragment` runs for objects whose material [is a mask](crate::scene::Material::is_masked), which [have
+    /// entry points of their own](crate::process::CommandDraws::masked) in WGSL. By default it does if it runs for
+    /// others.
     fn draws_masked_pixels(&self) -> bool {
         self.draws_pixels()
     }

@@ -6,9 +6,10 @@ mod cpu_shader;
 use crate::command::Selection;
 use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess};
 
-/// Draws the depth of every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType) into `depth` before the
-/// geometry buffer, which then stores each pixel once instead of once for each surface that is nearer than those drawn before it. It is
-/// worth it where pixels cost more than vertices. Only [masked](crate::scene::Material::is_masked) objects need a fragment shader.
+/// Draws the depth of every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType) into
+/// `depth` before the geometry buffer, which then stores each pixel once instead of once for each surface that is
+/// nearer than those drawn before it. It is worth it where pixels cost more than vertices. Only
+/// [masked](crate::scene::Material::is_masked) objects need a fragment shader.
 ///
 /// Of two surfaces at exactly the same depth, the one drawn last is visible, and not the one drawn first.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,9 @@ mod cpu_shader;
 use super::LightSum;
 use crate::process::{BlendEquation, ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
 
-/// Adds a target of floats, in which other processes have summed small contributions, to the target `radiance` once: see
-/// [`RadianceSum::Float`](crate::quality::RadianceSum::Float). The target's alpha is how much it hides of what `radiance` holds.
+/// Adds a target of floats, in which other processes have summed small contributions, to the target `radiance` once:
+/// see [`RadianceSum::Float`](crate::quality::RadianceSum::Float). The target's alpha is how much it hides of what
+/// `radiance` holds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FloatSum {
     name: &'static str,

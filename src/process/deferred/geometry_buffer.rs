@@ -19,7 +19,8 @@ use crate::scene::VERTEX_COLOR;
 /// | `diffuse` | the fraction of light reflected, 0 to 1 | [`Rgba8Srgb`](crate::process::Format::Rgba8Srgb) |
 /// | `radiance` | emitted light and reflected ambient light; elsewhere the scene's background | [`Rgba16Float`](crate::process::Format::Rgba16Float) |
 ///
-/// [Masked](crate::scene::Material::is_masked) objects are drawn with their holes, by pipelines of their own: others need not discard.
+/// [Masked](crate::scene::Material::is_masked) objects are drawn with their holes, by pipelines of their own: others
+/// need not discard.
 ///
 /// The seven steps of L 4.1 are: set the viewport, the targets, the depth state and the rasterizer state; clear the
 /// depth; draw each object; finish. The viewport is the picture's, and the states are the pipelines'.

@@ -10,9 +10,9 @@ use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::scene::{Blend, ViewKind};
 use crate::view::ShadowMaps;
 
-/// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target `radiance` once: see
-/// [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). Of each pixel it tests the lights that [`LightTiles`] marks.
-/// [`LightVolumes`](super::LightVolumes) adds them one by one.
+/// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target
+/// `radiance` once: see [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). Of each pixel it tests the lights
+/// that [`LightTiles`] marks. [`LightVolumes`](super::LightVolumes) adds them one by one.
 #[derive(Clone, Debug)]
 pub(super) struct LightSum {
     shader: String,

@@ -5,11 +5,12 @@ pub(super) mod cpu_shader;
 
 use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
 
-/// Marks the lights that may reach each tile of 32 × 32 pixels, for a shader that sums lights: so that a pixel tests those of its tile, and not
-/// all.
+/// Marks the lights that may reach each tile of 32 × 32 pixels, for a shader that sums lights: so that a pixel tests
+/// those of its tile, and not all.
 ///
-/// A tile's marks are in the pixels of a target of half the picture's size that the tile covers: 24 bits in each, because f32 holds whole
-/// numbers up to 2²⁴. So there are 6,144 bits; if there are more lights, or fewer pixels at the picture's edge, a bit stands for several lights.
+/// A tile's marks are in the pixels of a target of half the picture's size that the tile covers: 24 bits in each,
+/// because f32 holds whole numbers up to 2²⁴. So there are 6,144 bits; if there are more lights, or fewer pixels at the
+/// picture's edge, a bit stands for several lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightTiles;
 

@@ -12,8 +12,8 @@ use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
 /// Lights the geometry buffer with the lights of one class, and adds the reflected light to the target `radiance`.
-/// Surfaces are Lambertian. In a [`Deferred`](super::Deferred) pipeline it may add to a sum in floats first, or a shader that sums all lights
-/// may take its place: see [`RadianceSum`](crate::quality::RadianceSum).
+/// Surfaces are Lambertian. In a [`Deferred`](super::Deferred) pipeline it may add to a sum in floats first, or a
+/// shader that sums all lights may take its place: see [`RadianceSum`](crate::quality::RadianceSum).
 ///
 /// A light is drawn as a light volume (L 4.2.1; Calver 2003): a sphere for a point light, a cone for a spot or
 /// hemispherical light, the whole picture for a directional one. The back faces are drawn, and a pixel is shaded if
@@ -31,7 +31,8 @@ pub struct LightVolumes {
     #[cfg_attr(not(feature = "software"), expect(dead_code, reason = "the WGSL is generated for them"))]
     formats: GeometryFormats,
     maps: Option<ShadowMaps>,
-    /// `None` if lights are added to `radiance` one by one; otherwise whether this process adds the first terms of their sum.
+    /// `None` if lights are added to `radiance` one by one; otherwise whether this process adds the first terms of
+    /// their sum.
     sum: Option<bool>,
 }
 

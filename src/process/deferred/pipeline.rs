@@ -25,9 +25,10 @@ use crate::view::{LightClass, ShadowMaps};
 ///  depth pre-pass → geometry buffer → lights, a process per class → transparency → post-processing
 /// ```
 ///
-/// How lights and blended objects add up in `radiance` is set by [`Quality::radiance_sum`]. If they are summed in floats, a process "sum of
-/// lights" follows the lights, or takes their place, and a process "sum of blended objects" follows transparency. A process of lights or
-/// of transparency that the engine [replaces](Self::replace) draws over `radiance` as ever.
+/// How lights and blended objects add up in `radiance` is set by [`Quality::radiance_sum`]. If they are summed in
+/// floats, a process "sum of lights" follows the lights, or takes their place, and a process "sum of blended objects"
+/// follows transparency. A process of lights or of transparency that the engine [replaces](Self::replace) draws over
+/// `radiance` as ever.
 ///
 /// ```
 /// use drawloom::process::{Deferred, Fxaa, ToneMapping};
@@ -105,9 +106,9 @@ impl Deferred {
         Self { shadow_maps, ..self }
     }
 
-    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the sum of lights, to the
-    /// post-processing steps added so far and to the shadow maps if there are any. It changes neither the format of
-    /// `radiance` nor how far the shadow maps of directional lights reach.
+    /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the sum
+    /// of lights, to the post-processing steps added so far and to the shadow maps if there are any. It changes neither
+    /// the format of `radiance` nor how far the shadow maps of directional lights reach.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
@@ -331,7 +332,8 @@ impl Deferred {
         }
     }
 
-    /// The lights that are summed, unless they are added one by one: those whose process is neither replaced nor left out.
+    /// The lights that are summed, unless they are added one by one: those whose process is neither replaced nor left
+    /// out.
     fn summed_classes(&self) -> LightClasses {
         let is_shipped = |class: &LightClass| {
             let name = LightVolumes::name_of(*class);

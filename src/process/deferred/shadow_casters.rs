@@ -9,11 +9,12 @@ use crate::scene::ViewKind;
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
 /// [`ViewKind::Shadow`], which has a layer for each map.
 ///
-/// Objects whose material [is a mask](crate::scene::Material::is_masked) cast shadows of the mask's shape, also if the material has a
-/// [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its `texture` at the vertices' first
-/// texture coordinates decide. If a type finds its holes in another way, its materials have an `alpha_cutoff` and an `opacity` of 0, so
-/// that they cast no shadow here, and a process of the engine draws them into [`TARGET`](Self::TARGET) after this one, which the
-/// pipeline [keeps](super::Deferred::keep) if processes of the engine read the maps.
+/// Objects whose material [is a mask](crate::scene::Material::is_masked) cast shadows of the mask's shape, also if the
+/// material has a [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its
+/// `texture` at the vertices' first texture coordinates decide. If a type finds its holes in another way, its materials
+/// have an `alpha_cutoff` and an `opacity` of 0, so that they cast no shadow here, and a process of the engine draws
+/// them into [`TARGET`](Self::TARGET) after this one, which the pipeline [keeps](super::Deferred::keep) if processes of
+/// the engine read the maps.
 ///
 /// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same
 /// time (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the

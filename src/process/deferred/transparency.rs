@@ -14,8 +14,8 @@ use crate::view::ShadowMaps;
 
 /// Draws blended objects over `radiance`, back to front by the distance of their centres along the view's axis, with
 /// alpha, additive or subtractive blending (M listing 10.1). It leaves out those whose material has a
-/// [`MaterialType`](crate::scene::MaterialType). In a [`Deferred`](super::Deferred) pipeline they may be summed in floats first: see
-/// [`RadianceSum`](crate::quality::RadianceSum).
+/// [`MaterialType`](crate::scene::MaterialType). In a [`Deferred`](super::Deferred) pipeline they may be summed in
+/// floats first: see [`RadianceSum`](crate::quality::RadianceSum).
 ///
 /// Their shader lights them with all lights that reach the view and with the same shadows, on the visible side, and
 /// adds their emission. A subtractive object subtracts the light that it would otherwise reflect and emit. The result

@@ -22,8 +22,9 @@ pub const SHADER_PRELUDE: &str = concat!(
     include_str!("no_deformation.wgsl")
 );
 
-/// The prelude for a process that reads these attributes. With a deformation, the process brings the function `deform`. `clamps_corners` says
-/// whether corners in front of the near plane of a directional light's map are moved onto it: not if its pipelines clamp pixels instead.
+/// The prelude for a process that reads these attributes. With a deformation, the process brings the function `deform`.
+/// `clamps_corners` says whether corners in front of the near plane of a directional light's map are moved onto it: not
+/// if its pipelines clamp pixels instead.
 #[cfg(feature = "wgpu")]
 pub(crate) fn prelude_with(attributes: &[AttributeLayout], has_deformation: bool, clamps_corners: bool) -> String {
     let vertex_input = include_str!("vertex_input.wgsl");

@@ -198,8 +198,8 @@ fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [scaled_width, sca
 /// By how much JPEG changes texels of a mask that are far from its edges.
 const NOISE: u8 = 16;
 
-/// A texel is near an edge if a clear one and a solid one are at most so many texels away along each axis: as far as the filters of
-/// common programs blur an edge.
+/// A texel is near an edge if a clear one and a solid one are at most so many texels away along each axis: as far as
+/// the filters of common programs blur an edge.
 const EDGE_DISTANCE: usize = 2;
 
 /// One in so many texels of a mask may be neither clear nor solid, nor near an edge.
@@ -261,8 +261,8 @@ impl Pixels {
         true
     }
 
-    /// Whether a mask cuts holes: part of it is clear, and nearly all the rest is solid. Between them, texels may be anything where an edge is
-    /// near, as filters and JPEG leave them there. A smooth transition, or glass, is wider.
+    /// Whether a mask cuts holes: part of it is clear, and nearly all the rest is solid. Between them, texels may be
+    /// anything where an edge is near, as filters and JPEG leave them there. A smooth transition, or glass, is wider.
     pub(super) fn cuts_holes(&self) -> bool {
         let (width, height) = (self.width as usize, self.height as usize);
         let alpha = |x: usize, y: usize| self.bytes[(y * width + x) * 4 + 3];

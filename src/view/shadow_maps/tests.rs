@@ -13,8 +13,9 @@ fn sun() -> Light {
 }
 
 proptest! {
-    /// All that a main camera sees within the maximum distance is in the map of its cascade that the sun has for that camera, before its far
-    /// plane, and so far inside that the filter reads no pixel outside. So is what the camera sees that draws a tile or is jittered.
+    /// All that a main camera sees within the maximum distance is in the map of its cascade that the sun has for that
+    /// camera, before its far plane, and so far inside that the filter reads no pixel outside. So is what the camera
+    /// sees that draws a tile or is jittered.
     #[test]
     fn a_cascade_covers_what_main_cameras_see_of_its_slice(
         placements in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),
@@ -96,7 +97,8 @@ proptest! {
 }
 
 proptest! {
-    /// All that a camera sees within the maximum distance is in the sun's map, wherever it is when the frame is submitted.
+    /// All that a camera sees within the maximum distance is in the sun's map, wherever it is when the frame is
+    /// submitted.
     #[test]
     fn the_maps_cover_what_a_camera_sees_that_moves_until_submission(
         position in prop::array::uniform3(-1e4..1e4_f64),

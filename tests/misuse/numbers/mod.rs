@@ -1,5 +1,5 @@
-//! Each public number that an engine sets, at its extremes. "No limit" is no limit, nonsense is a named error, and both are the same with and
-//! without checks of overflows.
+//! Each public number that an engine sets, at its extremes. "No limit" is no limit, nonsense is a named error, and both
+//! are the same with and without checks of overflows.
 
 mod budgets;
 mod generated;

@@ -282,7 +282,8 @@ pub(super) fn one_object() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Two leaves of one object, a red one before a blue one, whose mask has the values that a program leaves in its holes and in its leaves.
+/// Two leaves of one object, a red one before a blue one, whose mask has the values that a program leaves in its holes
+/// and in its leaves.
 pub(super) fn leaves_of_a_file() -> Result<(), Failed> {
     for [hole, leaf] in [[0, 255], [5, 247]] {
         let mut first = None;

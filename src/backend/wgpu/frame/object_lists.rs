@@ -5,8 +5,8 @@ use std::ops::Range;
 use crate::backend::wgpu::resources::{ALIGNMENT, GrowingBuffer, UploadQueue, size_with_headroom};
 use crate::backend::{BackendError, SceneLimits};
 
-/// The lists of objects that passes of commands draw, one after the other: in one buffer, or in several of equal size where one would be larger
-/// than the device allows. A list lies in one of them.
+/// The lists of objects that passes of commands draw, one after the other: in one buffer, or in several of equal size
+/// where one would be larger than the device allows. A list lies in one of them.
 pub(super) struct ObjectLists {
     /// At least one.
     buffers: Vec<GrowingBuffer>,
@@ -53,8 +53,8 @@ impl ObjectLists {
         limits.buffer_bytes / (objects * size_of::<u32>()).next_multiple_of(ALIGNMENT) as u64
     }
 
-    /// The bytes of a list, by its place among all lists, as if these were in one buffer. The layout requires a binding even if a pass has no
-    /// list; it reads nothing from it.
+    /// The bytes of a list, by its place among all lists, as if these were in one buffer. The layout requires a binding
+    /// even if a pass has no list; it reads nothing from it.
     pub(super) fn bytes_of(&self, list: &Range<usize>) -> Range<usize> {
         if list.is_empty() { 0..ALIGNMENT } else { list.start * self.stride..list.end * self.stride }
     }

@@ -102,8 +102,8 @@ impl ProcessPipelines {
         self.inputs.has_clamped_pipelines()
     }
 
-    /// Creates the missing ones of these pipelines, but for those of meshes of which the shader cannot read an attribute.
-    /// [Insert](Self::insert) them only if the device reports no error.
+    /// Creates the missing ones of these pipelines, but for those of meshes of which the shader cannot read an
+    /// attribute. [Insert](Self::insert) them only if the device reports no error.
     ///
     /// # Errors
     /// If a resource cannot be made.

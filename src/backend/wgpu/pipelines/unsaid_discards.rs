@@ -7,8 +7,8 @@ use crate::command::Blending;
 use crate::process::Draws;
 use crate::unwind::emit_unlocked;
 
-/// Warns if a fragment shader, which compiles, discards pixels or returns a depth, and its process does not say so: its objects then hide
-/// from culling what is seen through their holes.
+/// Warns if a fragment shader, which compiles, discards pixels or returns a depth, and its process does not say so: its
+/// objects then hide from culling what is seen through their holes.
 pub(super) fn warn_of_unsaid_discards(process: &str, draws: &Draws<'_>, before: &str, own: &[(&str, &str)]) {
     let Draws::Commands(commands) = draws else { return };
     let may_hide = draws.hides() && commands.selection.blending != Blending::Blended;
@@ -26,7 +26,8 @@ pub(super) fn warn_of_unsaid_discards(process: &str, draws: &Draws<'_>, before: 
     }
 }
 
-/// Whether a fragment entry point of a process's own texts of WGSL, each with what it is, discards pixels or returns a depth.
+/// Whether a fragment entry point of a process's own texts of WGSL, each with what it is, discards pixels or returns a
+/// depth.
 fn leaves_out_pixels(fragment: &str, before: &str, own: &[(&str, &str)]) -> bool {
     // Parsing takes about as long as wgpu needs to make the module.
     if !own.iter().any(|(_, text)| text.contains("discard") || text.contains("frag_depth")) {

@@ -98,7 +98,8 @@ pub(crate) struct ImportedMeshes {
 }
 
 impl ImportedMeshes {
-    /// The imported meshes among `meshes`, which the device [can draw](super::mesh_check::check_mesh). Unchanged ones keep their entries.
+    /// The imported meshes among `meshes`, which the device [can draw](super::mesh_check::check_mesh). Unchanged ones
+    /// keep their entries.
     ///
     /// # Errors
     /// If the device has no room.

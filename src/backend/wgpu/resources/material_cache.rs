@@ -188,8 +188,8 @@ fn values_of(assets: &Assets, layout: MaterialLayout, limits: SceneLimits) -> Ar
     bytes.into()
 }
 
-/// How many elements of `stride` bytes an array has that has one for each slot of the materials, within the limits. No object is drawn with a
-/// material that is beyond them.
+/// How many elements of `stride` bytes an array has that has one for each slot of the materials, within the limits. No
+/// object is drawn with a material that is beyond them.
 fn element_count(assets: &Assets, stride: usize, limits: SceneLimits) -> usize {
     let allowed = usize::try_from(limits.binding_bytes / stride.max(1) as u64).unwrap_or(usize::MAX);
     assets.materials.slot_count().min(allowed).max(1)

@@ -35,8 +35,8 @@ fn check_buffer(needed: u64, allowed: u64) -> Result<(), BackendError> {
     if needed > allowed { Err(BackendError::Limit { limit: "max_buffer_size", allowed, needed }) } else { Ok(()) }
 }
 
-/// The size of the longest buffers of vertices and of indices in a page that holds nothing but a mesh. An attribute of the engine's own takes no more
-/// than the vertices: 16 bytes each at most.
+/// The size of the longest buffers of vertices and of indices in a page that holds nothing but a mesh. An attribute of
+/// the engine's own takes no more than the vertices: 16 bytes each at most.
 fn bytes_in_pages(mesh: &Mesh, format: VertexFormat) -> [u64; 2] {
     const MAX_ATTRIBUTE_BYTES: u64 = 16;
     let stride = vertex_stride(format).max(MAX_ATTRIBUTE_BYTES);

@@ -57,8 +57,8 @@ pub(super) struct ResidentTexture {
 }
 
 impl TextureArrays {
-    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Adds the copies to what is submitted before anything
-    /// that reads the textures.
+    /// Uploads new and changed textures, and rejects those that exceed the device's layers. Adds the copies to what is
+    /// submitted before anything that reads the textures.
     ///
     /// # Errors
     /// If the device has no room, or is lost. What is in the arrays is undefined then, so drop them.

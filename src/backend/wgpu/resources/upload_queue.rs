@@ -45,8 +45,8 @@ impl UploadQueue {
         self.queue.write_buffer_with(buffer, offset, size)
     }
 
-    /// Adds commands that have to be submitted before anything that reads what they make. To submit calls back for what the device has done:
-    /// the engine's code, which may ask for what the caller has locked. So this does not submit.
+    /// Adds commands that have to be submitted before anything that reads what they make. To submit calls back for what
+    /// the device has done: the engine's code, which may ask for what the caller has locked. So this does not submit.
     pub(crate) fn add_commands(&self, commands: impl IntoIterator<Item = wgpu::CommandBuffer>) {
         self.commands.lock().extend(commands);
     }

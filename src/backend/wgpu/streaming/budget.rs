@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::backend::BackendError;
 
-/// What streaming may take: memory of the device, and a part of each frame. `u64::MAX` and `Duration::MAX` are no limit. See
-/// [`WgpuBackend::stream_resources`](crate::backend::WgpuBackend::stream_resources).
+/// What streaming may take: memory of the device, and a part of each frame. `u64::MAX` and `Duration::MAX` are no
+/// limit. See [`WgpuBackend::stream_resources`](crate::backend::WgpuBackend::stream_resources).
 ///
 /// ```
 /// use std::time::Duration;

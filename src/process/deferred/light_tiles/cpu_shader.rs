@@ -5,7 +5,8 @@ use crate::process::{FullScreenCpuShader, FullScreenPixel, PassInputs, ShaderLig
 use crate::raster::{Real, Vector3, Vector4};
 use crate::scene::{LightKind, Projection};
 
-/// The width and height of a tile in pixels of the target that holds its marks, which is half as wide and high as the picture.
+/// The width and height of a tile in pixels of the target that holds its marks, which is half as wide and high as the
+/// picture.
 const TILE_SIDE: usize = 16;
 
 /// How many bits of a pixel are marks.
@@ -56,8 +57,8 @@ impl<R: Real> FullScreenCpuShader<R> for LightTilesCpuShader {
     }
 }
 
-/// Whether a light may reach what is seen between clip coordinates: whether its sphere is not wholly beyond one of four planes. The margin is a
-/// hundred times what rounding makes.
+/// Whether a light may reach what is seen between clip coordinates: whether its sphere is not wholly beyond one of four
+/// planes. The margin is a hundred times what rounding makes.
 fn may_reach<R: Real>(view: &ShaderView<R>, light: &ShaderLight<R>, horizontal: [R; 2], vertical: [R; 2]) -> bool {
     if light.kind == LightKind::Directional {
         return true;
@@ -121,8 +122,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2_000))]
 
-        /// A light within whose range a pixel's position is, is marked in the pixel's tile, whatever the picture's size and the lights before
-        /// it.
+        /// A light within whose range a pixel's position is, is marked in the pixel's tile, whatever the picture's size
+        /// and the lights before it.
         #[test]
         fn a_light_that_reaches_a_pixel_is_marked_in_its_tile(
             view in 0..4_usize,

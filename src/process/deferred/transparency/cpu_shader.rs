@@ -64,7 +64,8 @@ impl<R: Real> ObjectCpuShader<R> for TransparencyCpuShader {
         let radiance = material.emission + rgb(diffuse).map(|value| value / pi) * illuminance;
         let radiance = radiance.map(|value| value.min(R::of(MAX_STORED_RADIANCE)));
         let opacity = diffuse[3];
-        // Alpha blending multiplies by the opacity. In a sum alpha is how much is hidden of what is behind: what is added hides nothing.
+        // Alpha blending multiplies by the opacity. In a sum alpha is how much is hidden of what is behind: what is
+        // added hides nothing.
         targets[0] = match material.blend {
             Blend::Alpha => with_alpha(radiance, opacity),
             _ => with_alpha(radiance * opacity, if self.sums { R::zero() } else { opacity }),

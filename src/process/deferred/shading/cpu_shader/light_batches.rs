@@ -2,7 +2,8 @@
 
 use crate::raster::{Real, Vector3};
 
-/// A sum of light in batches of 32, and in batches of 32 of these: a term is rounded with those of its batch, not with all that follow it.
+/// A sum of light in batches of 32, and in batches of 32 of these: a term is rounded with those of its batch, not with
+/// all that follow it.
 pub(in crate::process::deferred) struct LightBatches<R> {
     sum: Vector3<R>,
     batches: Vector3<R>,
@@ -40,8 +41,8 @@ mod tests {
     use super::*;
     use crate::process::cpu_shader::test_inputs::UNIT;
 
-    /// Each term is added with up to 31 others, its batch with up to 31 others, those to n/1024 others, and all is added twice more. An
-    /// addition that rounds to nearest loses 2⁻²⁴ of its sum.
+    /// Each term is added with up to 31 others, its batch with up to 31 others, those to n/1024 others, and all is
+    /// added twice more. An addition that rounds to nearest loses 2⁻²⁴ of its sum.
     #[test]
     fn rounding_grows_with_batches_and_not_with_terms() {
         for count in [1_usize, 31, 32, 33, 100, 1_023, 1_024, 1_025, 10_000, 1_000_000] {
