@@ -17,6 +17,9 @@ use crate::sync::{Arc, thread};
 use crate::timeline::{Timeline, TimelineSettings};
 use crate::unwind::{Contained, catch};
 
+/// A function of the engine's that says something of each worker's thread.
+type PerWorker<T> = Contained<Box<dyn Fn(usize) -> T>>;
+
 /// The settings of a scheduler: see [`Scheduler::builder`].
 ///
 /// ```
@@ -34,9 +37,9 @@ use crate::unwind::{Contained, catch};
 #[derive(Default)]
 pub struct SchedulerBuilder {
     workers: Option<usize>,
-    name: Option<Contained<Box<dyn Fn(usize) -> String>>>,
+    name: Option<PerWorker<String>>,
     stack_size: Option<usize>,
-    affinity: Option<Contained<Box<dyn Fn(usize) -> AffinityMask>>>,
+    affinity: Option<PerWorker<AffinityMask>>,
     on_start: Option<Hook>,
     on_stop: Option<Hook>,
     shuffle: Option<u64>,
