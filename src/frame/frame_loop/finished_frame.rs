@@ -48,7 +48,7 @@ impl FrameTimes {
 
 /// Why a [`FrameLoop`](super::FrameLoop) cannot start, or lost a frame. The frames behind a lost one are not affected
 /// by that, unless they keep a [view](crate::scene::Redraw) that it was to draw: those that were recorded before it was
-/// lost are refused, with [`SubmitError::LostView`](crate::SubmitError::LostView).
+/// lost are refused, with [`SubmitError::LostView`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameLoopError {
