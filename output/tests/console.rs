@@ -13,11 +13,13 @@ use tempfile::TempDir;
 /// Names the file that the program writes, in its environment.
 const FILE: &str = "DRAWLOOM_CONSOLE_FILE";
 
+type Case = fn() -> Result<(), Failed>;
+
 fn main() -> ExitCode {
     if let Some(file) = std::env::var_os(FILE) {
         return exit_code(program(Path::new(&file)));
     }
-    let cases: [(&str, fn() -> Result<(), Failed>); 6] = [
+    let cases: [(&str, Case); 6] = [
         ("what_is_printed_is_read", read),
         ("an_output_that_nobody_reads_is_no_error", unread),
         ("a_full_output_is_an_error_after_the_files", full),

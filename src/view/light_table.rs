@@ -270,7 +270,13 @@ mod tests {
             let main = RenderView::new(&Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
             let view = RenderView { main_view, ..main };
             let mut table = LightTable::default();
-            table.fill_within(&view, (&lights, &main_views), &[view.clone()], true, (usize::MAX, &mut Vec::new()));
+            table.fill_within(
+                &view,
+                (&lights, &main_views),
+                std::slice::from_ref(&view),
+                true,
+                (usize::MAX, &mut Vec::new()),
+            );
             let found: Vec<_> = table.sources().map(|(light, _)| light).collect();
             assert_eq!(found, [0, 4, expected], "{main_view:?}");
         }

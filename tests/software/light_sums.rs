@@ -9,7 +9,7 @@ use crate::Fixture;
 
 fn radiance(submission: &SoftwareSubmission) -> Vec<[f64; 3]> {
     let numbers = submission.numbers(0, "radiance").unwrap();
-    numbers.iter().map(|pixel| [0, 1, 2].map(|channel| f64::from(pixel[channel]))).collect()
+    numbers.iter().map(|pixel| [0, 1, 2].map(|channel| pixel[channel])).collect()
 }
 
 /// Draws each scene with each value of the knob.

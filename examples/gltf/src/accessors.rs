@@ -179,6 +179,9 @@ impl<'a> Replaced<'a> {
             _ => return Err(Problem::invalid(accessor, "has sparse indices that are no unsigned integers")),
         };
         let view_of = |part: &Element<'_>| source.view(accessor, part.needed_index("bufferView")?);
+        if count > accessor.needed_index("count")? {
+            return Err(Problem::invalid(accessor, "has more sparse values than values"));
+        }
         let offset = |part: &Element<'_>| Ok::<_, Problem>(part.index("byteOffset")?.unwrap_or(0));
         let offsets = [offset(&indices)?, offset(&values)?];
         let (indices, values) = (view_of(&indices)?, view_of(&values)?);

@@ -76,12 +76,18 @@ pub(crate) fn read_uri(folder: &Path, element: &dyn Display, uri: &str, limit: &
     read_file(&path_of(folder, uri).map_err(refused)?, limit)
 }
 
+/// No system has longer paths. Messages show paths whole.
+const MAX_PATH_BYTES: usize = 4_096;
+
 fn path_of(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     let shown = excerpt(uri);
     if uri.split('/').next().is_some_and(|first| first.contains(':')) {
         return Err(format!("\"{shown}\" has a scheme other than data"));
     }
     let path = percent_decode_str(uri).decode_utf8().map_err(|_| format!("\"{shown}\" is not UTF-8"))?;
+    if path.len() > MAX_PATH_BYTES {
+        return Err(format!("\"{shown}\" is longer than a path can be"));
+    }
     let path = Path::new(&*path);
     if path.components().any(|part| !matches!(part, Component::Normal(_) | Component::CurDir)) {
         return Err(format!("\"{shown}\" leads out of the file's folder"));

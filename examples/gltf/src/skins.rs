@@ -22,6 +22,8 @@ impl Skin {
             Ok(accessors.source.referred(skin, Kind::Node, index)?.index)
         };
         let nodes = skin.list("joints")?.iter().map(joint).collect::<Result<Vec<_>, Problem>>()?;
+        let joint_bytes = size_of::<(usize, DAffine3)>() as u64;
+        accessors.source.budget.poses.take(skin, nodes.len() as u64, joint_bytes)?;
         if nodes.is_empty() {
             return Err(Problem::invalid(skin, "has no joints"));
         }

@@ -109,6 +109,10 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
         let weights = self.weights_of(node, mesh)?;
         let skin = parts.source.member(node, "skin", Kind::Skin).ok().flatten();
         let skin = skin.and_then(|skin| Some((skin, parts.skins.get(&skin.index)?)));
+        if let Some((_, read)) = skin {
+            let limit = &parts.source.budget.poses;
+            limit.take(node, read.joints.len() as u64, size_of::<DAffine3>() as u64)?;
+        }
         let joints = skin.map(|(skin, read)| {
             let place = |(node, bind): &(usize, DAffine3)| Some(parts.world[*node]? * *bind);
             let origin = read.joints.first().and_then(|(node, _)| parts.world[*node]);
@@ -248,6 +252,7 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
     /// The weight of each morph target: by the animation, the node or the mesh; 0 if something is wrong with them.
     fn weights_of(&mut self, node: &Element<'_>, mesh: &Element<'_>) -> Result<Vec<f32>, Problem> {
         let count = self.parts.target_counts[mesh.index];
+        self.parts.source.budget.poses.take(node, count as u64, size_of::<f32>() as u64)?;
         if let Some(weights) = self.parts.weights.get(&node.index) {
             return Ok(weights.clone());
         }

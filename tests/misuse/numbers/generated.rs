@@ -116,8 +116,14 @@ fn chunks() -> Result<(), Failed> {
         let buffer = GeneratedBuffer::with_chunk("buffer", 8, 4);
         for chunk in [2, 1 << 61, 1 << 62, 1 << 63, usize::MAX - 1, usize::MAX] {
             let text = format!("has no chunk {chunk}");
-            refused(record(&mut fixture, &buffer, |frame| Ok(drop(frame.fill(&buffer, chunk)?))), &text)?;
-            refused(record(&mut fixture, &buffer, |frame| Ok(drop(frame.filled(&buffer, chunk)?))), &text)?;
+            refused(
+                record(&mut fixture, &buffer, |frame| frame.fill(&buffer, chunk).map(drop).map_err(Into::into)),
+                &text,
+            )?;
+            refused(
+                record(&mut fixture, &buffer, |frame| frame.filled(&buffer, chunk).map(drop).map_err(Into::into)),
+                &text,
+            )?;
             fixture.expect_usual("the next frame")?;
         }
         for count in SIZES {
@@ -149,7 +155,7 @@ fn columns() -> Result<(), Failed> {
     let mut fixture = Fixture::null(2);
     let buffer = GeneratedBuffer::with_chunk("buffer", 1, 1);
     for chunk in [2, usize::MAX] {
-        refused(record(&mut fixture, &buffer, |_| Ok(drop(column.write(chunk)?))), "a node")?;
+        refused(record(&mut fixture, &buffer, |_| column.write(chunk).map(drop).map_err(Into::into)), "a node")?;
         refused(record(&mut fixture, &buffer, |_| Ok(_ = column.read(chunk))), "a node")?;
         fixture.expect_usual("the next frame")?;
     }

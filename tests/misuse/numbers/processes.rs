@@ -293,12 +293,12 @@ fn shares() -> Result<(), Failed> {
 
 fn shadow_maps() -> Result<(), Failed> {
     let usual = ShadowMaps::default();
-    let mut all: Vec<_> = COUNTS.iter().map(|side| ShadowMaps { side: *side, ..usual.clone() }).collect();
-    all.extend(COUNTS.iter().map(|filter| ShadowMaps { filter: *filter, ..usual.clone() }));
-    all.extend(COUNTS.iter().map(|cascades| ShadowMaps { cascades: *cascades, ..usual.clone() }));
-    all.extend(FLOATS.iter().map(|bias| ShadowMaps { bias: *bias, ..usual.clone() }));
-    all.extend(FLOATS.iter().map(|max_distance| ShadowMaps { max_distance: *max_distance, ..usual.clone() }));
-    all.extend(FLOATS.iter().map(|split_lambda| ShadowMaps { split_lambda: *split_lambda, ..usual.clone() }));
+    let mut all: Vec<_> = COUNTS.iter().map(|side| ShadowMaps { side: *side, ..usual }).collect();
+    all.extend(COUNTS.iter().map(|filter| ShadowMaps { filter: *filter, ..usual }));
+    all.extend(COUNTS.iter().map(|cascades| ShadowMaps { cascades: *cascades, ..usual }));
+    all.extend(FLOATS.iter().map(|bias| ShadowMaps { bias: *bias, ..usual }));
+    all.extend(FLOATS.iter().map(|max_distance| ShadowMaps { max_distance: *max_distance, ..usual }));
+    all.extend(FLOATS.iter().map(|split_lambda| ShadowMaps { split_lambda: *split_lambda, ..usual }));
     for maps in all {
         let what = format!("{maps:?}");
         let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).shadow_maps(maps);

@@ -247,7 +247,7 @@ fn cameras() -> Result<(), Failed> {
 fn ranges() -> Result<(), Failed> {
     for number in FLOATS {
         let range = Light::range_for(Vec3::splat(number));
-        ensure(range >= 0.0 || !(number >= 0.0), format_args!("the range for {number} is {range}"))?;
+        ensure(range >= 0.0 || number < 0.0 || number.is_nan(), format_args!("the range for {number} is {range}"))?;
         let bounds = Bounds::around([Vec3::splat(number), Vec3::ONE].into_iter());
         ensure(bounds.radius >= 0.0 || !number.is_finite(), format_args!("the bounds of {number}: {bounds:?}"))?;
     }

@@ -19,6 +19,8 @@ pub const CASES: &[crate::Case] = &[
 ];
 
 type Change = fn(&mut Builder);
+/// A file, what is changed in it, and a part of what is then said.
+type ChangedFile = (fn() -> Builder, Change, &'static str);
 
 /// A channel or a sampler is wrong: the other channels move their nodes.
 fn animations() -> Result<(), Failed> {
@@ -81,7 +83,7 @@ fn sampler(it: &mut Builder) -> &mut Value {
 
 /// A second element, which is wrong, beside those of a scene.
 fn elements() -> Result<(), Failed> {
-    let changes: [(fn() -> Builder, Change, &str); 24] = [
+    let changes: [ChangedFile; 24] = [
         (
             textured_square,
             |it| image(it, json!({"uri": "nowhere.png"})),

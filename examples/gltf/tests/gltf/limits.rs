@@ -21,10 +21,12 @@ pub const CASES: &[crate::Case] = &[
 ];
 
 type Change = fn(&mut Builder);
+/// A file, what is changed in it, and a part of what is then said.
+type ChangedFile = (fn() -> Builder, Change, &'static str);
 
 /// Files of a few kilobytes, with the limits that a user has not changed.
 fn growing() -> Result<(), Failed> {
-    let changes: [(fn() -> Builder, Change, &str); 13] = [
+    let changes: [ChangedFile; 13] = [
         (textured_square, |it| zeros(it, 0, 177_999_999), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 1 << 40), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 9_000_000_000_000_000), "zero_bytes"),

@@ -17,6 +17,8 @@ pub const CASES: &[crate::Case] = &[
 ];
 
 type Change = fn(&mut Builder);
+/// A file, what is changed in it, and a part of what is then said.
+type ChangedFile = (fn() -> Builder, Change, &'static str);
 
 fn valid() -> Result<(), Failed> {
     let changes: [(fn() -> Builder, Change); 22] = [
@@ -66,7 +68,7 @@ fn valid() -> Result<(), Failed> {
 
 /// The validator warns of these, and takes the file.
 fn unknown() -> Result<(), Failed> {
-    let changes: [(fn() -> Builder, Change, &str); 14] = [
+    let changes: [ChangedFile; 14] = [
         (textured_square, |it| primitive(it)["mode"] = json!(9), "has the mode 9, which is not known"),
         (textured_square, |it| sampled(it, "wrapS", 5), "sampler 0 has the wrapS 5, which is not known"),
         (textured_square, |it| sampled(it, "magFilter", 1), "sampler 0 has the magFilter 1, which is not known"),
@@ -83,7 +85,7 @@ fn unknown() -> Result<(), Failed> {
         ),
         (textured_square, |it| it.json["cameras"][0]["perspective"]["yfov"] = json!(3.5), "is drawn as 3.14"),
         (textured_square, |it| it.json["textures"][0] = json!({}), "has no image of a format that is read"),
-        (textured_square, |it| _ = it.json["accessors"][3]["count"] = json!(5), "and is drawn without the last 2"),
+        (textured_square, |it| it.json["accessors"][3]["count"] = json!(5), "and is drawn without the last 2"),
         (textured_square, |it| it.json["scene"] = json!(7), "the first one is drawn"),
         (lights_and_cameras, |it| light(it)["type"] = json!("area"), "light 0 has a `type` that is not known"),
         (bending_tube_at_rest, |it| target(it)["path"] = json!("visible"), "animates \"visible\", which is not known"),
