@@ -77,7 +77,8 @@ impl<'a> NodeFrame<'a> {
     ///
     /// # Errors
     /// If the node does not declare that it [fills](super::NodeAccesses::fills) the buffer, if there is no such chunk,
-    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it.
+    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it,
+    /// or any for a minute.
     pub fn fill<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,

@@ -143,8 +143,9 @@ impl FrameTables {
             let of_view = SceneLimits { binding_bytes: limits.binding_bytes.min(room), ..limits };
             let within = (of_view.max_lights(), &mut left_out);
             table.fill_within(view, (lights, main_views), views, separate_shadowed_lights, within);
-            // Each view's lights begin where a binding can.
-            room = room.saturating_sub((size_of_val(table.gpu_lights()) as u64).next_multiple_of(LIGHT_ALIGNMENT));
+            // Each view's lights begin where a binding can, and a view without lights has an empty one.
+            let bytes = size_of_val(table.gpu_lights()).max(1) as u64;
+            room = room.saturating_sub(bytes.next_multiple_of(LIGHT_ALIGNMENT));
         }
         let left_out = left_out.into_iter().map(|light| scene_indices[light]);
         self.objects.rejections().count_all_once(RejectionReason::LightLimit, left_out);

@@ -1,5 +1,5 @@
-//! How long a job waits for a chunk that a job of a CPU node holds: as long as that job works, however slow it is, and
-//! whether or not a debugger has stopped it. A chunk that nobody will let go of is an error after a second.
+//! How long a job waits for a chunk that a job of a CPU node holds: a minute while that job works, however slow it is, and
+//! whether or not a debugger has stopped it. A chunk that nobody will let go of is an error, as a rule after a second.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -33,12 +33,14 @@ thread_local! {
 /// A wait is cut into slices, and the time is counted in them: while a debugger has stopped the whole process, only one
 /// passes.
 const SLICE: Duration = Duration::from_millis(5);
-/// The slices in which nobody works on the chunk, after which nobody ever will.
+/// The slices in which nobody works on the chunk, after which nobody ever will: a second.
 const MAX_IDLE_SLICES: u32 = 200;
+/// All slices: a minute. A thread that seems to work may wait for this one, such as in a loop of which this is a part.
+const MAX_SLICES: u32 = 12_000;
 
 impl ChunkHolder {
     /// Takes a chunk with `try_lock`, which waits for a given time. `None` if it is held by this job, by one that has
-    /// leaked its guard, or by one that waits for another chunk itself.
+    /// leaked its guard, by one that waits for another chunk itself, or by any for a minute.
     pub(super) fn wait<G>(&self, try_lock: impl Fn(Duration) -> Option<G>) -> Option<G> {
         let guard = try_lock(Duration::ZERO).or_else(|| self.wait_in_slices(try_lock))?;
         *self.0.lock() = Some(NodeJob::current());
@@ -49,14 +51,15 @@ impl ChunkHolder {
     fn wait_in_slices<G>(&self, try_lock: impl Fn(Duration) -> Option<G>) -> Option<G> {
         let thread = THREAD.with(Arc::clone);
         thread.is_waiting.store(true, Ordering::Relaxed);
-        let mut idle_slices = 0;
+        let (mut slices, mut idle_slices) = (0, 0);
         let guard = loop {
             let guard = try_lock(SLICE);
-            if guard.is_some() || idle_slices == MAX_IDLE_SLICES {
+            if guard.is_some() || idle_slices == MAX_IDLE_SLICES || slices == MAX_SLICES {
                 break guard;
             }
             let is_worked_on = self.0.lock().as_ref().is_some_and(|holder| holder.works_beside(&thread));
             idle_slices += u32::from(!is_worked_on);
+            slices += 1;
         };
         thread.is_waiting.store(false, Ordering::Relaxed);
         guard

@@ -80,7 +80,8 @@ impl<'a, T> NodeColumn<'a, T> {
     ///
     /// # Errors
     /// If it has been read in this frame, because the node does not declare that it writes [`FrameData::Transforms`](crate::FrameData::Transforms);
-    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it.
+    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it,
+    /// or any for a minute.
     ///
     /// # Panics
     /// If there is no such chunk.

@@ -15,8 +15,8 @@ pub(super) struct BackgroundSlots {
 }
 
 impl BackgroundSlots {
-    /// A quarter of the workers, and at least one: a frame that runs beside long background jobs takes a third longer
-    /// at most.
+    /// A quarter of the workers, and at least one: with four workers or more, a frame that runs beside long background
+    /// jobs takes a third longer at most.
     pub(super) fn new(workers: usize) -> Self {
         Self { limit: AtomicUsize::new((workers / 4).max(1)), taken: AtomicUsize::new(0) }
     }

@@ -150,13 +150,13 @@ impl Timeline {
         }
     }
 
-    /// Records what was chosen by measurement in a frame: none if the timeline was off when the frame began.
     /// A stopwatch that starts now, for the cost of some work.
     #[inline]
     pub(crate) fn stopwatch(&self) -> Stopwatch<'_> {
         Stopwatch::of(&self.clock)
     }
 
+    /// Records what was chosen by measurement in a frame: none if the timeline was off when the frame began.
     pub(crate) fn add_tuning(&self, frame: Option<u64>, tuning: &FrameTuning) {
         if let Some(frame) = frame.filter(|_| self.is_on()) {
             let tuning = tuning.clone();

@@ -112,8 +112,10 @@ fn running_at_once(workers: usize, limit: Option<usize>, jobs: usize) -> usize {
     let scheduler = scheduler(workers);
     let [running, most] = [(); 2].map(|()| Arc::new(AtomicUsize::new(0)));
     let go_on = Arc::new(AtomicBool::new(false));
-    // Nothing begins before the limit is set, and then all that may begin does.
-    scheduler.set_background_workers(0);
+    if limit.is_some() {
+        // Nothing begins before the limit is set, and then all that may begin does.
+        scheduler.set_background_workers(0);
+    }
     let jobs: Vec<_> = (0..jobs)
         .map(|_job| {
             let (running, most, go_on) = (Arc::clone(&running), Arc::clone(&most), Arc::clone(&go_on));
@@ -125,7 +127,9 @@ fn running_at_once(workers: usize, limit: Option<usize>, jobs: usize) -> usize {
         })
         .collect();
     let expected = limit.unwrap_or((workers / 4).max(1)).min(workers - 1).min(jobs.len());
-    scheduler.set_background_workers(limit.unwrap_or((workers / 4).max(1)));
+    if let Some(limit) = limit {
+        scheduler.set_background_workers(limit);
+    }
     assert!(eventually(|| running.load(Ordering::Relaxed) == expected), "{running:?} of {expected} jobs run");
     // What holds a worker that the limit keeps free would show here: jobs of a frame that need all of those at once.
     let free = workers - expected;

@@ -189,7 +189,7 @@ impl Backend for WgpuBackend {
             pipelines.share();
         }
         if pipelines.has_unreadable() {
-            count_unreadable(frame, request, (pipelines, list));
+            count_unreadable(frame, request, (pipelines, list, pass.clamps_depth));
         }
         Ok(())
     }
@@ -398,9 +398,13 @@ fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
 }
 
 /// Counts the objects of a list with meshes of which the process's shader cannot read an attribute.
-fn count_unreadable(frame: &WgpuFrame, request: &FrameRequest<'_>, (pipelines, list): (&ProcessPipelines, &DrawList)) {
+fn count_unreadable(
+    frame: &WgpuFrame,
+    request: &FrameRequest<'_>,
+    (pipelines, list, clamps_depth): (&ProcessPipelines, &DrawList, bool),
+) {
     for batch in &list.batches {
-        if pipelines.is_unreadable(&PipelineVariant::of_batch(&frame.meshes, batch)) {
+        if pipelines.is_unreadable(&PipelineVariant::of_batch(&frame.meshes, batch).clamping(clamps_depth)) {
             let objects = &list.objects[batch.first as usize..][..batch.count as usize];
             let objects = objects.iter().map(|object| *object as usize);
             request.rejections.count_all_once(RejectionReason::UndrawableMesh, objects);

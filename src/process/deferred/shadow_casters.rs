@@ -35,7 +35,7 @@ impl ShadowCasters {
     /// The target's name.
     pub const TARGET: &str = "shadow map";
 
-    pub(in crate::process) const NAME: &str = "shadow casters";
+    pub(crate) const NAME: &str = "shadow casters";
 }
 
 impl RenderProcess for ShadowCasters {

@@ -4,13 +4,17 @@ use wgpu::naga::front::wgsl;
 use wgpu::naga::{Binding, Block, BuiltIn, Function, Module, ShaderStage, Statement, TypeInner};
 
 use crate::command::Blending;
-use crate::process::Draws;
+use crate::process::{Draws, ShadowCasters};
 use crate::unwind::emit_unlocked;
 
 /// Warns if a fragment shader, which compiles, discards pixels or returns a depth, and its process does not say so: its
 /// objects then hide from culling what is seen through their holes.
 pub(super) fn warn_of_unsaid_discards(process: &str, draws: &Draws<'_>, before: &str, own: &[(&str, &str)]) {
     let Draws::Commands(commands) = draws else { return };
+    // It discards in maps of paraboloids, in which nothing hides anything.
+    if process == ShadowCasters::NAME {
+        return;
+    }
     let may_hide = draws.hides() && commands.selection.blending != Blending::Blended;
     if let Some(fragment) = commands.fragment.filter(|_| may_hide)
         && leaves_out_pixels(fragment, before, own)

@@ -10,7 +10,17 @@ struct Caster {
 fn vertex(in: VertexInput) -> Caster {
     let object = drawn_object(in.instance);
     let relative = relative_position(object, deform(in, object).position);
-    return Caster(clip_position(relative), forward_of(relative), unclamped_clip_position(relative).z);
+    return Caster(caster_position(relative), forward_of(relative), unclamped_clip_position(relative).z);
+}
+
+// Where corners are clamped to the near plane, they are to the far one too: a triangle that crosses both would otherwise be
+// clipped by the far plane where it is not. The fragment shader has the depth of each pixel.
+fn caster_position(relative: vec3<f32>) -> vec4<f32> {
+    var clip = clip_position(relative);
+    if CLAMPS_CORNERS && view.projection == ORTHOGRAPHIC_SHADOW {
+        clip.z = max(clip.z, 0.0);
+    }
+    return clip;
 }
 
 // Discards pixels behind a paraboloid: a triangle behind it whose corners surround its axis would be rasterized across
@@ -42,7 +52,8 @@ fn masked_vertex(in: VertexInput) -> MaskedCaster {
     let deformed = deform(in, object);
     let relative = relative_position(object, deformed.position);
     let depth = unclamped_clip_position(relative).z;
-    return MaskedCaster(clip_position(relative), forward_of(relative), depth, bounded_uv(deformed.uv), object.material);
+    let clip = caster_position(relative);
+    return MaskedCaster(clip, forward_of(relative), depth, bounded_uv(deformed.uv), object.material);
 }
 
 @fragment
