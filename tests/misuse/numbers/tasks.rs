@@ -24,6 +24,16 @@ pub const CASES: &[NumberCase] = &[
         check: background,
     },
     NumberCase {
+        name: "any_number_of_background_workers",
+        numbers: &["task::Scheduler::set_background_workers"],
+        check: background_workers,
+    },
+    NumberCase {
+        name: "stacks_of_any_size_work_or_are_refused",
+        numbers: &["task::SchedulerBuilder::stack_size"],
+        check: stacks,
+    },
+    NumberCase {
         name: "any_cost_of_a_wake_up_and_any_seed",
         numbers: &["task::SchedulerBuilder::wake_up_cost", "task::SchedulerBuilder::shuffle"],
         check: wake_ups,
@@ -110,6 +120,29 @@ fn loops() -> Result<(), Failed> {
             })?;
             let counted = (high.into_inner(), low.into_inner());
             same(counted, (0, length as u64), format_args!("{length} in chunks of {chunk}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn background_workers() -> Result<(), Failed> {
+    for limit in SIZES {
+        let scheduler = Scheduler::new(3)?;
+        scheduler.set_background_workers(limit);
+        let jobs = [1, 2, 3].map(|number| scheduler.background(move || number));
+        for (job, number) in jobs.into_iter().zip([1, 2, 3]) {
+            // A thread that waits runs what no worker may.
+            ensure(job.wait() == Ok(number), format_args!("job {number} with a limit of {limit}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn stacks() -> Result<(), Failed> {
+    for bytes in SIZES {
+        // What the system has no address space for, it refuses.
+        if let Ok(scheduler) = Scheduler::builder().workers(2).stack_size(bytes).build() {
+            ensure(scheduler.background(|| 7).wait() == Ok(7), format_args!("a job on {bytes} bytes"))?;
         }
     }
     Ok(())
