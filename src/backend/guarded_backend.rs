@@ -36,7 +36,7 @@ pub(crate) fn guarded<R>(call: &'static str, method: impl FnOnce() -> R) -> Resu
 }
 
 /// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's
-/// code. The rest of the crate has no other way to a backend, so no call of it can unwind.
+/// code. Outside of jobs the rest of the crate calls it in no other way.
 ///
 /// The methods are those of [`Backend`]. Those that can fail already return the panic as a [`BackendError`] where the
 /// caller cannot tell it from other errors, and as a [`CallPanic`] elsewhere.

@@ -10,7 +10,8 @@ pub(super) struct FrameOutcome {
 }
 
 enum State {
-    /// It is neither submitted nor dropped, and keeps views that these frames draw.
+    /// It is neither submitted nor dropped, and keeps views that these frames draw, or that frames draw which they keep
+    /// views of in turn.
     InFlight(Vec<Arc<FrameOutcome>>),
     Submitted,
     /// It was dropped, or its submission failed.
@@ -21,10 +22,16 @@ impl FrameOutcome {
     /// Of a frame that keeps views which `earlier` frames draw.
     pub(super) fn in_flight<'a>(earlier: impl Iterator<Item = &'a Arc<Self>>) -> Self {
         let mut pending: Vec<Arc<Self>> = Vec::new();
-        for frame in earlier.filter(|frame| !frame.is_submitted()) {
-            if !pending.iter().any(|known| Arc::ptr_eq(known, frame)) {
+        let mut add = |frame: &Arc<Self>| {
+            if !frame.is_submitted() && !pending.iter().any(|known| Arc::ptr_eq(known, frame)) {
                 pending.push(Arc::clone(frame));
             }
+        };
+        for frame in earlier {
+            if let State::InFlight(earlier) = &*frame.state.lock() {
+                earlier.iter().for_each(&mut add);
+            }
+            add(frame);
         }
         Self { state: Mutex::new(State::InFlight(pending)) }
     }
@@ -36,8 +43,8 @@ impl FrameOutcome {
     /// Whether what the frame draws is lost, or will be, because a frame that it relies on is lost.
     pub(super) fn is_lost(&self) -> bool {
         match &*self.state.lock() {
-            // Each of them is older, so no two wait for each other's lock.
-            State::InFlight(earlier) => earlier.iter().any(|frame| frame.is_lost()),
+            // Each of them is older, so no two wait for each other's lock. Those that these rely on are among them.
+            State::InFlight(earlier) => earlier.iter().any(|frame| matches!(*frame.state.lock(), State::Lost)),
             State::Submitted => false,
             State::Lost => true,
         }

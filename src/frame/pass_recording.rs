@@ -34,9 +34,11 @@ impl<B: Backend> PassRecording<B> {
             if index >= parts.len() {
                 drop(parts);
                 discard(part);
-                panic!("the backend emits more parts than it has");
+                panic!("`record` emitted more parts than `part_count` announced");
             }
-            discard(parts[index].replace(part));
+            let before = parts[index].replace(part);
+            drop(parts);
+            discard(before);
             index += 1;
         }
     }

@@ -75,7 +75,7 @@ impl Scheduler {
 }
 
 impl SchedulerBuilder {
-    /// The size of a thread's stack in bytes if [nothing else](Self::stack_size) is set: 16 MiB, room for 4,000 nested
+    /// The size of a thread's stack in bytes if [nothing else](Self::stack_size) is set: 16 MiB, room for 2,000 nested
     /// scopes even without optimisations.
     pub const DEFAULT_STACK_SIZE: usize = 16 << 20;
     /// The smallest stack of a thread in bytes: 256 KiB, which the scheduler's own code and a few nested scopes need.
@@ -100,7 +100,7 @@ impl SchedulerBuilder {
     /// that. The stack of the thread that calls the scheduler is the engine's own choice.
     ///
     /// A scope, loop or graph that a job opens runs on top of that job, so scopes that nest need a stack in proportion
-    /// to their depth: 3 to 4 KiB each, beside what the jobs hold.
+    /// to their depth: some 4 KiB each, beside what the jobs hold.
     pub fn stack_size(mut self, bytes: usize) -> Self {
         self.stack_size = Some(bytes);
         self
@@ -158,7 +158,8 @@ impl SchedulerBuilder {
 
     /// Sets the clock that the [timeline](Scheduler::timeline) reads instead of the system's: the time since some
     /// moment, which never decreases, on whichever thread it is read. What nodes and stages cost is measured by it too,
-    /// so a simulated clock makes what is chosen by these costs the same in each run.
+    /// so a simulated clock makes what is chosen by these costs the same in each run, if the
+    /// [wake-up cost](Self::wake_up_cost) is set. Backends measure what recording costs by the system's clock.
     ///
     /// If the clock panics, it is not called again: time stands still at its latest reading. That is reported to [`tracing`] as an
     /// error, and in [`clock_panic`](crate::timeline::Log::clock_panic) of every log from then on. Jobs are not affected.

@@ -163,6 +163,9 @@ impl Scheduler {
     /// [`BackgroundJob::wait`], which this does not limit. A scheduler of two workers has one thread beside its caller,
     /// which a background job occupies as long as it runs.
     ///
+    /// What Drawloom does in the background is among them: streaming, asynchronous post-processing, and pipelines that are
+    /// prepared. So a load of ten seconds, on a scheduler with one such worker, holds them up for as long.
+    ///
     /// An engine that shows a loading screen raises it to [`workers`](Self::workers), and lowers it again when frames
     /// count. Jobs that have begun then go on.
     pub fn set_background_workers(&self, workers: usize) {

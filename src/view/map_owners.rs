@@ -20,6 +20,13 @@ impl MapOwners {
     /// `covered` are the spheres that the maps of a main camera cover, `None` if it has no maps: main cameras with the
     /// same spheres share maps.
     pub(super) fn new(cameras: &[Camera], covered: impl Fn(&Camera) -> Option<Vec<(DVec3, f64)>>) -> Self {
+        let mut main_cameras =
+            (0..).zip(cameras).filter(|(_, camera)| camera.kind == ViewKind::Main).map(|(index, _)| index);
+        let (first, second) = (main_cameras.next(), main_cameras.next());
+        if second.is_none() {
+            // There is nobody else to share maps with.
+            return Self { owners: first.into_iter().collect(), owner_of: vec![first; cameras.len()] };
+        }
         let mut owners = Vec::new();
         let mut owner_of = vec![None; cameras.len()];
         let mut by_spheres: HashMap<Option<Vec<[u64; 4]>>, usize> = HashMap::new();

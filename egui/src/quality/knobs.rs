@@ -180,7 +180,7 @@ pub const KNOBS: &[Knob] = &[
     },
     Knob {
         name: "sum of lights",
-        explanation: "Error: a fraction of the sum, 1/1024 for each light in half floats, 1/1024 in all otherwise. Cost: bytes a pixel for each \
+        explanation: "Error: a fraction of the sum, 1/1024 for each light in half floats; in all 1/1024 with a shader, and 2⁻²³ more for each light with floats. Cost: bytes a pixel for each \
             light that reaches it; with a shader, every pixel tests those of its tile.",
         values: &[
             ("half floats", |quality| quality.radiance_sum = RadianceSum::HalfFloat),
