@@ -65,7 +65,7 @@ fn printed_directly(sources: &[Source]) -> Vec<String> {
                 is_whole && if printer.starts_with("std") { names_stream } else { rest.starts_with('!') }
             })
         };
-        !code.starts_with("//") && PRINTERS.iter().any(|printer| prints(printer))
+        !code.starts_with("//") && PRINTERS.iter().any(prints)
     })
 }
 
