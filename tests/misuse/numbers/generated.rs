@@ -7,6 +7,7 @@ use drawloom::graph::NodeError;
 use drawloom::process::{Deferred, StorageBuffer};
 use drawloom::scene::{GeneratedBuffer, Mesh, NodeColumn, Topology, Vertex};
 use drawloom::task::Worker;
+use drawloom::view::{Rejection, RejectionReason};
 use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeFrame};
 use libtest_mimic::Failed;
 
@@ -93,7 +94,7 @@ fn capacities() -> Result<(), Failed> {
         let buffer = GeneratedBuffer::new("huge", capacity);
         refused(record(&mut fixture, &buffer, |_| Ok(())), "\"huge\"")?;
     }
-    // Meshes of them are drawn by no frame, which says so.
+    // A device draws no meshes of them, which frames say.
     for capacity in [u32::MAX as usize, 1 << 62, usize::MAX] {
         let corners = [Vec3::NEG_ONE, Vec3::ONE];
         let (vertices, indices) =
@@ -103,8 +104,12 @@ fn capacities() -> Result<(), Failed> {
         let object = scene.objects().next().ok_or("one")?;
         let (object, mesh) = (scene.object(object)?, scene.add(mesh)?);
         scene.add_object(drawloom::scene::RenderObject { mesh, ..object })?;
-        let drawn = Fixture::noop(1, Deferred::to_picture())?.draw(&scene);
-        refused(drawn.map_err(|failed| failed.message().unwrap_or_default().to_owned()), "max_buffer_size")?;
+        let drawn = Fixture::noop(1, Deferred::to_picture())?.draw(&scene)?;
+        let is_named = |rejection: &Rejection| {
+            rejection.reason == RejectionReason::UndrawableMesh && rejection.name.as_deref() == Some("made")
+        };
+        let rejections = &drawn.statistics.rejections;
+        ensure(rejections.iter().any(is_named), format_args!("{capacity} elements: {rejections:?}"))?;
         Fixture::software(Deferred::to_picture())?.draw(&scene)?;
     }
     Ok(())
