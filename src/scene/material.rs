@@ -66,6 +66,7 @@ impl Material {
 
     /// The alpha below which shaders leave out a pixel: less than the cutoff by what filtering may round off. 0 without
     /// a mask.
+    #[cfg(any(feature = "wgpu", feature = "software"))]
     pub(crate) fn least_alpha(&self) -> f32 {
         const ROUNDING: f32 = 1.0 / 4096.0;
         self.alpha_cutoff.filter(|_| self.is_masked()).map_or(0.0, |cutoff| cutoff * (1.0 - ROUNDING))
