@@ -571,6 +571,8 @@ impl World {
             emission: spec.emission.map_or(Vec3::ZERO, Vector::color),
             opacity: (spec.opacity.0.abs() / 4.0) as f32,
             blend: *pick(&blends, spec.blend),
+            // The first blend, which is none, of every second turn through them.
+            alpha_cutoff: (spec.blend % 8 == 4).then_some(0.5),
             double_sided: spec.double_sided,
             values: None,
         }
