@@ -1,5 +1,5 @@
-//! How long a job waits for a chunk that a job of a CPU node holds: a minute while that job works, however slow it is, and
-//! whether or not a debugger has stopped it. A chunk that nobody will let go of is an error, as a rule after a second.
+//! How long a job waits for a chunk that a job of a CPU node holds: a minute while that job works, not counting the time
+//! for which a debugger stops the process. A chunk that nobody will let go of is an error, as a rule after a second.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_waits_for_one_that_works_however_long_that_takes() {
+    fn a_job_waits_for_one_that_works_longer_than_for_one_that_does_not() {
         let chunk = Chunk::default();
         let (taken, is_taken) = mpsc::channel();
         thread::scope(|threads| {

@@ -99,4 +99,81 @@ macro_rules! forward_limits {
     };
 }
 
-pub(crate) use {forward_limits, forward_unchanged_calls};
+/// The methods that prepare, record and finish a frame, where a wrapper passes them on as they are, too.
+macro_rules! forward_recording_calls {
+    () => {
+        fn prepare_pipelines(
+            &self,
+            plan: &::drawloom::process::FramePlan,
+            draws: &[::drawloom::process::Draws<'_>],
+            states: &[Vec<::drawloom::command::DrawState>],
+            quality: &::drawloom::quality::Quality,
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.prepare_pipelines(plan, draws, states, quality)
+        }
+
+        fn begin(
+            &self,
+            request: &::drawloom::backend::FrameRequest<'_>,
+        ) -> Result<B::Frame, ::drawloom::backend::BackendError> {
+            self.inner.begin(request)
+        }
+
+        fn upload_objects(
+            &self,
+            worker: &::drawloom::task::Worker,
+            frame: &B::Frame,
+            request: &::drawloom::backend::FrameRequest<'_>,
+            blocks: ::std::ops::Range<usize>,
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.upload_objects(worker, frame, request, blocks)
+        }
+
+        fn prepare(
+            &self,
+            worker: &::drawloom::task::Worker,
+            frame: &B::Frame,
+            pass: &::drawloom::backend::PassRequest<'_>,
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.prepare(worker, frame, pass)
+        }
+
+        fn record(
+            &self,
+            worker: &::drawloom::task::Worker,
+            frame: &B::Frame,
+            pass: &::drawloom::backend::PassRequest<'_>,
+            parts: ::std::ops::Range<usize>,
+            emit: &mut dyn FnMut(B::Part),
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.record(worker, frame, pass, parts, emit)
+        }
+
+        fn finish(
+            &self,
+            worker: &::drawloom::task::Worker,
+            frame: &B::Frame,
+            pass: &::drawloom::backend::PassRequest<'_>,
+            parts: &mut Vec<B::Part>,
+        ) -> Result<B::Commands, ::drawloom::backend::BackendError> {
+            self.inner.finish(worker, frame, pass, parts)
+        }
+
+        fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> bool {
+            self.inner.continues_previous_pass(frame, pass)
+        }
+
+        fn finish_together(
+            &self,
+            worker: &::drawloom::task::Worker,
+            frame: &B::Frame,
+            passes: &[::drawloom::backend::PassRequest<'_>],
+            parts: &mut [Vec<B::Part>],
+            emit: &mut dyn FnMut(B::Commands),
+        ) -> Result<(), ::drawloom::backend::BackendError> {
+            self.inner.finish_together(worker, frame, passes, parts, emit)
+        }
+    };
+}
+
+pub(crate) use {forward_limits, forward_recording_calls, forward_unchanged_calls};

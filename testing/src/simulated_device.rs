@@ -1,19 +1,14 @@
 //! A device that takes a given time for a frame.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
-use drawloom::command::DrawState;
-use drawloom::process::{Draws, FramePlan};
-use drawloom::quality::Quality;
-use drawloom::task::Worker;
+use drawloom::backend::{Backend, BackendError, FrameFence, ViewQueue};
 
-use crate::forwarded_calls::{forward_limits, forward_unchanged_calls};
+use crate::forwarded_calls::{forward_limits, forward_recording_calls, forward_unchanged_calls};
 
 /// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
 /// Its passes take equal shares of that time.
@@ -110,6 +105,7 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
     forward_limits!();
 
     forward_unchanged_calls!();
+    forward_recording_calls!();
 
     fn submit(
         &self,
@@ -132,69 +128,5 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
 
     fn adapter_name(&self) -> String {
         format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
-    }
-
-    fn prepare_pipelines(
-        &self,
-        plan: &FramePlan,
-        draws: &[Draws<'_>],
-        states: &[Vec<DrawState>],
-        quality: &Quality,
-    ) -> Result<(), BackendError> {
-        self.inner.prepare_pipelines(plan, draws, states, quality)
-    }
-
-    fn begin(&self, request: &FrameRequest<'_>) -> Result<B::Frame, BackendError> {
-        self.inner.begin(request)
-    }
-
-    fn upload_objects(
-        &self,
-        worker: &Worker,
-        frame: &B::Frame,
-        request: &FrameRequest<'_>,
-        blocks: Range<usize>,
-    ) -> Result<(), BackendError> {
-        self.inner.upload_objects(worker, frame, request, blocks)
-    }
-
-    fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
-        self.inner.prepare(worker, frame, pass)
-    }
-
-    fn record(
-        &self,
-        worker: &Worker,
-        frame: &B::Frame,
-        pass: &PassRequest<'_>,
-        parts: Range<usize>,
-        emit: &mut dyn FnMut(B::Part),
-    ) -> Result<(), BackendError> {
-        self.inner.record(worker, frame, pass, parts, emit)
-    }
-
-    fn finish(
-        &self,
-        worker: &Worker,
-        frame: &B::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<B::Part>,
-    ) -> Result<B::Commands, BackendError> {
-        self.inner.finish(worker, frame, pass, parts)
-    }
-
-    fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> bool {
-        self.inner.continues_previous_pass(frame, pass)
-    }
-
-    fn finish_together(
-        &self,
-        worker: &Worker,
-        frame: &B::Frame,
-        passes: &[PassRequest<'_>],
-        parts: &mut [Vec<B::Part>],
-        emit: &mut dyn FnMut(B::Commands),
-    ) -> Result<(), BackendError> {
-        self.inner.finish_together(worker, frame, passes, parts, emit)
     }
 }
