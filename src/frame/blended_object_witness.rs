@@ -57,7 +57,7 @@ impl BlendedObjectWitness {
         self.witness.is_some()
     }
 
-    /// Counts the witness if the pipeline lacks float blending.
+    /// Counts the witness if the pipeline draws it in half floats because the backend cannot blend floats.
     pub(super) fn count_half_floats(&self, deferred: Option<&Deferred>, rejections: &Rejections) {
         let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
         if let Some(Witness { object, .. }) = witness {

@@ -22,6 +22,7 @@ pub const CASES: &[Case] = &[
     ("blended_objects_add_up_within_the_bounds_of_their_sum", blended_objects),
     ("exact_keeps_a_thousandth_of_every_sum_of_lights", exact),
     ("devices_that_do_not_blend_floats_lose_no_light_and_are_named", without_float_blending),
+    ("transparency_of_the_engines_own_lacks_no_float_blending", own_without_float_blending),
     ("a_sum_has_the_lights_of_every_class_and_camera", every_class),
     ("a_shader_sums_the_lights_of_every_tile_of_pictures_of_any_size", tiles),
     ("a_process_of_lights_that_is_replaced_adds_to_the_sum_of_the_others", replaced),
@@ -94,6 +95,30 @@ fn without_float_blending() -> Result<(), Failed> {
             let bound = scene.bound(RadianceSum::Shader) + in_half_floats;
             let error = scene.error(&radiance(&fixture.submit(recorded)?, 0)?);
             expect_below(bound, error, &format!("{sum:?} without the feature: {}", scene.name))?;
+        }
+    }
+    Ok(())
+}
+
+/// No device would sum what the engine draws itself or leaves out.
+fn own_without_float_blending() -> Result<(), Failed> {
+    let scenes = blended_scenes();
+    let scene = scenes.iter().find(|scene| scene.objects > 0).ok_or("no scene has blended objects")?;
+    let own = || drawloom::process::Transparency::new(None);
+    for (name, deferred, is_counted) in [
+        ("shipped", Deferred::new(), true),
+        ("replaced", Deferred::new().replace("transparency", own()), false),
+        ("deformed and replaced", Deferred::new().deformation(Still).replace("transparency", own()), false),
+        ("left out", Deferred::new().leave_out("transparency"), false),
+    ] {
+        let device = adapter::device_without(WgpuBackend::BLENDING_FEATURES).map_err(|error| error.to_string())?;
+        let build = |builder: drawloom::RendererBuilder<WgpuBackend>| {
+            builder.deferred(deferred).quality(quality(RadianceSum::Float))
+        };
+        let recorded = Fixture::on(device, 2, build)?.record(&scene.scene)?;
+        let mut rejections = recorded.statistics().rejections.iter();
+        if rejections.any(|rejection| rejection.reason == RejectionReason::HalfFloatBlending) != is_counted {
+            return Err(format!("{name}: {:?}", recorded.statistics().rejections).into());
         }
     }
     Ok(())

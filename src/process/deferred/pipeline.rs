@@ -178,9 +178,9 @@ impl Deferred {
         self.blends_floats
     }
 
-    /// Whether blended objects are added in half floats although the quality asks for floats.
+    /// Whether blended objects are added in half floats only because the backend cannot blend floats.
     pub(crate) fn lacks_float_blending(&self) -> bool {
-        self.radiance_sum != RadianceSum::HalfFloat && !self.blends_floats
+        !self.blends_floats && self.would_sum_blended_objects()
     }
 
     /// The names of all processes that a frame may have, whatever the scene, in order.
@@ -353,14 +353,19 @@ impl Deferred {
         self.replaced.iter().any(|(replaced, _)| replaced == name)
     }
 
-    /// Whether blended objects are summed in floats: all of them, because those that are drawn later cover the others.
+    /// Whether blended objects are summed in floats.
     fn sums_blended_objects(&self) -> bool {
+        self.blends_floats && self.would_sum_blended_objects()
+    }
+
+    /// Whether a backend that blends floats sums blended objects in floats: all of them or none, because those that are drawn later
+    /// cover the others.
+    fn would_sum_blended_objects(&self) -> bool {
         let draws_blended = |name: &str| {
             let mut deformed = self.deformations.iter().map(|deformation| undeformed_name(&**deformation, name));
             name == Transparency::NAME || deformed.any(|undeformed| undeformed == Some(Transparency::NAME))
         };
         self.radiance_sum != RadianceSum::HalfFloat
-            && self.blends_floats
             && !self.left_out.iter().any(|name| name == Transparency::NAME)
             && !self.replaced.iter().any(|(name, _)| draws_blended(name))
     }
