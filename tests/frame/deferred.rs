@@ -5,10 +5,11 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, Place, PlanError, RenderProcess,
-    ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, GeometryFormats, LightVolumes,
+    Place, PlanError, RenderProcess, ToneMapping,
 };
-use drawloom::scene::{Camera, LayerMask, Light, Scene, ViewKind};
+use drawloom::quality::{Quality, RadianceSum};
+use drawloom::scene::{Camera, LayerMask, Light, LightKind, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
@@ -259,6 +260,37 @@ fn a_kept_process_is_in_every_plan() {
         .fold(Deferred::to_picture(), |deferred, name| deferred.keep(name).leave_out(name));
     let mut renderer = build(builder(left_out.keep("shadowed spot lights"))).unwrap();
     assert_eq!(processes(&mut renderer, &empty()), ["geometry buffer", "tone mapping"]);
+}
+
+#[test]
+fn a_kept_sum_of_lights_is_in_every_plan_of_a_quality_that_has_it() {
+    let planned = |sum: RadianceSum, deferred: Deferred| {
+        let quality = Quality { radiance_sum: sum, ..Quality::balanced() };
+        processes(&mut build(builder(deferred).quality(quality)).unwrap(), &empty())
+    };
+    let pipeline = || Deferred::new().keep("sum of lights");
+    let geometry = ["geometry buffer"];
+    assert_eq!(planned(RadianceSum::HalfFloat, pipeline()), geometry);
+    let summed = ["geometry buffer", "tiles of lights", "sum of lights"];
+    for kept in ["tiles of lights", "sum of lights"] {
+        assert_eq!(planned(RadianceSum::Shader, Deferred::new().keep(kept)), summed, "{kept}");
+        assert_eq!(planned(RadianceSum::HalfFloat, Deferred::new().keep(kept)), geometry, "{kept}");
+        // The backend does not blend floats.
+        assert_eq!(planned(RadianceSum::Float, Deferred::new().keep(kept)), summed, "{kept}");
+    }
+    // A process of the engine's draws over radiance, so no sum needs it.
+    let lights = || LightVolumes::new(LightKind::Point, GeometryFormats::default());
+    let classes = ["directional", "point", "spot", "hemispherical"];
+    let names = || classes.iter().flat_map(|kind| [format!("{kind} lights"), format!("shadowed {kind} lights")]);
+    for is_replaced in [true, false] {
+        let without = |deferred: Deferred, name: String| {
+            if is_replaced { deferred.replace(name, lights()) } else { deferred.leave_out(name) }
+        };
+        let all_but_spots = names().filter(|name| name != "spot lights").fold(pipeline(), without);
+        assert_eq!(planned(RadianceSum::Shader, all_but_spots), summed);
+    }
+    assert_eq!(planned(RadianceSum::Shader, names().fold(pipeline(), Deferred::leave_out)), geometry);
+    assert_eq!(planned(RadianceSum::Shader, Deferred::new().keep("sum of blended objects")), geometry);
 }
 
 struct Wind;

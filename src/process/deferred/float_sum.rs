@@ -20,12 +20,9 @@ impl FloatSum {
     pub(super) const LIGHTS: Self = Self { name: LightSum::NAME, target: "light sum" };
 
     /// Of blended objects.
-    pub(super) const BLENDED_OBJECTS: Self = Self { name: "sum of blended objects", target: "blended sum" };
+    pub(super) const BLENDED_OBJECTS: Self = Self { name: Self::BLENDED_OBJECTS_NAME, target: "blended sum" };
 
-    /// The name of the process that adds the sum.
-    pub(super) fn process_name(self) -> &'static str {
-        self.name
-    }
+    pub(super) const BLENDED_OBJECTS_NAME: &str = "sum of blended objects";
 
     /// Declares that a process adds to the sum, and if it is the first one, that it begins with 0.
     pub(super) fn declare_term(self, declare: &mut Declare, is_first: bool) {

@@ -15,6 +15,7 @@ use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProce
 pub(super) struct LightTiles;
 
 impl LightTiles {
+    pub(super) const NAME: &str = "tiles of lights";
     pub(super) const TARGET: &str = "light tiles";
 }
 
@@ -23,7 +24,7 @@ pub(super) const LIGHT_TILES_SHADER: &str = include_str!("light_tiles/light_tile
 
 impl RenderProcess for LightTiles {
     fn name(&self) -> &str {
-        "tiles of lights"
+        Self::NAME
     }
 
     fn declare(&self, declare: &mut Declare) {

@@ -25,10 +25,15 @@ use crate::view::{LightClass, ShadowMaps};
 ///  depth pre-pass → geometry buffer → lights, a process per class → transparency → post-processing
 /// ```
 ///
-/// How lights and blended objects add up in `radiance` is set by [`Quality::radiance_sum`]. If they are summed in
-/// floats, a process "sum of lights" follows the lights, or takes their place, and a process "sum of blended objects"
-/// follows transparency. A process of lights or of transparency that the engine [replaces](Self::replace) draws over
-/// `radiance` as ever.
+/// [`Quality::radiance_sum`] sets how lights and blended objects add up in `radiance`. With [`RadianceSum::HalfFloat`], each process
+/// adds to it. The others have further processes, whose names are known to [`Self::keep`], [`Self::leave_out`] and [`Self::replace`]
+/// with every quality and on every device:
+///
+/// - "sum of lights" follows the processes of lights with [`RadianceSum::Float`]. With [`RadianceSum::Shader`], and on devices that do
+///   not blend floats, it takes their place, and "tiles of lights" precedes it: that marks the lights that reach each tile.
+/// - "sum of blended objects" follows transparency, on devices that blend floats.
+///
+/// A process of lights or of transparency that the engine [replaces](Self::replace) draws over `radiance` as ever.
 ///
 /// ```
 /// use drawloom::process::{Deferred, Fxaa, ToneMapping};
@@ -200,18 +205,29 @@ impl Deferred {
 
     /// What frames have processes for whatever their scene.
     pub(crate) fn kept_requirements(&self) -> Requirements {
+        let light_term = self.light_term();
         Requirements::of_processes(|name| {
             self.kept.iter().any(|kept| {
                 let deformed =
                     || self.deformations.iter().filter_map(|deformation| undeformed_name(&**deformation, kept));
                 // A sum stays with a process whose terms it adds.
-                let has_sum = |sum: FloatSum, term: &str| kept == sum.process_name() && name == term;
-                kept == name
-                    || deformed().any(|undeformed| undeformed == name)
-                    || has_sum(FloatSum::LIGHTS, &LightVolumes::name_of(UNSHADOWED_POINT_LIGHTS))
-                    || has_sum(FloatSum::BLENDED_OBJECTS, Transparency::NAME)
+                let has_sum = match kept.as_str() {
+                    LightSum::NAME => light_term.as_deref() == Some(name),
+                    LightTiles::NAME => self.light_sum() == RadianceSum::Shader && light_term.as_deref() == Some(name),
+                    FloatSum::BLENDED_OBJECTS_NAME => self.sums_blended_objects() && name == Transparency::NAME,
+                    _ => false,
+                };
+                kept == name || deformed().any(|undeformed| undeformed == name) || has_sum
             })
         })
+    }
+
+    /// The name of a process whose lights are summed, if possible of one without shadow maps; `None` if no lights are.
+    fn light_term(&self) -> Option<String> {
+        let summed = self.summed_classes();
+        let is_term = |class: &LightClass| summed.contains(*class) && (!class.shadowed || self.maps().is_some());
+        let term = LightClass::all().filter(is_term).min_by_key(|class| class.shadowed);
+        term.filter(|_| self.light_sum() != RadianceSum::HalfFloat).map(LightVolumes::name_of)
     }
 
     /// The processes that draw a scene, each in its slot. Empty slots mark the places for an engine's processes.
@@ -249,8 +265,11 @@ impl Deferred {
         }
         let complete = Self { left_out: Vec::new(), ..self.clone() };
         let names = complete.names();
+        // Which processes sum depends on the quality and the device, and these may change.
+        let with_sum = |radiance_sum| Self { radiance_sum, blends_floats: true, ..complete.clone() }.names();
+        let sums = [RadianceSum::Float, RadianceSum::Shader].map(with_sum).concat();
         let mut named = self.replaced.iter().map(|(name, _)| name).chain(self.left_out.iter().chain(&self.kept));
-        match named.find(|name| !names.contains(name)) {
+        match named.find(|name| !names.contains(name) && !sums.contains(name)) {
             Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
             None => Ok(()),
         }
@@ -412,4 +431,3 @@ impl Default for Deferred {
 
 const RADIANCE: &str = "radiance";
 const PICTURE: &str = "picture";
-const UNSHADOWED_POINT_LIGHTS: LightClass = LightClass { kind: LightKind::Point, shadowed: false };
