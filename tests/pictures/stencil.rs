@@ -10,14 +10,17 @@ use drawloom::process::{
     SURFACE_SHADER, Stencil, StencilOperation,
 };
 use drawloom::quality::Quality;
-use drawloom::scene::{Camera, LayerMask, Material, RenderObject, Scene, SceneRef};
+use drawloom::scene::{Camera, LayerMask, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder};
+use drawloom_testing::adapter;
 use drawloom_testing::scenes::{cube, field, sized};
 use libtest_mimic::Failed;
 
 use crate::Case;
 use crate::fixture::{Fixture, backend};
+use crate::rays::{Panel, PanelScene};
+use crate::shadows::{MAPS, camera, sun};
 use crate::strategies::{expect, strategies};
 
 pub const CASES: &[Case] = &[
@@ -28,6 +31,7 @@ pub const CASES: &[Case] = &[
     ("hidden_objects_are_marked_where_a_test_fails", hidden_objects),
     ("a_process_that_tests_the_stencil_alone_draws_hidden_objects", through_walls),
     ("objects_that_the_stencil_test_leaves_out_hide_nothing", masked),
+    ("a_process_that_tests_the_stencil_alone_draws_nothing_beyond_the_far_plane_of_a_suns_map", in_a_map),
     ("a_process_that_has_no_stencil_is_named", without),
 ];
 
@@ -149,6 +153,82 @@ fn scene() -> (Scene, Vec<LayerMask>) {
 fn pipeline() -> Deferred {
     Deferred::to_picture()
         .formats(GeometryFormats { depth: Format::Depth32FloatStencil8, ..GeometryFormats::default() })
+}
+
+/// Draws what a light sees in white, with a stencil that leaves out nothing.
+struct SeenByLight {
+    /// Whether the stencil is beside a depth that another process has cleared.
+    is_beside_depth: bool,
+}
+
+impl RenderProcess for SeenByLight {
+    fn name(&self) -> &str {
+        "seen by light"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Shadow);
+        declare.clears_color("seen", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        match self.is_beside_depth {
+            true => declare.tests_stencil("cleared"),
+            false => declare.clears_depth("stencil", Format::Stencil8),
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let stencil = Some(Stencil::test(Comparison::Always, 0));
+        Draws::Commands(CommandDraws { shader: COVERED, writes_depth: false, stencil, ..CommandDraws::default() })
+    }
+}
+
+/// Draws nothing.
+struct Cleared;
+
+impl RenderProcess for Cleared {
+    fn name(&self) -> &str {
+        "cleared"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Shadow);
+        declare.clears_depth("cleared", Format::Depth32FloatStencil8);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let selection = Selection::OPAQUE.in_layers(MARKED);
+        Draws::Commands(CommandDraws { shader: SURFACE_SHADER, fragment: None, selection, ..CommandDraws::default() })
+    }
+}
+
+/// Each triangle of the pillar reaches from a sun's map to beyond its far plane, where it would cover further pixels of the
+/// map. Devices without depth clip control leave these out by themselves.
+fn in_a_map() -> Result<(), Failed> {
+    let mut panels = Panel::closed_box(DVec3::new(0.5, -200.0, -1.0), DVec3::new(0.2, 201.0, 0.2));
+    panels.push(Panel::facing(DVec3::ZERO, DVec3::Y, 1.0));
+    let panel_scene = PanelScene { panels, lights: vec![sun(DVec3::new(0.2, -0.9, -0.3).normalize())], maps: MAPS };
+    let scene = panel_scene.scene(&[camera(DVec3::new(1.0, 4.5, 3.0), DVec3::ZERO, 45.0)])?;
+    for is_beside_depth in [true, false] {
+        let mut pictures = Vec::new();
+        for missing in [wgpu::Features::empty(), WgpuBackend::DEPTH_CLIP_FEATURES] {
+            let mut fixture = Fixture::on(adapter::device_without(missing)?, 2, |builder| {
+                let deferred = Deferred::to_picture().shadow_maps(Some(MAPS));
+                let builder = if is_beside_depth { builder.process(Cleared) } else { builder };
+                builder.deferred(deferred).process(SeenByLight { is_beside_depth }).output("seen")
+            })?;
+            let recorded = fixture.record(&scene)?;
+            let maps = recorded.statistics().views.iter().position(|view| view.kind == ViewKind::Shadow);
+            pictures.push(fixture.submit(recorded)?.read(maps.ok_or("a map is drawn")?, "seen")?.bytes);
+        }
+        let white = pictures[1].iter().filter(|byte| **byte != 0).count();
+        if white < 400 || white * 2 > pictures[1].len() {
+            return Err(format!("{white} of {} bytes are white", pictures[1].len()).into());
+        }
+        let differing = pictures[0].iter().zip(&pictures[1]).filter(|(found, expected)| found != expected).count();
+        expect(differing == 0, || {
+            format!("beside a depth: {is_beside_depth}: {differing} bytes differ, {white} are white")
+        })?;
+    }
+    Ok(())
 }
 
 fn draw(fixture: &mut Fixture, target: &str) -> Result<Picture, Failed> {

@@ -3,7 +3,7 @@
 use super::attachment_formats::AttachmentFormats;
 use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::binding_type;
-use crate::process::{Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess};
+use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
 use crate::scene::ViewKind;
 
@@ -48,9 +48,12 @@ impl PipelineInputs {
     /// Whether there are pipelines of their own for views that [clamp depth](crate::view::RenderView::clamps_depth).
     pub(super) fn has_clamped_pipelines(&self) -> bool {
         let has_geometry = matches!(self.key.vertices, VertexSource::Meshes(_) | VertexSource::Procedural(_));
-        // What is beyond the far plane is clamped too, and only a depth test leaves it out.
-        let draws_depth = has_geometry && self.draws_maps && self.attachments.depth.is_some();
-        draws_depth && (self.clamps_pixels() || self.key.clamped_fragments[0].is_some())
+        // What is beyond the far plane is clamped too, and only a depth test leaves it out. A test for what is drawn already needs the
+        // same depth, and passes beyond the far plane where nothing is drawn.
+        let tests_depth =
+            self.attachments.depth.is_some_and(|depth| depth.format.has_depth() && depth.access != Access::TestStencil);
+        let can_clamp = has_geometry && self.draws_maps && tests_depth;
+        can_clamp && (self.clamps_pixels() || self.key.clamped_fragments[0].is_some())
     }
 
     /// Whether the device clamps the depth of pixels.
