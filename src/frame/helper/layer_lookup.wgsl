@@ -20,8 +20,9 @@ fn layer_position_of_clip(clip: vec2<f32>) -> vec2<f32> {
     return clip * vec2<f32>(0.5, -0.5) + 0.5;
 }
 
-// Where in the layer, from (0, 0) at its upper left to (1, 1) at its lower right, the surface is that this view shows at `clip` with a depth,
-// if that surface has not moved. z is 1 if the layer's view shows that place, 0 if it is beside it, and -1 if it is behind its camera.
+// Where in the layer, from (0, 0) at its upper left to (1, 1) at its lower right, the surface is that this view shows
+// at `clip` with a depth, if that surface has not moved. z is 1 if the layer's view shows that place, 0 if it is beside
+// it, and -1 if it is behind its camera.
 fn layer_position(clip: vec2<f32>, depth: f32) -> vec3<f32> {
     let layer_projection = layer_word(23);
     if view.projection == PARABOLOID || layer_projection == PARABOLOID {
@@ -34,8 +35,8 @@ fn layer_position(clip: vec2<f32>, depth: f32) -> vec3<f32> {
         vec3<u32>(layer_word(16), layer_word(17), layer_word(18)),
         bitcast<vec3<i32>>(vec3<u32>(layer_word(19), layer_word(20), layer_word(21))),
     );
-    // Relative to the camera of the layer, in homogeneous coordinates: what is infinitely far away, with a depth of 0, has a direction and
-    // no position, and is turned without being moved.
+    // Relative to the camera of the layer, in homogeneous coordinates: what is infinitely far away, with a depth of 0,
+    // has a direction and no position, and is turned without being moved.
     var position = vec4<f32>(position_from_depth(clip, depth) + moved, 1.0);
     if view.projection == PERSPECTIVE {
         let ray = clip.x * view.right + clip.y * view.up + view.forward;

@@ -2,16 +2,17 @@
 //
 //   @group(0)  the frame and the view: below
 //   @group(1)  materials and their textures: below
-//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in that order, then
-//              the buffers that it reads or changes
-//   @group(3)  the engine's own, from binding 0: the columns of objects that the process reads, the values of materials, then its
-//              resources
+//   @group(2)  the process's own: binding 0 its parameters, bindings 1, 2 ... the targets that it samples, in order,
+//              then the buffers that it reads or changes
+//   @group(3)  the engine's own, from binding 0: the columns of objects that the process reads, the values of
+//              materials, then its resources
 //
 // `const ABSOLUTE_TRANSFORMS: bool` goes before it, as the frame's quality says.
 
 struct View {
     // No shader reads it. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders that read
-    // them and branch on a member of the buffer: it compiles these anew for each pass, and never frees what it compiled.
+    // them and branch on a member of the buffer: it compiles these anew for each pass, and never frees what it
+    // compiled.
     unread: vec4<f32>,
     // From world axes relative to the camera to clip space; depth is reversed.
     clip_from_relative: mat4x4<f32>,
@@ -21,8 +22,8 @@ struct View {
     light_count: u32,
     position_high: vec3<i32>,
     near: f32,
-    // Right and up are as long as half the picture's width and height at a distance of 1. In perspective, forward is the ray of the
-    // picture's centre.
+    // Right and up are as long as half the picture's width and height at a distance of 1. In perspective, forward is
+    // the ray of the picture's centre.
     right: vec3<f32>,
     width: f32,
     up: vec3<f32>,
@@ -32,8 +33,9 @@ struct View {
     // Linear.
     ambient: vec3<f32>,
     far: f32,
-    // Where each of the eight classes of lights ends in `lights`, four a vector. It begins where the one before ends. The classes are, in
-    // this order, directional, point, spot and hemispherical lights, of each kind first those without a shadow and then those with one.
+    // Where each of the eight classes of lights ends in `lights`, four a vector. It begins where the one before ends.
+    // The classes are, in this order, directional, point, spot and hemispherical lights, of each kind first those
+    // without a shadow and then those with one.
     light_ends: array<vec4<u32>, 2>,
 }
 
@@ -104,8 +106,8 @@ const ALPHA: u32 = 1u;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
 // The object of each instance, in batch order.
 @group(0) @binding(2) var<storage, read> drawn: array<u32>;
-// `view.light_count` lights. If a light has several shadow maps, one more follows for each layer of the maps: the light that the
-// layer belongs to, as that map shows it.
+// `view.light_count` lights. If a light has several shadow maps, one more follows for each layer of the maps: the light
+// that the layer belongs to, as that map shows it.
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 
 @group(1) @binding(0) var<storage, read> materials: array<Material>;
@@ -182,7 +184,8 @@ fn paraboloid_position(position: vec3<f32>) -> vec4<f32> {
     let depth = (view.far - distance) / (view.far - view.near);
     // The mapping is singular straight behind the camera. Everything near that direction is outside of the picture and
     // clipped.
-    return vec4<f32>(position.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1)), select(depth, -1.0, forward < -0.6), 1.0);
+    let on_disc = position.xy / (max(distance, 1e-30) * max(1.0 + forward, 0.1));
+    return vec4<f32>(on_disc, select(depth, -1.0, forward < -0.6), 1.0);
 }
 
 // A normal from object space to the world's axes, of unit length; 0 if there is none. The cofactors of a scale need no
@@ -239,7 +242,8 @@ fn fixed_difference(low: vec3<u32>, high: vec3<i32>, from_low: vec3<u32>, from_h
     let negative = difference_high < vec3<i32>(0);
     let carry = select(vec3<u32>(0u), vec3<u32>(1u), difference_low == vec3<u32>(0u));
     let magnitude_low = select(difference_low, ~difference_low + 1u, negative);
-    let magnitude_high = select(bitcast<vec3<u32>>(difference_high), ~bitcast<vec3<u32>>(difference_high) + carry, negative);
+    let high_bits = bitcast<vec3<u32>>(difference_high);
+    let magnitude_high = select(high_bits, ~high_bits + carry, negative);
     let magnitude = vec3<f32>(magnitude_high) * 4.0 + vec3<f32>(magnitude_low) * 0x1p-30;
     return select(magnitude, -magnitude, negative);
 }
@@ -253,18 +257,19 @@ fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
 // that needs uniform control flow.
 fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
     var texel = vec4<f32>(1.0);
+    let layer = material.texture_layer;
     switch material.texture_array {
-        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
-        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
-        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
-        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, material.texture_layer, uv_dx, uv_dy); }
+        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, layer, uv_dx, uv_dy); }
         default: {}
     }
     return vec4<f32>(material.diffuse, material.opacity) * texel;
 }
 
-// Whether a mask has a hole at texture coordinates. It is read at the texture's full resolution, because an averaged alpha may be below
-// the cutoff everywhere: leaves would vanish in the distance.
+// Whether a mask has a hole at texture coordinates. It is read at the texture's full resolution, because an averaged
+// alpha may be below the cutoff everywhere: leaves would vanish in the distance.
 fn is_cut_out(material: Material, uv: vec2<f32>) -> bool {
     var alpha = material.opacity;
     let layer = material.texture_layer;

@@ -1,4 +1,5 @@
-// The width and height of a tile in pixels of the target that holds its marks, which is half as wide and high as the picture.
+// The width and height of a tile in pixels of the target that holds its marks, which is half as wide and high as the
+// picture.
 const TILE_SIDE: u32 = 16u;
 
 // How many bits of a pixel are marks.

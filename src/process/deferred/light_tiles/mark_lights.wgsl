@@ -25,8 +25,8 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<u32> {
     return vec4<u32>(marks, 0u, 0u, 0u);
 }
 
-// Whether a light may reach what is seen between two clip coordinates: whether its sphere is not wholly beyond one of four planes. The margin
-// is a hundred times what rounding makes.
+// Whether a light may reach what is seen between two clip coordinates: whether its sphere is not wholly beyond one of
+// four planes. The margin is a hundred times what rounding makes.
 fn may_reach(light: Light, low: vec2<f32>, high: vec2<f32>) -> bool {
     if light.kind == DIRECTIONAL {
         return true;

@@ -1,4 +1,5 @@
-// A sum of light in batches of 32, and in batches of 32 of these: a term is rounded with those of its batch, not with all that follow it.
+// A sum of light in batches of 32, and in batches of 32 of these: a term is rounded with those of its batch, not with
+// all that follow it.
 struct LightBatches {
     sum: vec3<f32>,
     batches: vec3<f32>,

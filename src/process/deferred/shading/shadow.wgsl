@@ -54,24 +54,27 @@ fn cube_face(position: vec3<f32>) -> u32 {
     return select(4u, 5u, position.z < 0.0);
 }
 
-// The point of a light's map at which a position is looked up: that of the position, moved towards the light by the bias.
+// The point of a light's map at which a position is looked up: that of the position, moved towards the light by the
+// bias.
 fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>, off_surface: f32) -> ShadowMapPoint {
     var towards = -light.direction;
     if light.kind != DIRECTIONAL {
         towards = normalize(light.position - position);
     }
     // An upper bound of the depth change within the filter.
-    let depth_change = shadow_map_point(light, position).pixel * (0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards));
+    let filter_pixels = 0.1 + f32(SHADOW_FILTER + 1) * shadow_slope(light, normal, towards);
+    let depth_change = shadow_map_point(light, position).pixel * filter_pixels;
     let offset = SHADOW_BIAS * (depth_change + off_surface / max(dot(normal, towards), 1e-3));
 
     // An offset towards the light does not change where in the map the position is.
     return shadow_map_point(light, position + towards * min(offset, length(light.position - position)));
 }
 
-// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256 of a
-// pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a pixel's width at its distance, for
-// which 1/256 is an upper bound. Where an oblique near plane makes depth differ across the picture, the same depth is that of a position
-// farther or nearer there, too. And the corners were rounded to the steps of fixed-point positions.
+// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples
+// of 1/256 of a pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a
+// pixel's width at its distance, for which 1/256 is an upper bound. Where an oblique near plane makes depth differ
+// across the picture, the same depth is that of a position farther or nearer there, too. And the corners were rounded
+// to the steps of fixed-point positions.
 fn distance_off_surface(position: vec3<f32>) -> f32 {
     var pixel = 2.0 * length(view.up) / view.height;
     if view.projection == PERSPECTIVE {
@@ -109,8 +112,9 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     let reach = light.range - light.shadow_near;
     switch light.kind {
         case SPOT, POINT: {
-            let half = light.shadow_half * max(-local.z, light.shadow_near);
-            return ShadowMapPoint(local.xy / half, light.shadow_near / max(-local.z, light.shadow_near), 2.0 * half / side);
+            let distance = max(-local.z, light.shadow_near);
+            let half = light.shadow_half * distance;
+            return ShadowMapPoint(local.xy / half, light.shadow_near / distance, 2.0 * half / side);
         }
         case HEMISPHERICAL: {
             let distance = max(length(local), 1e-30);
@@ -120,7 +124,8 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
             return ShadowMapPoint(clip, (light.range - distance) / reach, pixel);
         }
         default: {
-            return ShadowMapPoint(local.xy / light.shadow_half, (light.range + local.z) / reach, 2.0 * light.shadow_half / side);
+            let half = light.shadow_half;
+            return ShadowMapPoint(local.xy / half, (light.range + local.z) / reach, 2.0 * half / side);
         }
     }
 }

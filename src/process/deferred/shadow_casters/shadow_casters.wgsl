@@ -13,8 +13,8 @@ fn vertex(in: VertexInput) -> Caster {
     return Caster(caster_position(relative), forward_of(relative), unclamped_clip_position(relative).z);
 }
 
-// Where corners are clamped to the near plane, they are to the far one too: a triangle that crosses both would otherwise be
-// clipped by the far plane where it is not. The fragment shader has the depth of each pixel.
+// Where corners are clamped to the near plane, they are to the far one too: a triangle that crosses both would
+// otherwise be clipped by the far plane where it is not. The fragment shader has the depth of each pixel.
 fn caster_position(relative: vec3<f32>) -> vec4<f32> {
     var clip = clip_position(relative);
     if CLAMPS_CORNERS && view.projection == ORTHOGRAPHIC_SHADOW {

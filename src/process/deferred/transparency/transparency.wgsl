@@ -22,6 +22,7 @@ fn fragment(in: Surface) -> @location(0) vec4<f32> {
     }
     let radiance = min(material.emission + diffuse.rgb / PI * illuminance, vec3<f32>(60000.0));
     let is_alpha = material.blend == ALPHA;
-    // Alpha blending multiplies by the opacity. In a sum alpha is how much is hidden of what is behind: what is added hides nothing.
+    // Alpha blending multiplies by the opacity. In a sum alpha is how much is hidden of what is behind: what is added
+    // hides nothing.
     return vec4<f32>(select(radiance * diffuse.a, radiance, is_alpha), select(diffuse.a, 0.0, SUMS && !is_alpha));
 }
