@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drawloom::Renderer;
-use drawloom::backend::SoftwareBackend;
+use drawloom::backend::{SoftwareBackend, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RenderProcess, ShadowCasters};
@@ -13,6 +13,7 @@ use drawloom::scene::{
 };
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
+use drawloom_testing::adapter;
 use drawloom_testing::scenes::square;
 use libtest_mimic::Failed;
 
@@ -25,6 +26,7 @@ use crate::shadows::{MAPS, camera, fixture_with, hemisphere, lamp, spot, sun, wi
 pub const CASES: &[Case] = &[
     ("masks_cast_shadows_of_their_shape", shape),
     ("software_draws_shadows_of_masks", on_software),
+    ("masks_across_the_near_plane_of_a_suns_map_cast_shadows_of_their_shape", across_the_near_plane),
     ("masks_of_the_engines_own_materials_cast_shadows_of_their_shape", of_material_types),
     ("a_process_of_the_engine_draws_holes_into_shadow_maps", by_own_process),
 ];
@@ -145,6 +147,41 @@ fn on_software() -> Result<(), Failed> {
         let found = half_floats(&submission.read(0, "radiance")?);
         let counts = expected.expect_radiance(&scene.cameras, |_| Ok(found.clone()));
         counts.and_then(expect_enough).map_err(|failed| with_context(failed, format!("{light:?}")))?;
+    }
+    Ok(())
+}
+
+/// The map reaches some 150 m towards the sun. The triangles of the mask extend from below the floor to far beyond that, and
+/// the edge of a hole is on the floor. Devices without depth clip control have an entry point of their own for this.
+fn across_the_near_plane() -> Result<(), Failed> {
+    for missing in [wgpu::Features::empty(), WgpuBackend::DEPTH_CLIP_FEATURES] {
+        let device = adapter::device_without(missing)?;
+        let mut fixture = Fixture::on(device, 2, |builder| builder.deferred(pipeline()).quality(quality()))?;
+        for size in [1.0, 400.0, 1600.0] {
+            // It stands to the right of what the camera sees, and its picture's right is in the direction of -Z.
+            let center = DVec3::new(2.0, size - 1.0, -0.5 - size / 2.0);
+            let panel = |(row, column): (usize, usize)| {
+                let offset = |cell: usize| (cell as f64 * 2.0 - 3.0) / 4.0 * size;
+                let center = center - DVec3::Z * offset(column) - DVec3::Y * offset(row);
+                Panel::new(center, DVec3::Z * (size / 4.0), DVec3::Y * (size / 4.0)).double_sided()
+            };
+            let cells = (0..4).flat_map(|row| (0..4).map(move |column| (row, column)));
+            let panels = cells.filter(|(row, column)| CELLS[*row][*column]).map(panel).collect();
+            let (expected, mut scene) = floor(sun(DVec3::new(-0.6, -0.8, 0.0)), panels)?;
+            let material = mask_material(&mut scene)?;
+            let object = UPRIGHT.object(&mut scene, material)?;
+            let orientation = Quat::from_rotation_y(90.0_f32.to_radians());
+            scene.add_object(RenderObject {
+                orientation,
+                scale: Vec3::splat(size as f32),
+                position: center,
+                ..object
+            })?;
+            let counts = expected.expect_of(&mut fixture, &scene);
+            counts
+                .and_then(expect_enough)
+                .map_err(|failed| with_context(failed, format!("{size} m, no {missing:?}")))?;
+        }
     }
     Ok(())
 }
