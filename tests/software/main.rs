@@ -1,6 +1,7 @@
 //! Frames on the software backend, which need no graphics adapter.
 
 mod drawn;
+mod generated;
 mod light_sums;
 mod mip_levels;
 mod refused;

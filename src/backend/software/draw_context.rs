@@ -5,7 +5,7 @@ use std::sync::Arc;
 use parking_lot::Mutex;
 
 use super::executor::Executor;
-use super::generated_meshes::GeneratedMeshes;
+use super::generated_meshes::{GeneratedMeshes, UndrawableMeshes};
 use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::scene::Mesh;
 
@@ -14,5 +14,6 @@ pub(super) struct DrawContext {
     pub(super) executor: Executor,
     /// Held while a frame is drawn: one frame is drawn at a time.
     pub(super) drawing: Mutex<GeneratedMeshes>,
+    pub(super) undrawable: UndrawableMeshes,
     pub(super) subdivisions: SubdivisionCache<Arc<Mesh>>,
 }

@@ -93,7 +93,7 @@ impl<R: Precision> TypedFrame<R> {
         mut fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
         let mut generated = self.context.drawing.lock();
-        let meshes = generated.update(&self.generated, &self.meshes);
+        let meshes = generated.update(&self.generated, &self.meshes, &self.context.undrawable);
         for (before, (pass, commands)) in queues.iter().flat_map(|queue| &queue.passes).enumerate() {
             FrameFence::set_up_to(before, &mut fences);
             let known = self.passes.iter().find(|known| known.pass == *pass);

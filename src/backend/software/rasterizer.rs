@@ -16,7 +16,6 @@ use super::software_pass::{DepthWrites, SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
 use crate::backend::mip_schedule::MipSchedule;
-use crate::backend::subdivision_cache::SubdivisionCache;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
@@ -33,9 +32,9 @@ pub(super) struct Rasterizer<R: Precision> {
 
 impl<R: Precision> Rasterizer<R> {
     pub(super) fn new(executor: Executor) -> Self {
-        let (drawing, subdivisions) = (Mutex::default(), SubdivisionCache::default());
+        let (drawing, undrawable, subdivisions) = Default::default();
         Self {
-            context: Arc::new(DrawContext { executor, drawing, subdivisions }),
+            context: Arc::new(DrawContext { executor, drawing, undrawable, subdivisions }),
             meshes: Mutex::default(),
             materials: Mutex::default(),
             targets: Mutex::default(),
@@ -78,6 +77,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         // The reference draws the scene's own vertices.
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
         let meshes = self.meshes.lock().update(scene.assets, request.objects.used_meshes(), vertices);
+        self.context.undrawable.count_objects(request, &meshes);
         let materials = self.materials.lock().update(scene.assets, rejections);
         let column = |&layout: &_| Some((layout, Box::from(scene.column(layout)?.bytes())));
         let columns = plan.columns().iter().filter_map(column).collect();
