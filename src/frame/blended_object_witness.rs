@@ -11,7 +11,8 @@ use crate::view::{ObjectTable, RejectionReason, Rejections, set_bits};
 /// are searched when the witness stops needing it, and without a witness when a material starts to need it.
 ///
 /// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is visible changes
-/// with every step of a camera, and the processes of a frame should not.
+/// with every step of a camera, and the processes of a frame should not. So do objects that the device has no room for, because how
+/// many have room follows from the processes, which the witness decides about.
 #[derive(Debug, Default)]
 pub(super) struct BlendedObjectWitness {
     materials: BlendedMaterials,
@@ -30,13 +31,14 @@ impl BlendedObjectWitness {
     pub(super) fn update(&mut self, scene: &SceneRef<'_>, objects: &ObjectTable) -> bool {
         let has_started = self.materials.update(scene.assets);
         let materials = &self.materials;
-        let count = objects.len();
+        let count = scene.object_count();
         let witness_of = |object: usize| {
             let material = scene.materials[object];
             materials.contains(material).then_some(Witness { object, material })
         };
-        // An object that is not reported is drawn as it was, so its material of that time counts.
-        let remains = |witness: Witness| match objects.is_reported(witness.object) {
+        // An object that is not reported is drawn as it was, so its material of that time counts. Those without room are not drawn.
+        let is_current = |object: usize| object >= objects.len() || objects.is_reported(object);
+        let remains = |witness: Witness| match is_current(witness.object) {
             true => witness_of(witness.object),
             false => materials.contains(witness.material).then_some(witness),
         };
@@ -51,7 +53,8 @@ impl BlendedObjectWitness {
             None if has_started => (0..count).find_map(witness_of),
             None => {
                 let words = (0..objects.changed_word_count()).map(|index| objects.changed_word(index));
-                words.flat_map(|word| set_bits(word.mask).map(move |bit| word.word * 64 + bit)).find_map(witness_of)
+                let changed = words.flat_map(|word| set_bits(word.mask).map(move |bit| word.word * 64 + bit));
+                changed.chain(objects.len()..count).find_map(witness_of)
             }
         };
         self.witness.is_some()
@@ -105,5 +108,50 @@ impl BlendedMaterials {
     fn contains(&self, material: Handle<Material>) -> bool {
         let slot = material.index() as usize;
         self.is_blended.get(slot) == Some(&true) && self.materials[slot] == Some(material)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Blend, Changes, RenderObject, Scene, Topology, Vertex};
+    use crate::view::TableLimits;
+
+    /// The device's room for objects changes after the frame's processes are decided on, in both directions.
+    #[test]
+    fn a_blended_object_that_gets_room_within_a_frame_is_known() {
+        let mut scene = Scene::new();
+        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+        let mesh = crate::scene::Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2]);
+        let mesh = scene.add(mesh.unwrap()).unwrap();
+        let opaque = scene.add(Material::default()).unwrap();
+        let blended = scene.add(Material { blend: Blend::Alpha, ..Material::default() }).unwrap();
+        for object in 0..200 {
+            let material = if object == 150 { blended } else { opaque };
+            scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        }
+        let unchanged = SceneRef { changes: Changes::Objects(&[]), ..scene.as_scene_ref() };
+        let can_draw = |_: &crate::scene::Mesh| true;
+        let within = |objects| TableLimits { objects, can_draw: &can_draw, ..TableLimits::NONE };
+        let (mut witness, mut table) = (BlendedObjectWitness::default(), ObjectTable::default());
+        // Before and after the processes are known: how many objects have room.
+        for (before, after) in [(100, 200), (200, 200), (200, 100), (100, 100), (100, 200)] {
+            table.begin_frame_within(&unchanged, &within(before));
+            let found = witness.update(&unchanged, &table);
+            if after != before {
+                table.begin_frame_anew(&unchanged, &within(after));
+            }
+            table.describe(&unchanged, 0..table.changed_block_count());
+            table.finish();
+            table.end_frame();
+            assert_eq!(found, Requirements::any_needs_transparency(&unchanged), "{before} {after}");
+        }
+        let fewer = SceneRef { materials: &unchanged.materials[..0], ..unchanged };
+        let fewer = SceneRef { meshes: &[], orientations: &[], positions: &[], scales: &[], ..fewer };
+        table.begin_frame_within(&fewer, &within(200));
+        assert!(!witness.update(&fewer, &table), "the object is removed");
     }
 }
