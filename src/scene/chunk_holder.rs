@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use parking_lot::Mutex;
 
-/// Who took a chunk last.
+/// The jobs that have taken a chunk and may hold it: several may read it at once. The latest of each thread, until it ends.
 #[derive(Default)]
-pub(super) struct ChunkHolder(Mutex<Option<NodeJob>>);
+pub(super) struct ChunkHolder(Mutex<Vec<NodeJob>>);
 
 /// A job of a CPU node, or what a thread does between two of them.
 #[derive(Clone)]
@@ -43,8 +43,17 @@ impl ChunkHolder {
     /// leaked its guard, by one that waits for another chunk itself, or by any for a minute.
     pub(super) fn wait<G>(&self, try_lock: impl Fn(Duration) -> Option<G>) -> Option<G> {
         let guard = try_lock(Duration::ZERO).or_else(|| self.wait_in_slices(try_lock))?;
-        *self.0.lock() = Some(NodeJob::current());
+        let job = NodeJob::current();
+        let mut jobs = self.0.lock();
+        jobs.retain(|other| !other.has_ended() && !Arc::ptr_eq(&other.thread, &job.thread));
+        jobs.push(job);
+        drop(jobs);
         Some(guard)
+    }
+
+    /// A frame begins: no job of an earlier one holds the chunk.
+    pub(super) fn clear(&mut self) {
+        self.0.get_mut().clear();
     }
 
     #[cold]
@@ -57,7 +66,7 @@ impl ChunkHolder {
             if guard.is_some() || idle_slices == MAX_IDLE_SLICES || slices == MAX_SLICES {
                 break guard;
             }
-            let is_worked_on = self.0.lock().as_ref().is_some_and(|holder| holder.works_beside(&thread));
+            let is_worked_on = self.0.lock().iter().any(|job| job.works_beside(&thread));
             idle_slices += u32::from(!is_worked_on);
             slices += 1;
         };
@@ -72,11 +81,13 @@ impl NodeJob {
         Self { ended_before: thread.ended.load(Ordering::Relaxed), thread }
     }
 
+    fn has_ended(&self) -> bool {
+        self.thread.ended.load(Ordering::Relaxed) != self.ended_before
+    }
+
     /// Whether it has not ended, and works on another thread.
     fn works_beside(&self, other: &Arc<NodeThread>) -> bool {
-        !Arc::ptr_eq(&self.thread, other)
-            && self.thread.ended.load(Ordering::Relaxed) == self.ended_before
-            && !self.thread.is_waiting.load(Ordering::Relaxed)
+        !Arc::ptr_eq(&self.thread, other) && !self.has_ended() && !self.thread.is_waiting.load(Ordering::Relaxed)
     }
 }
 
@@ -97,7 +108,7 @@ mod tests {
     use std::sync::mpsc;
     use std::thread;
 
-    use parking_lot::MutexGuard;
+    use parking_lot::{MutexGuard, RwLock};
 
     use super::*;
 
@@ -130,6 +141,31 @@ mod tests {
             is_taken.recv().unwrap();
             assert_eq!(chunk.take().as_deref(), Some(&7));
         });
+    }
+
+    /// Of two jobs that read a chunk, the one that came last ends first.
+    #[test]
+    fn a_job_waits_for_every_reader_of_a_chunk() {
+        let (value, holder) = (RwLock::new(3), ChunkHolder::default());
+        let read = || holder.wait(|slice| value.try_read_for(slice));
+        let (first_reads, is_read) = mpsc::channel();
+        thread::scope(|threads| {
+            threads.spawn(|| {
+                run_node_job(|| {
+                    let value = read().unwrap();
+                    first_reads.send(()).unwrap();
+                    // Longer than anybody waits for a chunk that nobody works on.
+                    thread::sleep(SLICE * (MAX_IDLE_SLICES + 100));
+                    drop(value);
+                });
+            });
+            is_read.recv().unwrap();
+            assert_eq!(threads.spawn(|| run_node_job(|| read().as_deref().copied())).join().unwrap(), Some(3));
+            run_node_job(|| assert_eq!(read().as_deref(), Some(&3)));
+            let written = run_node_job(|| holder.wait(|slice| value.try_write_for(slice)).map(|mut value| *value = 7));
+            assert_eq!(written, Some(()));
+        });
+        assert_eq!(*value.read(), 7);
     }
 
     #[test]
