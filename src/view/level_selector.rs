@@ -139,6 +139,17 @@ mod tests {
         }
     }
 
+    /// Whether a corner of the picture sees a clip plane, which its camera is behind, beyond the near plane or not at all.
+    fn reaches_beyond_near_plane(camera: &Camera, plane: &ClipPlane) -> bool {
+        let Projection::Perspective { field_of_view } = camera.projection else { return false };
+        let half = (f64::from(field_of_view) / 2.0).tan();
+        let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
+        let (near, orientation) = (f64::from(camera.near), camera.orientation.as_dquat().normalize());
+        let corners = [-1.0, 1.0].map(|x| [-1.0, 1.0].map(|y| DVec3::new(x * half * aspect, y * half, -1.0) * near));
+        // A corner of the near plane is behind the clip plane if its ray meets that farther away.
+        corners.as_flattened().iter().any(|corner| plane.distance(camera.position + orientation * *corner) < 0.0)
+    }
+
     /// Where a point is in the picture, in pixels from its upper left corner, by the definition of the projections; `None` if it is not in
     /// the picture, or nearer than the near plane.
     fn pixel(camera: &Camera, point: DVec3) -> Option<DVec2> {
@@ -159,8 +170,7 @@ mod tests {
                 (local.truncate() / (distance - local.z), if local.z < 0.0 { distance } else { 0.0 })
             }
         };
-        let is_oblique = RenderView::new(camera).has_oblique_near_plane();
-        let is_clipped = match camera.clip_plane.filter(|_| is_oblique) {
+        let is_clipped = match camera.clip_plane.filter(|plane| reaches_beyond_near_plane(camera, plane)) {
             Some(plane) => plane.distance(point) < 0.0 || depth <= 0.0,
             None => depth < f64::from(camera.near),
         };
