@@ -2,7 +2,7 @@
 //!
 //! [`Renderer::record`] has the steps of a frame in order, and `stages.rs` lists the stages that its jobs run.
 
-mod background_work;
+mod backend_maintenance;
 mod blended_object_witness;
 mod budgeted_view;
 mod builder;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
-use super::background_work::BackgroundWork;
+use super::backend_maintenance::BackendMaintenance;
 use super::column_check::ColumnCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
@@ -88,7 +88,7 @@ pub struct Renderer<B: Backend> {
     node_declarations: NodeDeclarations,
     warnings: Warnings,
     column_check: ColumnCheck,
-    background_work: BackgroundWork,
+    backend_maintenance: BackendMaintenance,
     /// Whether the histories of the next frame are empty.
     forgets_histories: bool,
 }
@@ -120,7 +120,7 @@ impl<B: Backend> Renderer<B> {
             node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
             column_check: ColumnCheck::default(),
-            background_work: BackgroundWork::default(),
+            backend_maintenance: BackendMaintenance::default(),
             forgets_histories: false,
         }
     }
@@ -158,7 +158,7 @@ impl<B: Backend> Renderer<B> {
         // all the same.
         let recorded = catch(|| {
             let recorded = self.record_frame(scene, nodes, choices, transparency)?;
-            self.background_work.start(&self.backend, &self.scheduler)?;
+            self.backend_maintenance.start(&self.backend, &self.scheduler)?;
             Ok(recorded)
         });
         let recorded = recorded.unwrap_or_else(|JobPanic { message }| {
@@ -416,7 +416,7 @@ impl<B: Backend> Renderer<B> {
         self.backend = backend;
         self.capacity.forget_backend();
         self.recordings.clear();
-        self.background_work = BackgroundWork::default();
+        self.backend_maintenance = BackendMaintenance::default();
         self.view_cache.forget_frames_in_flight();
     }
 

@@ -22,17 +22,18 @@ pub struct Material {
     pub opacity: f32,
     /// How the surface is blended with what is behind it.
     pub blend: Blend,
-    /// Makes a material without blending a mask, from 0 to 1: where its alpha, which is `opacity` times that of the
-    /// `texture`, is less, there is no surface, in pictures and in shadows; elsewhere the surface is opaque. `None` for
-    /// no holes. Blended materials do not use it. It is glTF's `alphaCutoff` for `alphaMode: MASK`.
+    /// Makes the material a mask: a surface with holes. A hole is where alpha, which is `opacity` times the alpha of the
+    /// `texture`, is below this cutoff, which is from 0 to 1. Holes show in pictures and in shadows; elsewhere the
+    /// surface is opaque. `None` is a surface without holes. Blended materials ignore the cutoff. It is glTF's
+    /// `alphaCutoff` for `alphaMode: MASK`.
     ///
     /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling. A mask has no
     /// holes while its texture is not on the device.
     ///
-    /// The mask is read at the texture's full resolution, however far away it is: what is left covers as large a share
-    /// of distant pixels as of near ones, where averaged alpha would be below the cutoff everywhere, or nowhere. As
-    /// with triangles of that size, each pixel is covered or not. Devices round when they filter, so an alpha that is
-    /// less by up to 1/4096 of the cutoff counts as equal.
+    /// Shaders read the mask at the texture's full resolution at every distance, so the surface covers the same share of
+    /// distant pixels as of near ones. The average of many texels would be below the cutoff everywhere, or nowhere. Each
+    /// pixel is covered or not, as by triangles of that size. Devices round when they filter, so an alpha counts as equal
+    /// to the cutoff if it is less by up to 1/4096 of the cutoff.
     pub alpha_cutoff: Option<f32>,
     /// Whether back faces are drawn too.
     pub double_sided: bool,
@@ -67,7 +68,7 @@ impl Material {
     /// The alpha below which shaders leave out a pixel: less than the cutoff by what filtering may round off. 0 without
     /// a mask.
     #[cfg(any(feature = "wgpu", feature = "software"))]
-    pub(crate) fn least_alpha(&self) -> f32 {
+    pub(crate) fn min_alpha(&self) -> f32 {
         const ROUNDING: f32 = 1.0 / 4096.0;
         self.alpha_cutoff.filter(|_| self.is_masked()).map_or(0.0, |cutoff| cutoff * (1.0 - ROUNDING))
     }

@@ -42,7 +42,7 @@ impl BackgroundSlots {
     }
 
     /// Frees a slot that the caller has taken.
-    pub(super) fn put_back(&self) {
+    pub(super) fn release(&self) {
         self.taken.fetch_sub(1, Ordering::Relaxed);
     }
 }

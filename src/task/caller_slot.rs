@@ -38,7 +38,7 @@ impl<W: JobContext> CallerSlot<W> {
     }
 
     /// Frees the slot, and wakes one thread that waits for it.
-    pub(super) fn put_back(&self, queues: Box<Queues<W>>) {
+    pub(super) fn release(&self, queues: Box<Queues<W>>) {
         *self.queues.lock() = Some(queues);
         self.freed.notify_one();
     }

@@ -214,7 +214,7 @@ impl Scheduler {
         let worker = Worker::new(0, queues, Arc::clone(&self.shared));
         // `body` catches the panics of the engine's code. If it missed one, the caller slot must be freed nevertheless.
         let result = panic::catch_unwind(AssertUnwindSafe(|| current_worker::enter(&worker, || body(&worker))));
-        self.shared.caller_slot().put_back(worker.into_queues());
+        self.shared.caller_slot().release(worker.into_queues());
         result.unwrap_or_else(|payload| panic::resume_unwind(payload))
     }
 }

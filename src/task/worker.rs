@@ -68,8 +68,8 @@ pub(super) enum ExitCondition {
     Finished { region: &'static Region<Worker> },
 }
 
-/// What a worker's thread does for the background.
-enum BackgroundWork {
+/// What a worker's thread runs while it holds a background slot.
+enum BackgroundTask {
     /// A job of a scope, a loop or a graph of a background job.
     Part(Job<Worker>),
     /// A background job.
@@ -290,12 +290,12 @@ impl Worker {
                 break;
             }
             if matches!(until, ExitCondition::Shutdown)
-                && let Some(work) = self.background_work(&mut has_slot)
+                && let Some(work) = self.background_task(&mut has_slot)
             {
                 idle.end(self.index, &self.shared, sees_more_work);
                 match work {
-                    BackgroundWork::Part(job) => self.run(job),
-                    BackgroundWork::Whole(job) => _ = self.run_in_background(&*job),
+                    BackgroundTask::Part(job) => self.run(job),
+                    BackgroundTask::Whole(job) => _ = self.run_in_background(&*job),
                 }
                 continue;
             }
@@ -305,16 +305,16 @@ impl Worker {
         idle.end(self.index, &self.shared, sees_more_work);
     }
 
-    /// Work of the background for this thread, if it has a slot or a slot is free. Then it has one from here on.
-    fn background_work(&self, has_slot: &mut bool) -> Option<BackgroundWork> {
+    /// A background task for this thread, if it has a slot or a slot is free. Then it has one from here on.
+    fn background_task(&self, has_slot: &mut bool) -> Option<BackgroundTask> {
         *has_slot = *has_slot || (self.sees_jobs(&[Priority::Background]) && self.shared.background_slots().try_take());
         if !*has_slot {
             return None;
         }
         // Parts of jobs come first: a job waits for them.
         let part = self.mailbox_job(Priority::Background).or_else(|| self.steal(&[Priority::Background]));
-        let whole = || self.shared.background().take_oldest().map(BackgroundWork::Whole);
-        part.map(BackgroundWork::Part).or_else(whole)
+        let whole = || self.shared.background().take_oldest().map(BackgroundTask::Whole);
+        part.map(BackgroundTask::Part).or_else(whole)
     }
 
     /// Frees the slot of this thread, if it has one, and wakes another worker if that may go on with the background jobs.
@@ -322,7 +322,7 @@ impl Worker {
         if !mem::take(has_slot) {
             return;
         }
-        self.shared.background_slots().put_back();
+        self.shared.background_slots().release();
         fence(Ordering::SeqCst);
         if self.sees_jobs(&[Priority::Background]) {
             self.shared.sleep().wake_despite_searchers(Priority::Background);

@@ -5,16 +5,17 @@ use std::time::Duration;
 use super::clock::{Clock, EngineClock};
 use crate::sync::Instant;
 
-/// A moment, and the clock that told it: the system's, or the engine's if it supplies one.
+/// Measures from its start by the clock that costs are measured with: the system's, or the engine's if it supplies one.
 ///
 /// Not the processor's counter, whose rate is measured for 10 ms before the first reading.
 #[derive(Clone, Copy)]
 pub(crate) struct Stopwatch<'clock> {
-    start: Moment<'clock>,
+    start: Start<'clock>,
 }
 
+/// When it started, by each clock.
 #[derive(Clone, Copy)]
-enum Moment<'clock> {
+enum Start<'clock> {
     System(Instant),
     Engine(&'clock EngineClock, u64),
 }
@@ -24,8 +25,8 @@ impl<'clock> Stopwatch<'clock> {
     #[inline]
     pub(super) fn of(clock: &'clock Clock) -> Self {
         let start = match clock {
-            Clock::Machine(_) => Moment::System(Instant::now()),
-            Clock::Engine(clock) => Moment::Engine(clock, clock.read()),
+            Clock::Machine(_) => Start::System(Instant::now()),
+            Clock::Engine(clock) => Start::Engine(clock, clock.read()),
         };
         Self { start }
     }
@@ -34,8 +35,8 @@ impl<'clock> Stopwatch<'clock> {
     #[inline]
     pub(crate) fn restarted(self) -> Self {
         let start = match self.start {
-            Moment::System(_) => Moment::System(Instant::now()),
-            Moment::Engine(clock, _) => Moment::Engine(clock, clock.read()),
+            Start::System(_) => Start::System(Instant::now()),
+            Start::Engine(clock, _) => Start::Engine(clock, clock.read()),
         };
         Self { start }
     }
@@ -44,8 +45,8 @@ impl<'clock> Stopwatch<'clock> {
     #[inline]
     pub(crate) fn elapsed(self) -> Duration {
         match self.start {
-            Moment::System(start) => start.elapsed(),
-            Moment::Engine(clock, start) => Duration::from_nanos(clock.read().saturating_sub(start)),
+            Start::System(start) => start.elapsed(),
+            Start::Engine(clock, start) => Duration::from_nanos(clock.read().saturating_sub(start)),
         }
     }
 }

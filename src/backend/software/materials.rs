@@ -104,7 +104,7 @@ struct TableEntry {
 impl TableEntry {
     fn new(material: &Material, chain: Option<Arc<MipChain>>) -> Self {
         let Material { diffuse, opacity, emission, double_sided, blend, .. } = *material;
-        let (alpha_cutoff, values) = (material.least_alpha(), material.values.clone());
+        let (alpha_cutoff, values) = (material.min_alpha(), material.values.clone());
         Self { diffuse, opacity, alpha_cutoff, emission, double_sided, blend, values, chain }
     }
 }

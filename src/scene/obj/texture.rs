@@ -198,12 +198,12 @@ fn scale_down(bytes: &mut Vec<u8>, [width, height]: [u32; 2], [scaled_width, sca
 /// By how much JPEG changes texels of a mask that are far from its edges.
 const NOISE: u8 = 16;
 
-/// A texel is near an edge if a clear one and a solid one are at most so many texels away along each axis: as far as
-/// the filters of common programs blur an edge.
+/// A texel is near an edge if a clear one and a solid one are within this many texels of it along each axis. The filters
+/// of common programs blur an edge as far as that.
 const EDGE_DISTANCE: usize = 2;
 
-/// One in so many texels of a mask may be neither clear nor solid, nor near an edge.
-const STRAYS: usize = 64;
+/// A mask may have one outlier for each of this many texels: a texel that is neither clear nor solid, nor near an edge.
+const TEXELS_PER_OUTLIER: usize = 64;
 
 fn is_clear(alpha: u8) -> bool {
     alpha < NOISE
@@ -280,14 +280,14 @@ impl Pixels {
             }
             false
         };
-        let max_strays = width * height / STRAYS;
-        let (mut strays, mut has_holes) = (0, false);
+        let max_outliers = width * height / TEXELS_PER_OUTLIER;
+        let (mut outliers, mut has_holes) = (0, false);
         for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
             let alpha = alpha(x, y);
             has_holes |= is_clear(alpha);
             if !is_clear(alpha) && !is_solid(alpha) && !is_at_edge(x, y) {
-                strays += 1;
-                if strays > max_strays {
+                outliers += 1;
+                if outliers > max_outliers {
                     return false;
                 }
             }

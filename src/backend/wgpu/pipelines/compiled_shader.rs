@@ -3,7 +3,7 @@
 use super::compile_shader::compile_shader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_key::VertexSource;
-use super::unsaid_discards::warn_of_unsaid_discards;
+use super::undeclared_discards::warn_of_undeclared_discards;
 use super::unused_bindings::warn_of_unused_bindings;
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::BindGroupLayouts;
@@ -36,7 +36,7 @@ impl CompiledShader {
         let before = key.prelude(attributes.iter().map(|attribute| attribute.layout), clamps_corners);
         let module = compile_shader(device, name, &before, &key.own_shaders())?;
         warn_of_unused_bindings(name, declaration, &before, &key.own_shaders());
-        warn_of_unsaid_discards(name, draws, &before, &key.own_shaders());
+        warn_of_undeclared_discards(name, draws, &before, &key.own_shaders());
         let groups = [Some(&layouts.frame), Some(&layouts.assets), own[0], own[1]];
         let used = 2 + own.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

@@ -9,7 +9,7 @@ mod pipeline_key;
 mod pipeline_variant;
 mod process_pipelines;
 mod shared_pipelines;
-mod unsaid_discards;
+mod undeclared_discards;
 mod unused_bindings;
 mod vertex_buffers;
 

@@ -28,7 +28,7 @@ impl GpuMaterial {
             texture_layer: texture.layer,
             double_sided: u32::from(material.double_sided),
             blend: material.blend as u32,
-            alpha_cutoff: material.least_alpha(),
+            alpha_cutoff: material.min_alpha(),
         }
     }
 }

@@ -6,12 +6,12 @@ use crate::task::{BackgroundJob, Scheduler};
 
 /// What a backend does between frames: one job at a time.
 #[derive(Default)]
-pub(super) struct BackgroundWork {
+pub(super) struct BackendMaintenance {
     /// The latest job, if there was any.
     job: Option<BackgroundJob<Result<(), CallPanic>>>,
 }
 
-impl BackgroundWork {
+impl BackendMaintenance {
     /// Starts a job if there is something to do and the last one has ended.
     ///
     /// # Errors
