@@ -118,7 +118,7 @@ const NO_PIECE: u32 = u32::MAX;
 const MAX_SELECTIONS: usize = 32;
 
 impl PieceTable {
-    /// Begins a frame of so many objects, in which passes with bins have these selections: decides which pieces are
+    /// Begins a frame of `objects` objects, in which passes with bins have these selections: decides which pieces are
     /// recorded, and which ones this frame records.
     ///
     /// # Errors
@@ -196,7 +196,7 @@ impl PieceTable {
         }
     }
 
-    /// Takes over the pieces of a scene with so many objects. Those that it had keep what is recorded.
+    /// Takes over the pieces of a scene with this number of objects. Those that it had keep what is recorded.
     fn sync(&mut self, pieces: &[Piece], objects: usize) -> Result<(), SceneError> {
         let before = self.owners.len();
         for piece in 0..self.pieces.len() {
@@ -264,7 +264,7 @@ impl PieceTable {
             self.pieces.iter().any(|known| known.piece.objects.iter_from(objects).next().is_some());
     }
 
-    /// Counts the indices at which the scene, which has so many objects, has none, each once.
+    /// Counts the objects of pieces that a scene with this number of objects does not have, each once.
     pub(super) fn count_unknown_objects(&self, objects: usize, rejections: &Rejections) {
         let pieces = if self.has_unknown_objects { &self.pieces[..] } else { &[] };
         for index in pieces.iter().flat_map(|known| known.piece.objects.iter_from(objects)) {

@@ -23,7 +23,7 @@ pub(super) struct ShadowViews {
 #[derive(Clone, Copy)]
 pub(super) struct MapSettings<'a> {
     pub(super) maps: &'a ShadowMaps,
-    /// They are drawn every so many frames.
+    /// The number of frames from one drawing of a map to the next.
     pub(super) interval: u32,
     pub(super) limits: SceneLimits,
 }

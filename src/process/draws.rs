@@ -49,8 +49,8 @@ pub struct CommandDraws<'a> {
     /// What `clamped_fragment` is for `fragment`, for the fragment entry point of `masked`.
     pub clamped_masked_fragment: Option<&'a str>,
     /// Whether `fragment` discards pixels, or returns a depth of its own: then no object that the process draws hides
-    /// what is behind it from culling. [Masked](crate::scene::Material::is_masked) objects never do. A shader that does
-    /// so unsaid is warned of.
+    /// what is behind it from culling. [Masked](crate::scene::Material::is_masked) objects never do. A warning
+    /// names a process whose shader does so, and which does not set this.
     pub discards: bool,
     /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
     /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped

@@ -79,7 +79,7 @@ impl<T: Pod> StorageBuffer<T> {
     }
 }
 
-/// The size of so many elements.
+/// The size of `count` elements.
 ///
 /// # Panics
 /// If it is no `u64`.

@@ -42,14 +42,15 @@ pub struct Imported {
 /// - Polygons are triangulated, including concave ones. Points, lines and free-form surfaces are left out.
 /// - Colours of vertices (three numbers behind the coordinates) count as sRGB, as in other programs. They become the attribute
 ///   [`VERTEX_COLOR`] of the meshes, which a pipeline [with vertex colours](crate::process::Deferred::vertex_colors) draws.
-/// - Every material is double-sided, since OBJ guarantees no winding. Of a material, `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
-///   `map_d` are read; PNG, JPEG, TGA and BMP textures are decoded. A material with a `d` below 1 is blended, and casts no shadow.
-/// - The opacity of a `map_d` is its alpha, or its luminance if it is opaque. If it cuts holes, the material is
-///   [masked](crate::scene::Material::alpha_cutoff) at 0.5: it is drawn with depth, and casts a shadow of the mask's shape. Else, and with a
-///   `d` below 1, the material is blended, and casts no shadow. A mask cuts holes if it has texels below 16, and all others are above
-///   239; apart from texels that have both within two texels along each axis, which are at a blurred edge, and from 1 in 64. A mask
-///   without texels below 240 hides nothing. One without texels above 127 that cuts holes hides all, which is a warning.
-///   The alpha of `map_Kd` counts only for a material with a `d` below 1.
+/// - Every material is double-sided, because OBJ guarantees no winding. The loader reads `Kd`, `map_Kd`, `Ke`, `d` or `Tr`, and
+///   `map_d` of a material, and decodes PNG, JPEG, TGA and BMP textures.
+/// - A material with a `d` below 1 is blended, and casts no shadow. Only then does the alpha of `map_Kd` count.
+/// - A material with a `map_d` that cuts holes is [masked](crate::scene::Material::alpha_cutoff) at 0.5: it writes depth, and its
+///   shadow has the shape of the mask. A material with another `map_d` is blended, and casts no shadow.
+/// - The opacity of a `map_d` is its alpha, or its luminance if it is opaque everywhere. Texels below 16 are clear, those above 239
+///   solid. A mask cuts holes if it has clear texels, and at most 1 in 64 of its texels are neither clear nor solid nor at an edge. A
+///   texel is at an edge if it has both a clear and a solid texel within two texels along each axis. A mask whose texels are all
+///   solid hides nothing. A mask that cuts holes, and has no texel above 127, hides everything: the loader warns of it.
 /// - A model without normals is shaded flat. Names of models are cut after 160 characters.
 /// - An emissive mesh (`Ke`) adds a light. There are no other lights, and no cameras.
 /// - What is malformed or not supported is left out, with a warning. Lines may end in LF, CR or both; text may be UTF-8 or

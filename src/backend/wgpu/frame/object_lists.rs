@@ -21,7 +21,7 @@ impl ObjectLists {
         Self { buffers: vec![new_buffer()], stride: 0, per_buffer: usize::MAX }
     }
 
-    /// Makes room for so many lists of so many objects. Returns whether what the lists held is lost.
+    /// Makes room for `lists` lists of `objects` objects each. Returns whether what the lists held is lost.
     ///
     /// # Errors
     /// If the device has no room.
@@ -48,7 +48,7 @@ impl ObjectLists {
         Ok(is_lost)
     }
 
-    /// The most lists that one buffer holds without headroom, of so many objects.
+    /// The maximum number of lists of `objects` objects each that one buffer holds without headroom.
     pub(super) fn max_in_one_buffer(objects: usize, limits: SceneLimits) -> u64 {
         limits.buffer_bytes / (objects * size_of::<u32>()).next_multiple_of(ALIGNMENT) as u64
     }

@@ -30,7 +30,7 @@ pub(crate) fn check_mesh(device: &wgpu::Device, mesh: &Mesh, format: VertexForma
 }
 
 /// # Errors
-/// If a buffer of so many bytes is larger than the device allows.
+/// If a buffer of `needed` bytes is larger than the device allows.
 fn check_buffer(needed: u64, allowed: u64) -> Result<(), BackendError> {
     if needed > allowed { Err(BackendError::Limit { limit: "max_buffer_size", allowed, needed }) } else { Ok(()) }
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// What may be uploaded until the next frame: so many bytes, within a time.
+/// How many bytes may be uploaded until the next frame, and how long that may take.
 pub(super) struct Allowance {
     bytes: u64,
     began: Instant,
