@@ -275,9 +275,12 @@ fn a_kept_sum_of_lights_is_in_every_plan_of_a_quality_that_has_it() {
     for kept in ["tiles of lights", "sum of lights"] {
         assert_eq!(planned(RadianceSum::Shader, Deferred::new().keep(kept)), summed, "{kept}");
         assert_eq!(planned(RadianceSum::HalfFloat, Deferred::new().keep(kept)), geometry, "{kept}");
-        // The backend does not blend floats.
-        assert_eq!(planned(RadianceSum::Float, Deferred::new().keep(kept)), summed, "{kept}");
     }
+    // The backend blends floats, which needs no tiles.
+    assert_eq!(planned(RadianceSum::Float, Deferred::new().keep("tiles of lights")), geometry);
+    let in_floats = planned(RadianceSum::Float, pipeline());
+    assert_eq!([&in_floats[0], &in_floats[2]], ["geometry buffer", "sum of lights"]);
+    assert!(in_floats.len() == 3 && in_floats[1].ends_with(" lights"), "{in_floats:?}");
     // A process of the engine's draws over radiance, so no sum needs it.
     let lights = || LightVolumes::new(LightKind::Point, GeometryFormats::default());
     let classes = ["directional", "point", "spot", "hemispherical"];

@@ -23,7 +23,7 @@ struct Fill<'a> {
 
 impl CpuNode for Fill<'_> {
     fn name(&self) -> &str {
-        "fill"
+        "fill indices"
     }
 
     fn declare(&self, accesses: &mut NodeAccesses) {
