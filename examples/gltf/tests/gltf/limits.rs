@@ -26,7 +26,7 @@ type ChangedFile = (fn() -> Builder, Change, &'static str);
 
 /// Files of a few kilobytes, with the limits that a user has not changed.
 fn growing() -> Result<(), Failed> {
-    let changes: [ChangedFile; 13] = [
+    let changes: [ChangedFile; 16] = [
         (textured_square, |it| zeros(it, 0, 177_999_999), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 1 << 40), "zero_bytes"),
         (textured_square, |it| zeros(it, 0, 9_000_000_000_000_000), "zero_bytes"),
@@ -99,6 +99,26 @@ fn growing() -> Result<(), Failed> {
             },
             "pose_bytes",
         ),
+        // The same where no vertex has joints.
+        (
+            || bending_tube(None),
+            |it| {
+                leave_out_vertex_joints(it);
+                let joints: Vec<_> = (0..3000).map(|joint| joint % 3).collect();
+                it.json["skins"][0] = json!({"joints": joints});
+                (0..1000).for_each(|_| _ = it.root(json!({"mesh": 0, "skin": 0})));
+            },
+            "pose_bytes",
+        ),
+        // The joints of a skin alone, which one node has.
+        (
+            || bending_tube(None),
+            |it| {
+                leave_out_vertex_joints(it);
+                it.json["skins"][0] = json!({"joints": vec![0; 250_000]});
+            },
+            "pose_bytes",
+        ),
         // Joints of a mesh without a skin, below a skewed node.
         (
             || bending_tube(None),
@@ -122,6 +142,15 @@ fn growing() -> Result<(), Failed> {
                 let primitive = json!({"attributes": {"POSITION": 0}, "targets": targets});
                 it.json["meshes"][0] = json!({"primitives": [primitive]});
                 it.json["accessors"][0]["count"] = json!(3);
+                (0..4000).for_each(|_| _ = it.root(json!({"mesh": 0})));
+            },
+            "pose_bytes",
+        ),
+        // The same where the targets move nothing.
+        (
+            || morphing_sphere(None),
+            |it| {
+                it.json["meshes"][0]["primitives"][0]["targets"] = vec![json!({}); 10_000].into();
                 (0..4000).for_each(|_| _ = it.root(json!({"mesh": 0})));
             },
             "pose_bytes",
@@ -176,6 +205,11 @@ fn refused(number: usize, bytes: Vec<u8>, limits: GltfLimits, expected: &str) ->
 fn zeros(it: &mut Builder, accessor: usize, count: u64) {
     it.json["accessors"][accessor]["count"] = json!(count);
     it.json["accessors"][accessor].as_object_mut().map(|accessor| accessor.remove("bufferView"));
+}
+
+fn leave_out_vertex_joints(it: &mut Builder) {
+    let attributes = &mut it.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes.as_object_mut().map(|attributes| ["JOINTS_0", "WEIGHTS_0"].map(|name| attributes.remove(name)));
 }
 
 fn images() -> Result<(), Failed> {

@@ -78,6 +78,8 @@ fn uris() -> Result<(), Failed> {
     fs::write(folder.join("secret.bin"), [0; 4096])?;
     fs::create_dir_all(folder.join("scene/folder.bin"))?;
     let absolute = folder.join("secret.bin").display().to_string();
+    // Of 4,097 characters, and of 4,096, of which some are escaped.
+    let (too_long, long) = (format!("{}.bin", "x".repeat(4093)), format!("{}.bin", "%78".repeat(4092)));
     let uris = [
         ("../secret.bin", "leads out of the file's folder"),
         ("%2e%2e/secret.bin", "leads out of the file's folder"),
@@ -85,6 +87,8 @@ fn uris() -> Result<(), Failed> {
         ("https://example.com/buffer.bin", "has a scheme other than data"),
         ("folder.bin", "is not a regular file"),
         ("%ff.bin", "is not UTF-8"),
+        (&too_long, "is longer than a path can be"),
+        (&long, "cannot be read"),
         ("data:nonsense", "buffer 0 has a URI that cannot be followed"),
     ];
     for (uri, expected) in uris {

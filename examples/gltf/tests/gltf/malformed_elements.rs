@@ -42,6 +42,16 @@ const CHANGES: &[Malformed] = &[
         |it| it.json["accessors"][1]["count"] = json!(3),
         "normals of mesh 0 primitive 0 has 3 values, but 4 vertices",
     ),
+    (
+        textured_square,
+        |it| {
+            let [indices, values] = [it.view(&[0, 1, 2, 3, 0]), it.view(&[0; 60])];
+            let indices = json!({"bufferView": indices, "componentType": 5121});
+            it.json["accessors"][0]["sparse"] =
+                json!({"count": 5, "indices": indices, "values": {"bufferView": values}});
+        },
+        "accessor 0 has more sparse values than values",
+    ),
     (textured_square, |it| it.json["bufferViews"][1]["byteLength"] = json!(99_999), "buffer view 1 is out of range"),
     (
         textured_square,
