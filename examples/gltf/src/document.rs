@@ -61,11 +61,12 @@ impl Source {
     /// If it is not glTF 2.0, or requires an extension that is not known.
     pub(crate) fn parse(
         folder: PathBuf,
-        bytes: Vec<u8>,
+        mut bytes: Vec<u8>,
         limits: &GltfLimits,
         warnings: &mut Warnings,
     ) -> Result<Self, Problem> {
         let chunks = split(&bytes, warnings)?;
+        Json::replace_lone_surrogates(&mut bytes[chunks.json.clone()]);
         let root = Json::parse(&bytes[chunks.json], &Limit::new("json_values", limits.json_values))?;
         check_version(&root, warnings)?;
         check_extensions(&root, warnings)?;

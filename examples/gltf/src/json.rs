@@ -41,6 +41,26 @@ impl Json {
         })
     }
 
+    /// Replaces each escape of half a surrogate pair, which JSON allows and UTF-8 cannot have, by that of U+FFFD.
+    pub(crate) fn replace_lone_surrogates(text: &mut [u8]) {
+        let mut rest = text;
+        // JSON has backslashes in strings only.
+        while let Some(at) = rest.iter().position(|&byte| byte == b'\\') {
+            let escape = &mut rest[at..];
+            let length = match [escaped_unit(escape), escape.get(6..).and_then(escaped_unit)] {
+                [Some(0xd800..=0xdbff), Some(0xdc00..=0xdfff)] => 12,
+                [Some(0xd800..=0xdfff), _] => {
+                    escape[2..6].copy_from_slice(b"fffd");
+                    6
+                }
+                [Some(_), _] => 6,
+                [None, _] => 2,
+            };
+            let length = length.min(escape.len());
+            rest = &mut escape[length..];
+        }
+    }
+
     /// A member of an object; `None` if it is not there or `null`, or if this is no object.
     pub(crate) fn get(&self, name: &str) -> Option<&Self> {
         let Self::Object(members) = self else { return None };
@@ -73,6 +93,12 @@ impl Json {
     pub(crate) fn as_list(&self) -> Option<&[Self]> {
         if let Self::List(values) = self { Some(values) } else { None }
     }
+}
+
+/// The unit of UTF-16 of an escape such as `\\u00e9`, if a text begins with one.
+fn escaped_unit(text: &[u8]) -> Option<u16> {
+    let digits = text.strip_prefix(b"\\u")?.get(..4)?;
+    digits.iter().try_fold(0, |unit, &digit| Some(unit << 4 | char::from(digit).to_digit(16)? as u16))
 }
 
 /// Builds trees, and counts their values.

@@ -22,6 +22,11 @@ pub(crate) fn read_light(
     world: &DAffine3,
     warnings: &mut Warnings,
 ) -> Result<Option<Light>, Problem> {
+    // A dark light is checked, too: it may be of a type that is not known.
+    let kind = light.text("type")?.ok_or_else(|| light.lacks("type"))?;
+    if !matches!(kind, "directional" | "point" | "spot") {
+        return Err(Problem::invalid(light, "has a `type` that is not known"));
+    }
     let color = light.numbers::<3>("color")?.map_or(Vec3::ONE, |color| DVec3::from_array(color).as_vec3());
     let intensity = color * light.number("intensity")?.unwrap_or(1.0);
     if !intensity.is_finite() || intensity.min_element() < 0.0 {
@@ -44,15 +49,13 @@ pub(crate) fn read_light(
         }
     };
     let range = range.clamp(f32::MIN_POSITIVE, MAX_RANGE);
-    Ok(Some(match light.text("type")? {
-        Some("directional") => Light::Directional { direction, illuminance: intensity, casts_shadow: true },
-        Some("point") => Light::Point { position, intensity, range, casts_shadow: false },
-        Some("spot") => {
+    Ok(Some(match kind {
+        "directional" => Light::Directional { direction, illuminance: intensity, casts_shadow: true },
+        "point" => Light::Point { position, intensity, range, casts_shadow: false },
+        _ => {
             let [inner_angle, outer_angle] = cone(light, warnings)?;
             Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow: true }
         }
-        Some(_) => return Err(Problem::invalid(light, "has a `type` that is not known")),
-        None => return Err(light.lacks("type")),
     }))
 }
 

@@ -12,6 +12,7 @@ use crate::generate::static_scenes::textured_square;
 pub const CASES: &[crate::Case] = &[
     ("containers_that_are_wrong_are_named", containers),
     ("what_is_left_out_is_a_warning", warnings),
+    ("halves_of_surrogate_pairs_in_names_lose_no_file", surrogates),
     ("uris_lead_only_below_the_folder", uris),
 ];
 
@@ -68,6 +69,39 @@ fn warnings() -> Result<(), Failed> {
         expect(warnings.iter().any(|warning| warning.contains(expected)), || {
             format!("{warnings:?}, not {expected:?}")
         })?;
+    }
+    Ok(())
+}
+
+/// JSON can escape what UTF-8 cannot have.
+fn surrogates() -> Result<(), Failed> {
+    let names = [
+        ("\\ud800", "\u{fffd}"),
+        ("a\\uDFFFb", "a\u{fffd}b"),
+        ("\\ud800\\ud800\\udc00", "\u{fffd}\u{10000}"),
+        ("\\udc00\\ud800", "\u{fffd}\u{fffd}"),
+        ("\\uD83D\\uDE00", "\u{1f600}"),
+        ("\\\\ud800", "\\ud800"),
+        ("\\u00e9\\ud900", "\u{e9}\u{fffd}"),
+        ("\\\"\\udabc\\\"", "\"\u{fffd}\""),
+    ];
+    for (escaped, name) in names {
+        let mut builder = textured_square();
+        builder.json["images"][0] = json!({"name": "NAME", "uri": "no such image.png"});
+        let glb = builder.gltf("");
+        let text = String::from_utf8(glb)?.replace("NAME", escaped).replace("\"uri\":\"\"", "\"uri\":\"data:,\"");
+        let world = load_bytes("surrogates", text.as_bytes(), &AT_REST);
+        let warnings = world.map_or_else(|error| error.warnings, |world| world.warnings);
+        let expected = format!("image 0 ({name}) is left out");
+        let is_named = warnings.iter().any(|warning| warning.contains(&expected));
+        expect(is_named, || format!("{escaped}: {warnings:?}, not {expected:?}"))?;
+    }
+    // What is cut off is an error of JSON.
+    for text in ["\\", "\\u", "\\ud80", "\\ud800", "\\ud800\\u", "\\ud800\\udc0"] {
+        let text = format!("{{\"asset\": {{\"version\": \"2.0\"}}, \"a\": \"{text}");
+        let error = load_bytes("surrogates", text.as_bytes(), &AT_REST).err().map(|error| error.to_string());
+        let error = error.ok_or("it is drawn")?;
+        expect(error.contains("its JSON is cut off"), || error)?;
     }
     Ok(())
 }

@@ -139,6 +139,11 @@ const CHANGES: &[Malformed] = &[
         "camera 0 has planes that are not 0 < near < far",
     ),
     (lights_and_cameras, |it| light(it, 0)["intensity"] = json!(-1), "light 0 has a colour or an intensity"),
+    (
+        lights_and_cameras,
+        |it| *light(it, 0) = json!({"type": "area", "intensity": 0}),
+        "light 0 does not shine: light 0 has a `type` that is not known",
+    ),
     (lights_and_cameras, |it| light(it, 0)["range"] = json!(0), "light 0 has the range 0"),
     (
         lights_and_cameras,
