@@ -1,7 +1,7 @@
 //! What can be wrong with a file.
 
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use drawloom::scene::SceneError;
 
@@ -20,6 +20,14 @@ pub struct LoadError {
     pub problem: Box<Problem>,
     /// What the loader had left out by then, as [`World::warnings`](crate::World::warnings).
     pub warnings: Vec<String>,
+    /// How many more warnings there are, as [`World::unlisted_warnings`](crate::World::unlisted_warnings).
+    pub unlisted_warnings: u64,
+}
+
+impl LoadError {
+    pub(crate) fn new(file: &Path, problem: Problem, warnings: Vec<String>, unlisted_warnings: u64) -> Self {
+        Self { file: file.to_owned(), problem: Box::new(problem), warnings, unlisted_warnings }
+    }
 }
 
 /// What is wrong with a file, or with an element of it. Elements are named as glTF numbers them, and by their names, in

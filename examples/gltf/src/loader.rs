@@ -66,7 +66,7 @@ pub fn load(
     let scene_bytes = Limit::new("scene_bytes", options.limits.scene_bytes);
     match read_file(path, &scene_bytes) {
         Ok(bytes) => load_bytes(path, bytes, options, scheduler, progress),
-        Err(problem) => Err(LoadError { file: path.to_owned(), problem: problem.into(), warnings: Vec::new() }),
+        Err(problem) => Err(LoadError::new(path, problem, Vec::new(), 0)),
     }
 }
 
@@ -88,7 +88,7 @@ pub fn load_bytes(
     let warnings = warnings.take();
     match read {
         Ok(world) => Ok(World { warnings, unlisted_warnings, ..world }),
-        Err(problem) => Err(LoadError { file: path.to_owned(), problem: problem.into(), warnings }),
+        Err(problem) => Err(LoadError::new(path, problem, warnings, unlisted_warnings)),
     }
 }
 

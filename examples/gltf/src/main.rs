@@ -52,8 +52,13 @@ fn main() -> ExitCode {
     // What Drawloom and wgpu warn of.
     tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
     let arguments = Arguments::parse();
-    match read(&arguments) {
-        Ok((world, scheduler)) => drawloom_output::exit_code(run(&arguments, &world, scheduler)),
+    // That threads cannot be started is no fault of the arguments.
+    let scheduler = match Scheduler::with_available_parallelism() {
+        Ok(scheduler) => Arc::new(scheduler),
+        Err(error) => return drawloom_output::exit_code(Err(error)),
+    };
+    match read(&arguments, &scheduler) {
+        Ok(world) => drawloom_output::exit_code(run(&arguments, &world, scheduler)),
         Err(error) => {
             print_diagnostic!("error: {error}");
             ExitCode::from(2)
@@ -62,8 +67,7 @@ fn main() -> ExitCode {
 }
 
 /// Loads the file, and prints what is left out of it.
-fn read(arguments: &Arguments) -> Result<(World, Arc<Scheduler>), Box<dyn Error>> {
-    let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
+fn read(arguments: &Arguments, scheduler: &Scheduler) -> Result<World, Box<dyn Error>> {
     let mut limits = GltfLimits::default();
     for limit in &arguments.limits {
         limits.set(&limit.name, limit.value)?;
@@ -76,11 +80,11 @@ fn read(arguments: &Arguments) -> Result<(World, Arc<Scheduler>), Box<dyn Error>
         limits,
     };
     let progress = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} images")?);
-    let loaded = load(&arguments.file, &options, &scheduler, &progress);
+    let loaded = load(&arguments.file, &options, scheduler, &progress);
     progress.finish_and_clear();
     let (warnings, unlisted) = match &loaded {
         Ok(world) => (&world.warnings, world.unlisted_warnings),
-        Err(error) => (&error.warnings, 0),
+        Err(error) => (&error.warnings, error.unlisted_warnings),
     };
     for warning in warnings {
         print_diagnostic!("warning: {warning}");
@@ -88,7 +92,7 @@ fn read(arguments: &Arguments) -> Result<(World, Arc<Scheduler>), Box<dyn Error>
     if unlisted > 0 {
         print_diagnostic!("warning: {unlisted} more warnings are not listed");
     }
-    Ok((loaded?, scheduler))
+    Ok(loaded?)
 }
 
 fn run(arguments: &Arguments, world: &World, scheduler: Arc<Scheduler>) -> Result<(), Box<dyn Error>> {

@@ -46,6 +46,10 @@ fn program() -> Result<(), Failed> {
     fails(run(&of_compressed, &[])?, "nothing of it can be drawn")?;
     fails(run(&of_compressed, &[])?, "primitive 0 is compressed with KHR_draco_mesh_compression")?;
 
+    // What is not listed is counted, also of a file that is refused.
+    let unlisted = "more warnings are not listed";
+    fails(run(&of_compressed, &["--limit", "warnings=0"])?, unlisted)?;
+
     // Nobody reads what it prints.
     fs::remove_file(&picture)?;
     let mut command = Command::new(env!("CARGO_BIN_EXE_gltf_scene"));
