@@ -25,6 +25,7 @@ const LIMITS: GltfLimits = GltfLimits {
     keyframe_bytes: 8 << 10,
     pose_bytes: 8 << 10,
     objects: 50,
+    lights: 4,
     texture_file_bytes: 16 << 10,
     texture_bytes: 64 << 10,
     all_textures_bytes: 128 << 10,

@@ -16,8 +16,8 @@ pub(crate) fn upload(
     queue: &wgpu::Queue,
     textures: &TextureArrays,
 ) -> Result<Vec<ShaderResource<'static>>, String> {
-    let empty = TextureArray { size: [1, 1], layers: vec![vec![255; 4]] };
-    let arrays = textures.arrays.iter().chain(std::iter::repeat(&empty)).take(ARRAYS);
+    let white = TextureArray::white();
+    let arrays = textures.arrays.iter().chain(std::iter::repeat(&white)).take(ARRAYS);
     let scopes = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
     let scopes = scopes.map(|filter| device.push_error_scope(filter));
     let uploaded = arrays.map(|array| upload_array(device, queue, array)).collect::<Result<Vec<_>, _>>();

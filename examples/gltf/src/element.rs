@@ -3,6 +3,7 @@
 use std::fmt::{self, Display};
 
 use crate::error::Problem;
+use crate::files::is_data;
 use crate::json::Json;
 use crate::text::excerpt;
 
@@ -60,7 +61,10 @@ pub(crate) struct Element<'a> {
 
 impl<'a> Element<'a> {
     pub(crate) fn new(json: &'a Json, kind: Kind, index: usize) -> Self {
-        let name = json.get("name").and_then(Json::as_text).filter(|name| !name.is_empty());
+        let text = |member| json.get(member).and_then(Json::as_text).filter(|text| !text.is_empty());
+        // Images seldom have names. Those inside the file have no URI that tells which they are.
+        let uri = || text("uri").filter(|uri| kind == Kind::Image && !is_data(uri));
+        let name = text("name").or_else(uri);
         Self { json, kind, index, name, part: None }
     }
 

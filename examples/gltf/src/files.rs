@@ -51,7 +51,7 @@ pub(crate) fn read_file(path: &Path, limit: &Limit) -> Result<Vec<u8>, Problem> 
 /// left of the limit.
 pub(crate) fn read_uri(folder: &Path, element: &dyn Display, uri: &str, limit: &Limit) -> Result<Vec<u8>, Problem> {
     let refused = |reason: String| Problem::Uri { element: element.to_string(), reason };
-    if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+    if is_data(uri) {
         let url = DataUrl::process(uri).map_err(|error| refused(format!("{error:?}")))?;
         let mut bytes = Vec::new();
         let decoded = url.decode(|part| {
@@ -74,6 +74,11 @@ pub(crate) fn read_uri(folder: &Path, element: &dyn Display, uri: &str, limit: &
         };
     }
     read_file(&path_of(folder, uri).map_err(refused)?, limit)
+}
+
+/// Whether a URI has the data that it refers to.
+pub(crate) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
 /// No system has longer paths. Messages show paths whole.

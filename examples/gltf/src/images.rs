@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use drawloom::scene::Texture;
 use drawloom::task::{BackgroundJob, JobPanic, Scheduler};
-use image::imageops::{self, FilterType};
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits, RgbaImage};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbaImage, imageops};
 use indicatif::ProgressBar;
 
 use crate::document::{Bytes, Source};
@@ -22,6 +21,20 @@ use crate::warnings::Warnings;
 pub(crate) struct Decoding(Vec<(usize, String, DecodingJob)>);
 
 type DecodingJob = BackgroundJob<Result<Decoded, String>>;
+
+/// A decoded image, with its name in messages.
+#[derive(Debug)]
+pub(crate) struct NamedImage {
+    pub(crate) name: String,
+    pub(crate) pixels: RgbaImage,
+}
+
+/// An image that is within the limits.
+struct Encoded {
+    bytes: Bytes,
+    /// What a decoder may allocate beside the pixels.
+    spare_bytes: u64,
+}
 
 struct Decoded {
     image: RgbaImage,
@@ -39,12 +52,11 @@ impl Decoding {
         warnings: &mut Warnings,
     ) -> Self {
         let all = Limit::new("all_textures_bytes", source.limits.all_textures_bytes);
-        let limit = source.limits.texture_bytes;
         let mut jobs = Vec::new();
         for image in images.into_iter().filter_map(|image| source.get(Kind::Image, image)) {
             let name = image.to_string();
             match encoded(source, &image, &all) {
-                Ok(bytes) => jobs.push((image.index, name, scheduler.background(move || decode(&bytes, limit)))),
+                Ok(encoded) => jobs.push((image.index, name, scheduler.background(move || decode(&encoded)))),
                 // Limits of images are limits of each, too.
                 Err(problem) => warnings.add(format!("{name} is left out: {problem}")),
             }
@@ -58,20 +70,20 @@ impl Decoding {
     }
 
     /// Waits for all of them. Returns each by its index; those that cannot be decoded are left out, with a warning.
-    pub(crate) fn wait(self, progress: &ProgressBar, warnings: &mut Warnings) -> BTreeMap<usize, Arc<RgbaImage>> {
+    pub(crate) fn wait(self, progress: &ProgressBar, warnings: &mut Warnings) -> BTreeMap<usize, Arc<NamedImage>> {
         let mut images = BTreeMap::new();
-        for (index, image, job) in self.0 {
+        for (index, name, job) in self.0 {
             match job.wait().unwrap_or_else(|panic: JobPanic| Err(panic.to_string())) {
                 Ok(Decoded { image: pixels, reduced_from }) => {
                     if let Some([width, height]) = reduced_from {
                         let [reduced, lower] = <[u32; 2]>::from(pixels.dimensions());
-                        warnings.add(format!("{image} of {width}x{height} pixels is reduced to {reduced}x{lower}"));
+                        warnings.add(format!("{name} of {width}x{height} pixels is reduced to {reduced}x{lower}"));
                     }
-                    images.insert(index, Arc::new(pixels));
+                    images.insert(index, Arc::new(NamedImage { name, pixels }));
                 }
                 Err(reason) => {
-                    let problem = Problem::Image { image: image.clone(), reason: excerpt(reason.trim()) };
-                    warnings.add(format!("{image} is left out: {problem}"));
+                    let problem = Problem::Image { image: name.clone(), reason: excerpt(reason.trim()) };
+                    warnings.add(format!("{name} is left out: {problem}"));
                 }
             }
             progress.inc(1);
@@ -80,8 +92,8 @@ impl Decoding {
     }
 }
 
-/// The bytes of an image, if they and its pixels are within the limits.
-fn encoded(source: &Source, image: &Element<'_>, all: &Limit) -> Result<Bytes, Problem> {
+/// An image, if its bytes and its pixels are within the limits.
+fn encoded(source: &Source, image: &Element<'_>, all: &Limit) -> Result<Encoded, Problem> {
     let of_file = Limit::new("texture_file_bytes", source.limits.texture_file_bytes);
     let bytes = match (image.index("bufferView")?, image.text("uri")?) {
         (Some(view), _) => {
@@ -92,22 +104,41 @@ fn encoded(source: &Source, image: &Element<'_>, all: &Limit) -> Result<Bytes, P
         (None, Some(uri)) => Bytes::new(read_uri(&source.folder, image, uri, &of_file)?),
         (None, None) => return Err(Problem::invalid(image, "has neither a URI nor a buffer view")),
     };
+    // Also those of an image that cannot be decoded: they are read.
+    all.take(image, bytes.len() as u64, 1)?;
     let failed = |reason: String| Problem::Image { image: image.to_string(), reason: excerpt(reason.trim()) };
-    let decoder = reader(&bytes, source.limits.texture_bytes).map_err(failed)?;
-    let decoder = decoder.into_decoder().map_err(|error| failed(error.to_string()))?;
-    let (width, height) = decoder.dimensions();
-    let pixels = u64::from(width) * u64::from(height);
-    let bytes_a_pixel = u64::from(decoder.color_type().bytes_per_pixel());
-    let channels = decoder.color_type().channel_count();
+    let limit = source.limits.texture_bytes;
+    let reader = reader(&bytes, limit).map_err(failed)?;
+    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
+    let decoder = reader.into_decoder().map_err(|error| failed(error.to_string()))?;
+    let (size, color) = (<[u32; 2]>::from(decoder.dimensions()), decoder.color_type());
     drop(decoder);
-    let has_bytes = bytes_a_pixel == u64::from(channels);
-    Limit::new("texture_bytes", source.limits.texture_bytes).take(
-        image,
-        pixels,
-        if has_bytes { 4 } else { 4 + bytes_a_pixel },
-    )?;
-    all.take(image, pixels.saturating_mul(4).saturating_add(bytes.len() as u64), 1)?;
-    Ok(bytes)
+    let taken = bytes_at_once(size, color, is_jpeg.then_some(bytes.len() as u64));
+    Limit::new("texture_bytes", limit).take(image, taken, 1)?;
+    all.take(image, pixel_count(size), 4)?;
+    Ok(Encoded { bytes, spare_bytes: (limit - taken).max(MIN_SPARE_BYTES) })
+}
+
+/// What a decoder may always allocate beside the pixels, for rows and metadata.
+const MIN_SPARE_BYTES: u64 = 1 << 20;
+
+/// The greatest number of bytes that an image takes at once while it is decoded and reduced. `of_jpeg` is the number of
+/// bytes of its file if that is a JPEG.
+fn bytes_at_once(size: [u32; 2], color: ColorType, of_jpeg: Option<u64>) -> u64 {
+    let pixels = pixel_count(size);
+    let as_rgba = pixels.saturating_mul(4);
+    let decoded = pixels.saturating_mul(color.bytes_per_pixel().into());
+    // The decoder copies the file. If the JPEG is progressive it keeps up to four coefficients of two bytes for each
+    // pixel, in blocks of up to 32 by 32.
+    let padded = pixel_count(size.map(|side| side.next_multiple_of(32)));
+    let of_decoder = of_jpeg.map_or(0, |of_file| padded.saturating_mul(8).saturating_add(of_file));
+    let converted = if color == ColorType::Rgba8 { as_rgba } else { decoded.saturating_add(as_rgba) };
+    let reduced = reduced_size(size).map_or(0, |size| pixel_count(size) * 4);
+    decoded.saturating_add(of_decoder).max(converted).max(as_rgba.saturating_add(reduced))
+}
+
+fn pixel_count(size: [u32; 2]) -> u64 {
+    size.map(u64::from).into_iter().product()
 }
 
 fn reader(bytes: &[u8], limit: u64) -> Result<ImageReader<Cursor<&[u8]>>, String> {
@@ -118,18 +149,22 @@ fn reader(bytes: &[u8], limit: u64) -> Result<ImageReader<Cursor<&[u8]>>, String
     Ok(reader)
 }
 
-fn decode(bytes: &[u8], limit: u64) -> Result<Decoded, String> {
-    let decoder = reader(bytes, limit)?.into_decoder().map_err(|error| error.to_string())?;
+fn decode(encoded: &Encoded) -> Result<Decoded, String> {
+    let decoder = reader(&encoded.bytes, encoded.spare_bytes)?.into_decoder().map_err(|error| error.to_string())?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?.into_rgba8();
-    let (width, height) = image.dimensions();
-    let greatest = width.max(height);
-    if greatest <= Texture::MAX_SIZE {
-        return Ok(Decoded { image, reduced_from: None });
-    }
+    let size = <[u32; 2]>::from(image.dimensions());
+    let Some([width, height]) = reduced_size(size) else { return Ok(Decoded { image, reduced_from: None }) };
+    // Other filters convert the image to floats, which takes four times its memory.
+    let reduced = imageops::thumbnail(&image, width, height);
+    Ok(Decoded { image: reduced, reduced_from: Some(size) })
+}
+
+/// The size of an image as a texture, if it is too large for one.
+fn reduced_size(size: [u32; 2]) -> Option<[u32; 2]> {
+    let greatest = size[0].max(size[1]);
     let reduced = |side: u32| {
         let side = u64::from(side) * u64::from(Texture::MAX_SIZE) / u64::from(greatest);
         side.max(1) as u32
     };
-    let reduced = imageops::resize(&image, reduced(width), reduced(height), FilterType::Triangle);
-    Ok(Decoded { image: reduced, reduced_from: Some([width, height]) })
+    (greatest > Texture::MAX_SIZE).then(|| size.map(reduced))
 }

@@ -9,8 +9,8 @@ use crate::error::Problem;
 /// file counts, and not only what is read of it: an accessor without a buffer view makes zeros of nothing, and an
 /// accessor that many primitives refer to is read for each of them.
 ///
-/// A file that exceeds a limit is refused, and the message names the limit. Images that exceed theirs are left out,
-/// with a warning that names it.
+/// A file that exceeds a limit is refused, and the message names the limit. Images and lights that exceed theirs are
+/// left out, with a warning that names it.
 ///
 /// ```
 /// use gltf_scene::{GltfLimits, LoadOptions};
@@ -38,13 +38,16 @@ pub struct GltfLimits {
     pub pose_bytes: u64,
     /// The objects: one for each primitive of each node's mesh. Default: 1 Mi.
     pub objects: u64,
+    /// The lights: one for each node that has one. Every pixel adds up all lights. Default: 1,024.
+    pub lights: u64,
     /// The bytes of an image before it is decoded. Default: 256 MiB.
     pub texture_file_bytes: u64,
-    /// The bytes that an image takes while it is decoded: 4 for each pixel, and besides those of the file's own format
-    /// where a channel has more than 8 bits. Default: 512 MiB.
+    /// The bytes that an image takes at once while it is decoded: 4 for each pixel, and as many as the file's format
+    /// has where that is not RGBA of 8 bits; 8 more for each pixel of a JPEG. A PNG may have 1 MiB of metadata beyond
+    /// the limit. Background jobs decode several images at once. Default: 1 GiB.
     pub texture_bytes: u64,
-    /// The bytes that all images take together: those of their files, and 4 for each pixel. The texture arrays that are
-    /// made of them, with mip levels, take as much again at most. Default: 1 GiB.
+    /// The bytes that all images take together: those of their files, also if they cannot be decoded, and 4 for each
+    /// pixel. The texture arrays that are made of them, with mip levels, take as much again at most. Default: 1 GiB.
     pub all_textures_bytes: u64,
     /// The warnings that are listed. All are counted. Default: 100.
     pub warnings: u64,
@@ -58,7 +61,7 @@ impl Default for GltfLimits {
 
 type Field = fn(&mut GltfLimits) -> &mut u64;
 
-const FIELDS: [(&str, Field); 12] = [
+const FIELDS: [(&str, Field); 13] = [
     ("scene_bytes", |limits| &mut limits.scene_bytes),
     ("json_values", |limits| &mut limits.json_values),
     ("buffer_bytes", |limits| &mut limits.buffer_bytes),
@@ -67,6 +70,7 @@ const FIELDS: [(&str, Field); 12] = [
     ("keyframe_bytes", |limits| &mut limits.keyframe_bytes),
     ("pose_bytes", |limits| &mut limits.pose_bytes),
     ("objects", |limits| &mut limits.objects),
+    ("lights", |limits| &mut limits.lights),
     ("texture_file_bytes", |limits| &mut limits.texture_file_bytes),
     ("texture_bytes", |limits| &mut limits.texture_bytes),
     ("all_textures_bytes", |limits| &mut limits.all_textures_bytes),
@@ -84,8 +88,9 @@ impl GltfLimits {
         keyframe_bytes: 256 << 20,
         pose_bytes: 24 << 20,
         objects: 1 << 20,
+        lights: 1 << 10,
         texture_file_bytes: 256 << 20,
-        texture_bytes: 512 << 20,
+        texture_bytes: 1 << 30,
         all_textures_bytes: 1 << 30,
         warnings: 100,
     };

@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use drawloom::task::{JobPanic, Scheduler};
-use image::RgbaImage;
 use indicatif::ProgressBar;
 
 use crate::array_sizes::array_sizes;
+use crate::images::NamedImage;
 use crate::limits::GltfLimits;
 use crate::mip_levels::mip_levels_within;
 use crate::surface::TexturePlace;
@@ -85,12 +85,19 @@ pub(crate) struct TextureArray {
     pub(crate) layers: Vec<Vec<u8>>,
 }
 
+impl TextureArray {
+    /// One white pixel, where no image is.
+    pub(crate) fn white() -> Self {
+        Self { size: [1, 1], layers: vec![vec![255; 4]] }
+    }
+}
+
 impl TextureArrays {
     /// Makes the mip levels of images in background jobs. Images that exceed the limit of all textures, or the number
     /// of layers that an array has, are left out, with a warning.
     pub(crate) fn new(
         uses: &TextureUses,
-        images: BTreeMap<usize, Arc<RgbaImage>>,
+        images: BTreeMap<usize, Arc<NamedImage>>,
         limits: &GltfLimits,
         scheduler: &Scheduler,
         progress: &ProgressBar,
@@ -98,7 +105,7 @@ impl TextureArrays {
     ) -> Self {
         let decoded = |(number, used): (u32, &TextureUse)| Some((number, *used, Arc::clone(images.get(&used.image)?)));
         let mut decoded: Vec<_> = (0..).zip(&uses.uses).filter_map(decoded).collect();
-        let size_of = |image: &RgbaImage| <[u32; 2]>::from(image.dimensions());
+        let size_of = |image: &NamedImage| <[u32; 2]>::from(image.pixels.dimensions());
         // Sizes that do not fit together take more than the images do, so fewer of them may fit: the most that do are
         // searched for.
         let arrays_of = |count: usize| array_sizes(decoded[..count].iter().map(|(_, _, image)| size_of(image)));
@@ -114,10 +121,10 @@ impl TextureArrays {
             let middle = kept + (too_many - kept) / 2;
             if fits(middle) { kept = middle } else { too_many = middle }
         }
-        for (_, used, _) in &decoded[kept..] {
-            let (image, limit) = (used.image, limits.all_textures_bytes);
+        for (_, _, image) in &decoded[kept..] {
+            let (name, limit) = (&image.name, limits.all_textures_bytes);
             let reason = "with those before it, its texture array exceeds `GltfLimits::all_textures_bytes`";
-            warnings.add(format!("image {image} is left out: {reason}, which is {limit}"));
+            warnings.add(format!("{name} is left out: {reason}, which is {limit}"));
         }
         let sizes = arrays_of(kept);
         decoded.truncate(kept);
@@ -130,16 +137,17 @@ impl TextureArrays {
             let Some(array) = sizes.iter().position(|array| array.sizes.contains(&size)) else { continue };
             if layers[array] == MAX_LAYERS {
                 let warning = format!("is left out: {MAX_LAYERS} other images share its texture array");
-                warnings.add(format!("image {} {warning}", used.image));
+                warnings.add(format!("{} {warning}", image.name));
                 continue;
             }
             layers[array] += 1;
             let (layer_size, space) = (sizes[array].size, used.space);
-            let job = scheduler.background(move || mip_levels_within(&image, layer_size, space));
-            jobs.push((number, used.image, array, size, job));
+            let name = image.name.clone();
+            let job = scheduler.background(move || mip_levels_within(&image.pixels, layer_size, space));
+            jobs.push((number, name, array, size, job));
         }
         let mut places = BTreeMap::new();
-        for (number, image, array, size, job) in jobs {
+        for (number, name, array, size, job) in jobs {
             match job.wait() {
                 Ok(bytes) => {
                     let layers = &mut arrays[array].layers;
@@ -149,12 +157,15 @@ impl TextureArrays {
                 }
                 Err(panic) => {
                     let panic: JobPanic = panic;
-                    warnings.add(format!("image {image} is left out: {panic}"));
+                    warnings.add(format!("{name} is left out: {panic}"));
                 }
             }
             progress.inc(1);
         }
-        Self { arrays, places }
+        // No layer refers to an array that has none, and devices have no such array.
+        let arrays =
+            arrays.into_iter().map(|array| if array.layers.is_empty() { TextureArray::white() } else { array });
+        Self { arrays: arrays.collect(), places }
     }
 
     /// Where a use is; `None` if it has no image.

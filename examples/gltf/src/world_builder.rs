@@ -155,7 +155,9 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
     /// # Errors
     /// If a limit is exceeded.
     pub(crate) fn add_lights(&mut self) -> Result<(), Problem> {
-        let mut has_lights = false;
+        let (mut has_lights, greatest) = (false, self.parts.source.limits.lights);
+        // Those beyond the limit: the first one, and how many there are.
+        let mut left_out: Option<(String, u64)> = None;
         for (node, world) in &self.parts.nodes {
             let Some(extension) = node.extension("KHR_lights_punctual") else { continue };
             has_lights = true;
@@ -163,7 +165,18 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
             let light = light.and_then(|light| self.parts.source.referred(node, Kind::Light, light));
             let Some(light) = self.warnings.keep(light, format_args!("{node} has no light"))? else { continue };
             let read = read_light(&light, world, self.warnings);
-            self.scene.lights.extend(self.warnings.keep(read, format_args!("{light} does not shine"))?.flatten());
+            let Some(read) = self.warnings.keep(read, format_args!("{light} does not shine"))?.flatten() else {
+                continue;
+            };
+            if (self.scene.lights.len() as u64) < greatest {
+                self.scene.lights.push(read);
+            } else {
+                left_out.get_or_insert_with(|| (format!("{light} of {node}"), 0)).1 += 1;
+            }
+        }
+        if let Some((first, count)) = left_out {
+            let reason = format!("`GltfLimits::lights` is {greatest}");
+            self.warnings.add(format!("{count} lights are left out, and {first} is the first of them: {reason}"));
         }
         let mut shadows = 0;
         for light in &mut self.scene.lights {

@@ -23,6 +23,7 @@ pub const SMALL_LIMITS: GltfLimits = GltfLimits {
     keyframe_bytes: 16 << 10,
     pose_bytes: 16 << 10,
     objects: 100,
+    lights: 4,
     texture_file_bytes: 16 << 10,
     texture_bytes: 64 << 10,
     all_textures_bytes: 256 << 10,

@@ -14,6 +14,8 @@ use gltf_scene::{GltfLimits, LoadOptions};
 pub const CASES: &[crate::Case] = &[
     ("small_files_that_would_grow_are_refused_by_the_name_of_the_limit", growing),
     ("images_beyond_a_limit_are_left_out_by_its_name", images),
+    ("images_that_cannot_be_decoded_count_as_what_is_read_of_them", unreadable_images),
+    ("lights_beyond_a_limit_are_left_out_and_counted", lights),
     ("a_limit_that_is_just_enough_changes_nothing", just_enough),
     ("sparse_accessors_have_as_many_zeros_as_their_values_allow", sparse),
     ("hierarchies_may_be_deep_and_round", hierarchies),
@@ -224,6 +226,30 @@ fn images() -> Result<(), Failed> {
     let limits = GltfLimits { texture_bytes: 300 * 100 * 12 - 1, ..GltfLimits::DEFAULT };
     left_out(&large, limits, "image 1 takes 8000000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
     left_out(&deep, limits, "image 1 takes 360000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
+    // What another format is converted from is there meanwhile, and what a decoder of JPEGs may keep.
+    let rgb = image::DynamicImage::from(image::RgbImage::new(300, 100));
+    let encoded = |image: &image::DynamicImage, format: image::ImageFormat| -> Result<Vec<u8>, Failed> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format)?;
+        Ok(bytes.into_inner())
+    };
+    let jpeg = encoded(&rgb, image::ImageFormat::Jpeg)?;
+    let of_jpeg = 300 * 100 * 3 + 320 * 128 * 8 + jpeg.len() as u64;
+    let converted = [
+        (encoded(&rgb, image::ImageFormat::Png)?, 300 * 100 * 7),
+        (encoded(&rgb.to_luma8().into(), image::ImageFormat::Png)?, 300 * 100 * 5),
+        (jpeg, of_jpeg),
+    ];
+    for (image, bytes) in converted {
+        let limits = GltfLimits { texture_bytes: bytes - 1, ..GltfLimits::DEFAULT };
+        left_out(&image, limits, &format!("image 1 takes {bytes} bytes or more, and `GltfLimits::texture_bytes` is"))?;
+        let world = load_memory(
+            "images.glb",
+            with_image(&image).glb(),
+            &LoadOptions { limits: GltfLimits { texture_bytes: bytes, ..GltfLimits::DEFAULT }, ..AT_REST },
+        )?;
+        expect(world.warnings.is_empty(), || format!("{:?}", world.warnings))?;
+    }
     let limits = GltfLimits { texture_file_bytes: 1000, ..GltfLimits::DEFAULT };
     left_out(&large, limits, "`GltfLimits::texture_file_bytes` is 1000")?;
     let limits = GltfLimits { all_textures_bytes: 100_000, ..GltfLimits::DEFAULT };
@@ -236,20 +262,80 @@ fn images() -> Result<(), Failed> {
     left_out(&huge, GltfLimits::DEFAULT, "image 1 ")?;
     // Too long for a texture: it is reduced, and that is said.
     let long = png(&image::RgbaImage::from_pixel(16384, 4, image::Rgba([0, 255, 0, 255])));
-    left_out(&long, GltfLimits::DEFAULT, "image 1 of 16384x4 pixels is reduced to 8192x2")
+    left_out(&long, GltfLimits::DEFAULT, "image 1 of 16384x4 pixels is reduced to 8192x2")?;
+    // Both are there meanwhile.
+    let bytes = 16384 * 4 * 4 + 8192 * 2 * 4;
+    let enough = GltfLimits { texture_bytes: bytes, ..GltfLimits::DEFAULT };
+    left_out(&long, enough, "image 1 of 16384x4 pixels is reduced to 8192x2")?;
+    let less = GltfLimits { texture_bytes: bytes - 1, ..GltfLimits::DEFAULT };
+    left_out(&long, less, "image 1 takes 327680 bytes or more, and `GltfLimits::texture_bytes` is 327679")
+}
+
+/// The bytes of a file are read before it turns out to be no image.
+fn unreadable_images() -> Result<(), Failed> {
+    let mut builder = textured_square();
+    let nonsense = builder.view(&[7; 40_000]);
+    for number in 0..6 {
+        let source = builder.push("images", json!({"name": format!("no image {number}"), "bufferView": nonsense}));
+        let texture = builder.push("textures", json!({"source": source}));
+        let material = builder.push("materials", json!({"emissiveTexture": {"index": texture}}));
+        let mut primitive = builder.json["meshes"][0]["primitives"][0].clone();
+        primitive["material"] = json!(material);
+        builder.json["meshes"][0]["primitives"].as_array_mut().ok_or("there are primitives")?.push(primitive);
+    }
+    let limits = GltfLimits { all_textures_bytes: 150_000, ..GltfLimits::DEFAULT };
+    let world = load_memory("images.glb", builder.glb(), &LoadOptions { limits, ..AT_REST })?;
+    let count = |reason: &str| world.warnings.iter().filter(|warning| warning.contains(reason)).count();
+    let counts = [count("cannot be decoded"), count("`GltfLimits::all_textures_bytes` is 150000")];
+    expect(counts == [3, 3] && count("(no image ") == 6, || format!("{:?}", world.warnings))
+}
+
+/// Nodes have a light, or a dark one.
+fn lights() -> Result<(), Failed> {
+    let mut builder = textured_square();
+    builder.json["extensions"]["KHR_lights_punctual"]["lights"] = json!([
+        {"name": "lamp", "type": "point"}, {"type": "point", "intensity": 0},
+    ]);
+    builder.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    let mut shine = |light: usize| builder.root(json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+    // Dark lights take nothing.
+    let nodes = [1, 0, 1, 0, 0, 1, 0].map(&mut shine);
+    let load = |lights: u64| {
+        let limits = GltfLimits { lights, ..GltfLimits::DEFAULT };
+        load_memory("lights.glb", builder.glb(), &LoadOptions { limits, ..AT_REST })
+    };
+    let light_count = |world: &gltf_scene::World| world.as_scene_ref(&world.columns()).lights.len();
+    let whole = load(u64::MAX)?;
+    let count = light_count(&whole);
+    expect(count >= 4 && whole.warnings.is_empty(), || format!("{count} lights, {:?}", whole.warnings))?;
+    let enough = load(count as u64)?;
+    expect(light_count(&enough) == count && enough.warnings.is_empty(), || format!("{:?}", enough.warnings))?;
+    let less = load(count as u64 - 2)?;
+    let limit = count - 2;
+    let expected = format!(
+        "2 lights are left out, and light 0 (lamp) of node {} is the first of them: `GltfLimits::lights` is {limit}",
+        nodes[4],
+    );
+    let is_named = less.warnings == [expected.as_str()];
+    expect(light_count(&less) == limit && is_named, || format!("{:?}, not {expected:?}", less.warnings))
 }
 
 /// Draws a scene with a second image.
 fn left_out(image: &[u8], limits: GltfLimits, expected: &str) -> Result<(), Failed> {
+    let world = load_memory("images.glb", with_image(image).glb(), &LoadOptions { limits, ..AT_REST })?;
+    let is_named = world.warnings.len() == 1 && world.warnings[0].contains(expected);
+    expect(is_named && world.object_count() == 1, || format!("{:?}, not {expected:?}", world.warnings))?;
+    check_world(&world, &limits)
+}
+
+/// A scene with a second image.
+fn with_image(image: &[u8]) -> Builder {
     let mut builder = textured_square();
     let view = builder.view(image);
     let source = builder.push("images", json!({"bufferView": view}));
     let texture = builder.push("textures", json!({"source": source}));
     builder.json["materials"][0]["emissiveTexture"] = json!({"index": texture});
-    let world = load_memory("images.glb", builder.glb(), &LoadOptions { limits, ..AT_REST })?;
-    let is_named = world.warnings.len() == 1 && world.warnings[0].contains(expected);
-    expect(is_named && world.object_count() == 1, || format!("{:?}, not {expected:?}", world.warnings))?;
-    check_world(&world, &limits)
+    builder
 }
 
 /// As PNG has it.
@@ -336,7 +422,9 @@ fn warnings() -> Result<(), Failed> {
     expect(none.warnings.is_empty() && none.unlisted_warnings >= 500, || format!("{}", none.unlisted_warnings))?;
     let mut json = builder.json.clone();
     json["buffers"] = json!([{"byteLength": 0}]);
-    let error = load_memory("warnings.glb", glb(&json, &[]), &LoadOptions { limits, ..AT_REST }).err();
-    let error = error.map(|error| error.to_string()).unwrap_or_default();
+    let error = load_memory("warnings.glb", glb(&json, &[]), &LoadOptions { limits, ..AT_REST });
+    let error = error.err().ok_or("it is drawn")?;
+    expect(error.warnings.is_empty() && error.unlisted_warnings >= 500, || format!("{}", error.unlisted_warnings))?;
+    let error = error.to_string();
     expect(error.contains("node 3 has no mesh"), || format!("the first loss is not named: {error}"))
 }
