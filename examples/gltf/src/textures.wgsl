@@ -45,19 +45,31 @@ fn texel(colors: texture_2d_array<f32>, slot: TextureSlot, at: Coordinates) -> v
         level = floor(level + 0.5);
     }
     let layer = slot.texture & 0xffffu;
+    let first = u32(level);
+    let texel = texel_of_level(colors, slot, at.uv, layer, first, nearest);
+    if fract(level) == 0.0 {
+        return texel;
+    }
+    // Each mip level has its own edges.
+    let next = texel_of_level(colors, slot, at.uv, layer, min(first + 1u, last_level(slot)), nearest);
+    return mix(texel, next, fract(level));
+}
+
+fn texel_of_level(
+    colors: texture_2d_array<f32>, slot: TextureSlot, uv: vec2<f32>, layer: u32, level: u32, nearest: bool,
+) -> vec4<f32> {
+    let size = max(slot.size >> vec2<u32>(level), vec2<u32>(1u));
+    let wraps = vec2<u32>((slot.flags >> 8u) & 3u, (slot.flags >> 10u) & 3u);
     if any(slot.size != textureDimensions(colors)) {
-        return texel_of_part(colors, slot, at.uv, layer, level, nearest);
+        return texel_of_part(colors, size, wraps, uv, layer, level, nearest);
     }
-    // Half a pixel of the mip level that is sampled: what is nearer to an edge would be blended with the opposite one.
-    let edge = min(0.5 * exp2(ceil(level)) / size, vec2<f32>(0.5));
-    let uv = vec2<f32>(
-        wrapped(at.uv.x, (slot.flags >> 8u) & 3u, edge.x),
-        wrapped(at.uv.y, (slot.flags >> 10u) & 3u, edge.y),
-    );
+    // Half a pixel: what is nearer to an edge would be blended with the opposite one.
+    let edge = 0.5 / vec2<f32>(size);
+    let within = vec2<f32>(wrapped(uv.x, wraps.x, edge.x), wrapped(uv.y, wraps.y, edge.y));
     if nearest {
-        return textureSampleLevel(colors, nearest_pixel, uv, layer, level);
+        return textureSampleLevel(colors, nearest_pixel, within, layer, f32(level));
     }
-    return textureSampleLevel(colors, smooth_pixels, uv, layer, level);
+    return textureSampleLevel(colors, smooth_pixels, within, layer, f32(level));
 }
 
 fn last_level(slot: TextureSlot) -> u32 {
@@ -75,22 +87,8 @@ fn wrapped(coordinate: f32, wrap: u32, edge: f32) -> f32 {
 
 // The image is in the upper left of the layer, so that the samplers would blend it with what is beside it.
 fn texel_of_part(
-    colors: texture_2d_array<f32>, slot: TextureSlot, uv: vec2<f32>, layer: u32, level: f32, nearest: bool,
+    colors: texture_2d_array<f32>, size: vec2<u32>, wraps: vec2<u32>, uv: vec2<f32>, layer: u32, level: u32, nearest: bool,
 ) -> vec4<f32> {
-    let first = u32(level);
-    let texel = texel_of_level(colors, slot, uv, layer, first, nearest);
-    if fract(level) == 0.0 {
-        return texel;
-    }
-    let next = texel_of_level(colors, slot, uv, layer, min(first + 1u, last_level(slot)), nearest);
-    return mix(texel, next, fract(level));
-}
-
-fn texel_of_level(
-    colors: texture_2d_array<f32>, slot: TextureSlot, uv: vec2<f32>, layer: u32, level: u32, nearest: bool,
-) -> vec4<f32> {
-    let size = max(slot.size >> vec2<u32>(level), vec2<u32>(1u));
-    let wraps = vec2<u32>((slot.flags >> 8u) & 3u, (slot.flags >> 10u) & 3u);
     let position = vec2<f32>(within_period(uv.x, wraps.x), within_period(uv.y, wraps.y)) * vec2<f32>(size);
     if nearest {
         return pixel(colors, vec2<i32>(floor(position)), size, wraps, layer, level);

@@ -13,6 +13,7 @@ use gltf_scene::LoadOptions;
 pub const CASES: &[crate::Case] = &[
     ("nearest_pixels_are_sharp_beside_images_of_many_sizes", nearest),
     ("images_that_share_an_array_look_as_those_with_their_own", shared),
+    ("edges_of_odd_sizes_have_nothing_of_the_opposite_ones", odd_edges),
 ];
 
 /// Sizes that the images of tests share arrays with, far beside the picture.
@@ -101,6 +102,50 @@ fn shared() -> Result<(), Failed> {
         expect(different < 40, || format!("{name}: {different} pixels differ"))?;
         let [darkest, brightest] = own.extremes([0.1, 0.9], [0.2, 0.8]);
         expect(brightest - darkest > 100, || "the picture is empty".to_owned())?;
+    }
+    Ok(())
+}
+
+/// Images of 5 by 7 pixels, white on the left or above, and black elsewhere. Where they are clamped or mirrored at their
+/// right or lower edge they are black, in the first two mip levels and between those.
+fn odd_edges() -> Result<(), Failed> {
+    const SIZE: [f32; 2] = [960.0, 100.0];
+    let image = |is_white: fn(u32, u32) -> bool| {
+        RgbaImage::from_fn(5, 7, |x, y| if is_white(x, y) { Rgba([255; 4]) } else { Rgba([0, 0, 0, 255]) })
+    };
+    let images = [image(|x, _| x < 2), image(|_, y| y < 2)];
+    let filters = [(9985, 1.0), (9987, 1.0), (9987, 0.7), (9987, 0.3)];
+    let cases: Vec<_> = [33071, 33648].into_iter().flat_map(|wrap| filters.map(|filter| (wrap, filter))).collect();
+    let sampler = |&(wrap, (filter, _)): &(u32, (u32, f32))| json!({"wrapS": wrap, "wrapT": wrap, "minFilter": filter});
+    let samplers: Vec<_> = cases.iter().map(sampler).collect();
+    // A metre in pixels of the picture.
+    let metre = SIZE[1] / (2.0 * 2.6 * 0.4_f32.tan());
+    for (others, axis) in [[].as_slice(), &OTHER_SIZES].into_iter().flat_map(|others| [(others, 0), (others, 1)]) {
+        let mut builder = squares(&images[axis], &samplers, 1.0, others);
+        for (number, (_, (_, level))) in cases.iter().enumerate() {
+            // Twice the image along one axis, so that the edge is in the middle. The other axis chooses the mip level.
+            let minified = level.exp2() * 2.0 * metre / [7.0, 5.0][axis];
+            let scale = if axis == 0 { [2.0, minified] } else { [minified, 2.0] };
+            builder.json["materials"][number]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+                json!({"KHR_texture_transform": {"scale": scale}});
+        }
+        let size = LoadOptions { size: SIZE.map(|side| side as u32), ..AT_REST };
+        let drawn = draw_builder("odd edges", &builder, &size)?;
+        for (number, case) in cases.iter().enumerate() {
+            let center = [(number as f32 - (cases.len() as f32 - 1.0) / 2.0) * 2.1, 0.0];
+            // From texture coordinates along one axis to the picture.
+            let region = |axis: usize, from: f32, to: f32| {
+                [from, to].map(|at| 0.5 + (center[axis] + at - 1.0) * metre / SIZE[axis])
+            };
+            let along = |from: f32, to: f32| match axis {
+                0 => drawn.extremes(region(0, from, to), region(1, 0.3, 1.7)),
+                _ => drawn.extremes(region(0, 0.3, 1.7), region(1, from, to)),
+            };
+            let ([_, edge], [opposite, _]) = (along(0.9, 1.1), along(0.06, 0.2));
+            expect(edge < 10 && opposite > 600, || {
+                format!("{case:?}, axis {axis}, {} others: {edge} at the edge, opposite {opposite}", others.len())
+            })?;
+        }
     }
     Ok(())
 }
