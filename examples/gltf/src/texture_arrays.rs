@@ -173,3 +173,33 @@ impl TextureArrays {
         self.places.get(&used).copied()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use image::RgbaImage;
+
+    use super::*;
+
+    /// Images without pixels, which no decoder makes: their jobs panic, and two of them share an array.
+    #[test]
+    fn arrays_whose_images_are_all_lost_have_a_layer() {
+        let (mut uses, mut images) = (TextureUses::default(), BTreeMap::new());
+        for (image, [width, height]) in [[1, 0], [0, 1], [100, 100], [200, 200], [300, 300]].into_iter().enumerate() {
+            uses.add(TextureUse { image, space: ColorSpace::Linear });
+            let image_of_size =
+                NamedImage { name: format!("image {image} (sky)"), pixels: RgbaImage::new(width, height) };
+            images.insert(image, Arc::new(image_of_size));
+        }
+        let (scheduler, mut warnings) = (Scheduler::new(1).expect("one worker"), Warnings::new(10));
+        let progress = ProgressBar::hidden();
+        let made = TextureArrays::new(&uses, images, &GltfLimits::DEFAULT, &scheduler, &progress, &mut warnings);
+        assert_eq!((made.arrays.len(), made.places.len()), (ARRAYS, 3));
+        assert!(made.arrays.iter().all(|array| !array.layers.is_empty()));
+        let warnings = warnings.take();
+        let starts = ["image 0 (sky) is left out: ", "image 1 (sky) is left out: "];
+        assert!(
+            warnings.len() == 2 && starts.iter().zip(&warnings).all(|(start, it)| it.starts_with(start)),
+            "{warnings:?}"
+        );
+    }
+}
