@@ -1,4 +1,5 @@
-//! What holds of every loaded file, whatever is in it.
+//! What holds of every file, whatever is in it: of the world that it is loaded as, and of the error that refuses it. The
+//! fuzz target `gltf` checks it, too.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -9,9 +10,6 @@ use drawloom::scene::Mesh;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
 use gltf_scene::{GltfLimits, LoadError, World};
-use libtest_mimic::Failed;
-
-use crate::fixture::expect;
 
 /// Little, so that small files reach every limit.
 pub const SMALL_LIMITS: GltfLimits = GltfLimits {
@@ -34,7 +32,7 @@ pub const SMALL_LIMITS: GltfLimits = GltfLimits {
 ///
 /// # Errors
 /// If it does not hold.
-pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), Failed> {
+pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), String> {
     let columns = world.columns();
     let scene = world.as_scene_ref(&columns);
     expect(world.warnings.len() as u64 <= limits.warnings, || "too many warnings are listed".to_owned())?;
@@ -72,7 +70,7 @@ pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), Failed> {
 ///
 /// # Errors
 /// If it does not name the file, or has a control character.
-pub fn check_error(error: &LoadError, file: &str) -> Result<(), Failed> {
+pub fn check_error(error: &LoadError, file: &str) -> Result<(), String> {
     let text = error.to_string();
     expect(text.starts_with(file) && text.len() > file.len() + 10, || format!("{text:?} does not say what is wrong"))?;
     error.warnings.iter().chain([&text]).try_for_each(|text| check_text(text))
@@ -80,9 +78,13 @@ pub fn check_error(error: &LoadError, file: &str) -> Result<(), Failed> {
 
 /// # Errors
 /// If it has a control character.
-pub fn check_text(text: &str) -> Result<(), Failed> {
+pub fn check_text(text: &str) -> Result<(), String> {
     expect(!text.chars().any(char::is_control), || format!("{text:?} has a control character"))?;
     expect(text.len() < 2000, || format!("{text:?} is long"))
+}
+
+fn expect(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(otherwise()) }
 }
 
 thread_local! {

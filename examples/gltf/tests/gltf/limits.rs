@@ -325,7 +325,7 @@ fn left_out(image: &[u8], limits: GltfLimits, expected: &str) -> Result<(), Fail
     let world = load_memory("images.glb", with_image(image).glb(), &LoadOptions { limits, ..AT_REST })?;
     let is_named = world.warnings.len() == 1 && world.warnings[0].contains(expected);
     expect(is_named && world.object_count() == 1, || format!("{:?}, not {expected:?}", world.warnings))?;
-    check_world(&world, &limits)
+    Ok(check_world(&world, &limits)?)
 }
 
 /// A scene with a second image.

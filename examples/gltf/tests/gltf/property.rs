@@ -88,7 +88,7 @@ fn changed() -> Result<(), Failed> {
             Ok(Ok(false)) => refused += 1,
             Ok(Err(failed)) => {
                 let path = keep(&bytes)?;
-                return Err(format!("seed {seed}: {}; see {}", failed.message().unwrap_or_default(), path).into());
+                return Err(format!("seed {seed}: {failed}; see {path}").into());
             }
             Err(_) => return Err(format!("seed {seed}: it panics; see {}", keep(&bytes)?).into()),
         }
