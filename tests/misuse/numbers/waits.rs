@@ -1,18 +1,18 @@
 //! Limits of waits.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
 use drawloom::backend::WgpuBackend;
-use drawloom::fence::{DeviceProgress, Fence};
+use drawloom::fence::{DeviceProgress, Fence, FenceSetter};
 use drawloom::process::Deferred;
 use drawloom::{Buffering, FrameLoop, FramePlace};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
 use super::NumberCase;
-use crate::fixture::{DURATIONS, Fixture, ensure, refused, scene};
+use crate::fixture::{DURATIONS, Fixture, LONG, ensure, refused, scene};
 
 pub const CASES: &[NumberCase] = &[
     NumberCase { name: "fences_are_waited_for_without_a_limit", numbers: &["fence::Fence::wait"], check: fences },
@@ -50,22 +50,45 @@ fn fences() -> Result<(), Failed> {
             refused(wait(), "soon")?;
         }
     }
-    // The same with a device.
+    // The same with a device, which sets its fence when it is asked for the third time.
+    for limit in DURATIONS {
+        let (setter, fence) = Fence::new("soon");
+        let device = Arc::new(Device::default());
+        setter.advance_by(Arc::clone(&device));
+        *device.setter.lock().map_err(|_| "it is locked")? = Some(setter);
+        let waited = fence.wait(limit);
+        let asked = device.limits.lock().map_err(|_| "it is locked")?;
+        let is_within = |asked: &Duration| *asked <= limit && (!is_long(limit) || limit - *asked < LONG);
+        ensure(!asked.is_empty() && asked.iter().all(is_within), format_args!("{asked:?} of {limit:?}"))?;
+        if is_long(limit) { waited? } else { refused(waited, "soon")? }
+    }
     let mut fixture = Fixture::noop(1, Deferred::to_picture())?;
     for limit in DURATIONS.into_iter().filter(|limit| is_long(*limit)) {
         let mut recorded = fixture.record(&scene())?;
         let end = recorded.fence_at(FramePlace::End)?;
         fixture.submitter.submit(recorded)?;
         end.wait(limit)?;
-        struct Still;
-        impl DeviceProgress for Still {
-            fn advance(&self, _: Duration) -> Result<(), String> {
-                Ok(())
-            }
-        }
-        Arc::new(Still).advance(limit)?;
     }
     Ok(())
+}
+
+/// A device that keeps the limits with which it was asked to advance.
+#[derive(Default)]
+struct Device {
+    limits: Mutex<Vec<Duration>>,
+    setter: Mutex<Option<FenceSetter>>,
+}
+
+impl DeviceProgress for Device {
+    fn advance(&self, limit: Duration) -> Result<(), String> {
+        let mut limits = self.limits.lock().map_err(|error| error.to_string())?;
+        limits.push(limit);
+        if limits.len() == 3 {
+            let setter = self.setter.lock().map_err(|error| error.to_string())?.take();
+            setter.ok_or("it sets its fence once")?.set();
+        }
+        Ok(())
+    }
 }
 
 fn submissions() -> Result<(), Failed> {
