@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
+use super::projection::MAX_SHIFT;
 use super::transform::is_unit;
 use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, WholePicture};
 
@@ -171,8 +172,8 @@ impl Camera {
             "its far plane is not beyond its near plane"
         } else if !self.shift.is_finite() || self.shift.abs().max_element() > MAX_SHIFT {
             "its shift is not between -65536 and 65536"
-        } else if self.whole.is_some_and(|whole| !(whole.shift.is_finite() && whole.position.is_finite())) {
-            "the shift or the position of its whole picture is not finite"
+        } else if let Some(reason) = self.whole.and_then(|whole| whole.problem()) {
+            reason
         } else if !(self.level_of_detail_scale >= 0.0 && self.level_of_detail_scale.is_finite()) {
             "its level_of_detail_scale is negative or not finite"
         } else if let Some(reason) = self.clip_plane.and_then(|plane| plane.problem()) {
@@ -212,16 +213,16 @@ impl Camera {
     }
 
     fn projection_problem(&self) -> Option<&'static str> {
-        let in_range = |value: f32, min: f32| value >= min && value.is_finite();
+        let is_in_range = self.projection.is_in_range();
         match self.projection {
-            Projection::Perspective { field_of_view } => (!in_range(field_of_view, MIN_FIELD_OF_VIEW)
-                || field_of_view >= std::f32::consts::PI)
-                .then_some("its field of view is not between 0.0001 and 180 degrees"),
+            Projection::Perspective { .. } => {
+                (!is_in_range).then_some("its field of view is not between 0.0001 and 180 degrees")
+            }
             _ if self.far.is_infinite() => Some("without perspective its far plane must be finite"),
             _ if self.shift != Vec2::ZERO => Some("without perspective it can have no shift"),
             _ if self.clip_plane.is_some() => Some("without perspective it can have no clip plane"),
-            Projection::Orthographic { height } => {
-                (!in_range(height, MIN_HEIGHT)).then_some("its height is not a distance of 1e-6 m or more")
+            Projection::Orthographic { .. } => {
+                (!is_in_range).then_some("its height is not a distance of 1e-6 m or more")
             }
             Projection::Paraboloid => {
                 (self.kind != ViewKind::Shadow).then_some("only a shadow view can use a paraboloid projection")
@@ -238,17 +239,6 @@ pub(crate) fn child_name(parent: &str, view: &str) -> String {
 /// The smallest distance of the near plane, in metres. Depth is `near` divided by distance, and the world is up to
 /// 1.5e10 m across: with a near plane below 2e-28 m, depth would underflow in f32.
 const MIN_NEAR: f32 = 1e-27;
-
-/// The largest shift: tiles of a picture of the largest size that are a pixel wide.
-const MAX_SHIFT: f32 = 65_536.0;
-
-/// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would
-/// be larger than a pixel.
-const MIN_HEIGHT: f32 = 1e-6;
-
-/// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of
-/// f32.
-pub(super) const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;
 
 /// The square of the smallest angle in radians, between the view direction and the vertical, at which the right vector
 /// is that of the angle. The axes are perpendicular and of unit length up to the rounding of f64, also where the

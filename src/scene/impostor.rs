@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::DVec3;
 
-use super::camera::MIN_FIELD_OF_VIEW;
+use super::projection::MIN_FIELD_OF_VIEW;
 use super::{Camera, Projection, ViewKind};
 
 /// The error of a picture is known up to the rounding of its camera's f32, in radii.

@@ -1,5 +1,7 @@
 //! How cameras project positions.
 
+use std::f32::consts::PI;
+
 /// How positions are projected onto the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -33,4 +35,24 @@ impl Projection {
             Self::Paraboloid => 1.0,
         }
     }
+
+    /// Whether its field of view or its height is one that a camera can have.
+    pub(super) fn is_in_range(self) -> bool {
+        match self {
+            Self::Perspective { field_of_view } => (MIN_FIELD_OF_VIEW..PI).contains(&field_of_view),
+            Self::Orthographic { height } => height >= MIN_HEIGHT && height.is_finite(),
+            Self::Paraboloid => true,
+        }
+    }
 }
+
+/// The largest shift: tiles of a picture of the largest size that are a pixel wide.
+pub(super) const MAX_SHIFT: f32 = 65_536.0;
+
+/// The smallest height of a parallel projection, in metres. Below it, the resolution of object positions, 2⁻³⁰ m, would
+/// be larger than a pixel.
+const MIN_HEIGHT: f32 = 1e-6;
+
+/// The smallest field of view, in radians: some 2 m at a distance of 1,000 km. A much smaller one leaves the range of
+/// f32.
+pub(super) const MIN_FIELD_OF_VIEW: f32 = 1.7e-6;

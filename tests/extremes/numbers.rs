@@ -281,6 +281,35 @@ fn cameras(harness: &mut Harness) -> Result<(), Failed> {
                 |number| if number.abs() <= 65_536.0 { Expected::Drawn } else { Expected::InvalidCamera },
             ),
             (
+                "shift of a camera's whole picture",
+                |test, number| {
+                    let Camera { projection, position, .. } = *test.camera();
+                    let shift = Vec2::new(0.0, number);
+                    test.camera().whole = Some(WholePicture { projection, shift, position });
+                },
+                |number| if number.abs() <= 65_536.0 { Expected::Drawn } else { Expected::InvalidCamera },
+            ),
+            (
+                "field of view of a camera's whole picture",
+                |test, number| {
+                    let projection = Projection::Perspective { field_of_view: number };
+                    let position = test.camera().position;
+                    test.camera().whole = Some(WholePicture { projection, shift: Vec2::ZERO, position });
+                },
+                |_| Expected::InvalidCamera,
+            ),
+            (
+                "height of a camera's whole picture",
+                |test, number| {
+                    let (position, shift) = (test.camera().position, Vec2::ZERO);
+                    test.camera().far = 100.0;
+                    test.camera().projection = Projection::Orthographic { height: 4.0 };
+                    let projection = Projection::Orthographic { height: number };
+                    test.camera().whole = Some(WholePicture { projection, shift, position });
+                },
+                |number| if number == f32::MAX { Expected::Drawn } else { Expected::InvalidCamera },
+            ),
+            (
                 "camera's clip plane's normal",
                 |test, number| {
                     let normal = Vec3::new(0.0, number, -1.0);
