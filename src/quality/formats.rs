@@ -70,13 +70,13 @@ impl VertexFormat {
     }
 
     /// The maximum error of a texture coordinate, in widths or heights of the texture. `repeats` is how often the
-    /// texture repeats over the mesh: the difference between the highest and the lowest coordinate.
+    /// texture repeats over the mesh: the difference between the highest and the lowest coordinate, of either sign.
     ///
     /// Coordinates are relative to the integer nearest the middle of their range, so their magnitude is at most half of
     /// `repeats`, plus 1/2. A half float has 11 bits and an error of 2⁻¹¹ of itself; coordinates beyond its maximum,
     /// 65,504, are clamped.
     pub fn max_uv_error(self, repeats: f64) -> f64 {
-        let max_magnitude = repeats * 0.5 + 0.5;
+        let max_magnitude = repeats.abs() * 0.5 + 0.5;
         match self {
             Self::Full => 0.0,
             Self::Packed if max_magnitude <= 65_504.0 => max_magnitude / 2048.0,
