@@ -4,6 +4,7 @@
 mod budgets;
 mod generated;
 mod imports;
+mod limits;
 mod processes;
 mod recorded;
 mod scenes;
@@ -26,6 +27,7 @@ pub const CASES: &[&[NumberCase]] = &[
     budgets::CASES,
     generated::CASES,
     imports::CASES,
+    limits::CASES,
     processes::CASES,
     recorded::CASES,
     scenes::CASES,
