@@ -176,12 +176,10 @@ impl Backend for NullBackend {
         ensure(frame.finished.lock().insert(pass), || {
             format!("each pass is finished once, but {pass:?} is finished again")
         })?;
-        let process = &request.plan.processes()[pass.process_index].process;
+        let process = &request.plan.processes()[pass.process_index].name;
         if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
             let has_none = bundles.is_empty() && list.batches.is_empty();
-            ensure(has_none, || {
-                format!("a pass without commands has no bundles, but one of {:?} has", process.name())
-            })?;
+            ensure(has_none, || format!("a pass without commands has no bundles, but one of {process:?} has"))?;
         }
         let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
         let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.first_object == first);
@@ -190,7 +188,7 @@ impl Backend for NullBackend {
         let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
         ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
         Ok(NullPass {
-            process: process.name().to_owned(),
+            process: process.clone(),
             view: pass.view_index,
             bundles: bundles.len(),
             batches: bundles.iter().map(|bundle| bundle.batches).sum(),

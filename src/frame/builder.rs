@@ -9,11 +9,12 @@ use crate::backend::{Backend, GuardedBackend};
 use crate::process::{Deferred, RenderProcess};
 use crate::quality::Quality;
 use crate::task::Scheduler;
+use crate::unwind::Contained;
 use crate::view::ShadowMaps;
 
 /// Builds a [`Renderer`] from render processes and settings.
 pub struct RendererBuilder<B> {
-    backend: B,
+    backend: GuardedBackend<B>,
     deferred: Option<Deferred>,
     processes: Vec<Arc<dyn RenderProcess>>,
     outputs: Vec<String>,
@@ -33,7 +34,7 @@ impl<B: Backend> Renderer<B> {
 impl<B: Backend> RendererBuilder<B> {
     fn new(backend: B) -> Self {
         Self {
-            backend,
+            backend: GuardedBackend::new(Arc::new(backend)),
             deferred: None,
             processes: Vec::new(),
             outputs: Vec::new(),
@@ -46,7 +47,7 @@ impl<B: Backend> RendererBuilder<B> {
 
     /// Adds a render process. The order of these calls matters only where reads and writes leave it open.
     pub fn process(mut self, process: impl RenderProcess + 'static) -> Self {
-        self.processes.push(Arc::new(process));
+        self.processes.push(Arc::new(Contained::new(process)));
         self
     }
 
@@ -104,7 +105,7 @@ impl<B: Backend> RendererBuilder<B> {
             (Some(deferred), Some(quality)) => Some(with_quality(deferred, quality)?),
             (deferred, _) => deferred,
         };
-        let backend = GuardedBackend::new(Arc::new(self.backend));
+        let backend = self.backend;
         let blends_floats = backend.can_blend_floats();
         let deferred = deferred.map(|deferred| deferred.with_float_blending(blends_floats));
         let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps)?;

@@ -7,7 +7,6 @@ use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements
 use crate::quality::Quality;
 use crate::scene::{Camera, Light, ViewKind};
 use crate::task::{JobPanic, catch};
-use crate::unwind::{discard, discard_all};
 use crate::view::ShadowMaps;
 
 /// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
@@ -152,14 +151,6 @@ impl PlanCache {
     /// The number of plans in the cache.
     pub(super) fn count(&self) -> usize {
         self.compiled.len()
-    }
-}
-
-/// Processes and steps are the engine's.
-impl Drop for PlanCache {
-    fn drop(&mut self) {
-        discard_all(self.processes.drain(..));
-        discard(self.deferred.take());
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{Declare, Draws};
+use crate::unwind::Contained;
 
 /// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
@@ -63,6 +64,26 @@ pub trait RenderProcess: Send + Sync {
 
 /// A process that an engine keeps a handle to, in order to change what it draws.
 impl<P: RenderProcess + ?Sized> RenderProcess for Arc<P> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (**self).declare(declare);
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        (**self).draws()
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self) -> Option<super::CpuShader> {
+        (**self).cpu_shader()
+    }
+}
+
+/// A process of the engine's, whose destructor may panic.
+impl<P: RenderProcess> RenderProcess for Contained<P> {
     fn name(&self) -> &str {
         (**self).name()
     }

@@ -21,6 +21,13 @@ impl<T> Contained<T> {
 /// Why a value is there: only `into_inner` takes it, which consumes what held it.
 const HAS_VALUE: &str = "a contained value is there until it is taken with what holds it";
 
+/// For values whose clone shares them, as that of an [`Arc`](std::sync::Arc).
+impl<T: Clone> Clone for Contained<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
 impl<T> Deref for Contained<T> {
     type Target = T;
 

@@ -1,8 +1,8 @@
 //! An engine whose code panics on request: its backend, process, node, device and subscriber.
 
 use std::ops::Range;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use drawloom::backend::{
@@ -25,8 +25,9 @@ use drawloom::{CpuNode, NodeAccesses, NodeFrame};
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Metadata, Subscriber};
+use tracing_core::span::Current;
 
-use crate::fuse::{Kind, Owned, call};
+use crate::fuse::{Kind, Owned, call, panic_as_planned};
 
 /// A backend under test.
 pub trait Subject: Backend + Sized {
@@ -237,7 +238,8 @@ impl<B: Backend> Backend for OwnBackend<B> {
 
     fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
         backend("read_back");
-        self.inner.read_back(frame.get_mut(), view, target)
+        let inner = self.inner.read_back(frame.get_mut(), view, target)?;
+        Ok(Box::new(OwnReadBack { inner, _dropped: Owned::new("read_back", ()) }))
     }
 
     fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
@@ -262,6 +264,24 @@ impl<B: Backend> Backend for OwnBackend<B> {
     }
 }
 
+/// What reads a target back.
+struct OwnReadBack {
+    inner: Box<dyn ReadBack>,
+    _dropped: Owned<()>,
+}
+
+impl ReadBack for OwnReadBack {
+    fn try_read(&self) -> Result<Option<Picture>, BackendError> {
+        call(Kind::Step, "try_read");
+        self.inner.try_read()
+    }
+
+    fn read(&self) -> Result<Picture, BackendError> {
+        call(Kind::Step, "read");
+        self.inner.read()
+    }
+}
+
 /// A process of the engine's, which leaves the picture as it is.
 pub struct OwnProcess {
     _dropped: Owned<()>,
@@ -275,10 +295,12 @@ impl OwnProcess {
 
 impl RenderProcess for OwnProcess {
     fn name(&self) -> &str {
+        call(Kind::Process, "process's name");
         "the engine's process"
     }
 
     fn declare(&self, declare: &mut Declare) {
+        call(Kind::Process, "process's declare");
         declare.at(drawloom::process::Place::AfterPostProcessing);
         declare.draws_over("picture");
         declare.keep();
@@ -291,11 +313,13 @@ impl RenderProcess for OwnProcess {
 
     fn cpu_shader(&self) -> Option<CpuShader> {
         call(Kind::Process, "cpu_shader");
-        Some(CpuShader::full_screen(Leaves))
+        Some(CpuShader::full_screen(Leaves { _dropped: Owned::new("shader", ()) }))
     }
 }
 
-struct Leaves;
+struct Leaves {
+    _dropped: Owned<()>,
+}
 
 impl<R: Real> FullScreenCpuShader<R> for Leaves {
     fn fragment(&self, _: &PassInputs<'_, R>, _: &FullScreenPixel<R>, _: &mut [Vector4<R>]) -> bool {
@@ -351,18 +375,28 @@ impl DeviceProgress for OwnDevice {
     }
 }
 
-/// A subscriber of everything.
+/// A subscriber of everything. It panics whenever it is told of an event or a span of Drawloom's for the first time: that
+/// happens once in a program, in whichever case comes first.
 #[derive(Default)]
 pub struct OwnSubscriber {
     spans: AtomicU64,
+    /// What it says the current span is.
+    first: OnceLock<&'static Metadata<'static>>,
 }
+
+/// How many events and spans it was told of for the first time.
+pub static CALLSITES: AtomicUsize = AtomicUsize::new(0);
 
 fn subscriber(name: &'static str) {
     call(Kind::Subscriber, name);
 }
 
 impl Subscriber for OwnSubscriber {
-    fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
+    fn register_callsite(&self, metadata: &'static Metadata<'static>) -> Interest {
+        if metadata.target().starts_with("drawloom") {
+            let index = CALLSITES.fetch_add(1, Ordering::Relaxed);
+            panic_as_planned(index % 2 == 0);
+        }
         Interest::sometimes()
     }
 
@@ -371,8 +405,9 @@ impl Subscriber for OwnSubscriber {
         true
     }
 
-    fn new_span(&self, _: &Attributes<'_>) -> Id {
+    fn new_span(&self, attributes: &Attributes<'_>) -> Id {
         subscriber("new_span");
+        self.first.get_or_init(|| attributes.metadata());
         Id::from_u64(1 + self.spans.fetch_add(1, Ordering::Relaxed))
     }
 
@@ -382,6 +417,11 @@ impl Subscriber for OwnSubscriber {
 
     fn record_follows_from(&self, _: &Id, _: &Id) {
         subscriber("record_follows_from");
+    }
+
+    fn event_enabled(&self, _: &Event<'_>) -> bool {
+        subscriber("event_enabled");
+        true
     }
 
     fn event(&self, _: &Event<'_>) {
@@ -394,6 +434,11 @@ impl Subscriber for OwnSubscriber {
 
     fn exit(&self, _: &Id) {
         subscriber("exit");
+    }
+
+    fn current_span(&self) -> Current {
+        subscriber("current_span");
+        self.first.get().map_or_else(Current::none, |metadata| Current::new(Id::from_u64(1), metadata))
     }
 
     fn clone_span(&self, id: &Id) -> Id {

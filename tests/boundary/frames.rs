@@ -2,17 +2,21 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use drawloom::backend::{NullBackend, SoftwareBackend};
 use drawloom::fence::Fence;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Camera, CameraMotion, Changes, Material, Mesh, Redraw, RenderObject, Scene, SceneRef, ViewKind};
+use drawloom::scene::{
+    Camera, CameraMotion, Changes, Material, MaterialPredicate, Mesh, ObjectFilter, Redraw, RenderObject, Scene,
+    SceneRef, ViewKind,
+};
 use drawloom::task::Scheduler;
 use drawloom::{CpuNode, Renderer, Submitter};
 
-use crate::engine::{OwnBackend, OwnNode, OwnProcess, Subject};
+use crate::engine::{CALLSITES, OwnBackend, OwnNode, OwnProcess, Subject};
 use crate::fuse::{self, Kind, Owned, PLANNED};
 use crate::within_time;
 
@@ -51,17 +55,25 @@ impl<S: Subject> Fixture<S> {
 
     /// Draws a frame in which the engine does all that it can.
     fn draw(&mut self, world: usize, changes: Changes<'_>) -> Result<Vec<u8>, String> {
+        let captured = Owned::new("captured by a predicate", ());
+        let predicate = MaterialPredicate::new(move |material| {
+            let _ = &captured;
+            fuse::call(Kind::Predicate, "contains");
+            material.emission == Vec3::ONE
+        });
+        self.worlds[world].cameras[0].filter = ObjectFilter::ALL.of_materials(predicate);
         let scene = SceneRef { changes, ..self.worlds[world].as_scene_ref() };
         let nodes: [&dyn CpuNode; 1] = [&OwnNode];
         let recorded = self.renderer.record_with_nodes(scene, &nodes);
         let mut recorded = recorded.map_err(|error| error.to_string())?;
         let camera = scene.cameras[0].clone();
         recorded.replace_camera(0, &camera).map_err(|error| error.to_string())?;
-        // Backends may be unable to.
-        if let Err(error) = recorded.read_back_whole(0, "picture")
-            && error.to_string().contains("panicked")
-        {
-            return Err(error.to_string());
+        match recorded.read_back_whole(0, "picture") {
+            Err(error) if error.to_string().contains("panicked") => return Err(error.to_string()),
+            // Backends may be unable to.
+            Err(_) => {}
+            // Its destructor is the engine's to catch.
+            Ok(read_back) => catch_unwind(AssertUnwindSafe(|| drop(read_back))).unwrap_or_else(std::mem::forget),
         }
         let drawn = recorded.fence_at(drawloom::FramePlace::End).map_err(|error| error.to_string())?;
         let captured = Owned::new("captured by a callback", ());
@@ -89,6 +101,7 @@ fn names(error: &str, call: &str) -> bool {
         "submit" => &["the submission of the frame panicked"],
         "name" => &["the name of node 0 panicked", "the engine's node panicked"],
         "declare" | "width" | "items_per_job" | "run" => &["the engine's node panicked"],
+        "contains" => &["filter"],
         "draws" | "cpu_shader" | "fragment" => &["\"the engine's process\""],
         _ => return error.contains(&format!("the backend's {call} panicked")),
     };
@@ -172,6 +185,11 @@ fn a_panic_in_any_call_of_a_process_is_an_error_that_names_it() {
 }
 
 #[test]
+fn a_panic_of_a_predicate_is_an_error_that_names_the_filter() {
+    each_call_of_all_backends_panics_once(Kind::Predicate, 1);
+}
+
+#[test]
 fn a_panic_in_a_callback_of_a_fence_changes_nothing() {
     each_call_of_all_backends_panics_once(Kind::Hook, 1);
 }
@@ -184,6 +202,8 @@ fn a_panic_in_any_destructor_changes_nothing() {
 #[test]
 fn a_panic_in_any_call_of_the_subscriber_changes_nothing() {
     each_call_of_all_backends_panics_once(Kind::Subscriber, 100);
+    let callsites = CALLSITES.load(Ordering::Relaxed);
+    assert!(callsites >= 5, "only {callsites} events and spans were told of for the first time");
 }
 
 /// Destructors of a renderer that is dropped: all of them panic, one after the other.
@@ -207,7 +227,7 @@ fn a_renderer_whose_destructors_panic_is_dropped() {
     });
 }
 
-/// What the engine would have done when a frame is ready is dropped with the frame.
+/// A device that is to set the fence which a frame waits for panics.
 #[test]
 fn a_device_that_panics_fails_the_fence_that_it_would_set() {
     within_time(|| {

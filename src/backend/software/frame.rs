@@ -130,12 +130,12 @@ impl<R: Precision> TypedFrame<R> {
                 };
                 let chunks = setup_chunks(commands, mesh_of)?;
                 let object_of = |object: u32| R::object(&self.objects, object as usize, &view.camera);
-                let (shader, face_culling, depth) = (&**shader, *face_culling, *depth);
+                let (shader, face_culling, depth) = (&***shader, *face_culling, *depth);
                 let (chunks, object_of) = (&chunks, &object_of);
                 ObjectPass { context, shader, attributes, face_culling, depth, chunks, object_of }.draw()
             }
-            SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &**shader, *blend),
-            SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &**shader, lights.clone()),
+            SoftwareDraws::FullScreen { shader, blend } => draw_full_screen(&context, &***shader, *blend),
+            SoftwareDraws::Lights { shader, lights } => draw_lights(&context, &***shader, lights.clone()),
         };
         let generate = || {
             pass.outdated_mip_levels

@@ -135,14 +135,14 @@ fn software_pass<R: Precision>(
             } else {
                 DepthWrites::Always
             };
-            SoftwareDraws::Objects { shader: Arc::clone(shader), face_culling: draws.face_culling, depth, attributes }
+            SoftwareDraws::Objects { shader: shader.clone(), face_culling: draws.face_culling, depth, attributes }
         }
         (Draws::FullScreen(draws), TypedCpuShader::FullScreen(shader)) => {
-            SoftwareDraws::FullScreen { shader: Arc::clone(shader), blend: draws.blend }
+            SoftwareDraws::FullScreen { shader: shader.clone(), blend: draws.blend }
         }
         (Draws::Lights(draws), TypedCpuShader::Lights(shader)) => {
             let lights = request.light_tables[pass.view_index].range(draws.class);
-            SoftwareDraws::Lights { shader: Arc::clone(shader), lights: lights.start as usize..lights.end as usize }
+            SoftwareDraws::Lights { shader: shader.clone(), lights: lights.start as usize..lights.end as usize }
         }
         _ => {
             let message = String::from("its CPU shader is of another kind than its draws");

@@ -8,6 +8,7 @@ use super::precision::Precision;
 use super::targets::SoftwareTarget;
 use crate::process::{DeclaredAttribute, FaceCulling, FullScreenCpuShader, LightCpuShader, ObjectCpuShader, Pass};
 use crate::scene::Blend;
+use crate::unwind::Contained;
 
 /// A pass of a frame: one process in one view.
 pub(super) struct SoftwarePass<R: Precision> {
@@ -23,17 +24,17 @@ pub(super) struct SoftwarePass<R: Precision> {
 /// What a pass draws.
 pub(super) enum SoftwareDraws<R: Precision> {
     Objects {
-        shader: Arc<dyn ObjectCpuShader<R>>,
+        shader: Contained<Arc<dyn ObjectCpuShader<R>>>,
         face_culling: FaceCulling,
         depth: DepthWrites,
         attributes: Vec<DeclaredAttribute>,
     },
     FullScreen {
-        shader: Arc<dyn FullScreenCpuShader<R>>,
+        shader: Contained<Arc<dyn FullScreenCpuShader<R>>>,
         blend: Blend,
     },
     Lights {
-        shader: Arc<dyn LightCpuShader<R>>,
+        shader: Contained<Arc<dyn LightCpuShader<R>>>,
         lights: Range<usize>,
     },
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::interface::TypedCpuShader;
 use super::{CpuShader, ObjectCpuShader, ObjectPixel, PassInputs, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
+use crate::unwind::Contained;
 
 /// The function `deform` of a [`Deformation`](crate::process::Deformation) on the CPU.
 pub trait DeformationCpuShader<R: Real>: Send + Sync {
@@ -26,15 +27,18 @@ impl CpuShader {
 impl<R: Real> TypedCpuShader<R> {
     fn deformed(self, deformation: Arc<dyn DeformationCpuShader<R>>) -> Self {
         match self {
-            Self::Objects(process) => Self::Objects(Arc::new(Deformed { process, deformation })),
+            Self::Objects(process) => {
+                let deformation = Contained::new(deformation);
+                Self::Objects(Contained::new(Arc::new(Deformed { process, deformation })))
+            }
             other => other,
         }
     }
 }
 
 struct Deformed<R> {
-    process: Arc<dyn ObjectCpuShader<R>>,
-    deformation: Arc<dyn DeformationCpuShader<R>>,
+    process: Contained<Arc<dyn ObjectCpuShader<R>>>,
+    deformation: Contained<Arc<dyn DeformationCpuShader<R>>>,
 }
 
 impl<R: Real> ObjectCpuShader<R> for Deformed<R> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{FullScreenPixel, ObjectPixel, PassInputs, ShaderLight, ShaderObject, VertexInput, VertexOutput};
 use crate::raster::{Real, Vector4};
+use crate::unwind::Contained;
 
 /// A process's shader on the CPU, which the software backend runs in place of its WGSL, in f32 and in f64: see
 /// [`RenderProcess::cpu_shader`](crate::process::RenderProcess::cpu_shader). It computes the same numbers as the WGSL.
@@ -16,31 +17,31 @@ pub struct CpuShader {
 /// A CPU shader in one precision.
 #[derive(Clone)]
 pub(crate) enum TypedCpuShader<R> {
-    Objects(Arc<dyn ObjectCpuShader<R>>),
-    FullScreen(Arc<dyn FullScreenCpuShader<R>>),
-    Lights(Arc<dyn LightCpuShader<R>>),
+    Objects(Contained<Arc<dyn ObjectCpuShader<R>>>),
+    FullScreen(Contained<Arc<dyn FullScreenCpuShader<R>>>),
+    Lights(Contained<Arc<dyn LightCpuShader<R>>>),
 }
 
 impl CpuShader {
     /// For a process that draws objects: [`Draws::Commands`](crate::process::Draws::Commands).
     pub fn objects<S: ObjectCpuShader<f32> + ObjectCpuShader<f64> + 'static>(shader: S) -> Self {
         let shader = Arc::new(shader);
-        Self { single: TypedCpuShader::Objects(Arc::clone(&shader) as _), double: TypedCpuShader::Objects(shader) }
+        let single = TypedCpuShader::Objects(Contained::new(Arc::clone(&shader) as _));
+        Self { single, double: TypedCpuShader::Objects(Contained::new(shader)) }
     }
 
     /// For a process that draws every pixel once: [`Draws::FullScreen`](crate::process::Draws::FullScreen).
     pub fn full_screen<S: FullScreenCpuShader<f32> + FullScreenCpuShader<f64> + 'static>(shader: S) -> Self {
         let shader = Arc::new(shader);
-        Self {
-            single: TypedCpuShader::FullScreen(Arc::clone(&shader) as _),
-            double: TypedCpuShader::FullScreen(shader),
-        }
+        let single = TypedCpuShader::FullScreen(Contained::new(Arc::clone(&shader) as _));
+        Self { single, double: TypedCpuShader::FullScreen(Contained::new(shader)) }
     }
 
     /// For a process that draws the pixels that lights reach: [`Draws::Lights`](crate::process::Draws::Lights).
     pub fn lights<S: LightCpuShader<f32> + LightCpuShader<f64> + 'static>(shader: S) -> Self {
         let shader = Arc::new(shader);
-        Self { single: TypedCpuShader::Lights(Arc::clone(&shader) as _), double: TypedCpuShader::Lights(shader) }
+        let single = TypedCpuShader::Lights(Contained::new(Arc::clone(&shader) as _));
+        Self { single, double: TypedCpuShader::Lights(Contained::new(shader)) }
     }
 }
 

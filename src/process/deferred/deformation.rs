@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::process::{Access, CommandDraws, Declare, Draws, RenderProcess, ShaderResource};
 use crate::scene::LayerMask;
+use crate::unwind::Contained;
 
 /// Vertex code of the engine's own for some objects: skinning, morph targets, wind. The [deferred pipeline](super::Deferred) draws
 /// these objects as it draws others, with their shadows, in processes of their own: `skinning: geometry buffer` and so on.
@@ -80,6 +81,34 @@ pub trait Deformation: Send + Sync {
 
 /// A deformation that an engine keeps a handle to, in order to change what it does.
 impl<D: Deformation + ?Sized> Deformation for Arc<D> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn layers(&self) -> LayerMask {
+        (**self).layers()
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        (**self).declare(declare);
+    }
+
+    fn shader(&self) -> &str {
+        (**self).shader()
+    }
+
+    fn resources(&self) -> Vec<ShaderResource<'_>> {
+        (**self).resources()
+    }
+
+    #[cfg(feature = "software")]
+    fn cpu_shader(&self, process: crate::process::CpuShader) -> Option<crate::process::CpuShader> {
+        (**self).cpu_shader(process)
+    }
+}
+
+/// A deformation of the engine's, whose destructor may panic.
+impl<D: Deformation> Deformation for Contained<D> {
     fn name(&self) -> &str {
         (**self).name()
     }

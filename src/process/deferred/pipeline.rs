@@ -11,6 +11,7 @@ use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
 use crate::quality::{Quality, RadianceSum};
 use crate::scene::LightKind;
+use crate::unwind::Contained;
 use crate::view::{LightClass, ShadowMaps};
 
 /// The deferred pipeline of L 4: its settings, its post-processing, and the processes that an engine replaces or leaves
@@ -53,7 +54,7 @@ pub struct Deferred {
     shadow_maps: Option<ShadowMaps>,
     radiance_sum: RadianceSum,
     blends_floats: bool,
-    post: Vec<Arc<dyn PostStep>>,
+    post: Vec<Contained<Arc<dyn PostStep>>>,
     replaced: Vec<(String, Arc<dyn RenderProcess>)>,
     left_out: Vec<String>,
     kept: Vec<String>,
@@ -121,7 +122,7 @@ impl Deferred {
         self.radiance_sum = quality.radiance_sum;
         for step in &mut self.post {
             if let Some(other) = step.with_quality(quality) {
-                *step = other;
+                *step = Contained::new(other);
             }
         }
         if let Some(maps) = &mut self.shadow_maps {
@@ -133,7 +134,7 @@ impl Deferred {
 
     /// Appends a step of post-processing. The first step reads `radiance`, the last draws `picture`.
     pub fn post(mut self, step: impl PostStep + 'static) -> Self {
-        self.post.push(Arc::new(step));
+        self.post.push(Contained::new(Arc::new(step)));
         self
     }
 
@@ -143,7 +144,7 @@ impl Deferred {
     pub fn replace(mut self, name: impl Into<String>, process: impl RenderProcess + 'static) -> Self {
         let name = name.into();
         self.replaced.retain(|(other, _)| *other != name);
-        self.replaced.push((name, Arc::new(process)));
+        self.replaced.push((name, Arc::new(Contained::new(process))));
         self
     }
 
@@ -165,7 +166,7 @@ impl Deferred {
 
     /// Adds vertex code of the engine's own for the objects of some layers.
     pub fn deformation(mut self, deformation: impl Deformation + 'static) -> Self {
-        self.deformations.push(Arc::new(deformation));
+        self.deformations.push(Arc::new(Contained::new(deformation)));
         self
     }
 
@@ -199,8 +200,13 @@ impl Deferred {
     }
 
     /// The steps of post-processing that are not left out.
-    fn steps(&self) -> impl Iterator<Item = &Arc<dyn PostStep>> {
-        self.post.iter().filter(|step| !self.left_out.iter().any(|name| name == step.process("", "").name()))
+    fn steps(&self) -> impl Iterator<Item = &Contained<Arc<dyn PostStep>>> {
+        self.post.iter().filter(|step| {
+            self.left_out.is_empty() || {
+                let process = Contained::new(step.process("", ""));
+                !self.left_out.iter().any(|name| name == process.name())
+            }
+        })
     }
 
     /// What frames have processes for whatever their scene.
@@ -410,13 +416,13 @@ impl Deferred {
     }
 
     fn post_processing(&self) -> Vec<Arc<dyn RenderProcess>> {
-        let mut processes = Vec::new();
+        let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
         let mut source = RADIANCE.to_owned();
         let steps: Vec<_> = self.steps().collect();
         for (index, step) in steps.iter().enumerate() {
             let last = index + 1 == steps.len();
             let target = if last { PICTURE.to_owned() } else { format!("post-processed {}", index + 1) };
-            processes.push(step.process(&source, &target));
+            processes.push(Arc::new(Contained::new(step.process(&source, &target))));
             source = target;
         }
         processes

@@ -114,7 +114,7 @@ mod tests {
             let pixel = ObjectPixel { coordinates: [3, 5], varyings, dpdx, dpdy, material: 0, object: 0 };
             let TypedCpuShader::Objects(transparency) = Transparency::new(None).cpu_shader().unwrap().double else { panic!("objects") };
             let mut drawn = [Vector::zero()];
-            prop_assert!(ObjectCpuShader::fragment(&*transparency, &pass, &pixel, &mut drawn));
+            prop_assert!(ObjectCpuShader::fragment(&**transparency, &pass, &pixel, &mut drawn));
             for channel in 0..3 {
                 let ambient = [0.5, 0.25, 0.75][channel] * view.ambient[channel];
                 let difference = lit[0][channel] + ambient - drawn[0][channel];
