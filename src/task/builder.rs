@@ -167,7 +167,7 @@ impl SchedulerBuilder {
     /// A worker may call the clock between taking a job and running it. So the clock must not wait for anything that a job may hold
     /// while it waits, such as a lock.
     pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
-        self.timeline.clock = Some(Box::new(clock));
+        self.timeline.clock = Some(Contained::new(Box::new(clock)));
         self
     }
 

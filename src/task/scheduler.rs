@@ -16,7 +16,7 @@ use super::sleep::{self, WakeFor};
 use super::worker::Worker;
 use crate::sync::{Arc, Instant, Mutex, thread};
 use crate::timeline::Timeline;
-use crate::unwind::{JobPanic, catch, discard};
+use crate::unwind::{Contained, JobPanic, catch, discard};
 
 /// A pool of workers that run jobs: the thread management of the Graphics Manager in L 3.3.
 ///
@@ -133,7 +133,10 @@ impl Scheduler {
         items: I,
         body: impl Fn(I::Item, &Worker) + Sync,
     ) -> Result<(), JobPanic> {
-        let (length, items) = (items.len(), Mutex::new(items));
+        // If the iterator panics, both are dropped here.
+        let (items, body) = (Contained::new(items), Contained::new(body));
+        let length = catch(|| items.len())?;
+        let (items, body) = (Mutex::new(items.into_inner()), body.into_inner());
         // It moves in, so that a panic of what it drops is caught too.
         self.parallel_for(length, 1, move |_, worker| {
             let taken = items.lock().next();

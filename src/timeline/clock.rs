@@ -93,19 +93,22 @@ impl MachineClock {
     }
 }
 
+/// The function that the engine supplies as a clock.
+pub(crate) type EngineFunction = Contained<Box<dyn Fn() -> Duration + Send + Sync>>;
+
 /// A clock that the engine supplies. Workers read it between two jobs, where a panic must not unwind.
 ///
 /// If it panics, it is not called again, and time stops at its latest reading.
 pub(super) struct EngineClock {
-    call: Contained<Box<dyn Fn() -> Duration + Send + Sync>>,
+    call: EngineFunction,
     /// The latest reading of any thread. Relaxed: it hands nothing over.
     latest: AtomicU64,
     panic: OnceLock<JobPanic>,
 }
 
 impl EngineClock {
-    pub(super) fn new(call: Box<dyn Fn() -> Duration + Send + Sync>) -> Self {
-        Self { call: Contained::new(call), latest: AtomicU64::new(0), panic: OnceLock::new() }
+    pub(super) fn new(call: EngineFunction) -> Self {
+        Self { call, latest: AtomicU64::new(0), panic: OnceLock::new() }
     }
 
     pub(super) fn read(&self) -> u64 {
@@ -193,6 +196,7 @@ mod tests {
     use std::time::{Duration, Instant};
 
     use super::{Clock, EngineClock};
+    use crate::unwind::Contained;
 
     #[test]
     fn the_counter_agrees_with_the_systems_clock() {
@@ -219,7 +223,7 @@ mod tests {
 
     #[test]
     fn an_engines_clock_is_used_unchanged() {
-        let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::new(3, 7))));
+        let clock = Clock::Engine(EngineClock::new(Contained::new(Box::new(|| Duration::new(3, 7)))));
         assert_eq!(clock.now(), Duration::new(3, 7));
         assert_eq!(clock.reader().read(), 3_000_000_007);
         assert_eq!(clock.panic_message(), None);
@@ -228,13 +232,13 @@ mod tests {
     #[test]
     fn a_clock_that_panics_stands_still_and_is_not_called_again() {
         let calls = Arc::new(AtomicU64::new(0));
-        let clock = Clock::Engine(EngineClock::new(Box::new({
+        let clock = Clock::Engine(EngineClock::new(Contained::new(Box::new({
             let calls = Arc::clone(&calls);
             move || match calls.fetch_add(1, Ordering::Relaxed) {
                 0 => Duration::from_secs(5),
                 _ => panic!("as planned"),
             }
-        })));
+        }))));
         assert_eq!([(); 4].map(|()| clock.now()), [Duration::from_secs(5); 4]);
         assert_eq!(clock.panic_message(), Some("as planned"));
         assert_eq!(calls.load(Ordering::Relaxed), 2);

@@ -38,15 +38,18 @@ pub fn worlds() -> [Scene; 2] {
     })
 }
 
-struct Fixture<S: Subject> {
+pub struct Fixture<S: Subject> {
     renderer: Renderer<OwnBackend<S>>,
     submitter: Submitter<OwnBackend<S>>,
     worlds: [Scene; 2],
 }
 
 impl<S: Subject> Fixture<S> {
-    fn new(workers: usize, joins_passes: bool) -> Self {
-        let scheduler = Arc::new(Scheduler::new(workers).unwrap());
+    pub fn new(workers: usize, joins_passes: bool) -> Self {
+        Self::on(Arc::new(Scheduler::new(workers).unwrap()), joins_passes)
+    }
+
+    pub fn on(scheduler: Arc<Scheduler>, joins_passes: bool) -> Self {
         let backend = OwnBackend::new(S::open(&scheduler), joins_passes);
         let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(OwnProcess::new());
         let (renderer, submitter) = builder.build(scheduler).unwrap();
@@ -54,7 +57,7 @@ impl<S: Subject> Fixture<S> {
     }
 
     /// Draws a frame in which the engine does all that it can.
-    fn draw(&mut self, world: usize, changes: Changes<'_>) -> Result<Vec<u8>, String> {
+    pub fn draw(&mut self, world: usize, changes: Changes<'_>) -> Result<Vec<u8>, String> {
         let captured = Owned::new("captured by a predicate", ());
         let predicate = MaterialPredicate::new(move |material| {
             let _ = &captured;

@@ -19,6 +19,7 @@ pub enum Kind {
     /// What follows a submission, callbacks of fences, devices that set fences, hooks of threads, jobs, and
     /// loads.
     Hook,
+    Clock,
     Destructor,
     Subscriber,
 }

@@ -10,6 +10,7 @@ mod frames;
 mod fuse;
 mod loops;
 mod preparations;
+mod schedulers;
 
 use std::panic;
 use std::sync::{Mutex, MutexGuard, Once, PoisonError, mpsc};
