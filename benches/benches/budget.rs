@@ -11,7 +11,6 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Parser;
 use drawloom::backend::WgpuBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
@@ -55,7 +54,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let (few, frames) = if quick { (100, 40) } else { (10_000, 600) };
     let progress = progress_bar("frames");
     let rows = measure(few, frames, &progress)?;

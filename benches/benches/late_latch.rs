@@ -13,7 +13,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
 use drawloom::glam::{DVec3, Quat};
@@ -53,7 +52,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = ExtentArguments::parse();
+    let arguments: ExtentArguments = drawloom_output::parse_arguments();
     let (boxes, rounds) = if arguments.is_quick() { (500, 1) } else { (10_000, 15) };
     let scene = city::new(boxes, [960, 540])?;
     let of = |metres: f32, degrees: f32, milliseconds: u64| {

@@ -16,7 +16,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use drawloom::backend::{BackendError, Picture, WgpuBackend};
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::scene::{Changes, Scene, SceneRef};
@@ -72,7 +71,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let Some(adapter) = adapter_name() else {
         print_line!("There is no graphics adapter.");
         return Ok(());

@@ -12,7 +12,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use clap::Parser;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::demo;
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
@@ -46,7 +45,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let (rounds, sizes): (_, &[[u32; 2]]) = match quick {
         true => (Rounds { warm_up: 0, measured: 1 }, &[[96, 54]]),
         false => (Rounds { warm_up: WARM_UP, measured: 15 }, &[[480, 270], [960, 540]]),

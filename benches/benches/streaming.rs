@@ -15,7 +15,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::handle::Handle;
@@ -64,7 +63,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Failure> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let extent = match quick {
         true => Extent {
             meshes: 60,

@@ -61,7 +61,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = ViewsArguments::parse();
+    let arguments: ViewsArguments = drawloom_output::parse_arguments();
     if let Some(views) = arguments.views {
         return print_memory(views);
     }

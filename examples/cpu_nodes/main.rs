@@ -32,7 +32,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use drawloom::Renderer;
 use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::process::{Deferred, ToneMapping};
@@ -55,7 +54,7 @@ const RECORDED_FRAMES: u32 = 30;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
-    drawloom_output::exit_code(run(&Arguments::parse()))
+    drawloom_output::exit_code(run(&drawloom_output::parse_arguments::<Arguments>()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

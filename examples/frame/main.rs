@@ -41,7 +41,7 @@ use sequence::Sequence;
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
-    let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| drawloom_output::exit_with(error));
     let with_causes = |error: Box<dyn Error>| with_causes(error.as_ref());
     match Input::load(&arguments).map_err(with_causes) {
         Ok(input) => drawloom_output::exit_code(run(&arguments, input).map_err(with_causes)),

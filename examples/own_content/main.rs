@@ -59,7 +59,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     create_folder(&arguments.out)?;
     let engine = Engine::new(device::open()?)?;
     let progress = ProgressBar::new((2 * arguments.frames + 3) as u64);

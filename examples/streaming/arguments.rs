@@ -57,7 +57,7 @@ pub struct Arguments {
 impl Arguments {
     /// The arguments of this program. Ends it if they are wrong.
     pub fn checked() -> Self {
-        Self::parse()
+        drawloom_output::parse_arguments()
     }
 
     /// The time of the flight at which a frame begins, in seconds; `None` if it is over.

@@ -59,7 +59,7 @@ struct Arguments {
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
-    drawloom_output::exit_code(run(&Arguments::parse()))
+    drawloom_output::exit_code(run(&drawloom_output::parse_arguments::<Arguments>()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

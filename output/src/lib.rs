@@ -14,12 +14,16 @@
 //!   reported. So does an open file that is named through `/proc`. `/dev/stdout` and `/dev/stderr` are the streams of the process, wherever a
 //!   shell has redirected them: the content comes behind what was printed before.
 
+#[cfg(feature = "clap")]
+mod arguments;
 mod console;
 mod destination;
 mod error;
 mod file;
 mod picture;
 
+#[cfg(feature = "clap")]
+pub use arguments::{exit_with, parse_arguments};
 pub use console::{check_output, diagnostics, exit_code, path_text, print_diagnostic, print_line, text};
 pub use error::OutputError;
 pub use file::{OutputFile, create_folder};

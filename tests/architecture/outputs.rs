@@ -1,5 +1,6 @@
 //! What examples and benchmarks write goes through `drawloom-output`: whole, or not at all. What they print does too,
-//! so that no output that is closed or full ends them before their files are there. The library writes to what its
+//! so that no output that is closed or full ends them before their files are there, and so do their arguments, of which
+//! clap prints those that are wrong. The library writes to what its
 //! callers open, and prints nothing.
 
 use std::path::Path;
@@ -34,6 +35,9 @@ fn written_directly(sources: &[Source]) -> Vec<String> {
 /// What prints, or names a stream to print to.
 const PRINTERS: [&str; 7] = ["print", "println", "eprint", "eprintln", "dbg", "stdout", "stderr"];
 
+/// What of clap ends a program, and prints the arguments as they are.
+const PARSERS: [&str; 4] = ["::parse()", "::parse_from(", ".get_matches()", "error.exit()"];
+
 /// Aborts the process, and says why where nothing else can.
 const MAY_PRINT: &str = "src/unwind/mod.rs";
 
@@ -65,7 +69,8 @@ fn printed_directly(sources: &[Source]) -> Vec<String> {
                 is_whole && if printer.starts_with("std") { names_stream } else { rest.starts_with('!') }
             })
         };
-        !code.starts_with("//") && PRINTERS.iter().any(prints)
+        let parses = |parser: &&str| code.contains(*parser);
+        !code.starts_with("//") && (PRINTERS.iter().any(prints) || PARSERS.iter().any(parses))
     })
 }
 
@@ -105,6 +110,10 @@ fn a_line_that_is_printed_directly_is_found() {
         "use std::io::{self, stderr};",
         "events.with_writer(std::io::stderr)",
         "report.map(|line| println!(\"{line}\"));",
+        "let arguments = Arguments::parse();",
+        "Arguments::parse_from(arguments)",
+        "command.get_matches()",
+        "unwrap_or_else(|error| error.exit())",
     ] {
         assert_eq!(count(line), 1, "{line}");
     }
@@ -116,6 +125,9 @@ fn a_line_that_is_printed_directly_is_found() {
         "    /// stdout",
         "text(run.stdout)?",
         ".stderr(log)",
+        "let count: usize = text.parse()?;",
+        "Self::try_parse_from(arguments)?",
+        "event_loop.exit();",
     ] {
         assert_eq!(count(line), 0, "{line}");
     }

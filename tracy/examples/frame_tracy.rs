@@ -42,7 +42,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     drawloom_tracy::install(if arguments.chunks { Zones::Chunks } else { Zones::Nodes })?;
     drawloom_tracy::name_worker(0);
     let builder = Scheduler::builder().on_start(drawloom_tracy::name_worker);

@@ -21,7 +21,6 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
-use clap::Parser;
 use drawloom::task::Scheduler;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
@@ -56,7 +55,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("runs");
     let mut speeds = Vec::new();

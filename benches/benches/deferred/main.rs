@@ -93,7 +93,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     let extent = Extent::new(&arguments);
     let adapter = backends::adapter_name();
     if adapter.is_none() {

@@ -17,7 +17,6 @@ use std::mem;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
 use drawloom::demo;
 use drawloom::quality::Quality;
@@ -38,7 +37,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let rounds = if quick { 15 } else { 1_001 };
     let cases = cases()?;
     let progress = progress_bar("rounds");

@@ -30,7 +30,6 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Parser;
 use drawloom::quality::{DepthCurve, DepthKey};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::{Rounds, progress_bar};
@@ -95,7 +94,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     sorting_error::print()?;
 

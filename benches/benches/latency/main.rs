@@ -50,7 +50,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse().backend;
+    let arguments = drawloom_output::parse_arguments::<Arguments>().backend;
     let quick = arguments.is_quick();
     let progress = progress_bar("rounds");
     let mut schemes = Vec::new();

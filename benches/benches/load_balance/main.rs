@@ -83,7 +83,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let is_requested = |name: &str| arguments.scenes.is_empty() || arguments.scenes.iter().any(|scene| scene == name);
     let cases: Vec<_> = scenes::all(extent.divisor)?.into_iter().filter(|case| is_requested(case.name)).collect();

@@ -15,7 +15,6 @@ mod naive;
 
 use std::error::Error;
 
-use clap::Parser;
 use drawloom::quality::Quality;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::city;
@@ -31,7 +30,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let (boxes, picture, rounds) = if quick { (1_500, [240, 136], 3) } else { (20_000, [960, 540], 31) };
     let city = city::new(boxes, picture)?;
     let scene = city.as_scene_ref();

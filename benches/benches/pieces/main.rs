@@ -21,7 +21,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use clap::Parser;
 use drawloom::backend::WgpuBackend;
 use drawloom::command::Selection;
 use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -57,7 +56,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = ExtentArguments::parse();
+    let arguments: ExtentArguments = drawloom_output::parse_arguments();
     // Trials of recording strategies are over after some hundred frames.
     let (rounds, sizes): (_, &[(usize, usize)]) = if arguments.is_quick() {
         (Rounds { warm_up: 4, measured: 3 }, &[(4, 100)])

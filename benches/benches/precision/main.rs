@@ -16,7 +16,6 @@ mod report;
 
 use std::error::Error;
 
-use clap::Parser;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_output::print_diagnostic;
@@ -38,7 +37,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let quick = ExtentArguments::parse().is_quick();
+    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
     let [by_distance, by_view] = if quick { [500, 1_000] } else { [200_000, 100_000] };
     let distances: Vec<_> = (0..10).map(|power| 10_f64.powi(power)).collect();
     let steps = distances.len() + BOUNDED.len() + MAGNIFYING.len();

@@ -101,7 +101,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);

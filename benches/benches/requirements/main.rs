@@ -88,7 +88,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse().backend;
+    let arguments = drawloom_output::parse_arguments::<Arguments>().backend;
     let quick = arguments.is_quick();
     let counts = if quick { [2, 1] } else { [WARM_UP, CHANGES] };
     let progress = progress_bar("frames");

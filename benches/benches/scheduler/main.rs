@@ -126,7 +126,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Failure> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     let quick = arguments.extent.is_quick();
     let extent = if quick { Extent::QUICK } else { Extent::FULL };
     let is_requested = |name: &str| arguments.rows.is_empty() || arguments.rows.iter().any(|row| row == name);

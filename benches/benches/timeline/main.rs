@@ -42,7 +42,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error + Send + Sync>> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     if let (Some(shape), Some(frames)) = (arguments.shape, arguments.frames) {
         return shape.run(frames);
     }

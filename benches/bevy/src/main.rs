@@ -82,7 +82,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Failure> {
-    let arguments = Arguments::parse();
+    let arguments: Arguments = drawloom_output::parse_arguments();
     let backend = if arguments.backend == "noop" { BackendName::Noop } else { BackendName::Adapter };
     let threads = match arguments.threads {
         Some(threads) => threads.max(1),

@@ -56,14 +56,14 @@ pub enum BackendName {
 impl Arguments {
     /// Parses the command line, or exits with an error.
     pub fn checked() -> Self {
-        let mut arguments = Self::parse();
+        let mut arguments: Self = drawloom_output::parse_arguments();
         if arguments.quick {
             (arguments.width, arguments.rounds) = (240, 0);
         }
         if arguments.budget_ms.is_some_and(|budget| !(budget > 0.0 && budget.is_finite())) {
             let error = <Self as clap::CommandFactory>::command()
                 .error(clap::error::ErrorKind::ValueValidation, "--budget-ms must be greater than 0");
-            error.exit();
+            drawloom_output::exit_with(error);
         }
         arguments
     }

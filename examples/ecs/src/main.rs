@@ -62,7 +62,7 @@ enum BackendName {
 }
 
 fn main() -> ExitCode {
-    drawloom_output::exit_code(run(&Options::parse()))
+    drawloom_output::exit_code(run(&drawloom_output::parse_arguments::<Options>()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {

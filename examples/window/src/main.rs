@@ -18,7 +18,6 @@ mod world;
 use std::error::Error;
 use std::process::ExitCode;
 
-use clap::Parser;
 use tracing_subscriber::filter::LevelFilter;
 use winit::event_loop::EventLoop;
 
@@ -26,7 +25,7 @@ use engine::Engine;
 use options::Options;
 
 fn main() -> ExitCode {
-    let options = Options::parse();
+    let options: Options = drawloom_output::parse_arguments();
     // What Drawloom and wgpu warn of.
     tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
     drawloom_output::exit_code(run(options))
