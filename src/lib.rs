@@ -80,6 +80,7 @@
 mod sync;
 mod unwind;
 mod leaked_guards;
+pub mod text;
 pub mod fence;
 pub mod timeline;
 mod tuning;

@@ -1,6 +1,7 @@
 //! What frames left out, or could not draw as requested.
 
 use drawloom::FrameStatistics;
+use drawloom::text::Escaped;
 use drawloom::view::Rejection;
 use egui::{Grid, Ui};
 
@@ -51,7 +52,7 @@ impl WarningList {
                 ui.label(rejection.reason.name());
                 ui.label(rejection.count.to_string());
                 ui.label(format!("index {}", rejection.first));
-                ui.label(rejection.name.as_deref().map(|name| name.escape_debug().to_string()).unwrap_or_default());
+                ui.label(rejection.name.as_deref().map(|name| Escaped(name).to_string()).unwrap_or_default());
                 ui.label(match self.frames - frame {
                     0 => "in the latest frame".to_owned(),
                     ago => format!("{ago} frames ago"),
@@ -62,5 +63,24 @@ impl WarningList {
         if ui.button("Clear").clicked() {
             self.entries.clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drawloom::view::RejectionReason;
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
+
+    use super::*;
+
+    #[test]
+    fn names_are_shown_as_they_are_but_on_one_line_and_in_one_direction() {
+        let reason = RejectionReason::StaleMesh;
+        let rejection = Rejection { reason, count: 1, first: 0, name: Some("'oak' \"é\"\n\u{202e}elm".into()) };
+        let mut list = WarningList::default();
+        list.add_frame(&FrameStatistics { rejections: vec![rejection], ..FrameStatistics::default() });
+        let harness = Harness::new_ui(|ui| list.show(ui));
+        harness.get_by_label("'oak' \"é\"\\u{a}\\u{202e}elm");
     }
 }

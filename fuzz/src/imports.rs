@@ -95,7 +95,7 @@ fn check_warnings(imported: &Imported) {
 /// No control character of a file reaches a terminal.
 fn assert_is_escaped(message: &impl ToString) {
     let message = message.to_string();
-    assert!(message.chars().all(|character| character == '\t' || !character.is_control()), "{message:?}");
+    assert!(!message.chars().any(char::is_control), "{message:?}");
 }
 
 /// A renderer draws the scene with this camera and further lights, or says that the camera is too far away for that.

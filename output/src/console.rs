@@ -6,34 +6,22 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
+use drawloom::text::Escaped;
+
 /// The first error of the standard output, until it is [taken](check_output).
 static OUTPUT_ERROR: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// A path as text. Control characters are escaped, so that none reaches a terminal.
+/// A path as text, [`Escaped`].
 pub fn path_text(path: &Path) -> String {
     text(path.display())
 }
 
-/// What a file holds, such as a name, as text on one line. Control characters are escaped, so that none reaches a
-/// terminal.
+/// What a file holds, such as a name, as text on one line, [`Escaped`].
 pub fn text(text: impl Display) -> String {
-    let mut escaped = String::new();
-    for character in text.to_string().chars() {
-        push_escaped(&mut escaped, character, false);
-    }
-    escaped
+    Escaped(&text.to_string()).to_string()
 }
 
-fn push_escaped(text: &mut String, character: char, keeps_lines: bool) {
-    let is_layout = keeps_lines && matches!(character, '\n' | '\t');
-    if character.is_control() && !is_layout {
-        text.extend(character.escape_unicode());
-    } else {
-        text.push(character);
-    }
-}
-
-/// Prints a line on the standard output. Control characters in it are escaped, except line feeds and tabs.
+/// Prints a line on the standard output, [`Escaped`] except for line feeds and tabs.
 ///
 /// That its reader has closed the pipe is no error: it wants no more, and what the program does beside printing goes
 /// on. Any other error, of a full disk for example, is kept until the program ends, so that it first writes its files:
@@ -135,11 +123,14 @@ fn line_of(line: impl Display) -> String {
     escaped_lines(text)
 }
 
-/// Lines whose other control characters are escaped.
+/// Lines that are escaped, except for their ends and tabs.
 fn escaped_lines(text: impl AsRef<str>) -> String {
-    let mut escaped = String::with_capacity(text.as_ref().len());
-    text.as_ref().chars().for_each(|character| push_escaped(&mut escaped, character, true));
-    escaped
+    let is_layout = |character: char| matches!(character, '\n' | '\t');
+    let parts = text.as_ref().split_inclusive(is_layout).map(|part| {
+        let end = part.trim_end_matches(is_layout).len();
+        [&Escaped(&part[..end]).to_string(), &part[end..]].concat()
+    });
+    parts.collect()
 }
 
 fn or_unread(written: io::Result<()>) -> io::Result<()> {
@@ -153,12 +144,14 @@ mod tests {
     #[test]
     fn control_characters_in_paths_are_escaped() {
         assert_eq!(path_text(Path::new("a/été\u{1b}[31m\n.png")), "a/été\\u{1b}[31m\\u{a}.png");
-        assert_eq!(text("\u{7}\u{9b}\r\t\u{7f}"), "\\u{7}\\u{9b}\\u{d}\\u{9}\\u{7f}");
+        assert_eq!(text("\u{7}\u{9b}\r\t\u{7f}\u{202e}"), "\\u{7}\\u{9b}\\u{d}\\u{9}\\u{7f}\\u{202e}");
     }
 
     #[test]
     fn lines_keep_their_ends_and_tabs_and_no_other_control_characters() {
         assert_eq!(line_of("a\tb\n\u{1b}]0;title\u{7}\u{9b}2J\r"), "a\tb\n\\u{1b}]0;title\\u{7}\\u{9b}2J\\u{d}\n");
+        assert_eq!(line_of("\n\t\n\u{202e}"), "\n\t\n\\u{202e}\n");
+        assert_eq!(line_of(""), "\n");
     }
 
     #[test]

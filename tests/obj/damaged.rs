@@ -213,7 +213,7 @@ fn warnings_are_capped_and_counted() {
 }
 
 fn control_characters_do_not_reach_messages() {
-    let hostile = "\u{1b}]0;title\u{7}\u{9b}31m\u{0}";
+    let hostile = "\u{1b}]0;title\u{7}\u{9b}31m\u{0}\u{202e}";
     let text = format!(
         "mtllib {hostile}.mtl\nmtllib a.mtl\nusemtl {hostile}\n{TRIANGLE}o {hostile}\n{hostile} 1\nf 1 1 {hostile}\n"
     );
@@ -224,11 +224,19 @@ fn control_characters_do_not_reach_messages() {
     assert!(imported.warnings.len() >= 8, "{:?}", imported.warnings);
     for warning in &imported.warnings {
         let message = warning.to_string();
-        assert!(!message.chars().any(char::is_control), "{message:?}");
+        assert!(!message.chars().any(|character| character.is_control() || character == '\u{202e}'), "{message:?}");
     }
     let materials = imported.scene.assets().iter::<Material>();
     assert!(materials.map(|(_, material)| &material.name).all(|name| !name.chars().any(char::is_control)));
     let file = format!("{hostile}.obj");
     let error = drawloom::scene::obj::read(&file, b"", |_| unreachable!()).unwrap_err();
-    assert!(!error.to_string().chars().any(char::is_control), "{error}");
+    assert!(!error.to_string().chars().any(|character| character.is_control() || character == '\u{202e}'), "{error}");
+}
+
+/// Windows puts such a mark in front of paths that are copied from its dialogs.
+#[test]
+fn a_file_whose_name_turns_text_is_found() {
+    let text = format!("mtllib \u{202a}a.mtl\nusemtl one\n{TRIANGLE}");
+    let imported = Folder::new().with("a.obj", text).with("\u{202a}a.mtl", "newmtl one\nKd 1 0 0\n").load().unwrap();
+    assert_eq!(imported.warnings, []);
 }

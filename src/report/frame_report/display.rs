@@ -10,6 +10,7 @@ use super::slack::Slack;
 use super::step::{HeldBy, Step};
 use super::what_if::WhatIf;
 use super::worker_report::WorkerReport;
+use crate::text::is_escaped;
 use crate::timeline::{JobSize, TuningChoice};
 
 /// How many lines a list has, for a person to read it.
@@ -329,14 +330,14 @@ fn held_by_text(held_by: HeldBy) -> &'static str {
     }
 }
 
-/// A name that fits into a line: cut to [`MAX_NAME_LENGTH`], and without control characters.
+/// A name that fits into a line: cut to [`MAX_NAME_LENGTH`], and [printable].
 fn sanitized(name: &str) -> String {
     printable(&truncated(name, MAX_NAME_LENGTH))
 }
 
-/// The text without control characters.
+/// The text without control characters, and others that are no part of a line. Each is replaced, so the length stays.
 fn printable(text: &str) -> String {
-    let plain = |character: char| if character.is_control() { char::REPLACEMENT_CHARACTER } else { character };
+    let plain = |character: char| if is_escaped(character) { char::REPLACEMENT_CHARACTER } else { character };
     text.chars().map(plain).collect()
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Lines end in LF, CR or both. Text is UTF-8 or, with a byte order mark or recognised by its first two characters, UTF-16. A
 //! line that is not UTF-8 is read as Latin-1, in which every byte is a character: names in other encodings look wrong, but
-//! those of an OBJ file still match those of its libraries. Control characters are escaped, so that none reaches a terminal.
+//! those of an OBJ file still match those of its libraries. Control characters are escaped, so that no name has any.
 
 use std::io::{self, BufRead};
 
@@ -261,15 +261,7 @@ pub(super) fn without_comment(values: &str) -> &str {
     values.split_once('#').map_or(values, |(values, _)| values)
 }
 
-/// A text without control characters, which are escaped.
-pub(super) fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        push_escaped(&mut escaped, character);
-    }
-    escaped
-}
-
+/// Appends a character of a statement. Messages escape more of what they quote: a file may have such a name.
 fn push_escaped(text: &mut String, character: char) {
     match character {
         '\t' => text.push('\t'),

@@ -5,8 +5,8 @@ use std::io::{self, BufRead, Read, Seek};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::limits::Limit;
-use super::statements::escaped;
 use crate::scene::Texture;
+use crate::text::Escaped;
 
 /// RGBA bytes, rows from top to bottom.
 #[derive(Debug)]
@@ -81,7 +81,7 @@ pub(super) fn decode(
 
 /// The message of an error on one line, without control characters: some of decoders end with a line feed, or quote the file.
 fn message(error: impl ToString) -> String {
-    escaped(error.to_string().trim())
+    Escaped(error.to_string().trim()).to_string()
 }
 
 /// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last

@@ -1,0 +1,54 @@
+//! Text of files and engines as messages quote it.
+
+use std::fmt::{self, Display, Formatter, Write};
+
+/// A text on one line, in which characters are escaped that do more than show: control characters, which terminals
+/// obey, and those that break lines or turn the direction in which text is read.
+///
+/// ```
+/// use drawloom::text::Escaped;
+///
+/// assert_eq!(Escaped("été \"oak\"\n\u{1b}[2J").to_string(), "été \"oak\"\\u{a}\\u{1b}[2J");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Escaped<'a>(pub &'a str);
+
+impl Display for Escaped<'_> {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        self.0.chars().try_for_each(|character| match character {
+            _ if is_escaped(character) => write!(formatter, "{}", character.escape_unicode()),
+            _ => formatter.write_char(character),
+        })
+    }
+}
+
+/// Whether a character does more than show.
+pub(crate) fn is_escaped(character: char) -> bool {
+    let breaks = matches!(character, '\u{2028}' | '\u{2029}');
+    // All of Unicode's property `Bidi_Control`.
+    let turns = matches!(
+        character,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+    );
+    character.is_control() || breaks || turns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_more_than_show_is_escaped() {
+        assert_eq!(Escaped("\u{7}\u{9b}\r\n\t\u{7f}").to_string(), "\\u{7}\\u{9b}\\u{d}\\u{a}\\u{9}\\u{7f}");
+        assert_eq!(Escaped("a\u{202e}b\u{2028}c\u{61c}").to_string(), "a\\u{202e}b\\u{2028}c\\u{61c}");
+        assert_eq!(Escaped("'é' \"\\\" \u{301} 表\u{200d}").to_string(), "'é' \"\\\" \u{301} 表\u{200d}");
+    }
+
+    /// `char::escape_debug` escapes what is not printable, and more.
+    #[test]
+    fn all_that_is_escaped_is_not_printable() {
+        let escaped: Vec<_> = ('\0'..=char::MAX).filter(|character| is_escaped(*character)).collect();
+        assert_eq!(escaped.len(), 65 + 2 + 12);
+        assert!(escaped.iter().all(|character| character.escape_debug().count() > 1), "{escaped:?}");
+    }
+}
