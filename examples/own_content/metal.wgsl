@@ -60,9 +60,15 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     return vec4<f32>(min(radiance, vec3<f32>(60000.0)), 1.0);
 }
 
-// The microfacet distribution of Trowbridge and Reitz, the visibility of Smith and Schlick, Schlick's Fresnel term: Karis,
-// "Real Shading in Unreal Engine 4", 2013.
-fn specular(normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, roughness: f32, head_on: vec3<f32>) -> vec3<f32> {
+// The microfacet distribution of Trowbridge and Reitz, the visibility of Smith and Schlick, Schlick's Fresnel term:
+// Karis, "Real Shading in Unreal Engine 4", 2013.
+fn specular(
+    normal: vec3<f32>,
+    to_eye: vec3<f32>,
+    to_light: vec3<f32>,
+    roughness: f32,
+    head_on: vec3<f32>,
+) -> vec3<f32> {
     let halfway = normalize(to_eye + to_light);
     let n_h = max(dot(normal, halfway), 0.0);
     let n_v = max(dot(normal, to_eye), 1e-3);

@@ -20,8 +20,8 @@ fn picture(shown: texture_2d<f32>, at: vec2<i32>) -> vec3<f32> {
     return select(vec3<f32>(0.0), textureLoad(shown, max(pixel, vec2<i32>(0)), 0).rgb, pixel.x >= 0);
 }
 
-// The number of the square of this side in which a pixel is, three to a row, and where in the square; the number is negative beside the
-// squares.
+// The number of the square of this side in which a pixel is, three to a row, and where in the square; the number is
+// negative beside the squares.
 fn square_of(at: vec2<i32>, count: i32, side: i32) -> vec3<i32> {
     let columns = min(count, 3);
     let x = at.x - (PICTURE.x - columns * side) / 2;

@@ -1,4 +1,5 @@
-// Puffs of smoke in a smaller target. `const DIVISOR: i32`, how many pixels of the picture each of its pixels is wide, goes before it.
+// Puffs of smoke in a smaller target. `const DIVISOR: i32`, how many pixels of the picture each of its pixels is wide,
+// goes before it.
 
 @group(2) @binding(1) var depth: texture_depth_2d;
 

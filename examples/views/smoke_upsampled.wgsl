@@ -1,5 +1,5 @@
-// The smoke over the picture: the mean of the four nearest pixels of the smaller target, in which those count less that stand for
-// something at another distance (Kopf et al. 2007, "Joint Bilateral Upsampling").
+// The smoke over the picture: the mean of the four nearest pixels of the smaller target, in which those count less that
+// stand for something at another distance (Kopf et al. 2007, "Joint Bilateral Upsampling").
 
 @group(2) @binding(1) var smoke: texture_2d<f32>;
 @group(2) @binding(2) var depth: texture_depth_2d;

@@ -21,7 +21,8 @@ fn vertex(
 ) -> Surface {
     let object = objects[object_index(instance)];
     let world_position = object.world_from_object * vec4<f32>(position, 1.0);
-    return Surface(clip_from_world * world_position, (object.world_from_object * vec4<f32>(normal, 0.0)).xyz, object.material);
+    let world_normal = (object.world_from_object * vec4<f32>(normal, 0.0)).xyz;
+    return Surface(clip_from_world * world_position, world_normal, object.material);
 }
 
 @fragment

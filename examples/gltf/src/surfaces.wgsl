@@ -54,7 +54,8 @@ fn vertex(in: VertexInput) -> Corner {
     let mirror = select(1.0, -1.0, object.scale.x * object.scale.y * object.scale.z < 0.0);
     let tangent = rotate(object.orientation, object.scale * deformed.tangent.xyz);
     return Corner(
-        clip_position(relative), relative, world_normal(object, deformed.normal), vec4<f32>(tangent, deformed.tangent.w * mirror),
+        clip_position(relative), relative, world_normal(object, deformed.normal),
+        vec4<f32>(tangent, deformed.tangent.w * mirror),
         deformed.uv, deformed.second_uv, deformed.color, object.material,
     );
 }
@@ -163,7 +164,8 @@ fn punctual_illuminance(light: Light, position: vec3<f32>, normal: vec3<f32>) ->
 
 // The normal with that of the texture.
 fn bumped_normal(
-    in: Corner, material: GltfMaterial, coordinates: AllCoordinates, normal: vec3<f32>, relative_dx: vec3<f32>, relative_dy: vec3<f32>,
+    in: Corner, material: GltfMaterial, coordinates: AllCoordinates, normal: vec3<f32>, relative_dx: vec3<f32>,
+    relative_dy: vec3<f32>,
 ) -> vec3<f32> {
     let slot = material.normal_texture;
     if slot.texture == 0xffffffffu {
@@ -190,7 +192,8 @@ fn bumped_normal(
 
 // What a surface reflects of a light, for each unit of illuminance: appendix B of the glTF specification.
 fn reflection(
-    normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, n_v: f32, roughness: f32, head_on: vec3<f32>, diffuse: vec3<f32>,
+    normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, n_v: f32, roughness: f32, head_on: vec3<f32>,
+    diffuse: vec3<f32>,
 ) -> vec3<f32> {
     let halfway = normalize_or(to_eye + to_light, normal);
     let n_h = clamp(dot(normal, halfway), 0.0, 1.0);

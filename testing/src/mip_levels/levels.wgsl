@@ -8,8 +8,8 @@ struct Levels {
     @location(1) layers: vec4<f32>,
 }
 
-// The pixel, or the last one of a level of a texture of this size. Some software devices query the size of a level wrongly where the level
-// differs from pixel to pixel.
+// The pixel, or the last one of a level of a texture of this size. Some software devices query the size of a level
+// wrongly where the level differs from pixel to pixel.
 fn within(pixel: vec2<u32>, size: vec2<u32>, level: u32) -> vec2<u32> {
     return min(pixel, max(size >> vec2<u32>(level), vec2<u32>(1u)) - 1u);
 }

@@ -9,5 +9,6 @@ fn vertex(in: VertexInput) -> @invariant @builtin(position) vec4<f32> {
 @fragment
 fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let size = vec2<i32>(textureDimensions(sampled));
-    return textureLoad(sampled, clamp(vec2<i32>(size.x - 1 - i32(position.x), i32(position.y)), vec2<i32>(0), size - 1), 0);
+    let mirrored = vec2<i32>(size.x - 1 - i32(position.x), i32(position.y));
+    return textureLoad(sampled, clamp(mirrored, vec2<i32>(0), size - 1), 0);
 }
