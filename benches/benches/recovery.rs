@@ -22,7 +22,6 @@ use drawloom::scene::{Changes, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, demo};
 use drawloom_benches::arguments::ExtentArguments;
-use drawloom_benches::backends::adapter_name;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
@@ -72,10 +71,7 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn Error>> {
     let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
-    let Some(adapter) = adapter_name() else {
-        print_line!("There is no graphics adapter.");
-        return Ok(());
-    };
+    let adapter = adapter::device().map(|(device, _)| device.adapter_info().name)?;
     let (rounds, sizes): (usize, &[[u32; 2]]) = if quick { (1, &[[96, 54]]) } else { (9, &[[480, 270], [960, 540]]) };
     let progress = progress_bar("rounds");
     progress.set_length((2 * rounds * sizes.len()) as u64);

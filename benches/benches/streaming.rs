@@ -22,12 +22,11 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Material, Mesh, ObjectHandle, RenderObject, Scene, Texture, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
-use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::arguments::BackendArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
-use drawloom_testing::adapter;
 use serde::Serialize;
 
 type Failure = Box<dyn Error>;
@@ -58,12 +57,20 @@ struct Extent {
     rounds: usize,
 }
 
+/// Measures streaming.
+#[derive(Parser)]
+struct Arguments {
+    #[command(flatten)]
+    backend: BackendArguments,
+}
+
 fn main() -> ExitCode {
     drawloom_output::exit_code(run())
 }
 
 fn run() -> Result<(), Failure> {
-    let quick = drawloom_output::parse_arguments::<ExtentArguments>().is_quick();
+    let arguments = drawloom_output::parse_arguments::<Arguments>().backend;
+    let quick = arguments.is_quick();
     let extent = match quick {
         true => Extent {
             meshes: 60,
@@ -84,8 +91,8 @@ fn run() -> Result<(), Failure> {
     };
     let progress = progress_bar("cases");
     let mut rows = Vec::new();
-    let devices = [("noop", adapter::noop_device().ok()), ("adapter", adapter::device().ok())];
-    for (name, device) in devices.into_iter().filter_map(|(name, device)| Some((name, device?))) {
+    for backend in arguments.backends()? {
+        let (name, device) = (backend.name(), backend.device()?);
         for _round in 0..extent.rounds {
             // `noop` has 256 layers.
             let textures = extent.textures.min(device.0.limits().max_texture_array_layers as usize);

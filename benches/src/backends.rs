@@ -2,12 +2,14 @@
 
 use std::error::Error;
 
+use clap::ValueEnum;
 use drawloom::backend::WgpuBackend;
+use drawloom::wgpu;
 use drawloom_testing::adapter;
 use serde::Serialize;
 
 /// A wgpu backend.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendName {
     /// wgpu's no-op backend, which measures the CPU part of a frame.
@@ -18,11 +20,6 @@ pub enum BackendName {
 
 impl BackendName {
     pub const ALL: &[Self] = &[Self::Noop, Self::Adapter];
-
-    /// The backends that this machine has.
-    pub fn available() -> &'static [Self] {
-        if adapter_name().is_some() { Self::ALL } else { &Self::ALL[..1] }
-    }
 
     /// This backend's value of a pair.
     pub fn of<T>(self, [noop, adapter]: [T; 2]) -> T {
@@ -40,11 +37,19 @@ impl BackendName {
     ///
     /// # Errors
     /// Returns an error if no device can be opened.
+    pub fn device(self) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
+        match self {
+            Self::Noop => adapter::noop_device(),
+            Self::Adapter => adapter::device(),
+        }
+    }
+
+    /// A backend on a new device.
+    ///
+    /// # Errors
+    /// Returns an error if no device can be opened.
     pub fn open(self) -> Result<WgpuBackend, Box<dyn Error>> {
-        let (device, queue) = match self {
-            Self::Noop => adapter::noop_device()?,
-            Self::Adapter => adapter::device()?,
-        };
+        let (device, queue) = self.device()?;
         Ok(WgpuBackend::new(device, queue)?)
     }
 }

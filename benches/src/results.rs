@@ -40,3 +40,48 @@ pub fn folder() -> io::Result<PathBuf> {
     fs::create_dir_all(&folder)?;
     Ok(folder)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::env;
+    use std::error::Error;
+    use std::fs;
+    use std::process::{self, Command};
+
+    use serde::{Serialize, Serializer};
+
+    use super::*;
+
+    /// Set in a program that the test starts, which ends in the middle of a result.
+    const INTERRUPTED: &str = "DRAWLOOM_RESULTS_INTERRUPTED";
+
+    /// A row that takes the program down, as a signal would.
+    struct Interruption;
+
+    impl Serialize for Interruption {
+        fn serialize<S: Serializer>(&self, _serializer: S) -> Result<S::Ok, S::Error> {
+            process::abort()
+        }
+    }
+
+    #[test]
+    fn an_interrupt_leaves_the_results_of_the_run_before() -> Result<(), Box<dyn Error>> {
+        let name = format!("interrupted-{}.json", env::var(INTERRUPTED).unwrap_or(process::id().to_string()));
+        if env::var_os(INTERRUPTED).is_some() {
+            // Far more than a buffer of a file holds.
+            write_json(&name, &(vec!["new"; 100_000], Interruption))?;
+        }
+        write_json(&name, &["old"])?;
+        let test = "results::tests::an_interrupt_leaves_the_results_of_the_run_before";
+        let interrupted = Command::new(env::current_exe()?)
+            .args(["--exact", test])
+            .env(INTERRUPTED, process::id().to_string())
+            .output()?;
+        let path = file(&name)?;
+        let left = fs::read_to_string(&path)?;
+        fs::remove_file(path)?;
+        assert!(!interrupted.status.success());
+        assert_eq!(left, "[\n  \"old\"\n]\n");
+        Ok(())
+    }
+}

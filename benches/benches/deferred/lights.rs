@@ -23,6 +23,7 @@ use crate::report::milliseconds;
 pub struct Row {
     backend: BackendName,
     pipeline: Pipeline,
+    workers: usize,
     lights: usize,
     processes: usize,
     draws: usize,
@@ -31,7 +32,7 @@ pub struct Row {
     #[serde(rename = "processor_ms")]
     cpu_ms: f64,
     device_ms: Option<f64>,
-    /// Additional CPU time per additional light, against the row above.
+    /// Additional CPU time per additional light, against the row above, of the same pipeline and number of workers.
     #[serde(rename = "ns_a_light")]
     ns_per_light: Option<f64>,
 }
@@ -51,8 +52,6 @@ enum Pipeline {
 }
 
 impl Pipeline {
-    const ALL: [Self; 4] = [Self::Deferred, Self::DrawPerLight, Self::LoopOverLights, Self::Clustered];
-
     fn name(self) -> &'static str {
         match self {
             Self::Deferred => "deferred",
@@ -63,22 +62,28 @@ impl Pipeline {
     }
 }
 
-/// One worker, so that the times compare the sum of the work.
-const WORKERS: usize = 1;
-
 /// # Errors
 /// Returns an error if a frame cannot be drawn, an object or light is not visible, or pipelines draw different pictures.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
+pub fn measure(
+    extent: &Extent,
+    backend: BackendName,
+    workers: &[usize],
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut block = Block::new(backend, progress);
+    let of_this_crate = [Pipeline::Deferred, Pipeline::LoopOverLights];
+    let parallel =
+        of_this_crate.into_iter().flat_map(|pipeline| workers.iter().map(move |&workers| (pipeline, workers)));
+    let pipelines: Vec<_> = parallel.chain([(Pipeline::DrawPerLight, 1), (Pipeline::Clustered, 1)]).collect();
     let mut drawn = Vec::new();
     for &lights in extent.lights {
         let field = Field { lights, ..Field::default() };
         let scene = Rc::new(field.scene(extent)?);
-        for pipeline in Pipeline::ALL {
+        for &(pipeline, workers) in &pipelines {
             let scene = Rc::clone(&scene);
             match pipeline {
-                Pipeline::Deferred => block.add(scene, WORKERS, |builder| builder.deferred(Deferred::to_picture()))?,
-                Pipeline::LoopOverLights => block.add(scene, WORKERS, loop_over_lights)?,
+                Pipeline::Deferred => block.add(scene, workers, |builder| builder.deferred(Deferred::to_picture()))?,
+                Pipeline::LoopOverLights => block.add(scene, workers, loop_over_lights)?,
                 Pipeline::DrawPerLight => {
                     let contender = PlainForward::new(&backend.open()?, &scene.as_scene_ref(), DrawPerLight::new)?;
                     block.add_contender(scene, Box::new(contender));
@@ -88,20 +93,21 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
                     block.add_contender(scene, Box::new(contender));
                 }
             }
-            drawn.push((pipeline, field));
+            drawn.push(((pipeline, workers), field));
         }
     }
     let settings = block.measure(extent, "lights")?;
 
     let mut rows: Vec<Row> = Vec::new();
-    for pipeline in Pipeline::ALL {
-        for (setting, (_, field)) in settings.iter().zip(&drawn).filter(|(_, (own, _))| *own == pipeline) {
+    for &(pipeline, workers) in &pipelines {
+        for (setting, (_, field)) in settings.iter().zip(&drawn).filter(|(_, (own, _))| *own == (pipeline, workers)) {
             check_visible(setting, *field, extent)?;
             let cpu_ms = milliseconds(setting.cpu());
-            let above = rows.last().filter(|row| row.pipeline == pipeline);
+            let above = rows.last().filter(|row| (row.pipeline, row.workers) == (pipeline, workers));
             rows.push(Row {
                 backend,
                 pipeline,
+                workers,
                 lights: field.lights,
                 processes: setting.counts().processes,
                 draws: setting.counts().draws,
@@ -115,7 +121,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     if backend == BackendName::Adapter {
         for &lights in extent.lights {
             let of_these = settings.iter().zip(&drawn).filter(|(_, (_, field))| field.lights == lights);
-            check_pictures(lights, of_these.map(|(setting, (pipeline, _))| (*pipeline, setting)))?;
+            check_pictures(lights, of_these.map(|(setting, ((pipeline, _), _))| (*pipeline, setting)))?;
         }
     }
     Ok(rows)
@@ -167,15 +173,14 @@ fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
 const MAX_DIFFERENT: f64 = 2e-4;
 
 pub fn print(rows: &[Row]) {
-    print_line!(
-        "Lights over a field of boxes, 1 worker. Draws: batches of objects, and one for each process that draws lights."
-    );
+    print_line!("Lights over a field of boxes. Draws: batches of objects, and one for each process that draws lights.");
     print_line!(
         "Objects: the number of drawn objects. ns per light: additional CPU time per additional light, against the row above.\n"
     );
     let mut table = Table::new(&[
         "backend",
         "pipeline",
+        "workers",
         "lights",
         "processes",
         "draws",
@@ -188,6 +193,7 @@ pub fn print(rows: &[Row]) {
         table.row([
             row.backend.name().to_owned(),
             row.pipeline.name().to_owned(),
+            row.workers.to_string(),
             row.lights.to_string(),
             row.processes.to_string(),
             row.draws.to_string(),

@@ -3,13 +3,14 @@
 //!
 //!     cargo bench -p drawloom-benches --bench deferred
 //!     cargo bench -p drawloom-benches --bench deferred -- --quick
+//!     cargo bench -p drawloom-benches --bench deferred -- --backend noop --workers 1,4
 //!
 //! A block is one table on one backend: wgpu's `noop`, which measures the CPU alone, or the machine's adapter. The settings of a block
-//! are interleaved, one frame each per round. The tables show medians. Without an adapter its blocks are left out.
-//! The forward pipelines:
+//! are interleaved, one frame each per round. The tables show medians. Without an adapter its blocks are left out. Pipelines of this crate
+//! run on each number of workers. The forward pipelines:
 //!
 //! - *loop per pixel* is a process of this crate, whose shader loops over all lights that reach the view.
-//! - *draw per light* is written in plain wgpu: it draws all objects, and then adds each light to the objects that it reaches.
+//! - *draw per light* is written in plain wgpu, on one thread: it draws all objects, and then adds each light to the objects that it reaches.
 //! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its cluster.
 //!
 //! `target/drawloom/deferred.json` has the same.
@@ -26,25 +27,22 @@ mod report;
 mod shadows;
 
 use std::error::Error;
+use std::process::ExitCode;
 
 use clap::Parser;
-use drawloom_benches::backends;
-use drawloom_benches::backends::BackendName;
+use drawloom_benches::arguments::{BackendArguments, WorkersArguments};
+use drawloom_benches::backends::adapter_name;
 use drawloom_benches::harness::progress_bar;
-use drawloom_output::print_diagnostic;
-use std::process::ExitCode;
 
 use report::Report;
 
 /// Measures the deferred pipeline.
 #[derive(Parser)]
 struct Arguments {
-    /// Runs few rounds, for a first impression.
-    #[arg(long)]
-    quick: bool,
-    /// Cargo passes it under `cargo bench`; without it, as under `cargo test --benches`, each setting is only tried.
-    #[arg(long, hide = true)]
-    bench: bool,
+    #[command(flatten)]
+    backend: BackendArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
 }
 
 /// The size of the measurement.
@@ -76,16 +74,6 @@ impl Extent {
         lights: &[0, 1, 30, 1_000],
         shadow_maps: &[0, 1, 16],
     };
-    const TRIAL: Self =
-        Self { name: "trial", rounds: [1, 1], picture: [64, 36], boxes: 50, lights: &[0, 1, 4], shadow_maps: &[0, 2] };
-
-    fn new(arguments: &Arguments) -> Self {
-        match (arguments.bench, arguments.quick) {
-            (false, _) => Self::TRIAL,
-            (true, true) => Self::QUICK,
-            (true, false) => Self::FULL,
-        }
-    }
 }
 
 fn main() -> ExitCode {
@@ -94,22 +82,19 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn Error>> {
     let arguments: Arguments = drawloom_output::parse_arguments();
-    let extent = Extent::new(&arguments);
-    let adapter = backends::adapter_name();
-    if adapter.is_none() {
-        print_diagnostic!("no graphics adapter found: device times are left out");
-    }
+    let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
+    let (backends, workers) = (arguments.backend.backends()?, arguments.workers.counts());
 
     let progress = progress_bar("frames");
-    let mut report = Report::new(&extent, adapter);
-    for &backend in BackendName::available() {
-        report.lights.extend(lights::measure(&extent, backend, &progress)?);
-        report.shadows.extend(shadows::measure(&extent, backend, &progress)?);
-        report.depth_pre_pass.extend(pre_pass::measure(&extent, backend, &progress)?);
+    let mut report = Report::new(&extent, adapter_name());
+    for backend in backends {
+        report.lights.extend(lights::measure(&extent, backend, &workers, &progress)?);
+        report.shadows.extend(shadows::measure(&extent, backend, &workers, &progress)?);
+        report.depth_pre_pass.extend(pre_pass::measure(&extent, backend, &workers, &progress)?);
     }
     progress.finish_and_clear();
     report.print();
-    if arguments.bench && !arguments.quick {
+    if !arguments.backend.is_quick() {
         report.write()?;
     }
     Ok(())

@@ -22,6 +22,7 @@ use crate::report::milliseconds;
 pub struct Row {
     backend: BackendName,
     scene: &'static str,
+    workers: usize,
     depth_pre_pass: bool,
     draws: usize,
     #[serde(rename = "processor_ms")]
@@ -31,7 +32,12 @@ pub struct Row {
 
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
+pub fn measure(
+    extent: &Extent,
+    backend: BackendName,
+    workers: &[usize],
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut colonnade = demo::colonnade()?;
     for camera in &mut colonnade.cameras {
         camera.size = extent.picture;
@@ -45,16 +51,19 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     let mut names = Vec::new();
     for (name, scene) in scenes {
         let scene = Rc::new(scene);
-        for depth_pre_pass in [false, true] {
-            let deferred = Deferred::to_picture().depth_pre_pass(depth_pre_pass);
-            block.add(Rc::clone(&scene), WORKERS, |builder| builder.deferred(deferred))?;
-            names.push((name, depth_pre_pass));
+        for &workers in workers {
+            for depth_pre_pass in [false, true] {
+                let deferred = Deferred::to_picture().depth_pre_pass(depth_pre_pass);
+                block.add(Rc::clone(&scene), workers, |builder| builder.deferred(deferred))?;
+                names.push((name, workers, depth_pre_pass));
+            }
         }
     }
     let settings = block.measure(extent, "depth pre-pass")?;
-    let row = |(setting, (scene, depth_pre_pass)): (&Setting, (&'static str, bool))| Row {
+    let row = |(setting, (scene, workers, depth_pre_pass)): (&Setting, (&'static str, usize, bool))| Row {
         backend,
         scene,
+        workers,
         depth_pre_pass,
         draws: setting.counts().draws,
         cpu_ms: milliseconds(setting.cpu()),
@@ -62,9 +71,6 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     };
     Ok(settings.iter().zip(names).map(row).collect())
 }
-
-/// One worker, so that the times compare the sum of the work.
-const WORKERS: usize = 1;
 
 /// The order in which walls are added to the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,12 +102,13 @@ fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
 }
 
 pub fn print(rows: &[Row]) {
-    print_line!("The depth pre-pass, 1 worker.\n");
-    let mut table = Table::new(&["backend", "scene", "pre-pass", "draws", "CPU ms", "device ms"]);
+    print_line!("The depth pre-pass.\n");
+    let mut table = Table::new(&["backend", "scene", "workers", "pre-pass", "draws", "CPU ms", "device ms"]);
     for row in rows {
         table.row([
             row.backend.name().to_owned(),
             row.scene.to_owned(),
+            row.workers.to_string(),
             if row.depth_pre_pass { "on" } else { "off" }.to_owned(),
             row.draws.to_string(),
             format!("{:.3}", row.cpu_ms),

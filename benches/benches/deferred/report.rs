@@ -42,10 +42,7 @@ impl Report {
         print_line!(
             "{extent} run: medians of {noop} frames on noop and {adapter_rounds} on the adapter, {width} × {height} pixels"
         );
-        print_line!(
-            "{boxes} boxes in the field{}",
-            if *extent == "trial" { "; a trial run: the figures are meaningless" } else { "" }
-        );
+        print_line!("{boxes} boxes in the field{}", if *extent == "full" { "" } else { " (meaningless figures)" });
         print_line!("adapter: {}", adapter.as_deref().unwrap_or("none"));
         print_line!(
             "CPU ms: from the scene's hand-over to the return of submit; device ms: from the call of submit until drawn\n"

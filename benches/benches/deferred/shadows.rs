@@ -2,7 +2,6 @@
 
 use std::error::Error;
 use std::rc::Rc;
-use std::thread;
 
 use drawloom::process::Deferred;
 use drawloom_benches::backends::BackendName;
@@ -28,25 +27,29 @@ pub struct Row {
     #[serde(rename = "processor_ms")]
     cpu_ms: f64,
     device_ms: Option<f64>,
-    /// Speed-up of the CPU time over one worker.
+    /// Speed-up of the CPU time over the fewest workers.
     speed_up: f64,
 }
 
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
-    let workers = [1, thread::available_parallelism()?.get().max(2)];
+pub fn measure(
+    extent: &Extent,
+    backend: BackendName,
+    workers: &[usize],
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let mut block = Block::new(backend, progress);
     for &shadow_maps in extent.shadow_maps {
         let scene = Rc::new(Field { shadow_maps, ..Field::default() }.scene(extent)?);
-        for workers in workers {
+        for &workers in workers {
             block.add(Rc::clone(&scene), workers, |builder| builder.deferred(Deferred::to_picture()))?;
         }
     }
     let settings = block.measure(extent, "shadows")?;
     let mut rows = Vec::new();
     for (settings, &shadow_maps) in settings.chunks(workers.len()).zip(extent.shadow_maps) {
-        for (setting, workers) in settings.iter().zip(workers) {
+        for (setting, &workers) in settings.iter().zip(workers) {
             rows.push(Row {
                 backend,
                 shadow_maps,
@@ -64,7 +67,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
 
 pub fn print(rows: &[Row]) {
     print_line!(
-        "Spot lights that cast shadows over the same field. Objects: the number of drawn objects over all views.\n"
+        "Spot lights that cast shadows over the same field. Objects: the number of drawn objects over all views. Speed-up: over the fewest workers.\n"
     );
     let mut table =
         Table::new(&["backend", "shadow maps", "workers", "views", "objects", "CPU ms", "device ms", "speed-up"]);

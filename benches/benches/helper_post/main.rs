@@ -56,7 +56,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let quick = arguments.is_quick();
     let progress = progress_bar("rounds");
     let (mut rates, mut errors) = (Vec::new(), Vec::new());
-    for backend in arguments.backends() {
+    for backend in arguments.backends()? {
         rates.extend(rates::measure(backend, quick, &progress)?);
         if backend == BackendName::Adapter {
             errors = errors::measure(quick)?;

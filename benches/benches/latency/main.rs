@@ -54,7 +54,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let quick = arguments.is_quick();
     let progress = progress_bar("rounds");
     let mut schemes = Vec::new();
-    for backend in arguments.backends() {
+    for backend in arguments.backends()? {
         schemes.extend(schemes::measure(backend, quick, &progress)?);
     }
     let overlap = overlap::measure(quick, &progress)?;

@@ -58,7 +58,7 @@ fn predicted(rows: &[&Row], backend: BackendName, workers: usize) -> Lines {
             };
             rows.iter().find(matches).map(|row| (workers as f64, row.speedup_vs_serial))
         };
-        let measured = (1..=workers.ilog2()).filter_map(|power| adaptive(1 << power, false));
+        let measured = (2..=workers).filter_map(|count| adaptive(count, false));
         let beyond = PREDICTED.into_iter().filter(|&count| count > workers).filter_map(|count| adaptive(count, true));
         (scene.to_owned(), [(1.0, 1.0)].into_iter().chain(measured).chain(beyond).collect())
     };

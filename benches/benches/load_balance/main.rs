@@ -4,8 +4,9 @@
 //!     cargo bench -p drawloom-benches --bench load_balance
 //!     cargo bench -p drawloom-benches --bench load_balance -- --quick
 //!     cargo bench -p drawloom-benches --bench load_balance -- --backend noop --scene uneven --scene interrupted
+//!     cargo bench -p drawloom-benches --bench load_balance -- --workers 4,8
 //!
-//! A block is one scene on one backend. Its modes are interleaved; a sample is as many frames as fill some milliseconds, from
+//! A block is one scene on one backend and one number of workers. Its modes are interleaved; a sample is as many frames as fill some milliseconds, from
 //! hand-over to the return of submit. The first half of the rounds determines the best fixed mode, and the second half gives the
 //! results: in the rounds that select it, the best of seven modes is also the luckiest. A ratio is the median of the
 //! rounds' own ratios. Large scenes are measured on `noop` alone.
@@ -27,12 +28,11 @@ mod scenes;
 
 use std::error::Error;
 use std::process::ExitCode;
-use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
 use drawloom::report::SchedulerCosts;
-use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::arguments::{BackendArguments, WorkersArguments};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
 
@@ -45,6 +45,8 @@ use scenes::Case;
 struct Arguments {
     #[command(flatten)]
     backend: BackendArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
     /// Measures this scene only. May be repeated.
     #[arg(long = "scene", value_parser = scenes::NAMES)]
     scenes: Vec<String>,
@@ -91,10 +93,10 @@ fn run() -> Result<(), Box<dyn Error>> {
     let costs = SchedulerCosts::measure()?;
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
-    for backend in arguments.backend.backends() {
+    for backend in arguments.backend.backends()? {
         let is_measured = |case: &&Case| backend == BackendName::Noop || !case.is_large;
         for case in cases.iter().filter(is_measured) {
-            for workers in worker_counts()? {
+            for workers in arguments.workers.parallel_counts() {
                 let block = Block { case, backend, workers, costs, extent: &extent, progress: &progress };
                 report.add(&block, block.measure()?);
             }
@@ -106,10 +108,4 @@ fn run() -> Result<(), Box<dyn Error>> {
         report.write()?;
     }
     Ok(())
-}
-
-/// The powers of two from 2 up to the number of cores.
-fn worker_counts() -> Result<Vec<usize>, Box<dyn Error>> {
-    let available = thread::available_parallelism()?.get().max(2);
-    Ok((1..=available.ilog2()).map(|power| 1 << power).collect())
 }

@@ -93,7 +93,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
-    for backend in arguments.backend.backends() {
+    for backend in arguments.backend.backends()? {
         for &objects in extent.objects {
             report.scenarios.extend(scenario::measure(&extent, backend, objects, &progress)?);
         }

@@ -50,10 +50,10 @@ fn clouds_of_fifty(objects: usize) -> Result<Scene, Failure> {
 
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
-pub fn measure(extent: &Extent, progress: &ProgressBar) -> Result<Vec<ExtentRow>, Failure> {
+pub fn measure(extent: &Extent, workers: &[usize], progress: &ProgressBar) -> Result<Vec<ExtentRow>, Failure> {
     let mut contenders = Vec::new();
     for (name, motion, objects, make) in SCENES {
-        for workers in [1, 2] {
+        for &workers in workers {
             let technique = Box::new(Drawloom::new(BackendName::Noop.open()?, workers, true)?);
             let world = Moving::new(make(objects * extent.objects / Extent::FULL.objects)?, motion);
             contenders.push(Contender { name, workers, motion, technique, world });

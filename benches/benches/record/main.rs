@@ -3,6 +3,7 @@
 //!     cargo bench -p drawloom-benches --bench record
 //!     cargo bench -p drawloom-benches --bench record -- --quick
 //!     cargo bench -p drawloom-benches --bench record -- --backend noop
+//!     cargo bench -p drawloom-benches --bench record -- --workers 1,4
 //!
 //! In the scene *moving*, every object moves, and the engine says nothing about it. In *one percent moving*, *still* and *still, cameras
 //! moving* it says what moved. Techniques that issue 64 instanced draws a camera have a table of their own:
@@ -52,7 +53,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::arguments::{BackendArguments, WorkersArguments};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
 
@@ -70,6 +71,8 @@ pub const CAMERAS: usize = 4;
 struct Arguments {
     #[command(flatten)]
     backend: BackendArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
 }
 
 /// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
@@ -105,11 +108,12 @@ fn run() -> Result<(), Box<dyn Error>> {
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
-    for backend in arguments.backend.backends() {
-        report.measured.push(measure::measure(&extent, backend, &progress)?);
+    let (backends, workers) = (arguments.backend.backends()?, arguments.workers.counts());
+    for &backend in &backends {
+        report.measured.push(measure::measure(&extent, backend, &workers, &progress)?);
     }
-    if arguments.backend.backends().any(|backend| backend == BackendName::Noop) {
-        report.extents = extents::measure(&extent, &progress)?;
+    if backends.contains(&BackendName::Noop) {
+        report.extents = extents::measure(&extent, &workers, &progress)?;
     }
     progress.finish_and_clear();
     report.print();

@@ -39,9 +39,14 @@ pub struct Measured {
 
 /// # Errors
 /// Returns an error if a frame cannot be drawn, or if a technique draws another picture.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Measured, Failure> {
+pub fn measure(
+    extent: &Extent,
+    backend: BackendName,
+    workers: &[usize],
+    progress: &ProgressBar,
+) -> Result<Measured, Failure> {
     let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
-    let mut contenders = Contender::all(backend, extent.objects)?;
+    let mut contenders = Contender::all(backend, extent.objects, workers)?;
     progress.set_message(backend.name());
     pictures::compare(&mut contenders, backend == BackendName::Adapter)?;
 
@@ -65,10 +70,11 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
     };
     let find = |name, workers| find_in(name, workers, Motion::Everything);
     let [naive, one, two] = [("naive", 1), ("drawloom", 1), ("drawloom", 2)].map(|(name, workers)| find(name, workers));
-    // The ratio of two samples of the same round, so that a disturbance meets both.
+    // The ratio of two samples of the same round, so that a disturbance meets both; NaN if one of them is not measured.
     let speed_up = |slow: Option<usize>, fast: &[f64]| {
         let slow = slow.map_or(&[][..], |index| &times[index]);
-        median(slow.iter().zip(fast).map(|(slow, fast)| slow / fast))
+        let ratios: Vec<_> = slow.iter().zip(fast).map(|(slow, fast)| slow / fast).collect();
+        if ratios.is_empty() { f64::NAN } else { median(ratios) }
     };
     let speed_ups = [speed_up(one, two.map_or(&[][..], |two| &times[two])), speed_up(one, &independent_times)];
     let share = |drawloom: Option<usize>, peer: Option<usize>| {

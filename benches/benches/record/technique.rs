@@ -47,8 +47,8 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// All contenders, in the order of the table.
-    pub fn all(backend: BackendName, objects: usize) -> Result<Vec<Self>, Failure> {
+    /// All contenders with these numbers of workers, in the order of the table.
+    pub fn all(backend: BackendName, objects: usize, workers: &[usize]) -> Result<Vec<Self>, Failure> {
         let scene = around_one(CAMERAS, objects)?;
         let scene = &scene.as_scene_ref();
         let fixture = || Fixture::new(&backend.open()?, scene);
@@ -63,18 +63,16 @@ impl Contender {
             })
         };
         let of = |name, workers, technique| in_scene(name, workers, Motion::Everything, technique);
-        let mut all = vec![
-            of("naive", 1, Box::new(Naive::new(fixture()?, scene)) as Box<dyn Technique>)?,
-            of("rayon", 1, Box::new(Parallel::new(draw_only()?, 1)?))?,
-            of("rayon", 2, Box::new(Parallel::new(draw_only()?, 2)?))?,
-            of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?))?,
-            of("by-mesh", 1, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 1)?))?,
-            of("by-mesh", 2, Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), 2)?))?,
-        ];
-        let turning = Motion::EverythingInTurningViews;
-        for threads in [1, 2] {
-            let technique = Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), threads)?);
-            all.push(in_scene("by-mesh", threads, turning, technique)?);
+        let mut all = vec![of("naive", 1, Box::new(Naive::new(fixture()?, scene)) as Box<dyn Technique>)?];
+        for &threads in workers {
+            all.push(of("rayon", threads, Box::new(Parallel::new(draw_only()?, threads)?))?);
+        }
+        all.push(of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?))?);
+        for motion in [Motion::Everything, Motion::EverythingInTurningViews] {
+            for &threads in workers {
+                let technique = Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), threads)?);
+                all.push(in_scene("by-mesh", threads, motion, technique)?);
+            }
         }
         let strategies = [
             ("drawloom", None),
@@ -83,7 +81,7 @@ impl Contender {
             ("drawloom-cached", Some(RecordingStrategy::CachedBundles)),
             ("drawloom-indirect", Some(RecordingStrategy::Indirect)),
         ];
-        for workers in [1, 2] {
+        for &workers in workers {
             for (name, strategy) in strategies {
                 let opened = backend.open()?;
                 let opened = match strategy {

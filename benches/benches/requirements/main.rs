@@ -93,7 +93,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     let counts = if quick { [2, 1] } else { [WARM_UP, CHANGES] };
     let progress = progress_bar("frames");
     let mut rows = Vec::new();
-    for backend in arguments.backends() {
+    let backends = arguments.backends()?;
+    for &backend in &backends {
         // The processor draws the pixels of software drivers.
         let (numbers, size): (&[usize], _) = match backend {
             _ if quick => (&[100], [32, 32]),
@@ -105,7 +106,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         }
     }
     let mut unneeded = Vec::new();
-    for backend in arguments.backends() {
+    for backend in backends {
         let (rounds, size) = if quick { (2, [32, 32]) } else { (101, [480, 270]) };
         let scene = || if quick { Ok(everything()) } else { demo::colonnade() };
         unneeded.extend(unneeded::measure(backend, scene, rounds, size, &progress)?);

@@ -11,27 +11,30 @@ use rayon::prelude::*;
 use crate::row::{Contender, Order, Row};
 use crate::thread_team::ThreadTeam;
 use crate::timer::Pace;
-use crate::{Extent, Failure, WORKERS, pools};
+use crate::{Extent, Failure, pools};
 
 const NODES: usize = 24;
 
-pub fn frame(extent: &Extent) -> Row {
-    row("frame", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), extent.back_to_back())
+pub fn frame(extent: &Extent, workers: &[usize]) -> Row {
+    row("frame", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), extent.back_to_back(), workers)
 }
 
 /// The same with one frame every 5 ms, so that workers sleep and caches are cold.
-pub fn frame_cold(extent: &Extent) -> Row {
+pub fn frame_cold(extent: &Extent, workers: &[usize]) -> Row {
     let pace = Pace::Paced { interval: Duration::from_millis(5), frames: extent.cold_frames };
-    row("frame_cold", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), pace)
+    row("frame_cold", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), pace, workers)
 }
 
-pub fn fine(extent: &Extent) -> Row {
-    row("fine", Chain { nodes: NODES, jobs: 192 }, Duration::from_nanos(300), extent.back_to_back())
+pub fn fine(extent: &Extent, workers: &[usize]) -> Row {
+    row("fine", Chain { nodes: NODES, jobs: 192 }, Duration::from_nanos(300), extent.back_to_back(), workers)
 }
 
-fn row(name: &'static str, shape: Chain, job: Duration, pace: Pace<'static>) -> Row {
-    let mut contenders = vec![Contender::plain_loop(shape.all()), Contender::ideal(shape.all())];
-    contenders.extend(shape.contenders());
+fn row(name: &'static str, shape: Chain, job: Duration, pace: Pace<'static>, workers: &[usize]) -> Row {
+    let mut contenders = vec![Contender::plain_loop(shape.all())];
+    for &workers in workers {
+        contenders.push(Contender::ideal(shape.all(), workers));
+        contenders.extend(shape.contenders(workers));
+    }
     Row {
         name,
         unit: "µs per frame",
@@ -76,23 +79,23 @@ impl Chain {
     }
 
     /// All contenders but the plain loop.
-    pub fn contenders(self) -> Vec<Contender> {
+    pub fn contenders(self, workers: usize) -> Vec<Contender> {
         vec![
-            self.drawloom(),
-            self.drawloom_parallel_for(),
-            self.rayon(),
-            self.rayon_single(),
-            self.bevy_tasks(),
-            self.chili(),
-            self.std_threads(),
+            self.drawloom(workers),
+            self.drawloom_parallel_for(workers),
+            self.rayon(workers),
+            self.rayon_single(workers),
+            self.bevy_tasks(workers),
+            self.chili(workers),
+            self.std_threads(workers),
         ]
     }
 
     /// The schedule is compiled for each sample, so that it has no measurements of an earlier pool.
-    pub fn drawloom(self) -> Contender {
-        Contender::new("drawloom", move |work, timer| {
+    pub fn drawloom(self, workers: usize) -> Contender {
+        Contender::new("drawloom", workers, move |work, timer| {
             let mut schedule = self.schedule()?;
-            let scheduler = Scheduler::new(WORKERS)?;
+            let scheduler = Scheduler::new(workers)?;
             timer.frames(|| Ok(schedule.run(&scheduler, work)?))
         })
     }
@@ -107,9 +110,9 @@ impl Chain {
         Ok(graph.compile()?)
     }
 
-    pub fn drawloom_parallel_for(self) -> Contender {
-        Contender::new("drawloom parallel_for", move |work, timer| {
-            let scheduler = Scheduler::new(WORKERS)?;
+    pub fn drawloom_parallel_for(self, workers: usize) -> Contender {
+        Contender::new("drawloom parallel_for", workers, move |work, timer| {
+            let scheduler = Scheduler::new(workers)?;
             timer.frames(|| {
                 for jobs in self.ranges() {
                     scheduler.parallel_for(jobs.len(), 1, |range, _worker| {
@@ -122,9 +125,9 @@ impl Chain {
     }
 
     /// rayon itself decides how to split a node's jobs.
-    pub fn rayon(self) -> Contender {
-        Contender::new("rayon", move |work, timer| {
-            pools::rayon()?.install(|| {
+    pub fn rayon(self, workers: usize) -> Contender {
+        Contender::new("rayon", workers, move |work, timer| {
+            pools::rayon(workers)?.install(|| {
                 timer.frames(|| {
                     self.ranges().for_each(|jobs| jobs.into_par_iter().for_each(|job| work.job(job)));
                     Ok(())
@@ -134,9 +137,9 @@ impl Chain {
     }
 
     /// Split down to single jobs.
-    pub fn rayon_single(self) -> Contender {
-        Contender::new("rayon max_len 1", move |work, timer| {
-            pools::rayon()?.install(|| {
+    pub fn rayon_single(self, workers: usize) -> Contender {
+        Contender::new("rayon max_len 1", workers, move |work, timer| {
+            pools::rayon(workers)?.install(|| {
                 timer.frames(|| {
                     self.ranges().for_each(|jobs| jobs.into_par_iter().with_max_len(1).for_each(|job| work.job(job)));
                     Ok(())
@@ -146,9 +149,9 @@ impl Chain {
     }
 
     /// One scope per node, one task per job.
-    pub fn bevy_tasks(self) -> Contender {
-        Contender::new("bevy_tasks", move |work, timer| {
-            let pool = pools::bevy_tasks();
+    pub fn bevy_tasks(self, workers: usize) -> Contender {
+        Contender::new("bevy_tasks", workers, move |work, timer| {
+            let pool = pools::bevy_tasks(workers);
             timer.frames(|| {
                 for jobs in self.ranges() {
                     pool.scope(|scope| jobs.for_each(|job| scope.spawn(async move { work.job(job) })));
@@ -161,9 +164,9 @@ impl Chain {
     /// With one scope for all frames, which keeps the heartbeat going between them.
     ///
     /// It checks for idle threads at every join, which costs little beside such jobs.
-    pub fn chili(self) -> Contender {
-        Contender::new("chili", move |work, timer| {
-            let pool = pools::chili();
+    pub fn chili(self, workers: usize) -> Contender {
+        Contender::new("chili", workers, move |work, timer| {
+            let pool = pools::chili(workers);
             let mut scope = pool.scope();
             timer.frames(|| {
                 self.ranges().for_each(|jobs| pools::join_halves::<1>(&mut scope, jobs, work));
@@ -173,9 +176,9 @@ impl Chain {
     }
 
     /// With one scope per frame: no heartbeat between frames.
-    pub fn chili_scope_per_frame(self) -> Contender {
-        Contender::new("chili", move |work, timer| {
-            let pool = pools::chili();
+    pub fn chili_scope_per_frame(self, workers: usize) -> Contender {
+        Contender::new("chili", workers, move |work, timer| {
+            let pool = pools::chili(workers);
             timer.frames(|| {
                 let mut scope = pool.scope();
                 self.ranges().for_each(|jobs| pools::join_halves::<1>(&mut scope, jobs, work));
@@ -184,9 +187,9 @@ impl Chain {
         })
     }
 
-    pub fn std_threads(self) -> Contender {
-        let team = ThreadTeam::new(self.ranges().map(|jobs| jobs.end).collect(), 1);
-        Contender::new("std threads", move |work, timer| team.frames(work, timer))
+    pub fn std_threads(self, workers: usize) -> Contender {
+        let team = ThreadTeam::new(self.ranges().map(|jobs| jobs.end).collect(), 1, workers);
+        Contender::new("std threads", workers, move |work, timer| team.frames(work, timer))
     }
 }
 

@@ -12,7 +12,7 @@ use drawloom_testing::random::Random;
 
 use crate::row::{Contender, Order, Row};
 use crate::thread_team::ThreadTeam;
-use crate::{Extent, Failure, WORKERS, pools};
+use crate::{Extent, Failure, pools};
 
 const LAYER: usize = 64;
 
@@ -20,8 +20,24 @@ const LAYER: usize = 64;
 ///
 /// chili and std's threads have no dependencies between jobs. They run layer by layer, and the plain loop runs node by node:
 /// none of these has to find out which node is ready.
-pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
+pub fn row(name: &'static str, nodes: usize, extent: &Extent, workers: &[usize]) -> Row {
     let graph = Arc::new(Graph::new(nodes));
+    let mut contenders = vec![Contender::plain_loop(nodes)];
+    if !workers.contains(&1) {
+        contenders.push(drawloom("drawloom", 1, &graph));
+    }
+    for &workers in workers {
+        contenders.extend([
+            Contender::ideal(nodes, workers),
+            drawloom("drawloom", workers, &graph),
+            drawloom(ALWAYS_PARALLEL, workers, &graph),
+            rayon_inline(&graph, workers),
+            rayon(&graph, workers),
+            bevy_tasks(&graph, workers),
+            chili(&graph, workers),
+            std_threads(&graph, workers),
+        ]);
+    }
     Row {
         name,
         unit: "ns per node",
@@ -30,18 +46,7 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent) -> Row {
         work: Work::empty(),
         jobs: nodes,
         order: order(&graph),
-        contenders: vec![
-            Contender::plain_loop(nodes),
-            Contender::ideal(nodes),
-            drawloom("drawloom", WORKERS, &graph),
-            drawloom("drawloom", 1, &graph),
-            drawloom(ALWAYS_PARALLEL, WORKERS, &graph),
-            rayon_inline(&graph),
-            rayon(&graph),
-            bevy_tasks(&graph),
-            chili(&graph),
-            std_threads(&graph),
-        ],
+        contenders,
     }
 }
 
@@ -151,13 +156,12 @@ const ALWAYS_PARALLEL: &str = "drawloom always parallel";
 /// The schedule is compiled for each sample, so that it has no measurements of an earlier pool.
 fn drawloom(name: &'static str, workers: usize, graph: &Arc<Graph>) -> Contender {
     let graph = Arc::clone(graph);
-    let contender = Contender::new(name, move |work, timer| {
+    Contender::new(name, workers, move |work, timer| {
         let mut schedule = schedule(&graph)?;
         schedule.always_parallel(name == ALWAYS_PARALLEL);
         let scheduler = Scheduler::new(workers)?;
         timer.frames(|| Ok(schedule.run(&scheduler, work)?))
-    });
-    contender.with_workers(workers)
+    })
 }
 
 fn schedule(graph: &Graph) -> Result<Schedule<Empty>, Failure> {
@@ -174,7 +178,7 @@ fn schedule(graph: &Graph) -> Result<Schedule<Empty>, Failure> {
 }
 
 /// Runs the first node that becomes ready in place and spawns the others. This is the fastest hand-written scheme.
-fn rayon_inline(graph: &Arc<Graph>) -> Contender {
+fn rayon_inline(graph: &Arc<Graph>, workers: usize) -> Contender {
     fn run_on<'scope>(graph: &'scope Graph, mut node: u32, work: &'scope Work, scope: &rayon::Scope<'scope>) {
         loop {
             let mut ready = graph.run(node, work);
@@ -186,9 +190,9 @@ fn rayon_inline(graph: &Arc<Graph>) -> Contender {
         }
     }
     let graph = Arc::clone(graph);
-    Contender::new("rayon inline", move |work, timer| {
+    Contender::new("rayon inline", workers, move |work, timer| {
         let graph = &*graph;
-        pools::rayon()?.install(|| {
+        pools::rayon(workers)?.install(|| {
             timer.frames(|| {
                 rayon::scope(|scope| {
                     for root in graph.roots() {
@@ -202,16 +206,16 @@ fn rayon_inline(graph: &Arc<Graph>) -> Contender {
 }
 
 /// Spawns all nodes that become ready.
-fn rayon(graph: &Arc<Graph>) -> Contender {
+fn rayon(graph: &Arc<Graph>, workers: usize) -> Contender {
     fn run<'scope>(graph: &'scope Graph, node: u32, work: &'scope Work, scope: &rayon::Scope<'scope>) {
         for ready in graph.run(node, work) {
             scope.spawn(move |scope| run(graph, ready, work, scope));
         }
     }
     let graph = Arc::clone(graph);
-    Contender::new("rayon", move |work, timer| {
+    Contender::new("rayon", workers, move |work, timer| {
         let graph = &*graph;
-        pools::rayon()?.install(|| {
+        pools::rayon(workers)?.install(|| {
             timer.frames(|| {
                 rayon::scope(|scope| {
                     for root in graph.roots() {
@@ -225,7 +229,7 @@ fn rayon(graph: &Arc<Graph>) -> Contender {
 }
 
 /// Runs the first node that becomes ready in place and spawns the others.
-fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
+fn bevy_tasks(graph: &Arc<Graph>, workers: usize) -> Contender {
     fn spawn<'scope, 'env>(
         graph: &'env Graph,
         mut node: u32,
@@ -244,9 +248,9 @@ fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
         });
     }
     let graph = Arc::clone(graph);
-    Contender::new("bevy_tasks", move |work, timer| {
+    Contender::new("bevy_tasks", workers, move |work, timer| {
         let graph = &*graph;
-        let pool = pools::bevy_tasks();
+        let pool = pools::bevy_tasks(workers);
         timer.frames(|| {
             pool.scope(|scope| {
                 for root in graph.roots() {
@@ -258,10 +262,10 @@ fn bevy_tasks(graph: &Arc<Graph>) -> Contender {
     })
 }
 
-fn chili(graph: &Arc<Graph>) -> Contender {
+fn chili(graph: &Arc<Graph>, workers: usize) -> Contender {
     let ends: Vec<_> = graph.ends().collect();
-    Contender::new("chili by layers", move |work, timer| {
-        let pool = pools::chili();
+    Contender::new("chili by layers", workers, move |work, timer| {
+        let pool = pools::chili(workers);
         let mut scope = pool.scope();
         timer.frames(|| {
             let mut begin = 0;
@@ -276,7 +280,7 @@ fn chili(graph: &Arc<Graph>) -> Contender {
 }
 
 /// A ticket claims 8 nodes, as it costs far more than a node.
-fn std_threads(graph: &Arc<Graph>) -> Contender {
-    let team = ThreadTeam::new(graph.ends().collect(), 8);
-    Contender::new("std threads by layers", move |work, timer| team.frames(work, timer)).with_easier_task()
+fn std_threads(graph: &Arc<Graph>, workers: usize) -> Contender {
+    let team = ThreadTeam::new(graph.ends().collect(), 8, workers);
+    Contender::new("std threads by layers", workers, move |work, timer| team.frames(work, timer)).with_easier_task()
 }

@@ -3,11 +3,12 @@
 //!     cargo bench -p drawloom-benches --bench scheduler
 //!     cargo bench -p drawloom-benches --bench scheduler -- --quick
 //!     cargo bench -p drawloom-benches --bench scheduler -- --row frame --row fine
+//!     cargo bench -p drawloom-benches --bench scheduler -- --workers 2,8
 //!
 //! Contenders are interleaved: in each round those of one row run once in random order, then those of the next row. A run
-//! builds a pool of two workers, warms it up, measures, and drops it, so that pools do not disturb each other. Each contender
-//! is checked before it is measured. Each row's file explains the row. The table shows medians; `target/drawloom/scheduler.json`
-//! has the same.
+//! builds a pool, warms it up, measures, and drops it, so that pools do not disturb each other. Each contender is checked before it
+//! is measured. All contenders run on each number of workers, the calling thread included, and are compared with peers of as many.
+//! Each row's file explains the row. The table shows medians; `target/drawloom/scheduler.json` has the same.
 
 mod chains;
 mod flat;
@@ -26,15 +27,13 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::arguments::{ExtentArguments, WorkersArguments};
 use drawloom_benches::harness::{Harness, Rounds, progress_bar};
+use drawloom_output::print_diagnostic;
 
 use report::Report;
 use row::Row;
 use timer::Pace;
-
-/// Threads that run jobs: the calling thread, and one more.
-pub const WORKERS: usize = 2;
 
 /// Why a contender failed.
 pub type Failure = Box<dyn Error + Send + Sync>;
@@ -44,6 +43,8 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 struct Arguments {
     #[command(flatten)]
     extent: ExtentArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
     /// Measures this row only. May be repeated.
     #[arg(long = "row", value_parser = ROWS)]
     rows: Vec<String>,
@@ -103,19 +104,20 @@ impl Extent {
         Pace::BackToBack { duration: self.sample }
     }
 
-    fn row(&self, name: &str) -> Result<Row, Failure> {
+    /// The row of that name, with contenders of each of these numbers of workers.
+    fn row(&self, name: &str, workers: &[usize]) -> Result<Row, Failure> {
         match name {
-            "graph_1k" => Ok(graph::row("graph_1k", self.graphs[0], self)),
-            "graph_4k" => Ok(graph::row("graph_4k", self.graphs[1], self)),
-            "graph_10k" => Ok(graph::row("graph_10k", self.graphs[2], self)),
-            "frame" => Ok(chains::frame(self)),
-            "frame_cold" => Ok(chains::frame_cold(self)),
-            "fine" => Ok(chains::fine(self)),
-            "flat" => Ok(flat::row(self)),
-            "wake" => Ok(wake::row(self)),
-            "idle" => Ok(idle::idle(self)),
-            "asleep" => Ok(idle::asleep(self)),
-            "tiny" => Ok(tiny::row(self)),
+            "graph_1k" => Ok(graph::row("graph_1k", self.graphs[0], self, workers)),
+            "graph_4k" => Ok(graph::row("graph_4k", self.graphs[1], self, workers)),
+            "graph_10k" => Ok(graph::row("graph_10k", self.graphs[2], self, workers)),
+            "frame" => Ok(chains::frame(self, workers)),
+            "frame_cold" => Ok(chains::frame_cold(self, workers)),
+            "fine" => Ok(chains::fine(self, workers)),
+            "flat" => Ok(flat::row(self, workers)),
+            "wake" => Ok(wake::row(self, workers)),
+            "idle" => Ok(idle::idle(self, workers)),
+            "asleep" => Ok(idle::asleep(self, workers)),
+            "tiny" => Ok(tiny::row(self, workers)),
             _ => Err(format!("there is no row {name:?}").into()),
         }
     }
@@ -135,7 +137,14 @@ fn run() -> Result<(), Failure> {
     // The report compares a cold frame with the time of a wake-up.
     let is_needed = |name: &str| is_requested(name) || name == "wake" && is_requested("frame_cold");
     let rows = ROWS.into_iter().filter(|name| is_needed(name) && is_available(name));
-    let mut rows: Vec<Row> = rows.map(|name| extent.row(name)).collect::<Result<_, _>>()?;
+    let workers = arguments.workers.parallel_counts();
+    let mut rows: Vec<Row> = rows.map(|name| extent.row(name, &workers)).collect::<Result<_, _>>()?;
+    for row in rows.extract_if(.., |row| row.contenders.is_empty()) {
+        print_diagnostic!("The row {} is left out: it takes two workers or more", row.name);
+    }
+    if rows.is_empty() {
+        return Err("there is nothing to measure".into());
+    }
 
     let progress = progress_bar("runs");
     rows.iter_mut().try_for_each(Row::check)?;

@@ -1,28 +1,28 @@
-//! The pools of the other executors, with [`WORKERS`] threads that run jobs, the calling thread included.
+//! The pools of the other executors, with as many threads that run jobs as asked for, the calling thread included.
 
 use std::num::NonZero;
 use std::ops::Range;
 
 use drawloom_benches::work::Work;
 
-use crate::{Failure, WORKERS};
+use crate::Failure;
 
 /// Frames must run inside `install`: the calling thread sleeps there, and one of the pool's threads replaces it.
 ///
 /// # Errors
 /// Returns an error if a thread cannot be started.
-pub fn rayon() -> Result<rayon::ThreadPool, Failure> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(WORKERS).build()?)
+pub fn rayon(workers: usize) -> Result<rayon::ThreadPool, Failure> {
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(workers).build()?)
 }
 
 /// A thread that waits for a scope runs its tasks, and bevy_tasks does not count it.
-pub fn bevy_tasks() -> bevy_tasks::TaskPool {
-    bevy_tasks::TaskPoolBuilder::new().num_threads(WORKERS - 1).build()
+pub fn bevy_tasks(workers: usize) -> bevy_tasks::TaskPool {
+    bevy_tasks::TaskPoolBuilder::new().num_threads(workers - 1).build()
 }
 
 /// chili counts the calling thread, but not the one that only sets heartbeats.
-pub fn chili() -> chili::ThreadPool {
-    chili::ThreadPool::with_config(chili::Config { thread_count: NonZero::new(WORKERS), ..chili::Config::default() })
+pub fn chili(workers: usize) -> chili::ThreadPool {
+    chili::ThreadPool::with_config(chili::Config { thread_count: NonZero::new(workers), ..chili::Config::default() })
 }
 
 /// Splits the range in halves down to single jobs, as join is all that chili offers. Every `TIMES`-th join checks for idle threads.

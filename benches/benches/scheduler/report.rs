@@ -61,12 +61,14 @@ impl Report {
     pub fn print(&self) {
         let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
         print_line!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
-        print_line!("workers: threads that run jobs, the caller's included; ratio: to the best of the peers");
+        print_line!(
+            "workers: threads that run jobs, the caller's included; ratio: to the best of the peers of as many, or of all"
+        );
         print_line!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
         let mut table = Table::new(&["row", "executor", "workers", "median", "p95", "unit", "ratio"]);
         for line in &self.lines {
             let Line { row, executor, workers, median, p95, unit, .. } = line;
-            let ratio = self.best_peer(row).map_or(String::new(), |best| format!("{:.2}", median / best));
+            let ratio = self.best_peer(row, *workers).map_or(String::new(), |best| format!("{:.2}", median / best));
             let figures = [median, p95].map(|figure| format!("{figure:.decimals$}", decimals = decimals(*figure)));
             let [median, p95] = figures;
             table.row([
@@ -85,25 +87,30 @@ impl Report {
 
     /// A frame that finds all workers asleep has to wake them. Prints its distance from the ideal plus the time of a wake-up.
     fn print_cold_target(&self) {
-        let (Some(wake), Some(ideal)) = (self.median("wake", "drawloom"), self.median("frame_cold", "ideal")) else {
-            return;
-        };
-        let target = ideal + 1.5 * wake;
-        print_line!("frame_cold: a wake takes {wake:.1} µs (row wake, drawloom); ideal + 1.5 wakes = {target:.1} µs");
         let own_lines = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
-        for Line { executor, median, .. } in own_lines {
-            print_line!("frame_cold: {executor} takes {:+.1} µs against that", median - target);
+        for &Line { executor, workers, median, .. } in own_lines {
+            let figures = (self.median("wake", "drawloom", workers), self.median("frame_cold", "ideal", workers));
+            let (Some(wake), Some(ideal)) = figures else { continue };
+            let target = ideal + 1.5 * wake;
+            print_line!(
+                "frame_cold: {executor} on {workers} workers takes {:+.1} µs against {target:.1}, the ideal + 1.5 wakes of {wake:.1} (row wake, drawloom)",
+                median - target
+            );
         }
         print_line!();
     }
 
-    fn median(&self, row: &str, executor: &str) -> Option<f64> {
-        self.lines.iter().find(|line| line.row == row && line.executor == executor).map(|line| line.median)
+    fn median(&self, row: &str, executor: &str, workers: usize) -> Option<f64> {
+        let is_same = |line: &&Line| (line.row, line.executor, line.workers) == (row, executor, workers);
+        self.lines.iter().find(is_same).map(|line| line.median)
     }
 
-    fn best_peer(&self, row: &str) -> Option<f64> {
+    /// The best peer with as many workers, or of all where none has as many.
+    fn best_peer(&self, row: &str, workers: usize) -> Option<f64> {
         let peers = self.lines.iter().filter(|line| line.row == row && line.is_peer);
-        peers.map(|line| line.median).min_by(f64::total_cmp)
+        let equal = peers.clone().filter(|line| line.workers == workers);
+        let best = |lines: &mut dyn Iterator<Item = &Line>| lines.map(|line| line.median).min_by(f64::total_cmp);
+        best(&mut equal.into_iter()).or_else(|| best(&mut peers.into_iter()))
     }
 
     /// # Errors

@@ -5,8 +5,8 @@ use drawloom_benches::statistics::{median, percentile};
 use drawloom_benches::work::{Record, Work};
 use indicatif::ProgressBar;
 
+use crate::Failure;
 use crate::timer::{Pace, Timer};
-use crate::{Failure, WORKERS};
 
 type Run = Box<dyn FnMut(&Work, &mut Timer) -> Result<(), Failure>>;
 
@@ -27,21 +27,12 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// A contender with [`WORKERS`] workers.
-    pub fn new(name: &'static str, run: impl FnMut(&Work, &mut Timer) -> Result<(), Failure> + 'static) -> Self {
-        Self {
-            name,
-            workers: WORKERS,
-            divisor: 1,
-            is_easier: false,
-            jobs: None,
-            run: Box::new(run),
-            samples: Vec::new(),
-        }
-    }
-
-    pub fn with_workers(self, workers: usize) -> Self {
-        Self { workers, ..self }
+    pub fn new(
+        name: &'static str,
+        workers: usize,
+        run: impl FnMut(&Work, &mut Timer) -> Result<(), Failure> + 'static,
+    ) -> Self {
+        Self { name, workers, divisor: 1, is_easier: false, jobs: None, run: Box::new(run), samples: Vec::new() }
     }
 
     /// Runs only this many of the row's jobs, from the first on.
@@ -67,12 +58,12 @@ impl Contender {
                 Ok(())
             })
         };
-        Self::new("loop", run).with_workers(1).with_easier_task()
+        Self::new("loop", 1, run).with_easier_task()
     }
 
     /// The time of the plain loop, if splitting it among the workers were free.
-    pub fn ideal(jobs: usize) -> Self {
-        Self { name: "ideal", workers: WORKERS, ..Self::plain_loop(jobs) }.per(WORKERS)
+    pub fn ideal(jobs: usize, workers: usize) -> Self {
+        Self { name: "ideal", workers, ..Self::plain_loop(jobs) }.per(workers)
     }
 
     fn sample(&mut self, row: &str, work: &Work, pace: Pace) -> Result<Vec<f64>, Failure> {

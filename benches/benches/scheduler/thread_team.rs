@@ -7,14 +7,15 @@ use std::thread;
 use crossbeam_utils::CachePadded;
 use drawloom_benches::work::Work;
 
+use crate::Failure;
 use crate::timer::Timer;
-use crate::{Failure, WORKERS};
 
 /// The calling thread, and others that live for one sample. A thread claims the next jobs of a node by a ticket.
 pub struct ThreadTeam {
     /// The end of each node's jobs.
     ends: Vec<usize>,
     jobs_per_ticket: usize,
+    threads: usize,
     tickets: Vec<CachePadded<AtomicUsize>>,
     barrier: Barrier,
     is_over: AtomicBool,
@@ -22,10 +23,10 @@ pub struct ThreadTeam {
 
 impl ThreadTeam {
     /// `ends` has the end of each node's jobs. They begin at the end of those of the node before.
-    pub fn new(ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
+    pub fn new(ends: Vec<usize>, jobs_per_ticket: usize, threads: usize) -> Self {
         let tickets = ends.iter().map(|_| CachePadded::default()).collect();
-        let (barrier, is_over) = (Barrier::new(WORKERS), AtomicBool::new(false));
-        Self { ends, jobs_per_ticket, tickets, barrier, is_over }
+        let (barrier, is_over) = (Barrier::new(threads), AtomicBool::new(false));
+        Self { ends, jobs_per_ticket, threads, tickets, barrier, is_over }
     }
 
     /// # Errors
@@ -33,7 +34,7 @@ impl ThreadTeam {
     pub fn frames(&self, work: &Work, timer: &mut Timer) -> Result<(), Failure> {
         thread::scope(|scope| {
             self.is_over.store(false, Ordering::Relaxed);
-            for _ in 1..WORKERS {
+            for _ in 1..self.threads {
                 scope.spawn(|| {
                     loop {
                         self.barrier.wait();

@@ -9,10 +9,13 @@ use crate::chains::Chain;
 use crate::row::{Contender, Row};
 
 /// 7 jobs of 1 µs.
-pub fn row(extent: &Extent) -> Row {
+pub fn row(extent: &Extent, workers: &[usize]) -> Row {
     let chain = Chain { nodes: 1, jobs: 7 };
-    let mut contenders = vec![Contender::plain_loop(chain.all()), Contender::ideal(chain.all())];
-    contenders.extend(chain.contenders());
+    let mut contenders = vec![Contender::plain_loop(chain.all())];
+    for &workers in workers {
+        contenders.push(Contender::ideal(chain.all(), workers));
+        contenders.extend(chain.contenders(workers));
+    }
     Row {
         name: "tiny",
         unit: "µs per frame",

@@ -13,12 +13,31 @@ use drawloom_benches::work::Work;
 
 use crate::row::{Contender, Row};
 use crate::timer::{Pace, WakeLatency};
-use crate::{Extent, WORKERS, pools};
+use crate::{Extent, pools};
 
 /// chili is left out: it hands over a job only at a join, so a thread cannot submit a job and go on.
-pub fn row(extent: &Extent) -> Row {
-    let drawloom = Contender::new("drawloom", |_work, timer| {
-        let scheduler = Scheduler::new(WORKERS)?;
+pub fn row(extent: &Extent, workers: &[usize]) -> Row {
+    // One worker is the submitter.
+    let workers = workers.iter().filter(|&&workers| workers > 1);
+    let mut contenders: Vec<_> = workers.flat_map(|&workers| pool_contenders(workers)).collect();
+    if !contenders.is_empty() {
+        contenders.push(std_threads());
+    }
+    Row {
+        name: "wake",
+        unit: "µs",
+        scale: 1e6,
+        pace: Pace::Wakes { idle: Duration::from_millis(3), jobs: extent.wakes },
+        work: Work::empty(),
+        jobs: 0,
+        order: Box::new(|_record| Ok(())),
+        contenders,
+    }
+}
+
+fn pool_contenders(workers: usize) -> [Contender; 4] {
+    let drawloom = Contender::new("drawloom", workers, move |_work, timer| {
+        let scheduler = Scheduler::new(workers)?;
         timer.wakes(|latency| {
             Ok(scheduler.scope(|scope| {
                 latency.mark_submitted();
@@ -27,8 +46,8 @@ pub fn row(extent: &Extent) -> Row {
             })?)
         })
     });
-    let rayon = Contender::new("rayon", |_work, timer| {
-        pools::rayon()?.install(|| {
+    let rayon = Contender::new("rayon", workers, move |_work, timer| {
+        pools::rayon(workers)?.install(|| {
             timer.wakes(|latency| {
                 rayon::scope(|scope| {
                     latency.mark_submitted();
@@ -39,8 +58,8 @@ pub fn row(extent: &Extent) -> Row {
             })
         })
     });
-    let rayon_in_place = Contender::new("rayon in_place_scope", |_work, timer| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(WORKERS - 1).build()?;
+    let rayon_in_place = Contender::new("rayon in_place_scope", workers, move |_work, timer| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(workers - 1).build()?;
         timer.wakes(|latency| {
             pool.in_place_scope(|scope| {
                 latency.mark_submitted();
@@ -50,8 +69,8 @@ pub fn row(extent: &Extent) -> Row {
             Ok(())
         })
     });
-    let bevy_tasks = Contender::new("bevy_tasks", |_work, timer| {
-        let pool = pools::bevy_tasks();
+    let bevy_tasks = Contender::new("bevy_tasks", workers, move |_work, timer| {
+        let pool = pools::bevy_tasks(workers);
         timer.wakes(|latency| {
             pool.scope(|scope| {
                 latency.mark_submitted();
@@ -61,21 +80,12 @@ pub fn row(extent: &Extent) -> Row {
             Ok(())
         })
     });
-    Row {
-        name: "wake",
-        unit: "µs",
-        scale: 1e6,
-        pace: Pace::Wakes { idle: Duration::from_millis(3), jobs: extent.wakes },
-        work: Work::empty(),
-        jobs: 0,
-        order: Box::new(|_record| Ok(())),
-        contenders: vec![drawloom, rayon, rayon_in_place, bevy_tasks, std_threads()],
-    }
+    [drawloom, rayon, rayon_in_place, bevy_tasks]
 }
 
 /// A thread that parks until it has a job.
 fn std_threads() -> Contender {
-    Contender::new("std threads", |_work, timer| {
+    Contender::new("std threads", 2, |_work, timer| {
         let submitted: Mutex<Option<Arc<WakeLatency>>> = Mutex::new(None);
         let is_over = AtomicBool::new(false);
         let take = || submitted.lock().unwrap_or_else(PoisonError::into_inner).take();
