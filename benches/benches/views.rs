@@ -2,6 +2,7 @@
 //!
 //!     cargo bench -p drawloom-benches --bench views
 //!     cargo bench -p drawloom-benches --bench views -- --quick
+//!     cargo bench -p drawloom-benches --bench views -- --workers 1,4
 //!
 //! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is compared in a row is
 //! drawn in turn, and the table has the medians. All cameras move in every frame. `target/drawloom/views.json` has the same.
@@ -25,7 +26,7 @@ use drawloom::scene::{
 };
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
-use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::arguments::{ExtentArguments, WorkersArguments};
 use drawloom_benches::harness::{Harness, Rounds, WARM_UP, progress_bar};
 use drawloom_benches::mirror::{self, Mirror};
 use drawloom_benches::results;
@@ -42,6 +43,8 @@ use serde::Serialize;
 struct ViewsArguments {
     #[command(flatten)]
     extent: ExtentArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
     /// Draw so many views, and print the memory that they need in KiB.
     #[arg(long)]
     views: Option<usize>,
@@ -51,6 +54,8 @@ struct ViewsArguments {
 #[derive(Serialize)]
 struct Row {
     compared: &'static str,
+    /// Of the second; the first has as many, or one, if the numbers of workers are compared.
+    workers: usize,
     /// Objects that the views see, summed over those of the first frame, and of the second.
     seen: [usize; 2],
     microseconds: [f64; 2],
@@ -68,14 +73,23 @@ fn run() -> Result<(), Box<dyn Error>> {
     let quick = arguments.extent.is_quick();
     let (rounds, side) = if quick { (3, 20) } else { (1001, 100) };
     let progress = progress_bar("frames");
-    let rows = [mirror(side, rounds, &progress)?, many_views(side, rounds, &progress)?];
+    let workers = arguments.workers.counts();
+    let mut rows = Vec::new();
+    for &workers in &workers {
+        rows.push(mirror(side, workers, rounds, &progress)?);
+    }
+    for &workers in workers.iter().filter(|&&workers| workers > 1) {
+        rows.push(many_views(side, workers, rounds, &progress)?);
+    }
     progress.finish_and_clear();
 
-    let mut table = Table::new(&["compared", "objects seen", "first, µs", "second, µs", "difference, µs", "ratio"]);
-    for Row { compared, seen, microseconds: [first, second] } in &rows {
+    let mut table =
+        Table::new(&["compared", "workers", "objects seen", "first, µs", "second, µs", "difference, µs", "ratio"]);
+    for Row { compared, workers, seen, microseconds: [first, second] } in &rows {
         let seen = format!("{} and {}", seen[0], seen[1]);
         let [difference, ratio] = [format!("{:.1}", second - first), format!("{:.2}", first / second)];
-        table.row([(*compared).to_owned(), seen, format!("{first:.1}"), format!("{second:.1}"), difference, ratio]);
+        let [first, second] = [first, second].map(|time| format!("{time:.1}"));
+        table.row([(*compared).to_owned(), workers.to_string(), seen, first, second, difference, ratio]);
     }
     table.print();
 
@@ -137,21 +151,21 @@ fn resident_kib() -> Result<usize, Box<dyn Error>> {
     Ok(number.ok_or("the system does not tell how much memory a process has")?.parse()?)
 }
 
-/// A frame without a mirror and with one, on one worker.
-fn mirror(side: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
+/// A frame without a mirror and with one.
+fn mirror(side: usize, workers: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
     let scene = grid(side)?;
-    let runners = [Runner::new(1, false)?, Runner::new(1, true)?];
-    measure("without and with a small mirror, 1 worker", scene, runners, rounds, progress)
+    let runners = [Runner::new(workers, false)?, Runner::new(workers, true)?];
+    measure("without and with a small mirror", scene, runners, rounds, progress)
 }
 
-/// The same 64 views on one worker and on two.
-fn many_views(side: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
+/// The same 64 views on one worker and on several.
+fn many_views(side: usize, workers: usize, rounds: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
     let scene = grid(side)?;
-    let mut runners = [Runner::new(1, false)?, Runner::new(2, false)?];
+    let mut runners = [Runner::new(1, false)?, Runner::new(workers, false)?];
     for runner in &mut runners {
         runner.cameras = (0..64).map(|index| overhead(&format!("view {index}"), index as f64 * 5.0, 7)).collect();
     }
-    measure("64 views, 1 worker and 2", scene, runners, rounds, progress)
+    measure("64 views, on 1 worker and on all", scene, runners, rounds, progress)
 }
 
 fn measure(
@@ -161,6 +175,7 @@ fn measure(
     rounds: usize,
     progress: &ProgressBar,
 ) -> Result<Row, Box<dyn Error>> {
+    let workers = runners[1].renderer.scheduler().workers();
     let mut seen = Vec::new();
     for runner in &mut runners {
         seen.push(runner.frame(&scene)?.0);
@@ -168,7 +183,12 @@ fn measure(
     let times = Harness::new(Rounds { warm_up: WARM_UP, measured: rounds }, progress)
         .measure(&mut runners, |runner, _round| Ok::<_, Box<dyn Error>>(runner.frame(&scene)?.1))?;
     let microseconds = |times: &Vec<Duration>| median_duration(times.iter().copied()).as_secs_f64() * 1e6;
-    Ok(Row { compared, seen: [seen[0], seen[1]], microseconds: [microseconds(&times[0]), microseconds(&times[1])] })
+    Ok(Row {
+        compared,
+        workers,
+        seen: [seen[0], seen[1]],
+        microseconds: [microseconds(&times[0]), microseconds(&times[1])],
+    })
 }
 
 /// A square of boxes, 2 m apart, with a mirror in the middle.

@@ -12,7 +12,6 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::runner::{Runner, Sample};
-use crate::scenario::WORKERS;
 use crate::{Extent, world};
 
 /// A row of the table.
@@ -20,28 +19,36 @@ use crate::{Extent, world};
 pub struct Row {
     pub objects: usize,
     pub backend: BackendName,
+    pub workers: usize,
     pub ns_per_object_view: f64,
 }
 
-/// Measures all numbers of objects, interleaved.
+/// Measures all numbers of objects with all numbers of workers, interleaved.
 ///
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
-pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
+pub fn measure(
+    extent: &Extent,
+    backend: BackendName,
+    workers: &[usize],
+    progress: &ProgressBar,
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let rounds = Rounds { warm_up: backend.of(extent.growth_warm_up), measured: backend.of(extent.growth_rounds) };
     progress.set_message(format!("growth, {}", backend.name()));
-    let scheduler = Arc::new(Scheduler::new(WORKERS)?);
-    let open = |&objects: &usize| {
-        let runner = Runner::new(backend.open()?, &scheduler, false)?;
-        Ok::<_, Box<dyn Error>>((world::new(objects)?, runner))
-    };
-    let mut sizes = extent.growth.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let (mut sizes, mut runners) = (Vec::new(), Vec::new());
+    for &workers in workers {
+        let scheduler = Arc::new(Scheduler::new(workers)?);
+        for &objects in extent.growth {
+            sizes.push((objects, workers));
+            runners.push((world::new(objects)?, Runner::new(backend.open()?, &scheduler, false)?));
+        }
+    }
     let samples = Harness::new(rounds, progress)
-        .measure(&mut sizes, |(world, runner), _round| runner.sample(world, Duration::ZERO))?;
-    let row = |(&objects, samples): (&usize, Vec<Sample>)| {
+        .measure(&mut runners, |(world, runner), _round| runner.sample(world, Duration::ZERO))?;
+    let row = |((objects, workers), samples): ((usize, usize), Vec<Sample>)| {
         let object_views = (objects * world::VIEWS) as f64;
         let frame = median(samples.iter().map(|sample| sample.frame));
-        Row { objects, backend, ns_per_object_view: frame * 1e9 / object_views }
+        Row { objects, backend, workers, ns_per_object_view: frame * 1e9 / object_views }
     };
-    Ok(extent.growth.iter().zip(samples).map(row).collect())
+    Ok(sizes.into_iter().zip(samples).map(row).collect())
 }

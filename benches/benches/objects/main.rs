@@ -1,23 +1,28 @@
-//! The speed-up of a second core by the number of objects: the table of L 6, on this machine.
+//! The speed-up of more cores by the number of objects: the table of L 6, on this machine.
 //!
 //!     cargo bench -p drawloom-benches --bench objects
 //!     cargo bench -p drawloom-benches --bench objects -- --quick
-//!     cargo bench -p drawloom-benches --bench objects -- --backend noop
+//!     cargo bench -p drawloom-benches --bench objects -- --backend noop --workers 2,8
 //!
 //! L's scene holds 7 to 2,006 objects; further objects have the positions of existing ones, so that they cost the device little.
 //! All of them move a little in every frame. The deferred pipeline draws them with one hemispherical light that casts shadows, so
 //! each is drawn in two views.
 //!
 //! - *single* is L's first scenario: the same processes on one thread, recorded directly into the passes, one draw per object.
-//! - *multi* is this crate on two workers, with instancing and without.
+//! - *multi* is this crate on each number of workers, with instancing and without.
 //! - Two scenarios in between separate the effect of threads from that of bundles that are kept: *one worker, cached* is single with
-//!   cached bundles, and *two workers, direct* is single on two workers.
+//!   cached bundles, and *direct* is single on as many workers as *multi*.
 //!
 //! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
 //! the device's time. Frames per second are those of the median round, and a ratio is the median of the rounds' own ratios.
-//! `ceiling.rs` explains the ceiling. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
+//! `ceiling.rs` explains the ceiling. On the adapter there are also frames per second *until drawn*: each waits until the device has
+//! drawn the one before.
 //!
-//! Growth is the cost of an object in scenes of many objects: two workers, no instancing.
+//! The second table says where the time of a frame goes. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
+//! *Load* is how busy the calling thread is, and the mean of the other workers. *API* is the share of the work in calls of wgpu. Loads and
+//! shares are those of a frame after each sample that the timeline records.
+//!
+//! Growth is the cost of an object in scenes of many objects, without instancing.
 //!
 //! `target/drawloom/objects.json` and `.svg` have the same.
 
@@ -34,16 +39,18 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::arguments::{BackendArguments, WorkersArguments};
 use drawloom_benches::harness::progress_bar;
 
 use report::Report;
 
-/// Compares one thread with two workers.
+/// Compares one thread with several workers.
 #[derive(Parser)]
 struct Arguments {
     #[command(flatten)]
     backend: BackendArguments,
+    #[command(flatten)]
+    workers: WorkersArguments,
 }
 
 /// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
@@ -93,11 +100,12 @@ fn run() -> Result<(), Box<dyn Error>> {
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");
     let mut report = Report::new(&extent);
+    let workers = arguments.workers.parallel_counts();
     for backend in arguments.backend.backends()? {
         for &objects in extent.objects {
-            report.scenarios.extend(scenario::measure(&extent, backend, objects, &progress)?);
+            report.scenarios.extend(scenario::measure(&extent, backend, objects, &workers, &progress)?);
         }
-        report.growth.extend(growth::measure(&extent, backend, &progress)?);
+        report.growth.extend(growth::measure(&extent, backend, &workers, &progress)?);
     }
     progress.finish_and_clear();
     report.print();

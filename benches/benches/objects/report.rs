@@ -39,60 +39,110 @@ impl Report {
         print_line!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         print_line!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
         print_line!(
-            "fps: frames of record + submit per second, without the device's time; ratios: of fps, to single; held: the time, and the share of the frame, in which the world is borrowed\n"
+            "fps: frames of record + submit per second; until drawn: with the device's time; ratios: of fps, to single\n"
         );
-        let mut table = Table::new(&[
-            "objects",
-            "backend",
-            "instancing",
-            "single fps",
-            "multi fps",
-            "ratio",
-            "one worker, cached",
-            "two workers, direct",
-            "ceiling",
-            "single held ms",
-            "multi held ms",
-            "single held %",
-            "multi held %",
-        ]);
-        for row in &self.scenarios {
-            table.row([
-                row.objects.to_string(),
-                row.backend.name().to_owned(),
-                if row.instancing { "on" } else { "off" }.to_owned(),
-                format!("{:.1}", row.single_fps),
-                format!("{:.1}", row.multi_fps),
-                format!("{:.2}", row.ratio),
-                row.cached_ratio.map_or_else(String::new, |ratio| format!("{ratio:.2}")),
-                row.direct_ratio.map_or_else(String::new, |ratio| format!("{ratio:.2}")),
-                format!("{:.2}", row.ceiling),
-                format!("{:.4}", row.single_held_ms),
-                format!("{:.4}", row.multi_held_ms),
-                format!("{:.1}", row.single_held_share * 100.0),
-                format!("{:.1}", row.multi_held_share * 100.0),
-            ]);
-        }
-        table.print();
-        print_line!("Growth: two workers, no instancing; medians of {many_noop} and {many_adapter} rounds\n");
-        let mut table = Table::new(&["objects", "backend", "ns per object and view"]);
+        self.print_rates();
+        print_line!(
+            "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; API: the share of the work in calls of wgpu\n"
+        );
+        self.print_shares();
+        print_line!("Growth: no instancing; medians of {many_noop} and {many_adapter} rounds\n");
+        let mut table = Table::new(&["objects", "backend", "workers", "ns per object and view"]);
         for row in &self.growth {
             let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
-            table.row([objects, backend, format!("{:.1}", row.ns_per_object_view)]);
+            table.row([objects, backend, row.workers.to_string(), format!("{:.1}", row.ns_per_object_view)]);
         }
         table.print();
         self.print_targets();
     }
 
-    /// Prints the targets and the results on `noop`.
+    fn print_rates(&self) {
+        let mut table = Table::new(&[
+            "objects",
+            "backend",
+            "workers",
+            "instancing",
+            "single fps",
+            "multi fps",
+            "single, until drawn",
+            "multi, until drawn",
+            "ratio",
+            "one worker, cached",
+            "direct",
+            "ceiling",
+        ]);
+        let optional = |figure: Option<f64>, decimals: usize| {
+            figure.map_or(String::new(), |figure| format!("{figure:.decimals$}"))
+        };
+        for row in &self.scenarios {
+            let [objects, backend, workers, instancing] = configuration(row);
+            table.row([
+                objects,
+                backend,
+                workers,
+                instancing,
+                format!("{:.1}", row.single_fps),
+                format!("{:.1}", row.multi_fps),
+                optional(row.single_drawn_fps, 1),
+                optional(row.multi_drawn_fps, 1),
+                format!("{:.2}", row.ratio),
+                optional(row.cached_ratio, 2),
+                optional(row.direct_ratio, 2),
+                format!("{:.2}", row.ceiling),
+            ]);
+        }
+        table.print();
+    }
+
+    fn print_shares(&self) {
+        let mut table = Table::new(&[
+            "objects",
+            "backend",
+            "workers",
+            "instancing",
+            "single held ms",
+            "multi held ms",
+            "single held %",
+            "multi held %",
+            "load of the caller %",
+            "of the others %",
+            "single API %",
+            "multi API %",
+        ]);
+        let percent = |share: f64| format!("{:.0}", share * 100.0);
+        for row in &self.scenarios {
+            let [objects, backend, workers, instancing] = configuration(row);
+            let (caller, others) =
+                row.multi_loads.split_first().map_or((f64::NAN, &[][..]), |(caller, others)| (*caller, others));
+            let mean = others.iter().sum::<f64>() / others.len() as f64;
+            table.row([
+                objects,
+                backend,
+                workers,
+                instancing,
+                format!("{:.4}", row.single_held_ms),
+                format!("{:.4}", row.multi_held_ms),
+                percent(row.single_held_share),
+                percent(row.multi_held_share),
+                percent(caller),
+                if others.is_empty() { String::new() } else { percent(mean) },
+                percent(row.single_api_share),
+                percent(row.multi_api_share),
+            ]);
+        }
+        table.print();
+    }
+
+    /// Prints the targets and the results on `noop` with two workers.
     fn print_targets(&self) {
-        print_line!("Targets and results on noop, without instancing\n");
+        print_line!("Targets and results on noop with two workers, without instancing\n");
         let mut table = Table::new(&["figure", "objects", "bound", "reached"]);
         let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
             let note = if is_reached { "" } else { ", short" };
             table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{note}")]);
         };
-        for row in self.scenarios.iter().filter(|row| row.backend == BackendName::Noop && !row.instancing) {
+        let has_target = |row: &&scenario::Row| row.backend == BackendName::Noop && row.workers == 2 && !row.instancing;
+        for row in self.scenarios.iter().filter(has_target) {
             let target = match row.objects {
                 7 | 16 | 106 => 0.97,
                 1_006 => 1.70,
@@ -106,7 +156,8 @@ impl Report {
                 target_row("ratio, of its ceiling", row.objects, 0.90, of_ceiling, of_ceiling >= 0.9);
             }
         }
-        let growth: Vec<_> = self.growth.iter().filter(|row| row.backend == BackendName::Noop).collect();
+        let has_target = |row: &&growth::Row| row.backend == BackendName::Noop && row.workers == 2;
+        let growth: Vec<_> = self.growth.iter().filter(has_target).collect();
         if let [first, .., last] = growth[..] {
             let grown = last.ns_per_object_view / first.ns_per_object_view;
             target_row("growth of the ns, at most", last.objects, 1.5, grown, grown <= 1.5);
@@ -122,4 +173,10 @@ impl Report {
         results::write_json("objects.json", &rows)?;
         charts::draw(&results::file("objects.svg")?, &self.scenarios)
     }
+}
+
+/// The first cells of a row.
+fn configuration(row: &scenario::Row) -> [String; 4] {
+    let instancing = if row.instancing { "on" } else { "off" };
+    [row.objects.to_string(), row.backend.name().to_owned(), row.workers.to_string(), instancing.to_owned()]
 }

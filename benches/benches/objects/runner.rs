@@ -27,7 +27,23 @@ pub struct Sample {
     pub frame: f64,
     /// The part of the frame in which the world is borrowed.
     pub borrowed: f64,
+    /// From the hand-over of the scene until the device has drawn it.
+    pub until_drawn: f64,
 }
+
+/// What the timeline tells about a frame.
+pub struct Profile {
+    /// The time outside of its jobs, in seconds: a part of `record`, and `submit`.
+    pub serial: f64,
+    /// How busy each worker is, as a share of the frame. The first is the calling thread, with the serial part.
+    pub loads: Vec<f64>,
+    /// The share of the work, of all threads together, that is calls of wgpu: [`API_STAGES`] and submission.
+    pub api_share: f64,
+}
+
+/// The stages that consist of calls of wgpu. The uploads of objects as they are described are in a stage with other work, which is left
+/// out.
+const API_STAGES: [&str; 4] = ["upload", "prepare", "record", "finish"];
 
 impl Runner {
     /// # Errors
@@ -45,7 +61,7 @@ impl Runner {
     /// # Errors
     /// Returns an error if a frame cannot be drawn, or if a view does not see all objects.
     pub fn sample(&mut self, world: &mut Moving, at_least: Duration) -> Result<Sample, Box<dyn Error>> {
-        let (mut borrowed, mut frames) = (Duration::ZERO, 0);
+        let (mut borrowed, mut until_drawn, mut frames) = (Duration::ZERO, Duration::ZERO, 0);
         let frame = mean_frame(at_least, || {
             world.step();
             let scene = world.as_scene_ref();
@@ -57,17 +73,19 @@ impl Runner {
                 return Err(format!("of {} objects, views see {visible:?}", scene.object_count()).into());
             }
             borrowed += time.borrowed;
+            until_drawn += time.borrowed + time.device;
             frames += 1;
             Ok::<_, Box<dyn Error>>(time.cpu)
         })?;
-        Ok(Sample { frame, borrowed: borrowed.as_secs_f64() / f64::from(frames) })
+        let mean = |time: Duration| time.as_secs_f64() / f64::from(frames);
+        Ok(Sample { frame, borrowed: mean(borrowed), until_drawn: mean(until_drawn) })
     }
 
-    /// The time of a frame outside its jobs, in seconds: a part of `record`, and `submit`.
+    /// Draws a frame, and tells where its time goes.
     ///
     /// # Errors
     /// Returns an error if the frame cannot be drawn.
-    pub fn serial_part(&mut self, world: &mut Moving) -> Result<f64, Box<dyn Error>> {
+    pub fn profile(&mut self, world: &mut Moving) -> Result<Profile, Box<dyn Error>> {
         world.step();
         let timeline = Arc::clone(self.renderer.scheduler().timeline());
         timeline.start();
@@ -77,7 +95,27 @@ impl Runner {
         submitted.submission.wait()?;
         let log = timeline.take();
         let in_runs: Duration = log.runs.iter().map(Run::duration).sum();
-        let in_spans: Duration = log.spans.iter().map(|span| span.ended - span.began).sum();
-        Ok((in_spans - in_runs).as_secs_f64())
+        let in_spans = |name: Option<&str>| -> Duration {
+            let spans = log.spans.iter().filter(|span| name.is_none_or(|name| span.name == name));
+            spans.map(|span| span.ended - span.began).sum()
+        };
+        let (frame, serial, mut api) = (in_spans(None), in_spans(None) - in_runs, in_spans(Some("submit")));
+        let mut busy = vec![Duration::ZERO; log.workers.len()];
+        busy[0] = serial;
+        for run in &log.runs {
+            for chunk in &run.chunks {
+                busy[chunk.worker] += chunk.duration();
+                let stage = run.graph.nodes[chunk.node].labels.stage.as_deref();
+                if stage.is_some_and(|stage| API_STAGES.contains(&stage)) {
+                    api += chunk.duration();
+                }
+            }
+        }
+        let share = |part: Duration, of: Duration| part.as_secs_f64() / of.as_secs_f64();
+        Ok(Profile {
+            serial: serial.as_secs_f64(),
+            loads: busy.iter().map(|&busy| share(busy, frame)).collect(),
+            api_share: share(api, busy.iter().sum()),
+        })
     }
 }

@@ -13,23 +13,26 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::ceiling::ceiling;
-use crate::runner::{Runner, Sample};
+use crate::runner::{Profile, Runner, Sample};
 use crate::{Extent, world};
-
-pub const WORKERS: usize = 2;
 
 /// A row of L's table.
 #[derive(Serialize)]
 pub struct Row {
     pub objects: usize,
     pub backend: BackendName,
+    /// Of *multi*.
+    pub workers: usize,
     pub instancing: bool,
     pub single_fps: f64,
     pub multi_fps: f64,
+    /// Frames per second if each waits until the device has drawn the one before: on the adapter only, like the next.
+    pub single_drawn_fps: Option<f64>,
+    pub multi_drawn_fps: Option<f64>,
     pub ratio: f64,
     /// The ratio of one worker that replays cached bundles. Without instancing only, like the next.
     pub cached_ratio: Option<f64>,
-    /// The ratio of two workers that record directly.
+    /// The ratio of as many workers that record directly.
     pub direct_ratio: Option<f64>,
     pub ceiling: f64,
     /// The time in which the world is borrowed.
@@ -38,62 +41,125 @@ pub struct Row {
     /// The same as a share of the frame.
     pub single_held_share: f64,
     pub multi_held_share: f64,
+    /// How busy each worker of *multi* is, as a share of the frame. The first is the calling thread.
+    pub multi_loads: Vec<f64>,
+    /// The share of the work that is calls of wgpu.
+    pub single_api_share: f64,
+    pub multi_api_share: f64,
 }
 
+/// A scenario, and what was measured of it.
+struct Scenario {
+    runner: Runner,
+    samples: Vec<Sample>,
+    profiles: Vec<Profile>,
+}
+
+/// The scenarios with some number of workers.
+struct Parallel {
+    scheduler: Arc<Scheduler>,
+    /// The index of the one that records directly, and of *multi* without instancing and with it.
+    direct: usize,
+    multi: [usize; 2],
+}
+
+/// Measures the scenarios on one thread, and those with each of these numbers of workers, interleaved.
+///
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
 pub fn measure(
     extent: &Extent,
     backend: BackendName,
     objects: usize,
+    workers: &[usize],
     progress: &ProgressBar,
-) -> Result<[Row; 2], Box<dyn Error>> {
+) -> Result<Vec<Row>, Box<dyn Error>> {
     let rounds = Rounds { warm_up: backend.of(extent.warm_up), measured: backend.of(extent.rounds) };
     progress.set_message(format!("{objects} objects, {}", backend.name()));
-    let (one, two) = (Arc::new(Scheduler::new(1)?), Arc::new(Scheduler::new(WORKERS)?));
-    let with = |strategy| Ok::<_, Box<dyn Error>>(backend.open()?.recording_strategy(strategy)?);
-    let mut runners = [
-        Runner::new(with(RecordingStrategy::Direct)?, &one, false)?,
-        Runner::new(with(RecordingStrategy::CachedBundles)?, &one, false)?,
-        Runner::new(with(RecordingStrategy::Direct)?, &two, false)?,
-        Runner::new(backend.open()?, &two, false)?,
-        Runner::new(backend.open()?, &two, true)?,
-    ];
-    let mut world = world::new(objects)?;
-    let mut samples: [Vec<Sample>; 5] = Default::default();
-    let mut serial = Vec::new();
-    let mut harness = Harness::new(rounds, progress);
-    for round in harness.rounds(runners.len()) {
-        let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
-        let results = harness.round(&mut runners, |runner| runner.sample(&mut world, at_least))?;
-        if !round.is_warm_up() {
-            samples.iter_mut().zip(results).for_each(|(samples, result)| samples.push(result));
-            serial.push(runners[0].serial_part(&mut world)?);
-        }
+    let mut scenarios = Vec::new();
+    let mut add = |strategy: Option<RecordingStrategy>, scheduler: &Arc<Scheduler>, instancing| {
+        let opened = backend.open()?;
+        let opened = match strategy {
+            Some(strategy) => opened.recording_strategy(strategy)?,
+            None => opened,
+        };
+        let runner = Runner::new(opened, scheduler, instancing)?;
+        scenarios.push(Scenario { runner, samples: Vec::new(), profiles: Vec::new() });
+        Ok::<_, Box<dyn Error>>(scenarios.len() - 1)
+    };
+    let one = Arc::new(Scheduler::new(1)?);
+    let single = add(Some(RecordingStrategy::Direct), &one, false)?;
+    let cached = add(Some(RecordingStrategy::CachedBundles), &one, false)?;
+    let mut parallel = Vec::new();
+    for &workers in workers {
+        let scheduler = Arc::new(Scheduler::new(workers)?);
+        let direct = add(Some(RecordingStrategy::Direct), &scheduler, false)?;
+        let multi = [add(None, &scheduler, false)?, add(None, &scheduler, true)?];
+        parallel.push(Parallel { scheduler, direct, multi });
     }
-    let frame = |samples: &[Sample]| median(samples.iter().map(|sample| sample.frame));
-    let borrowed = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed));
-    let borrowed_share = |samples: &[Sample]| median(samples.iter().map(|sample| sample.borrowed / sample.frame));
-    let [single, cached, direct, multi @ ..] = &samples;
-    let ratio = |to: &[Sample]| median(single.iter().zip(to).map(|(single, sample)| single.frame / sample.frame));
-    let ceiling = ceiling(frame(single), median(serial), two.wake_up_cost().as_secs_f64());
-    let row = |instancing: bool| {
-        let multi = &multi[usize::from(instancing)];
+    let mut world = world::new(objects)?;
+    let mut harness = Harness::new(rounds, progress);
+    for round in harness.rounds(scenarios.len()) {
+        let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
+        harness.round(&mut scenarios, |Scenario { runner, samples, profiles }| {
+            let sample = runner.sample(&mut world, at_least)?;
+            if !round.is_warm_up() {
+                samples.push(sample);
+                profiles.push(runner.profile(&mut world)?);
+            }
+            Ok::<_, Box<dyn Error>>(())
+        })?;
+    }
+    let single = &scenarios[single];
+    let row = |parallel: &Parallel, instancing: bool| {
+        let multi = &scenarios[parallel.multi[usize::from(instancing)]];
+        let workers = parallel.scheduler.workers();
+        let wake = parallel.scheduler.wake_up_cost().as_secs_f64();
+        let drawn_fps = |scenario: &Scenario| {
+            (backend == BackendName::Adapter).then(|| scenario.median(|sample| sample.until_drawn).recip())
+        };
+        let held_share = |scenario: &Scenario| scenario.median(|sample| sample.borrowed / sample.frame);
         Row {
             objects,
             backend,
+            workers,
             instancing,
-            single_fps: frame(single).recip(),
-            multi_fps: frame(multi).recip(),
-            ratio: ratio(multi),
-            cached_ratio: (!instancing).then(|| ratio(cached)),
-            direct_ratio: (!instancing).then(|| ratio(direct)),
-            ceiling,
-            single_held_ms: borrowed(single) * 1e3,
-            multi_held_ms: borrowed(multi) * 1e3,
-            single_held_share: borrowed_share(single),
-            multi_held_share: borrowed_share(multi),
+            single_fps: single.median(|sample| sample.frame).recip(),
+            multi_fps: multi.median(|sample| sample.frame).recip(),
+            single_drawn_fps: drawn_fps(single),
+            multi_drawn_fps: drawn_fps(multi),
+            ratio: multi.ratio_to(single),
+            cached_ratio: (!instancing).then(|| scenarios[cached].ratio_to(single)),
+            direct_ratio: (!instancing).then(|| scenarios[parallel.direct].ratio_to(single)),
+            ceiling: ceiling(
+                single.median(|sample| sample.frame),
+                single.median_of_profiles(|profile| profile.serial),
+                wake,
+                workers,
+            ),
+            single_held_ms: single.median(|sample| sample.borrowed) * 1e3,
+            multi_held_ms: multi.median(|sample| sample.borrowed) * 1e3,
+            single_held_share: held_share(single),
+            multi_held_share: held_share(multi),
+            multi_loads: (0..workers).map(|worker| multi.median_of_profiles(|profile| profile.loads[worker])).collect(),
+            single_api_share: single.median_of_profiles(|profile| profile.api_share),
+            multi_api_share: multi.median_of_profiles(|profile| profile.api_share),
         }
     };
-    Ok([row(false), row(true)])
+    Ok(parallel.iter().flat_map(|parallel| [row(parallel, false), row(parallel, true)]).collect())
+}
+
+impl Scenario {
+    fn median(&self, value: impl Fn(&Sample) -> f64) -> f64 {
+        median(self.samples.iter().map(value))
+    }
+
+    fn median_of_profiles(&self, value: impl Fn(&Profile) -> f64) -> f64 {
+        median(self.profiles.iter().map(value))
+    }
+
+    /// How many times as fast it is, as the median of the rounds' own ratios.
+    fn ratio_to(&self, base: &Self) -> f64 {
+        median(base.samples.iter().zip(&self.samples).map(|(base, sample)| base.frame / sample.frame))
+    }
 }
