@@ -7,6 +7,8 @@ use std::thread;
 
 use clap::{Args, Parser};
 use drawloom::task::Scheduler;
+#[cfg(feature = "wgpu")]
+use drawloom_output::print_diagnostic;
 
 #[cfg(feature = "wgpu")]
 use crate::backends::BackendName;
@@ -52,8 +54,6 @@ impl BackendArguments {
     /// # Errors
     /// Returns an error if this machine lacks the requested backend.
     pub fn backends(&self) -> Result<Vec<BackendName>, Box<dyn Error>> {
-        use drawloom_output::print_diagnostic;
-
         let mut backends = self.backend.map_or(BackendName::ALL.to_vec(), |backend| vec![backend]);
         if backends.contains(&BackendName::Adapter)
             && let Err(error) = BackendName::Adapter.device()
