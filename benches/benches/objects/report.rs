@@ -8,7 +8,7 @@ use drawloom_benches::table::Table;
 use drawloom_output::print_line;
 use serde::Serialize;
 
-use crate::{Extent, charts, growth, scenario};
+use crate::{Extent, charts, growth, scenario, update};
 
 /// The results.
 pub struct Report {
@@ -16,21 +16,23 @@ pub struct Report {
     rounds: [usize; 2],
     growth_rounds: [usize; 2],
     pub scenarios: Vec<scenario::Row>,
+    pub updates: Vec<update::Row>,
     pub growth: Vec<growth::Row>,
 }
 
-/// A row of the JSON file: of either table.
+/// A row of the JSON file: of any table.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Row<'a> {
     Scenario(&'a scenario::Row),
+    Update(&'a update::Row),
     Growth(&'a growth::Row),
 }
 
 impl Report {
     pub fn new(extent: &Extent) -> Self {
         let Extent { name, rounds, growth_rounds, .. } = *extent;
-        Self { extent: name, rounds, growth_rounds, scenarios: Vec::new(), growth: Vec::new() }
+        Self { extent: name, rounds, growth_rounds, scenarios: Vec::new(), updates: Vec::new(), growth: Vec::new() }
     }
 
     pub fn print(&self) {
@@ -46,6 +48,19 @@ impl Report {
             "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; API: the share of the work in calls of wgpu\n"
         );
         self.print_shares();
+        print_line!("An engine's update on all workers, frames per second: before record, and beside submit\n");
+        let mut table = Table::new(&["objects", "backend", "workers", "before", "beside", "ratio"]);
+        for row in &self.updates {
+            table.row([
+                row.objects.to_string(),
+                row.backend.name().to_owned(),
+                row.workers.to_string(),
+                format!("{:.1}", row.update_before_fps),
+                format!("{:.1}", row.update_beside_fps),
+                format!("{:.2}", row.ratio),
+            ]);
+        }
+        table.print();
         print_line!("Growth: no instancing; medians of {many_noop} and {many_adapter} rounds\n");
         let mut table = Table::new(&["objects", "backend", "workers", "ns per object and view"]);
         for row in &self.growth {
@@ -169,7 +184,8 @@ impl Report {
     /// Returns an error if a file cannot be written.
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         let scenarios = self.scenarios.iter().map(Row::Scenario);
-        let rows: Vec<_> = scenarios.chain(self.growth.iter().map(Row::Growth)).collect();
+        let updates = self.updates.iter().map(Row::Update);
+        let rows: Vec<_> = scenarios.chain(updates).chain(self.growth.iter().map(Row::Growth)).collect();
         results::write_json("objects.json", &rows)?;
         charts::draw(&results::file("objects.svg")?, &self.scenarios)
     }

@@ -17,8 +17,8 @@ use crate::world::{PICTURE, VIEWS};
 
 /// A renderer with timed frames.
 pub struct Runner {
-    renderer: Renderer<WgpuBackend>,
-    submitter: Submitter<WgpuBackend>,
+    pub renderer: Renderer<WgpuBackend>,
+    pub submitter: Submitter<WgpuBackend>,
 }
 
 /// Mean times of several frames, in seconds.
