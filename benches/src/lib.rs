@@ -18,4 +18,5 @@ pub mod results;
 pub mod statistics;
 pub mod stopwatch;
 pub mod table;
+pub mod targets;
 pub mod work;

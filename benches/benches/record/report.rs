@@ -6,6 +6,7 @@ use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::chart::{self, HorizontalBars, Panel};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use serde::Serialize;
 
 use drawloom_benches::moving::Motion;
@@ -44,33 +45,6 @@ pub struct Report {
     pub extents: Vec<ExtentRow>,
 }
 
-/// A figure to reach.
-struct Target {
-    figure: &'static str,
-    is_upper_bound: bool,
-    bound: f64,
-    reached: f64,
-}
-
-impl Target {
-    fn at_most(figure: &'static str, bound: f64, reached: f64) -> Self {
-        Self { figure, is_upper_bound: true, bound, reached }
-    }
-
-    fn at_least(figure: &'static str, bound: f64, reached: f64) -> Self {
-        Self { figure, is_upper_bound: false, bound, reached }
-    }
-
-    fn wanted(&self) -> String {
-        format!("{} {}", if self.is_upper_bound { "≤" } else { "≥" }, self.bound)
-    }
-
-    /// NaN, where a figure is missing, meets no target.
-    fn is_met(&self) -> bool {
-        if self.is_upper_bound { self.reached <= self.bound } else { self.reached >= self.bound }
-    }
-}
-
 impl Report {
     pub fn new(extent: &Extent) -> Self {
         Self {
@@ -106,7 +80,6 @@ impl Report {
         if !self.extents.is_empty() {
             extents::print(&self.extents);
         }
-        self.print_targets();
     }
 
     fn print_rows(&self, is_shown: impl Fn(&Row) -> bool) {
@@ -127,9 +100,12 @@ impl Report {
         table.print();
     }
 
-    /// Prints the targets on `noop`, and what was reached.
-    fn print_targets(&self) {
-        let Some(noop) = self.measured.iter().find(|measured| measured.backend == BackendName::Noop) else { return };
+    /// The targets on `noop`, and what was reached.
+    pub fn targets(&self) -> Targets {
+        let mut targets = Targets::new();
+        let Some(noop) = self.measured.iter().find(|measured| measured.backend == BackendName::Noop) else {
+            return targets;
+        };
         let of_moving =
             |name| noop.of_moving.iter().find(|(scene, _)| *scene == name).map_or(f64::NAN, |(_, share)| *share);
         let microseconds = |scene, workers| {
@@ -141,37 +117,25 @@ impl Report {
             row.map_or(f64::NAN, |row| row.microseconds_per_frame / (row.objects * row.cameras) as f64)
         };
         let [two, independent] = noop.speed_ups;
-        let targets = [
-            Target::at_most("drawloom with 1 worker ÷ by-mesh on 1 thread", 0.6, noop.of_by_mesh[0]),
-            Target::at_most("drawloom with 2 workers ÷ by-mesh on 2 threads", 0.6, noop.of_by_mesh[1]),
-            Target::at_least("drawloom with 1 worker ÷ 2 workers", 1.8, two),
-            Target::at_least("the same ÷ that of two independent threads", 0.9, two / independent),
-            Target::at_most("not instanced with 2 workers ÷ encoder-per-thread", 0.5, noop.of_encoders),
-            Target::at_most("one percent moving ÷ moving", 0.2, of_moving(Motion::OnePercent.name())),
-            Target::at_most("still, cameras moving ÷ moving", 0.5, of_moving(Motion::Cameras.name())),
-            Target::at_most("still, 100,000 objects in one view, µs a frame", 30.0, microseconds(extents::STILL, 1)),
-            Target::at_most(
-                "64 cameras, 50 of 100,000 ÷ 50 of 3,200 objects",
-                1.5,
-                microseconds(extents::FEW_OF_MANY, 1) / microseconds(extents::FEW_OF_FEW, 1),
-            ),
-            Target::at_most(
-                "1,000,000 ÷ 10,000 objects, an object and view, 2 workers",
-                1.3,
-                per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
-            ),
-        ];
-        print_line!("Targets and results on noop\n");
-        let mut table = Table::new(&["figure", "target", "reached"]);
-        for target in &targets {
-            table.row([target.figure.to_owned(), target.wanted(), format!("{:.2}", target.reached)]);
-        }
-        table.print();
-        let missed: Vec<_> = targets.iter().filter(|target| !target.is_met()).map(|target| target.figure).collect();
-        match &missed[..] {
-            [] => print_line!("\nAll targets are met."),
-            missed => print_line!("\nMissed: {}.", missed.join("; ")),
-        }
+        targets.at_most("drawloom with 1 worker ÷ by-mesh on 1 thread", 0.6, noop.of_by_mesh[0]);
+        targets.at_most("drawloom with 2 workers ÷ by-mesh on 2 threads", 0.6, noop.of_by_mesh[1]);
+        targets.at_least("drawloom with 1 worker ÷ 2 workers", 1.8, two);
+        targets.at_least("the same ÷ that of two independent threads", 0.9, two / independent);
+        targets.at_most("not instanced with 2 workers ÷ encoder-per-thread", 0.5, noop.of_encoders);
+        targets.at_most("one percent moving ÷ moving", 0.2, of_moving(Motion::OnePercent.name()));
+        targets.at_most("still, cameras moving ÷ moving", 0.5, of_moving(Motion::Cameras.name()));
+        targets.at_most("still, 100,000 objects in one view, µs a frame", 30.0, microseconds(extents::STILL, 1));
+        targets.at_most(
+            "64 cameras, 50 of 100,000 ÷ 50 of 3,200 objects",
+            1.5,
+            microseconds(extents::FEW_OF_MANY, 1) / microseconds(extents::FEW_OF_FEW, 1),
+        );
+        targets.at_most(
+            "1,000,000 ÷ 10,000 objects, an object and view, 2 workers",
+            1.3,
+            per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
+        );
+        targets
     }
 
     fn rows(&self) -> impl Iterator<Item = &Row> {
