@@ -15,6 +15,7 @@ pub mod harness;
 pub mod mirror;
 pub mod moving;
 pub mod results;
+pub mod spinning;
 pub mod statistics;
 pub mod stopwatch;
 pub mod table;
