@@ -1,43 +1,61 @@
-//! Chunks of objects. Any free thread of a rayon pool culls a chunk and records it as a bundle.
-
-use std::sync::atomic::{AtomicUsize, Ordering};
+//! A bundle for each chunk of a camera's objects, into which a thread records one draw for each object.
 
 use drawloom::scene::SceneRef;
-use drawloom::view::Frustum;
 use drawloom::wgpu;
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::draw_only::DrawOnly;
 use crate::objects::clip_from_world;
+use crate::spheres::{LANES, planes, visible_objects};
 use crate::technique::{Failure, Technique};
+use crate::threads::Threads;
 
-/// Objects per chunk: fewer make bundles costly, more leave threads without work at the end.
-const CHUNK: usize = 256;
+/// Groups of objects in a bundle, which are 256 objects: fewer make bundles costly, more leave threads without work at the end.
+const GROUPS: usize = 256 / LANES;
 
-pub struct Parallel {
+pub struct Bundles {
     shared: DrawOnly,
-    pool: ThreadPool,
+    threads: Threads,
     drawn: usize,
 }
 
-impl Parallel {
-    pub fn new(shared: DrawOnly, threads: usize) -> Result<Self, Failure> {
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
-        Ok(Self { shared, pool, drawn: 0 })
+impl Bundles {
+    pub fn new(shared: DrawOnly, threads: &Threads) -> Self {
+        Self { shared, threads: threads.clone(), drawn: 0 }
     }
 }
 
-impl Technique for Parallel {
+impl Technique for Bundles {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
-        let Self { shared, pool, drawn } = self;
-        *drawn = pool.install(|| {
-            shared.prepare(&scene);
-            for (index, camera) in scene.cameras.iter().enumerate() {
-                shared.write_camera(index, &clip_from_world(camera));
+        let Self { shared, threads, drawn } = self;
+        shared.prepare(&scene, threads)?;
+        let cameras: Vec<_> = scene.cameras.iter().map(clip_from_world).collect();
+        for (index, camera) in cameras.iter().enumerate() {
+            shared.write_camera(index, camera);
+        }
+        let planes: Vec<_> = cameras.iter().map(planes).collect();
+        let chunks = shared.groups().len().div_ceil(GROUPS);
+        let mut all: Vec<_> =
+            (0..cameras.len()).flat_map(|camera| (0..chunks).map(move |chunk| (camera, chunk))).collect();
+        let recorded = threads.map(&mut all, |&mut (camera, chunk)| {
+            let mut encoder = shared.fixture.bundle_encoder();
+            shared.set(&mut encoder, camera);
+            let (first, mut drawn) = (chunk * GROUPS, 0);
+            let groups = &shared.groups()[first..shared.groups().len().min(first + GROUPS)];
+            for object in visible_objects(groups, first, &planes[camera]) {
+                shared.draw(&mut encoder, &scene, object);
+                drawn += 1;
             }
-            record(shared, &scene)
+            (encoder.finish(&wgpu::RenderBundleDescriptor::default()), drawn)
         });
+        let (bundles, counts): (Vec<_>, Vec<usize>) = recorded.into_iter().unzip();
+        let mut views: Vec<_> = bundles.chunks(chunks).enumerate().collect();
+        let commands = threads.map(&mut views, |(camera, bundles)| {
+            let mut encoder = shared.fixture.encoder();
+            shared.fixture.pass(&mut encoder, *camera).execute_bundles(*bundles);
+            encoder.finish()
+        });
+        shared.fixture.queue.submit(commands);
+        *drawn = counts.iter().sum();
         Ok(())
     }
 
@@ -52,34 +70,4 @@ impl Technique for Parallel {
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
         self.shared.fixture.read(camera)
     }
-}
-
-/// Returns the number of objects drawn.
-fn record(shared: &DrawOnly, scene: &SceneRef<'_>) -> usize {
-    let drawn = AtomicUsize::new(0);
-    let frustums: Vec<_> = scene.cameras.iter().map(Frustum::new).collect();
-    let chunks = shared.spheres.len().div_ceil(CHUNK);
-    let bundle = |index: usize| {
-        let (camera, chunk) = (index / chunks, index % chunks);
-        let mut encoder = shared.fixture.bundle_encoder();
-        shared.set(&mut encoder, camera);
-        let mut count = 0;
-        for object in (chunk * CHUNK..shared.spheres.len()).take(CHUNK) {
-            if shared.spheres[object].is_visible(&frustums[camera]) {
-                shared.draw(&mut encoder, scene, object);
-                count += 1;
-            }
-        }
-        drawn.fetch_add(count, Ordering::Relaxed);
-        encoder.finish(&wgpu::RenderBundleDescriptor::default())
-    };
-    let bundles: Vec<_> = (0..chunks * frustums.len()).into_par_iter().map(bundle).collect();
-    let encode = |(camera, bundles): (usize, &[wgpu::RenderBundle])| {
-        let mut encoder = shared.fixture.encoder();
-        shared.fixture.pass(&mut encoder, camera).execute_bundles(bundles);
-        encoder.finish()
-    };
-    let commands: Vec<_> = bundles.par_chunks(chunks).enumerate().map(encode).collect();
-    shared.fixture.queue.submit(commands);
-    drawn.into_inner()
 }

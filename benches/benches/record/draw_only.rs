@@ -1,15 +1,18 @@
 //! Shared by the techniques that set no state between draws: all meshes in one buffer, all objects in another.
 
+use std::num::NonZeroU64;
 use std::ops::Range;
 
 use drawloom::glam::Mat4;
 use drawloom::scene::{Mesh, SceneRef};
 use drawloom::wgpu;
 use drawloom::wgpu::util::{DeviceExt, RenderEncoder};
-use rayon::prelude::*;
 
 use crate::fixture::Fixture;
-use crate::objects::{GpuObject, Sphere, colors};
+use crate::objects::{GpuObject, colors};
+use crate::spheres::{LANES, SphereGroup};
+use crate::technique::Failure;
+use crate::threads::Threads;
 
 /// The state that is set once per pass, and the objects.
 pub struct DrawOnly {
@@ -21,12 +24,21 @@ pub struct DrawOnly {
     meshes: Vec<MeshRange>,
     objects: wgpu::Buffer,
     cameras: Vec<CameraBuffers>,
-    pub gpu_objects: Vec<GpuObject>,
-    pub spheres: Vec<Sphere>,
+    /// Bounding spheres of all objects.
+    groups: Vec<SphereGroup>,
 }
 
-/// Fewer are not worth another thread.
-pub const MIN_OBJECTS_PER_JOB: usize = 512;
+/// Groups of objects in a job, which are 512 objects: fewer are not worth another thread.
+const GROUPS_PER_JOB: usize = 512 / LANES;
+
+const BYTES_PER_GROUP: usize = LANES * size_of::<GpuObject>();
+
+/// Groups of objects, from the group `first` on, and for each of them the memory from which its objects are uploaded.
+struct Chunk<'a> {
+    first: usize,
+    groups: &'a mut [SphereGroup],
+    staged: Vec<wgpu::WriteOnly<'a, [u8; BYTES_PER_GROUP]>>,
+}
 
 struct CameraBuffers {
     clip_from_world: wgpu::Buffer,
@@ -63,7 +75,8 @@ impl DrawOnly {
             vertices.extend_from_slice(mesh.vertices());
             indices.extend_from_slice(mesh.indices());
         }
-        let gpu_objects = vec![GpuObject::default(); scene.object_count()];
+        let groups = vec![SphereGroup::EMPTY; scene.object_count().div_ceil(LANES)];
+        let gpu_objects = vec![GpuObject::default(); groups.len() * LANES];
         let buffer = |usage: wgpu::BufferUsages, contents: &[u8]| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
@@ -89,18 +102,30 @@ impl DrawOnly {
         };
         let cameras = scene.cameras.iter().map(camera).collect();
         let pipeline = fixture.pipeline(&[&layout], &(include_str!("draw_only.wgsl").to_owned() + object_index));
-        let spheres = vec![Sphere::default(); scene.object_count()];
-        Self { pipeline, vertices, indices, meshes, objects, cameras, gpu_objects, spheres, fixture }
+        Self { pipeline, vertices, indices, meshes, objects, cameras, groups, fixture }
     }
 
-    /// Computes all objects on the threads of the current pool, and uploads them.
-    pub fn prepare(&mut self, scene: &SceneRef<'_>) {
-        let objects =
-            self.gpu_objects.par_iter_mut().zip(&mut self.spheres).enumerate().with_min_len(MIN_OBJECTS_PER_JOB);
-        objects.for_each(|(object, (gpu_object, sphere))| {
-            (*gpu_object, *sphere) = describe(scene, object);
-        });
-        self.write_objects();
+    /// Computes all objects in the memory from which they are uploaded.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such memory.
+    pub fn prepare(&mut self, scene: &SceneRef<'_>, threads: &Threads) -> Result<(), Failure> {
+        const NO_MEMORY: &str = "wgpu has no memory from which objects could be uploaded";
+        let bytes = NonZeroU64::new(self.objects.size()).ok_or(NO_MEMORY)?;
+        let mut staging = self.fixture.queue.write_buffer_with(&self.objects, 0, bytes).ok_or(NO_MEMORY)?;
+        let (staged, _) = staging.slice(..).into_chunks();
+        let mut staged = staged.into_iter();
+        let chunk = |(index, groups)| {
+            let staged = staged.by_ref().take(GROUPS_PER_JOB).collect();
+            Chunk { first: index * GROUPS_PER_JOB, groups, staged }
+        };
+        let mut chunks: Vec<_> = self.groups.chunks_mut(GROUPS_PER_JOB).enumerate().map(chunk).collect();
+        threads.for_each(&mut chunks, |chunk| chunk.describe(scene));
+        Ok(())
+    }
+
+    pub fn groups(&self) -> &[SphereGroup] {
+        &self.groups
     }
 
     pub fn camera_count(&self) -> usize {
@@ -116,16 +141,12 @@ impl DrawOnly {
         self.fixture.queue.write_buffer(&self.cameras[camera].clip_from_world, 0, bytemuck::bytes_of(clip_from_world));
     }
 
-    /// Uploads a camera's list of instances.
-    pub fn write_instances(&self, camera: usize, instances: &[u32]) {
+    /// Uploads instances of a camera's list, from the instance `first` on.
+    pub fn write_instances(&self, camera: usize, first: u32, instances: &[u32]) {
         if let Some(buffer) = &self.cameras[camera].instances {
-            self.fixture.queue.write_buffer(buffer, 0, bytemuck::cast_slice(instances));
+            let offset = u64::from(first) * size_of::<u32>() as u64;
+            self.fixture.queue.write_buffer(buffer, offset, bytemuck::cast_slice(instances));
         }
-    }
-
-    /// Uploads all objects.
-    pub fn write_objects(&self) {
-        self.fixture.queue.write_buffer(&self.objects, 0, bytemuck::cast_slice(&self.gpu_objects));
     }
 
     /// Sets the state that all draws share.
@@ -148,9 +169,19 @@ impl DrawOnly {
     }
 }
 
-/// What is computed for each object in each frame.
-fn describe(scene: &SceneRef<'_>, object: usize) -> (GpuObject, Sphere) {
-    (GpuObject::new(scene, object), Sphere::new(scene, object))
+impl Chunk<'_> {
+    fn describe(&mut self, scene: &SceneRef<'_>) {
+        for (index, (group, staged)) in self.groups.iter_mut().zip(self.staged.drain(..)).enumerate() {
+            let first = (self.first + index) * LANES;
+            let mut gpu_objects = [GpuObject::default(); LANES];
+            for (lane, object) in (first..scene.object_count()).take(LANES).enumerate() {
+                gpu_objects[lane] = GpuObject::new(scene, object);
+                group.set(lane, scene, object);
+            }
+            let bytes = bytemuck::bytes_of(&gpu_objects).first_chunk();
+            staged.write(*bytes.expect("a group has this many bytes"));
+        }
+    }
 }
 
 fn layout(device: &wgpu::Device, has_instances: bool) -> wgpu::BindGroupLayout {

@@ -1,39 +1,32 @@
-//! One thread per camera, each with an encoder of its own.
+//! An encoder for each camera, into which a thread records one draw for each object.
 
 use drawloom::scene::{Camera, SceneRef};
-use drawloom::view::Frustum;
 use drawloom::wgpu;
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::CAMERAS;
 use crate::draw_only::DrawOnly;
 use crate::objects::clip_from_world;
+use crate::spheres::{planes, visible_objects};
 use crate::technique::{Failure, Technique};
+use crate::threads::Threads;
 
-pub struct EncoderPerThread {
+pub struct Encoders {
     shared: DrawOnly,
-    /// Kept over all frames.
-    threads: ThreadPool,
+    threads: Threads,
     drawn: usize,
 }
 
-impl EncoderPerThread {
-    pub fn new(shared: DrawOnly) -> Result<Self, Failure> {
-        let threads = ThreadPoolBuilder::new().num_threads(CAMERAS).build()?;
-        Ok(Self { shared, threads, drawn: 0 })
+impl Encoders {
+    pub fn new(shared: DrawOnly, threads: &Threads) -> Self {
+        Self { shared, threads: threads.clone(), drawn: 0 }
     }
 }
 
-impl Technique for EncoderPerThread {
+impl Technique for Encoders {
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure> {
         let Self { shared, threads, drawn } = self;
-        threads.install(|| shared.prepare(&scene));
-        let encode = |(index, camera): (usize, &Camera)| encode(shared, &scene, index, camera);
-        let encoded: Vec<_> = threads.install(|| {
-            let cameras = scene.cameras.par_iter().enumerate().with_max_len(1);
-            cameras.map(encode).collect()
-        });
+        shared.prepare(&scene, threads)?;
+        let mut cameras: Vec<_> = scene.cameras.iter().enumerate().collect();
+        let encoded = threads.map(&mut cameras, |(index, camera)| encode(shared, &scene, *index, camera));
         let (commands, counts): (Vec<_>, Vec<usize>) = encoded.into_iter().unzip();
         shared.fixture.queue.submit(commands);
         *drawn = counts.iter().sum();
@@ -55,13 +48,13 @@ impl Technique for EncoderPerThread {
 
 /// Culls and records a camera's objects; also returns their number.
 fn encode(shared: &DrawOnly, scene: &SceneRef<'_>, index: usize, camera: &Camera) -> (wgpu::CommandBuffer, usize) {
-    shared.write_camera(index, &clip_from_world(camera));
-    let frustum = Frustum::new(camera);
+    let clip_from_world = clip_from_world(camera);
+    shared.write_camera(index, &clip_from_world);
     let mut encoder = shared.fixture.encoder();
     let mut pass = shared.fixture.pass(&mut encoder, index);
     shared.set(&mut pass, index);
     let mut drawn = 0;
-    for object in (0..scene.object_count()).filter(|&object| shared.spheres[object].is_visible(&frustum)) {
+    for object in visible_objects(shared.groups(), 0, &planes(&clip_from_world)) {
         shared.draw(&mut pass, scene, object);
         drawn += 1;
     }

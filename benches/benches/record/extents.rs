@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::measure::sample;
 use crate::renderer::Drawloom;
-use crate::technique::{Contender, Failure};
+use crate::technique::{Contender, Failure, Runner};
 use crate::{CAMERAS, Extent};
 
 /// A scene of some extent, drawn by some workers.
@@ -54,9 +54,9 @@ pub fn measure(extent: &Extent, workers: &[usize], progress: &ProgressBar) -> Re
     let mut contenders = Vec::new();
     for (name, motion, objects, make) in SCENES {
         for &workers in workers {
-            let technique = Box::new(Drawloom::new(BackendName::Noop.open()?, workers, true)?);
+            let runner = Runner::Drawloom(Box::new(Drawloom::new(BackendName::Noop.open()?, workers, true)?));
             let world = Moving::new(make(objects * extent.objects / Extent::FULL.objects)?, motion);
-            contenders.push(Contender { name, workers, motion, technique, world });
+            contenders.push(Contender { name, workers, motion, runner, world });
         }
     }
     progress.set_message("extents");

@@ -1,4 +1,4 @@
-//! The maximum throughput of two threads on this machine: each draws frames of its own, and they share only the hardware.
+//! The maximum throughput of several threads on this machine: each draws frames of its own, and they share only the hardware.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -12,9 +12,9 @@ use crate::CAMERAS;
 use crate::renderer::Drawloom;
 use crate::technique::{Failure, Technique};
 
-/// Two threads that draw at the same time.
+/// Threads that draw at the same time.
 pub struct IndependentThreads {
-    threads: [Runner; 2],
+    threads: Vec<Runner>,
 }
 
 /// A thread that draws some frames on each request, and returns the seconds per frame.
@@ -27,11 +27,15 @@ struct Runner {
 const FRAMES: u32 = 8;
 
 impl IndependentThreads {
-    pub fn new(backend: BackendName, objects: usize) -> Self {
-        Self { threads: [(); 2].map(|()| Runner::new(backend, objects)) }
+    pub fn new(threads: usize, backend: BackendName, objects: usize) -> Self {
+        Self { threads: (0..threads).map(|_| Runner::new(backend, objects)).collect() }
     }
 
-    /// Has both draw; returns the seconds per frame of both together.
+    pub fn count(&self) -> usize {
+        self.threads.len()
+    }
+
+    /// Has all draw; returns the seconds per frame of all together.
     ///
     /// # Errors
     /// Returns an error if one cannot draw.

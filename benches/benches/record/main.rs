@@ -8,23 +8,30 @@
 //! In the scene *moving*, every object moves, and the engine says nothing about it. In *one percent moving*, *still* and *still, cameras
 //! moving* it says what moved. Techniques that issue 64 instanced draws a camera have a table of their own:
 //!
-//! - *by-mesh* instances by hand: a thread culls a camera, counts and scatters its objects by mesh, and records one draw a mesh. It
-//!   is the best plain code there is here. On two threads, a thread takes a camera at a time.
+//! - *by-mesh* instances by hand: threads cull cameras, count and scatter their objects by mesh, and record one draw a mesh. It
+//!   is the best plain code there is here.
 //! - *drawloom* is this crate by default, and *drawloom-…* are its recording strategies, each alone.
 //!
 //! Techniques that issue 10,000 single draws a camera have another:
 //!
 //! - *naive* is a plain engine: the same culling, and then all state for each object, in the order of the scene, on one thread,
 //!   directly into the pass.
-//! - *rayon* splits the objects of each camera into chunks, culls them and records a bundle of each in parallel; all meshes are in
+//! - *bundles* splits the objects of each camera into chunks, and threads cull them and record a bundle of each; all meshes are in
 //!   one buffer and all objects in another, so no state is set between draws.
-//! - *encoder-per-thread* has a thread per camera, which culls and records directly into an encoder of its own, in the same form.
+//! - *encoders* has an encoder per camera, into which a thread culls and records directly, in the same form.
 //! - *drawloom-not-instanced* is this crate without instancing.
+//!
+//! What is written by hand runs on as many threads as this crate has workers, in three ways, and on one thread. The fastest of these
+//! is what targets compare with, in each scene:
+//!
+//! - *rayon*: a pool of rayon's, which sleeps between frames, and splits work as it sees fit.
+//! - *spinning*: threads that spin between frames, as this crate's workers do, and claim one piece of work after the other.
+//! - *camera a thread*: such threads, each with its own cameras and its own share of the objects.
 //!
 //! All draw the same picture, which is checked first, upload what moved in every frame, and use wgpu alike. They are
 //! interleaved; a sample is as many frames as fill some milliseconds. The table shows medians, and how often a frame allocates
 //! memory, counted over the whole process in frames that are not timed. For Drawloom it also shows the renderer's own
-//! allocations, counted on a backend that does nothing.
+//! allocations, counted on a backend that does nothing. Ratios are those of the medians that the tables show.
 //!
 //! On noop a third table shows how frames of this crate grow with the number of objects and of cameras. The last line names the
 //! targets that were missed.
@@ -32,6 +39,7 @@
 //! `target/drawloom/record.json` and `.svg`, and `record_extents.json`, have the same.
 
 mod allocations;
+mod bundles;
 mod by_mesh;
 mod draw_only;
 mod encoders;
@@ -42,11 +50,12 @@ mod measure;
 mod naive;
 mod noop_backend;
 mod objects;
-mod parallel;
 mod pictures;
 mod renderer;
 mod report;
+mod spheres;
 mod technique;
+mod threads;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -107,8 +116,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     let arguments: Arguments = drawloom_output::parse_arguments();
     let extent = if arguments.backend.is_quick() { Extent::QUICK } else { Extent::FULL };
     let progress = progress_bar("samples");
-    let mut report = Report::new(&extent);
     let (backends, workers) = (arguments.backend.backends()?, arguments.workers.counts());
+    let mut report = Report::new(&extent, &workers);
     for &backend in &backends {
         report.measured.push(measure::measure(&extent, backend, &workers, &progress)?);
     }

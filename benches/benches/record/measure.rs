@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::clouds::around_one;
 use drawloom_benches::harness::{Harness, Rounds};
-use drawloom_benches::moving::{Motion, Moving};
+use drawloom_benches::moving::Moving;
 use drawloom_benches::statistics::median;
 use drawloom_benches::stopwatch::mean_frame;
 use indicatif::ProgressBar;
@@ -25,16 +25,8 @@ const COUNTED: usize = 8;
 pub struct Measured {
     pub backend: BackendName,
     pub rows: Vec<Row>,
-    /// Nanoseconds per object and view of two independent threads.
-    pub independent: f64,
-    /// The speed-up of two workers over one, and of two independent threads over one worker.
-    pub speed_ups: [f64; 2],
-    /// The time of one worker as a share of by-mesh on one thread, and of two workers of two threads.
-    pub of_by_mesh: [f64; 2],
-    /// The time of two workers without instancing as a share of the fastest peer with an encoder a camera.
-    pub of_encoders: f64,
-    /// The time of each scene, with one worker, as a share of the scene in which everything moves.
-    pub of_moving: Vec<(&'static str, f64)>,
+    /// By number of threads: nanoseconds per object and view of as many independent threads.
+    pub independent: Vec<(usize, f64)>,
 }
 
 /// # Errors
@@ -50,80 +42,61 @@ pub fn measure(
     progress.set_message(backend.name());
     pictures::compare(&mut contenders, backend == BackendName::Adapter)?;
 
-    let independent = IndependentThreads::new(backend, extent.objects);
-    let mut independent_times = Vec::new();
+    let several = workers.iter().filter(|&&workers| workers > 1);
+    let independent: Vec<_> =
+        several.map(|&threads| IndependentThreads::new(threads, backend, extent.objects)).collect();
+    let mut independent_times = vec![Vec::new(); independent.len()];
     let mut times = vec![Vec::new(); contenders.len()];
     let mut harness = Harness::new(rounds, progress);
     for round in harness.rounds(contenders.len()) {
         let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
         let samples = harness.round(&mut contenders, |contender| sample(contender, at_least))?;
-        let independent_time = independent.sample()?;
+        let independent = independent.iter().map(IndependentThreads::sample).collect::<Result<Vec<_>, _>>()?;
         if !round.is_warm_up() {
             times.iter_mut().zip(samples).for_each(|(times, sample)| times.push(sample));
-            independent_times.push(independent_time);
+            independent_times.iter_mut().zip(independent).for_each(|(times, sample)| times.push(sample));
         }
     }
-    let nanoseconds = |seconds: f64| seconds * 1e9 / (CAMERAS * extent.objects) as f64;
+    let nanoseconds = |times: Vec<f64>| median(times) * 1e9 / (CAMERAS * extent.objects) as f64;
     let mut rows = Vec::new();
-    let find_in = |name, workers, motion| {
-        contenders.iter().position(|one| (one.name, one.workers, one.motion) == (name, workers, motion))
-    };
-    let find = |name, workers| find_in(name, workers, Motion::Everything);
-    let [naive, one, two] = [("naive", 1), ("drawloom", 1), ("drawloom", 2)].map(|(name, workers)| find(name, workers));
-    // The ratio of two samples of the same round, so that a disturbance meets both; NaN if one of them is not measured.
-    let speed_up = |slow: Option<usize>, fast: &[f64]| {
-        let slow = slow.map_or(&[][..], |index| &times[index]);
-        let ratios: Vec<_> = slow.iter().zip(fast).map(|(slow, fast)| slow / fast).collect();
-        if ratios.is_empty() { f64::NAN } else { median(ratios) }
-    };
-    let speed_ups = [speed_up(one, two.map_or(&[][..], |two| &times[two])), speed_up(one, &independent_times)];
-    let share = |drawloom: Option<usize>, peer: Option<usize>| {
-        1.0 / speed_up(peer, drawloom.map_or(&[][..], |index| &times[index]))
-    };
-    let of_by_mesh = [(1, one), (2, two)].map(|(threads, drawloom)| share(drawloom, find("by-mesh", threads)));
-    let of_encoders = share(find("drawloom-not-instanced", 2), find("encoder-per-thread", CAMERAS));
-    let of_moving = Motion::ALL[1..].iter().map(|&motion| (motion.name(), share(find_in("drawloom", 1, motion), one)));
-    let of_moving = of_moving.collect();
-    for (contender, times) in contenders.iter_mut().zip(&times) {
+    for (contender, times) in contenders.iter_mut().zip(times) {
         let own = contender.is_drawloom().then(|| own_requests(contender, rounds.warm_up, extent.objects));
         rows.push(Row {
             technique: contender.name,
             scene: contender.motion.name(),
             backend,
             workers: contender.workers,
+            threads: contender.threads(),
             is_instanced: contender.is_instanced(),
-            ns_per_object_view: nanoseconds(median(times.iter().copied())),
-            speed_up_over_naive: speed_up(naive, times),
+            is_drawloom: contender.is_drawloom(),
+            ns_per_object_view: nanoseconds(times),
             own_allocations_per_frame: own.transpose()?,
-            allocations_per_frame: requests(&mut contender.world, |world| {
-                let (result, requests) = requests_in(|| contender.technique.frame(world.as_scene_ref()));
-                result?;
-                contender.technique.wait()?;
-                Ok(requests)
+            allocations_per_frame: contender.run(|technique, world| {
+                requests(world, |world| {
+                    let (result, requests) = requests_in(|| technique.frame(world.as_scene_ref()));
+                    result?;
+                    technique.wait()?;
+                    Ok(requests)
+                })
             })?,
         });
     }
-    Ok(Measured {
-        backend,
-        rows,
-        independent: nanoseconds(median(independent_times)),
-        speed_ups,
-        of_by_mesh,
-        of_encoders,
-        of_moving,
-    })
+    let independent = independent.iter().zip(independent_times);
+    let independent = independent.map(|(threads, times)| (threads.count(), nanoseconds(times))).collect();
+    Ok(Measured { backend, rows, independent })
 }
 
 /// Draws one frame, and more until they have taken `at_least`; returns seconds per frame.
 pub fn sample(contender: &mut Contender, at_least: Duration) -> Result<f64, Failure> {
-    let Contender { technique, world, .. } = contender;
-    mean_frame(at_least, || {
-        world.step();
-        let start = Instant::now();
-        technique.frame(world.as_scene_ref())?;
-        let elapsed = start.elapsed();
-        technique.wait()?;
-        Ok(elapsed)
+    contender.run(|technique, world| {
+        mean_frame(at_least, || {
+            world.step();
+            let start = Instant::now();
+            technique.frame(world.as_scene_ref())?;
+            let elapsed = start.elapsed();
+            technique.wait()?;
+            Ok(elapsed)
+        })
     })
 }
 

@@ -45,16 +45,19 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
 pub fn compare(contenders: &mut [Contender], has_pictures: bool) -> Result<(), Failure> {
     let mut first = Vec::new();
     for contender in contenders {
-        let name = contender.name;
+        let name = [contender.name, contender.threads()].join(" ");
+        contender.run(|technique, world| {
+            technique.frame(world.as_scene_ref())?;
+            technique.wait()
+        })?;
+        let drawn = contender.technique().drawn();
         let scene = contender.world.as_scene_ref();
-        contender.technique.frame(scene)?;
-        contender.technique.wait()?;
-        let (drawn, all) = (contender.technique.drawn(), scene.object_count() * scene.cameras.len());
+        let (views, all) = (scene.cameras.len(), scene.object_count() * scene.cameras.len());
         if drawn != all {
             return Err(format!("{name} draws {drawn} objects of {all}").into());
         }
-        let cameras = 0..if has_pictures { scene.cameras.len() } else { 0 };
-        let pictures = cameras.map(|camera| contender.technique.picture(camera)).collect::<Result<Vec<_>, _>>()?;
+        let cameras = 0..if has_pictures { views } else { 0 };
+        let pictures = cameras.map(|camera| contender.technique().picture(camera)).collect::<Result<Vec<_>, _>>()?;
         if first.is_empty() {
             first = pictures.concat();
             if has_pictures && first.iter().all(|&byte| byte == 0) {

@@ -11,19 +11,23 @@ use drawloom_benches::moving::{Motion, Moving};
 use drawloom_output::print_diagnostic;
 
 use crate::CAMERAS;
+use crate::bundles::Bundles;
 use crate::by_mesh::ByMesh;
 use crate::draw_only::DrawOnly;
-use crate::encoders::EncoderPerThread;
+use crate::encoders::Encoders;
 use crate::fixture::Fixture;
 use crate::naive::Naive;
-use crate::parallel::Parallel;
 use crate::renderer::Drawloom;
+use crate::threads::Threads;
 
 pub type Failure = Box<dyn Error>;
 
+/// The scenes in which instancing by hand is measured.
+pub const BY_MESH_SCENES: [Motion; 2] = [Motion::Everything, Motion::EverythingInTurningViews];
+
 /// A way to record.
 pub trait Technique {
-    /// Draws a frame, from visibility to submit.
+    /// Draws a frame, from visibility to submit. Called within [`Contender::run`].
     fn frame(&mut self, scene: SceneRef<'_>) -> Result<(), Failure>;
 
     /// Waits until the device is idle.
@@ -41,37 +45,49 @@ pub struct Contender {
     pub name: &'static str,
     pub workers: usize,
     pub motion: Motion,
-    pub technique: Box<dyn Technique>,
+    pub runner: Runner,
     /// A world of its own, because the reported changes hold for one renderer.
     pub world: Moving,
 }
 
+/// A technique, and what runs its frames.
+pub enum Runner {
+    /// This crate, whose scheduler has threads of its own.
+    Drawloom(Box<Drawloom>),
+    ByHand(Box<dyn Technique + Send>, Threads),
+}
+
 impl Contender {
-    /// All contenders with these numbers of workers, in the order of the table.
+    /// All contenders, in the order of the table. Peers run on one thread too.
     pub fn all(backend: BackendName, objects: usize, workers: &[usize]) -> Result<Vec<Self>, Failure> {
         let scene = around_one(CAMERAS, objects)?;
         let scene = &scene.as_scene_ref();
         let fixture = || Fixture::new(&backend.open()?, scene);
         let draw_only = || Ok::<_, Failure>(DrawOnly::new(fixture()?, scene));
-        let in_scene = |name, workers, motion, technique| {
-            Ok::<_, Failure>(Self {
-                name,
-                workers,
-                motion,
-                technique,
-                world: Moving::new(around_one(CAMERAS, objects)?, motion),
-            })
+        let world = |motion| Ok::<_, Failure>(Moving::new(around_one(CAMERAS, objects)?, motion));
+        let by_hand = |name, threads: &Threads, motion, technique| {
+            let runner = Runner::ByHand(technique, threads.clone());
+            Ok::<_, Failure>(Self { name, workers: threads.count(), motion, runner, world: world(motion)? })
         };
-        let of = |name, workers, technique| in_scene(name, workers, Motion::Everything, technique);
-        let mut all = vec![of("naive", 1, Box::new(Naive::new(fixture()?, scene)) as Box<dyn Technique>)?];
-        for &threads in workers {
-            all.push(of("rayon", threads, Box::new(Parallel::new(draw_only()?, threads)?))?);
+        let drawloom = |name, workers, motion, technique| {
+            let runner = Runner::Drawloom(Box::new(technique));
+            Ok::<_, Failure>(Self { name, workers, motion, runner, world: world(motion)? })
+        };
+        let naive = Box::new(Naive::new(fixture()?, scene));
+        let mut all = vec![by_hand("naive", &Threads::One, Motion::Everything, naive)?];
+        let threads = Threads::all(workers)?;
+        for threads in &threads {
+            let technique = Box::new(Bundles::new(draw_only()?, threads));
+            all.push(by_hand("bundles", threads, Motion::Everything, technique)?);
         }
-        all.push(of("encoder-per-thread", CAMERAS, Box::new(EncoderPerThread::new(draw_only()?)?))?);
-        for motion in [Motion::Everything, Motion::EverythingInTurningViews] {
-            for &threads in workers {
-                let technique = Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), threads)?);
-                all.push(in_scene("by-mesh", threads, motion, technique)?);
+        for threads in &threads {
+            let technique = Box::new(Encoders::new(draw_only()?, threads));
+            all.push(by_hand("encoders", threads, Motion::Everything, technique)?);
+        }
+        for motion in BY_MESH_SCENES {
+            for threads in &threads {
+                let technique = Box::new(ByMesh::new(DrawOnly::with_instances(fixture()?, scene), threads));
+                all.push(by_hand("by-mesh", threads, motion, technique)?);
             }
         }
         let strategies = [
@@ -95,20 +111,53 @@ impl Contender {
                         }
                     },
                 };
-                all.push(of(name, workers, Box::new(Drawloom::new(opened, workers, true)?))?);
+                all.push(drawloom(name, workers, Motion::Everything, Drawloom::new(opened, workers, true)?)?);
             }
-            all.push(of("drawloom-not-instanced", workers, Box::new(Drawloom::new(backend.open()?, workers, false)?))?);
+            let single_draws = Drawloom::new(backend.open()?, workers, false)?;
+            all.push(drawloom("drawloom-not-instanced", workers, Motion::Everything, single_draws)?);
             for motion in Motion::ALL.into_iter().filter(|motion| *motion != Motion::Everything) {
-                let technique = Box::new(Drawloom::new(backend.open()?, workers, true)?);
-                all.push(in_scene("drawloom", workers, motion, technique)?);
+                all.push(drawloom("drawloom", workers, motion, Drawloom::new(backend.open()?, workers, true)?)?);
             }
         }
         Ok(all)
     }
 
+    /// Runs `frames` on a thread of the technique's.
+    ///
+    /// # Errors
+    /// Returns the error of `frames`.
+    pub fn run<R: Send>(
+        &mut self,
+        frames: impl FnOnce(&mut dyn Technique, &mut Moving) -> Result<R, Failure> + Send,
+    ) -> Result<R, Failure> {
+        match &mut self.runner {
+            Runner::Drawloom(technique) => frames(&mut **technique, &mut self.world),
+            Runner::ByHand(technique, threads) => {
+                let world = &mut self.world;
+                // Errors of wgpu cannot be sent from thread to thread.
+                Ok(threads.run(|| frames(&mut **technique, world).map_err(|failure| failure.to_string()))?)
+            }
+        }
+    }
+
+    pub fn technique(&mut self) -> &mut dyn Technique {
+        match &mut self.runner {
+            Runner::Drawloom(technique) => &mut **technique,
+            Runner::ByHand(technique, _) => &mut **technique,
+        }
+    }
+
+    /// How a hand-written technique divides its work among threads; empty for one thread.
+    pub fn threads(&self) -> &'static str {
+        match &self.runner {
+            Runner::Drawloom(_) => "",
+            Runner::ByHand(_, threads) => threads.name(),
+        }
+    }
+
     /// Whether it is a technique of this crate.
     pub fn is_drawloom(&self) -> bool {
-        self.name.starts_with("drawloom")
+        matches!(self.runner, Runner::Drawloom(_))
     }
 
     /// Whether equal objects are one draw.
