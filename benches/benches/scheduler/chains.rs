@@ -15,6 +15,9 @@ use crate::{Extent, Failure, pools};
 
 const NODES: usize = 24;
 
+/// Threads that never sleep.
+const SPINNING: &str = "spinning threads";
+
 pub fn frame(extent: &Extent, workers: &[usize]) -> Row {
     row("frame", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), extent.back_to_back(), workers)
 }
@@ -22,7 +25,10 @@ pub fn frame(extent: &Extent, workers: &[usize]) -> Row {
 /// The same with one frame every 5 ms, so that workers sleep and caches are cold.
 pub fn frame_cold(extent: &Extent, workers: &[usize]) -> Row {
     let pace = Pace::Paced { interval: Duration::from_millis(5), frames: extent.cold_frames };
-    row("frame_cold", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), pace, workers)
+    let mut row = row("frame_cold", Chain { nodes: NODES, jobs: 24 }, Duration::from_nanos(2_900), pace, workers);
+    // They keep a core busy between frames, and have none to wake.
+    row.contenders.iter_mut().filter(|contender| contender.name == SPINNING).for_each(|one| one.is_easier = true);
+    row
 }
 
 pub fn fine(extent: &Extent, workers: &[usize]) -> Row {
@@ -88,6 +94,7 @@ impl Chain {
             self.bevy_tasks(workers),
             self.chili(workers),
             self.std_threads(workers),
+            self.spinning_threads(workers),
         ]
     }
 
@@ -188,8 +195,13 @@ impl Chain {
     }
 
     pub fn std_threads(self, workers: usize) -> Contender {
-        let team = ThreadTeam::new(self.ranges().map(|jobs| jobs.end).collect(), 1, workers);
+        let team = ThreadTeam::sleeping(workers, self.ranges().map(|jobs| jobs.end).collect(), 1);
         Contender::new("std threads", workers, move |work, timer| team.frames(work, timer))
+    }
+
+    pub fn spinning_threads(self, workers: usize) -> Contender {
+        let team = ThreadTeam::spinning(workers, self.ranges().map(|jobs| jobs.end).collect(), 1);
+        Contender::new(SPINNING, workers, move |work, timer| team.frames(work, timer))
     }
 }
 

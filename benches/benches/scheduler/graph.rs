@@ -36,6 +36,7 @@ pub fn row(name: &'static str, nodes: usize, extent: &Extent, workers: &[usize])
             bevy_tasks(&graph, workers),
             chili(&graph, workers),
             std_threads(&graph, workers),
+            spinning_threads(&graph, workers),
         ]);
     }
     Row {
@@ -279,8 +280,16 @@ fn chili(graph: &Arc<Graph>, workers: usize) -> Contender {
     .with_easier_task()
 }
 
-/// A ticket claims 8 nodes, as it costs far more than a node.
+/// A ticket costs far more than a node.
+const NODES_PER_TICKET: usize = 8;
+
 fn std_threads(graph: &Arc<Graph>, workers: usize) -> Contender {
-    let team = ThreadTeam::new(graph.ends().collect(), 8, workers);
+    let team = ThreadTeam::sleeping(workers, graph.ends().collect(), NODES_PER_TICKET);
     Contender::new("std threads by layers", workers, move |work, timer| team.frames(work, timer)).with_easier_task()
+}
+
+fn spinning_threads(graph: &Arc<Graph>, workers: usize) -> Contender {
+    let team = ThreadTeam::spinning(workers, graph.ends().collect(), NODES_PER_TICKET);
+    Contender::new("spinning threads by layers", workers, move |work, timer| team.frames(work, timer))
+        .with_easier_task()
 }

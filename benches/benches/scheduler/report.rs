@@ -1,14 +1,16 @@
 //! The results, as a table and as JSON.
 
+use std::collections::BTreeSet;
 use std::io;
 
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use serde::Serialize;
 
-use crate::Extent;
 use crate::row::Row;
+use crate::{Extent, ROWS};
 
 /// The results.
 pub struct Report {
@@ -62,13 +64,16 @@ impl Report {
         let note = if self.extent == "full" { "" } else { " (inaccurate figures)" };
         print_line!("{} run{note}: medians and 95th percentiles of {} rounds", self.extent, self.rounds);
         print_line!(
-            "workers: threads that run jobs, the caller's included; ratio: to the best of the peers of as many, or of all"
+            "workers: threads that run jobs, the caller's included; ratio: to the best of the peers of at most as many, or of all"
         );
-        print_line!("easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all\n");
+        print_line!(
+            "easier, and so no peers: a graph layer by layer, jobs that need not be spawned, no jobs at all, threads that never sleep where others do\n"
+        );
         let mut table = Table::new(&["row", "executor", "workers", "median", "p95", "unit", "ratio"]);
         for line in &self.lines {
             let Line { row, executor, workers, median, p95, unit, .. } = line;
-            let ratio = self.best_peer(row, *workers).map_or(String::new(), |best| format!("{:.2}", median / best));
+            let ratio =
+                self.best_peer(row, *workers).map_or(String::new(), |best| format!("{:.2}", median / best.median));
             let figures = [median, p95].map(|figure| format!("{figure:.decimals$}", decimals = decimals(*figure)));
             let [median, p95] = figures;
             table.row([
@@ -82,22 +87,35 @@ impl Report {
             ]);
         }
         table.print();
-        self.print_cold_target();
     }
 
-    /// A frame that finds all workers asleep has to wake them. Prints its distance from the ideal plus the time of a wake-up.
-    fn print_cold_target(&self) {
-        let own_lines = self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours());
-        for &Line { executor, workers, median, .. } in own_lines {
+    /// What was reached of the targets.
+    pub fn targets(&self) -> Targets {
+        let mut targets = Targets::new();
+        // A pool that sleeps takes next to no time, and the ratio of two such times says nothing.
+        for row in ROWS.into_iter().filter(|&row| row != "asleep") {
+            let own_lines = || self.lines.iter().filter(|line| line.row == row && line.is_ours());
+            for workers in own_lines().map(|line| line.workers).collect::<BTreeSet<_>>() {
+                let own = own_lines().filter(|line| line.workers <= workers);
+                let own = own.min_by(|one, other| one.median.total_cmp(&other.median));
+                let peer = self.best_peer(row, workers).filter(|peer| peer.workers <= workers);
+                if let (Some(own), Some(peer)) = (own, peer) {
+                    let figure = format!("{row}, {workers} workers, {} ÷ {}", own.executor, peer.executor);
+                    targets.at_most(figure, 1.0, own.median / peer.median);
+                }
+            }
+        }
+        // A frame that finds all workers asleep has to wake them.
+        for &Line { executor, workers, median, .. } in
+            self.lines.iter().filter(|line| line.row == "frame_cold" && line.is_ours())
+        {
             let figures = (self.median("wake", "drawloom", workers), self.median("frame_cold", "ideal", workers));
             let (Some(wake), Some(ideal)) = figures else { continue };
-            let target = ideal + 1.5 * wake;
-            print_line!(
-                "frame_cold: {executor} on {workers} workers takes {:+.1} µs against {target:.1}, the ideal + 1.5 wakes of {wake:.1} (row wake, drawloom)",
-                median - target
-            );
+            let bound = ideal + 1.5 * wake;
+            let figure = format!("frame_cold, {workers} workers, {executor} ÷ (ideal + 1.5 × wake = {bound:.1} µs)");
+            targets.at_most(figure, 1.0, median / bound);
         }
-        print_line!();
+        targets
     }
 
     fn median(&self, row: &str, executor: &str, workers: usize) -> Option<f64> {
@@ -105,12 +123,13 @@ impl Report {
         self.lines.iter().find(is_same).map(|line| line.median)
     }
 
-    /// The best peer with as many workers, or of all where none has as many.
-    fn best_peer(&self, row: &str, workers: usize) -> Option<f64> {
-        let peers = self.lines.iter().filter(|line| line.row == row && line.is_peer);
-        let equal = peers.clone().filter(|line| line.workers == workers);
-        let best = |lines: &mut dyn Iterator<Item = &Line>| lines.map(|line| line.median).min_by(f64::total_cmp);
-        best(&mut equal.into_iter()).or_else(|| best(&mut peers.into_iter()))
+    /// The best peer with at most as many workers, or of all where none has so few.
+    fn best_peer(&self, row: &str, workers: usize) -> Option<&Line> {
+        let best = |most: usize| {
+            let peers = self.lines.iter().filter(|line| line.row == row && line.is_peer && line.workers <= most);
+            peers.min_by(|one, other| one.median.total_cmp(&other.median))
+        };
+        best(workers).or_else(|| best(usize::MAX))
     }
 
     /// # Errors

@@ -5,28 +5,59 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 use crossbeam_utils::CachePadded;
+use drawloom_benches::spinning::SpinBarrier;
 use drawloom_benches::work::Work;
 
 use crate::Failure;
 use crate::timer::Timer;
 
 /// The calling thread, and others that live for one sample. A thread claims the next jobs of a node by a ticket.
-pub struct ThreadTeam {
+pub struct ThreadTeam<B> {
+    threads: usize,
     /// The end of each node's jobs.
     ends: Vec<usize>,
     jobs_per_ticket: usize,
-    threads: usize,
     tickets: Vec<CachePadded<AtomicUsize>>,
-    barrier: Barrier,
+    barrier: B,
     is_over: AtomicBool,
 }
 
-impl ThreadTeam {
-    /// `ends` has the end of each node's jobs. They begin at the end of those of the node before.
-    pub fn new(ends: Vec<usize>, jobs_per_ticket: usize, threads: usize) -> Self {
+/// How threads wait for each other.
+pub trait Wait: Sync {
+    /// Waits until all threads have called it. Returns true on one of them.
+    fn wait(&self) -> bool;
+}
+
+impl Wait for Barrier {
+    fn wait(&self) -> bool {
+        Self::wait(self).is_leader()
+    }
+}
+
+impl Wait for SpinBarrier {
+    fn wait(&self) -> bool {
+        Self::wait(self)
+    }
+}
+
+impl ThreadTeam<Barrier> {
+    /// Threads that sleep at a barrier. `ends` has the end of each node's jobs. They begin at the end of those of the node before.
+    pub fn sleeping(threads: usize, ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
+        Self::new(threads, ends, jobs_per_ticket, Barrier::new(threads))
+    }
+}
+
+impl ThreadTeam<SpinBarrier> {
+    /// The same with threads that never sleep, neither at a barrier nor between frames.
+    pub fn spinning(threads: usize, ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
+        Self::new(threads, ends, jobs_per_ticket, SpinBarrier::new(threads))
+    }
+}
+
+impl<B: Wait> ThreadTeam<B> {
+    fn new(threads: usize, ends: Vec<usize>, jobs_per_ticket: usize, barrier: B) -> Self {
         let tickets = ends.iter().map(|_| CachePadded::default()).collect();
-        let (barrier, is_over) = (Barrier::new(threads), AtomicBool::new(false));
-        Self { ends, jobs_per_ticket, threads, tickets, barrier, is_over }
+        Self { threads, ends, jobs_per_ticket, tickets, barrier, is_over: AtomicBool::new(false) }
     }
 
     /// # Errors
@@ -67,7 +98,7 @@ impl ThreadTeam {
                 (first..end.min(first + self.jobs_per_ticket)).for_each(|job| work.job(job));
             }
             // No thread uses this ticket again before one more barrier.
-            if self.barrier.wait().is_leader() {
+            if self.barrier.wait() {
                 ticket.store(0, Ordering::Relaxed);
             }
             begin = end;
