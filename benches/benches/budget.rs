@@ -5,7 +5,8 @@
 //!
 //! A main view and six others look at boxes, on wgpu's `noop` device and two workers. All cameras move in every frame. The budget is what
 //! frames with few boxes cost, and half as much again. Then there are four times as many boxes, and few again. The table has the mean thread
-//! time of a frame from the 30th frame after each step on, and the rungs after it. `target/drawloom/budget.json` has the same.
+//! time of a frame from the 30th frame after each step on, and the rungs after it. `target/drawloom/budget.json` has the same. The last line names
+//! the targets that were missed.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -22,6 +23,7 @@ use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::{median, percentile};
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_testing::adapter;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -86,9 +88,15 @@ fn run() -> Result<(), Box<dyn Error>> {
         ]);
     }
     table.print();
+    let mut targets = Targets::new();
+    for row in &rows {
+        targets.at_most(format!("{}, mean ÷ budget", row.step), 1.0, row.share_of_budget);
+    }
+    targets.print("Targets and results");
     if !quick {
         results::write_json("budget.json", &rows)?;
     }
+    targets.print_missed();
     Ok(())
 }
 

@@ -8,7 +8,7 @@
 //! replacing the old one; of preparing pipelines, if the engine does; of recording the next frame, with everything that is uploaded and
 //! compiled for it; until it is submitted, in sum; and until it is drawn, with the longest. For comparison there is the frame that was drawn
 //! last on the device before, from record until it is drawn. Each picture is compared with that of the device before, byte by byte.
-//! `target/drawloom/recovery.json` has the same.
+//! `target/drawloom/recovery.json` has the same. The last line names the targets that were missed.
 
 use std::error::Error;
 use std::panic;
@@ -26,6 +26,7 @@ use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use drawloom_testing::adapter;
 use serde::Serialize;
@@ -125,10 +126,23 @@ fn run() -> Result<(), Box<dyn Error>> {
         ]);
     }
     table.print();
+    let targets = targets(&rows);
+    targets.print("Targets and results");
     if !quick {
         results::write_json("recovery.json", &rows)?;
     }
+    targets.print_missed();
     Ok(())
+}
+
+/// The targets: the next picture comes within a second.
+fn targets(rows: &[Row]) -> Targets {
+    let mut targets = Targets::new();
+    for Row { size: [width, height], pipelines, until_drawn_ms, .. } in rows {
+        let figure = format!("{width} × {height}, pipelines {pipelines}, s until drawn");
+        targets.at_most(figure, 1.0, until_drawn_ms / 1e3);
+    }
+    targets
 }
 
 fn row(size: [u32; 2], pipelines: &'static str, recoveries: &[Recovery]) -> Row {

@@ -23,10 +23,12 @@ use drawloom::scene::{Camera, Material, Mesh, ObjectHandle, RenderObject, Scene,
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
 use drawloom_benches::arguments::BackendArguments;
+use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use serde::Serialize;
 
 type Failure = Box<dyn Error>;
@@ -43,6 +45,9 @@ struct Row {
     uploaded_bytes: u64,
     resident_bytes_max: u64,
 }
+
+/// The case of a world that is streamed through a budget.
+const WHOLE_FRAMES: &str = "whole frames";
 
 /// How much there is of everything.
 struct Extent {
@@ -125,10 +130,30 @@ fn run() -> Result<(), Failure> {
         ]);
     }
     table.print();
+    let targets = targets(&rows, &extent);
+    targets.print("Targets and results of whole frames");
     if !quick {
         results::write_json("streaming.json", &rows)?;
     }
+    targets.print_missed();
     Ok(())
+}
+
+/// The targets of a world that is streamed: it keeps to its budget, and no frame takes longer than two, where frames are long enough
+/// that the system's other programs do not make one of them twice as long.
+fn targets(rows: &[Row], extent: &Extent) -> Targets {
+    let mut targets = Targets::new();
+    let budget: u64 = extent.budget_bytes.iter().sum();
+    for row in rows.iter().filter(|row| row.case == WHOLE_FRAMES) {
+        let Row { adapter, scene, .. } = row;
+        let resident = row.resident_bytes_max as f64 / budget as f64;
+        targets.at_most(format!("{adapter}, {scene}, bytes on the device ÷ budget"), 1.0, resident);
+        if *adapter != BackendName::Noop.name() {
+            let figure = format!("{adapter}, {scene}, longest ÷ median frame");
+            targets.at_most(figure, 2.0, row.longest_ms / row.median_ms);
+        }
+    }
+    targets
 }
 
 /// One row for each case: the medians of its rounds.
@@ -366,5 +391,5 @@ fn through_a_budget(adapter: &'static str, device: &Device, extent: &Extent) -> 
         std::thread::sleep(Duration::from_millis(8).saturating_sub(elapsed));
     }
     let scene = format!("{} MB through {} MB", extent.world_bytes >> 20, (mesh_bytes + texture_bytes) >> 20);
-    Ok(Measured { adapter, scene, case: "whole frames", times }.row(&world, before, resident))
+    Ok(Measured { adapter, scene, case: WHOLE_FRAMES, times }.row(&world, before, resident))
 }

@@ -7,7 +7,8 @@
 //! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is compared in a row is
 //! drawn in turn, and the table has the medians. All cameras move in every frame. `target/drawloom/views.json` has the same.
 //!
-//! The second table has the memory of many small views with transient targets, each number of views in a process of its own.
+//! The second table has the memory of many small views with transient targets, each number of views in a process of its own. The last
+//! line names the targets that were missed.
 
 use std::env;
 use std::error::Error;
@@ -33,6 +34,7 @@ use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::stopwatch::timed_frame;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
@@ -56,6 +58,9 @@ struct Row {
     compared: &'static str,
     /// Of the second; the first has as many, or one, if the numbers of workers are compared.
     workers: usize,
+    /// Whether the second is the first on more workers.
+    #[serde(skip)]
+    is_speed_up: bool,
     /// Objects that the views see, summed over those of the first frame, and of the second.
     seen: [usize; 2],
     microseconds: [f64; 2],
@@ -85,7 +90,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 
     let mut table =
         Table::new(&["compared", "workers", "objects seen", "first, µs", "second, µs", "difference, µs", "ratio"]);
-    for Row { compared, workers, seen, microseconds: [first, second] } in &rows {
+    for Row { compared, workers, seen, microseconds: [first, second], .. } in &rows {
         let seen = format!("{} and {}", seen[0], seen[1]);
         let [difference, ratio] = [format!("{:.1}", second - first), format!("{:.2}", first / second)];
         let [first, second] = [first, second].map(|time| format!("{time:.1}"));
@@ -103,10 +108,24 @@ fn run() -> Result<(), Box<dyn Error>> {
         table.row([views.to_string(), format!("{mebibytes:.1}"), format!("{ratio:.2}")]);
     }
     table.print();
+    let targets = targets(&rows, &memory);
+    targets.print("Targets and results");
     if !quick {
         results::write_json("views.json", &(rows, memory))?;
     }
+    targets.print_missed();
     Ok(())
+}
+
+/// The targets: several workers divide the time of many views, and memory grows no faster than the number of views.
+fn targets(rows: &[Row], [few, many]: &[Memory; 2]) -> Targets {
+    let mut targets = Targets::new();
+    for Row { compared, workers, microseconds: [first, second], .. } in rows.iter().filter(|row| row.is_speed_up) {
+        targets.at_least(format!("{compared}, {workers} workers"), 0.9 * *workers as f64, first / second);
+    }
+    let figure = format!("memory of {} ÷ {} views", many.views, few.views);
+    targets.at_most(figure, many.views as f64 / few.views as f64, many.mebibytes / few.mebibytes);
+    targets
 }
 
 /// What a process with many views needs.
@@ -175,7 +194,8 @@ fn measure(
     rounds: usize,
     progress: &ProgressBar,
 ) -> Result<Row, Box<dyn Error>> {
-    let workers = runners[1].renderer.scheduler().workers();
+    let [first_workers, workers] = [0, 1].map(|index: usize| runners[index].renderer.scheduler().workers());
+    let is_speed_up = workers > first_workers;
     let mut seen = Vec::new();
     for runner in &mut runners {
         seen.push(runner.frame(&scene)?.0);
@@ -186,6 +206,7 @@ fn measure(
     Ok(Row {
         compared,
         workers,
+        is_speed_up,
         seen: [seen[0], seen[1]],
         microseconds: [microseconds(&times[0]), microseconds(&times[1])],
     })

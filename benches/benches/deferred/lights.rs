@@ -7,6 +7,7 @@ use drawloom::backend::Picture;
 use drawloom::process::Deferred;
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -171,6 +172,26 @@ fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
 
 /// A few pixels on edges may differ.
 const MAX_DIFFERENT: f64 = 2e-4;
+
+/// The targets: with one worker, the deferred pipeline takes no longer than the faster of the renderers written by hand.
+pub fn targets(rows: &[Row]) -> Targets {
+    let mut targets = Targets::new();
+    for row in rows.iter().filter(|row| (row.pipeline, row.workers) == (Pipeline::Deferred, 1)) {
+        let is_peer = |other: &&Row| {
+            (other.backend, other.lights) == (row.backend, row.lights)
+                && matches!(other.pipeline, Pipeline::DrawPerLight | Pipeline::Clustered)
+        };
+        // The processor's time is compared on noop: a driver in software takes some of it on the adapter.
+        let time = |row: &Row| row.device_ms.unwrap_or(row.cpu_ms);
+        let fastest = rows.iter().filter(is_peer).min_by(|one, other| time(one).total_cmp(&time(other)));
+        if let Some(peer) = fastest {
+            let what = row.backend.of(["CPU", "device"]);
+            let figure = format!("{what}, lights: {}, deferred ÷ {}", row.lights, peer.pipeline.name());
+            targets.at_most(figure, 1.0, time(row) / time(peer));
+        }
+    }
+    targets
+}
 
 pub fn print(rows: &[Row]) {
     print_line!("Lights over a field of boxes. Draws: batches of objects, and one for each process that draws lights.");

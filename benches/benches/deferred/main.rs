@@ -13,7 +13,7 @@
 //! - *draw per light* is written in plain wgpu, on one thread: it draws all objects, and then adds each light to the objects that it reaches.
 //! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its cluster.
 //!
-//! `target/drawloom/deferred.json` has the same.
+//! `target/drawloom/deferred.json` has the same. The last line names the targets that were missed.
 
 mod block;
 mod contender;
@@ -94,8 +94,11 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
+    let targets = lights::targets(&report.lights);
+    targets.print("Targets and results, on one worker, beside the renderers written by hand");
     if !arguments.backend.is_quick() {
         report.write()?;
     }
+    targets.print_missed();
     Ok(())
 }

@@ -12,7 +12,8 @@
 //! - *buffers* are those that the backend keeps for frames.
 //!
 //! The second table compares update, record and submit of the next frame and this one at once with one after the other. The third one has
-//! the cost of a fence that nobody waits for. `target/drawloom/latency.json` has the same, and `latency.svg` draws the first table.
+//! the cost of a fence that nobody waits for. `target/drawloom/latency.json` has the same, and `latency.svg` draws the first table. The last
+//! line names the targets that were missed.
 
 mod charts;
 mod contender;
@@ -28,6 +29,7 @@ use drawloom_benches::backends::adapter_name;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -106,9 +108,14 @@ fn run() -> Result<(), Box<dyn Error>> {
         ]);
     }
     table.print();
+    let mut targets = Targets::new();
+    schemes::add_targets(&schemes, &mut targets);
+    targets.at_least("update + record and submit, one after the other ÷ at once", 1.8, overlap.ratio);
+    targets.print("Targets and results");
     if !quick {
         charts::draw(&results::file("latency.svg")?, &schemes)?;
         results::write_json("latency.json", &Results { adapter: adapter_name(), schemes, overlap, fences })?;
     }
+    targets.print_missed();
     Ok(())
 }

@@ -7,12 +7,13 @@ use std::time::Duration;
 use drawloom::backend::{Backend, WgpuBackend};
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
-use drawloom::{FrameTimes, Renderer};
+use drawloom::{Buffering, FrameTimes, Renderer};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::city;
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::moving::{Motion, Moving};
 use drawloom_benches::statistics::{median, percentile};
+use drawloom_benches::targets::Targets;
 use drawloom_testing::simulated_device::SimulatedDevice;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -92,6 +93,18 @@ pub fn measure(backend: BackendName, quick: bool, progress: &ProgressBar) -> Res
         }
     }
     Ok(rows)
+}
+
+/// The targets: two frames in flight come as often as with the faster of the loops by hand.
+pub fn add_targets(rows: &[Row], targets: &mut Targets) {
+    for row in rows.iter().filter(|row| row.name == Kind::Loop(Buffering::Double).name()) {
+        let by_hand = [Kind::Plain(1), Kind::Plain(2)].map(Kind::name);
+        let peers = rows.iter().filter(|peer| peer.device == row.device && by_hand.contains(&peer.name));
+        if let Some(peer) = peers.min_by(|one, other| one.frame_ms.total_cmp(&other.frame_ms)) {
+            let figure = format!("{}, double ÷ {}, ms a frame", row.device, peer.name);
+            targets.at_most(figure, 1.05, row.frame_ms / peer.frame_ms);
+        }
+    }
 }
 
 fn of_device<B: Backend>(

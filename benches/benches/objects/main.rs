@@ -114,8 +114,11 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     progress.finish_and_clear();
     report.print();
+    let targets = report.targets();
+    targets.print("Targets and results on noop with two workers, without instancing");
     if !arguments.backend.is_quick() {
         report.write()?;
     }
+    targets.print_missed();
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::error::Error;
 use drawloom_benches::backends::{BackendName, adapter_name};
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use serde::Serialize;
 
@@ -68,7 +69,6 @@ impl Report {
             table.row([objects, backend, row.workers.to_string(), format!("{:.1}", row.ns_per_object_view)]);
         }
         table.print();
-        self.print_targets();
     }
 
     fn print_rates(&self) {
@@ -148,36 +148,31 @@ impl Report {
         table.print();
     }
 
-    /// Prints the targets and the results on `noop` with two workers.
-    fn print_targets(&self) {
-        print_line!("Targets and results on noop with two workers, without instancing\n");
-        let mut table = Table::new(&["figure", "objects", "bound", "reached"]);
-        let mut target_row = |what: &str, objects: usize, bound: f64, reached: f64, is_reached: bool| {
-            let note = if is_reached { "" } else { ", short" };
-            table.row([what.to_owned(), objects.to_string(), format!("{bound:.2}"), format!("{reached:.3}{note}")]);
-        };
+    /// The targets, and what was reached on `noop` with two workers, without instancing.
+    pub fn targets(&self) -> Targets {
+        let mut targets = Targets::new();
         let has_target = |row: &&scenario::Row| row.backend == BackendName::Noop && row.workers == 2 && !row.instancing;
         for row in self.scenarios.iter().filter(has_target) {
-            let target = match row.objects {
+            let bound = match row.objects {
                 7 | 16 | 106 => 0.97,
                 1_006 => 1.70,
                 2_006 => 1.80,
                 10_000 => 1.90,
                 _ => continue,
             };
-            target_row("ratio", row.objects, target, row.ratio, row.ratio >= target);
+            targets.at_least(format!("{} objects, ratio", row.objects), bound, row.ratio);
             if row.objects >= 1_000 {
-                let of_ceiling = row.ratio / row.ceiling;
-                target_row("ratio, of its ceiling", row.objects, 0.90, of_ceiling, of_ceiling >= 0.9);
+                let figure = format!("{} objects, ratio ÷ ceiling", row.objects);
+                targets.at_least(figure, 0.9, row.ratio / row.ceiling);
             }
         }
         let has_target = |row: &&growth::Row| row.backend == BackendName::Noop && row.workers == 2;
         let growth: Vec<_> = self.growth.iter().filter(has_target).collect();
         if let [first, .., last] = growth[..] {
-            let grown = last.ns_per_object_view / first.ns_per_object_view;
-            target_row("growth of the ns, at most", last.objects, 1.5, grown, grown <= 1.5);
+            let figure = format!("{} ÷ {} objects, ns an object and view", last.objects, first.objects);
+            targets.at_most(figure, 1.5, last.ns_per_object_view / first.ns_per_object_view);
         }
-        table.print();
+        targets
     }
 
     /// # Errors

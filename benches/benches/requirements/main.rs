@@ -10,7 +10,7 @@
 //! the first run on a machine shows what they take; Mesa's compile in each run with `MESA_SHADER_CACHE_DISABLE=true`.
 //!
 //! The second table has the colonnade drawn by a pipeline that keeps all of its processes, and by one that has what the scene requires.
-//! `target/drawloom/requirements.json` has the same.
+//! `target/drawloom/requirements.json` has the same. The last line names the targets that were missed.
 
 mod unneeded;
 mod world;
@@ -33,6 +33,7 @@ use drawloom_benches::mirror::Mirror;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::everything::everything;
 use indicatif::ProgressBar;
@@ -130,10 +131,23 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     table.print();
     unneeded::print(&unneeded);
+    let targets = targets(&rows);
+    targets.print("Targets and results after a warm-up");
     if !quick {
         results::write_json("requirements.json", &(rows, unneeded))?;
     }
+    targets.print_missed();
     Ok(())
+}
+
+/// The targets: after a warm-up, no frame takes longer than two of those around it.
+fn targets(rows: &[Row]) -> Targets {
+    let mut targets = Targets::new();
+    for row in rows.iter().filter(|row| row.preparation == Preparation::WarmedUp) {
+        let figure = format!("{}, {} boxes, a frame ÷ its own median", row.backend.name(), row.boxes);
+        targets.at_most(figure, 2.0, row.longest_by_own_median);
+    }
+    targets
 }
 
 fn measure(

@@ -4,6 +4,7 @@ use std::io;
 
 use drawloom_benches::results;
 use drawloom_benches::table::Table;
+use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use serde::Serialize;
 
@@ -80,6 +81,15 @@ impl Report {
             "a span without a subscriber: {span:.1} ns; rings: {:.1} MiB a worker",
             *ring_bytes as f64 / 1048576.0
         );
+    }
+
+    /// The targets: a timeline that is off costs at most a quarter of an instruction a chunk. A quick run counts none.
+    pub fn targets(&self) -> Targets {
+        let mut targets = Targets::new();
+        for Counted { shape, off, without } in &self.figures.counted {
+            targets.at_most(format!("{}, off, more instructions a chunk", shape.name()), 0.25, off - without);
+        }
+        targets
     }
 
     /// # Errors
