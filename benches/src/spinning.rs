@@ -132,7 +132,7 @@ struct Spin {
 }
 
 /// After this many pauses, a thread lets another one run: on a busy machine that may be the one that it waits for.
-const PAUSES_TO_YIELD: u32 = 1 << 10;
+const PAUSES_TO_YIELD: u32 = 1 << 8;
 
 impl Spin {
     fn pause(&mut self) {
