@@ -37,6 +37,9 @@ pub struct FrameRequest<'a> {
     pub list_capacity: usize,
     /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes are finished.
     pub generated: &'a [Arc<GeneratedContents>],
+    /// Whether passes are recorded in bundles, which jobs divide, also where another way is cheaper: what a fixed
+    /// [`Granularity`](crate::Granularity) asks for.
+    pub records_bundles: bool,
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// The backend's [limits](super::Backend::limits). What is beyond them is not drawn: a backend that keeps arrays of

@@ -182,6 +182,11 @@ impl BinnedSegment {
         Some(((bin, level_of_detail), start as usize..end as usize))
     }
 
+    /// All runs in draw order: the bin and the level of detail of each, and the range of its objects.
+    pub(super) fn runs(&self) -> impl Iterator<Item = ((u32, u32), Range<usize>)> {
+        (0..self.runs.len()).filter_map(|index| self.run(index))
+    }
+
     /// The objects in a range of a run.
     pub(super) fn objects(&self, range: Range<usize>) -> &[u32] {
         &self.by_bin[range]

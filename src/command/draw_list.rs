@@ -25,12 +25,41 @@ pub struct DrawList {
     partial_batches: Vec<(u32, Range<u32>)>,
     /// The version of batches and objects, without the objects of pieces.
     version: Version,
+    bundle_size: BundleSize,
+    /// Scratch memory: the runs of all segments that are joined.
+    run_order: Vec<SegmentRun>,
+}
+
+/// The number of batches in a bundle.
+#[derive(Clone, Copy, Debug)]
+struct BundleSize(usize);
+
+impl Default for BundleSize {
+    fn default() -> Self {
+        Self(DrawList::BATCHES_PER_BUNDLE)
+    }
+}
+
+/// A run of a segment. Runs are ordered as they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct SegmentRun {
+    bin_rank: u32,
+    level: u32,
+    segment: u32,
+    /// The first and the end of its objects in the segment.
+    objects: [u32; 2],
 }
 
 impl DrawList {
-    /// The number of batches in a bundle. It is the same for every granularity: smaller bundles cost up to three times as
-    /// much per draw, and bundle boundaries that moved with the granularity could change the picture.
+    /// The most batches in a bundle, and their number unless a [`Granularity`](crate::Granularity) asks for fewer:
+    /// smaller bundles cost up to three times as much per draw.
     pub const BATCHES_PER_BUNDLE: usize = BATCHES_PER_BUNDLE;
+
+    /// Sets the number of batches in a bundle, from 1 to [`BATCHES_PER_BUNDLE`](Self::BATCHES_PER_BUNDLE). Bundles of
+    /// pieces are recorded once and keep that size.
+    pub(crate) fn set_batches_per_bundle(&mut self, batches: usize) {
+        self.bundle_size = BundleSize(batches.clamp(1, Self::BATCHES_PER_BUNDLE));
+    }
 
     /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
     /// it. Lists of [`Version::default`] may differ.
@@ -108,26 +137,28 @@ impl DrawList {
             }
             return;
         }
-        debug_assert!(segments.len() <= Self::MAX_SEGMENTS);
-        let mut positions = [0; Self::MAX_SEGMENTS];
-        let next_run = |positions: &[usize], segments: &[S]| {
-            let runs = segments.iter().zip(positions).filter_map(|(segment, &index)| segment.run(index));
-            runs.map(|(run, _)| run).min_by_key(|&(bin, level)| (bins.rank(bin), level))
-        };
-        while let Some(run) = next_run(&positions, segments) {
-            let start = self.objects.len();
-            for (segment, index) in segments.iter().zip(&mut positions) {
-                if let Some((_, objects)) = segment.run(*index).filter(|(other, _)| *other == run) {
-                    self.objects.extend_from_slice(segment.objects(objects));
-                    *index += 1;
-                }
-            }
-            self.push_batches(bins, run, start..self.objects.len(), &can_merge);
+        let mut order = std::mem::take(&mut self.run_order);
+        order.clear();
+        for (index, segment) in (0..).zip(&*segments) {
+            order.extend(segment.runs().map(|((bin, level), objects)| SegmentRun {
+                bin_rank: bins.rank(bin),
+                level,
+                segment: index,
+                objects: [objects.start as u32, objects.end as u32],
+            }));
         }
+        order.sort_unstable();
+        for same_bin in order.chunk_by(|one, next| (one.bin_rank, one.level) == (next.bin_rank, next.level)) {
+            let start = self.objects.len();
+            for &SegmentRun { segment, objects: [first, end], .. } in same_bin {
+                self.objects.extend_from_slice(segments[segment as usize].objects(first as usize..end as usize));
+            }
+            let SegmentRun { bin_rank, level, .. } = same_bin[0];
+            let bin = bins.in_order()[bin_rank as usize];
+            self.push_batches(bins, (bin, level), start..self.objects.len(), &can_merge);
+        }
+        self.run_order = order;
     }
-
-    /// The most segments that can be joined.
-    pub const MAX_SEGMENTS: usize = 32;
 
     fn push_batches(
         &mut self,
@@ -236,7 +267,7 @@ impl DrawList {
     /// The number of bundles that the batches fill. No bundle has batches of pieces and of other objects.
     pub fn bundle_count(&self) -> usize {
         let own = self.batches.len() - self.pieces.batch_count();
-        self.pieces.bundle_count() + own.div_ceil(Self::BATCHES_PER_BUNDLE)
+        self.pieces.bundle_count() + own.div_ceil(self.bundle_size.0)
     }
 
     /// The batches of one bundle.
@@ -255,8 +286,8 @@ impl DrawList {
         match index.checked_sub(self.pieces.bundle_count()) {
             None => self.pieces.bundle_range(index),
             Some(own) => {
-                let start = self.pieces.batch_count() + own * Self::BATCHES_PER_BUNDLE;
-                start..self.batches.len().min(start + Self::BATCHES_PER_BUNDLE)
+                let start = self.pieces.batch_count() + own * self.bundle_size.0;
+                start..self.batches.len().min(start + self.bundle_size.0)
             }
         }
     }

@@ -15,7 +15,10 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::AttachmentExtent;
 use crate::scene::Projection;
-use crate::view::{ObjectLevels, SelectionFilter};
+use crate::view::{ObjectLevels, ObjectsPart, SelectionFilter};
+
+/// The most segments of a pass with adaptive granularity: one job joins them.
+pub(super) const MAX_SEGMENTS: usize = 32;
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -109,9 +112,35 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share the workers.
     pub(super) fn segment_count(&self, pass: usize) -> usize {
-        let by_size = self.visible_count(pass) / MIN_OBJECTS_PER_SEGMENT;
-        let by_workers = self.workers.div_ceil(self.binning_passes.max(1));
-        by_size.min(by_workers).clamp(1, DrawList::MAX_SEGMENTS)
+        let count = self.visible_count(pass);
+        match self.granularity.draws_per_job() {
+            Some(draws) => count.div_ceil(draws).max(1),
+            None if self.granularity == Granularity::PerCamera => 1,
+            None => {
+                let by_workers = self.workers.div_ceil(self.binning_passes.max(1));
+                (count / MIN_OBJECTS_PER_SEGMENT).min(by_workers).clamp(1, MAX_SEGMENTS)
+            }
+        }
+    }
+
+    /// What of a pass's objects is in one of its segments, by index.
+    pub(super) fn part_of_segment(&self, pass: usize, segment: usize) -> ObjectsPart {
+        match self.granularity.draws_per_job() {
+            Some(draws) => {
+                let end = self.visible_count(pass);
+                ObjectsPart::Ranks(end.min(segment * draws)..end.min((segment + 1).saturating_mul(draws)))
+            }
+            None => ObjectsPart::Share { index: segment, count: self.segment_count(pass) },
+        }
+    }
+
+    /// The number of buckets in which a pass sorts and merges its commands, once they are divided.
+    pub(super) fn bucket_count(&self, pass: usize) -> usize {
+        let table = &self.tables.passes[pass];
+        match self.granularity.draws_per_job() {
+            Some(_) => table.partition.read().part_count(),
+            None => table.splitters.read().bucket_count(),
+        }
     }
 
     /// What the backend records of a pass.
@@ -138,10 +167,9 @@ impl<B: Backend> FrameContext<'_, B> {
         self.instancing && !(self.pass_culls_triangles(pass) && self.tables.cullable_meshes.contains(mesh))
     }
 
-    /// The number of a node's `width` items that make a job.
-    pub(super) fn items_per_job(&self, node: usize, width: usize, units_per_item: usize) -> usize {
-        let by_cost = || self.costs.items_per_job(node, width, self.workers);
-        self.granularity.items_per_job(units_per_item).unwrap_or_else(by_cost)
+    /// The number of a node's `width` items that are worth a job.
+    pub(super) fn items_worth_a_job(&self, node: usize, width: usize) -> usize {
+        self.costs.items_per_job(node, width, self.workers)
     }
 
     /// Adds a time that a job of another pass spent on a pass.

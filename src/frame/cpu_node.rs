@@ -68,8 +68,7 @@ pub trait CpuNode: Send + Sync {
         1
     }
 
-    /// The number of items for each job; 0 counts as 1. If it is `None`, the measured cost of an item decides, or the renderer's
-    /// [granularity](crate::Granularity), as for stages.
+    /// The number of items for each job; 0 counts as 1. If it is `None`, the measured cost of an item decides.
     fn items_per_job(&self) -> Option<usize> {
         None
     }

@@ -6,7 +6,7 @@ use super::context::FrameContext;
 use super::lent_nodes::LentNodes;
 use super::stage::StageNode;
 use super::stage_clock::StageGroup;
-use super::{CpuNode, Granularity, NodeFrame};
+use super::{CpuNode, NodeFrame};
 use crate::backend::Backend;
 use crate::graph::{Node, NodeError};
 use crate::scene::run_node_job;
@@ -51,7 +51,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
             Self::Stage(stage) => stage.chunk(frame),
             Self::Cpu(index) => {
                 let (node, node_frame) = index.get(frame);
-                let by_cost = || frame.items_per_job(index.node, node.width(&node_frame), 1);
+                let by_cost = || frame.items_worth_a_job(index.node, node.width(&node_frame));
                 node.items_per_job().unwrap_or_else(by_cost)
             }
         }
@@ -60,9 +60,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
     fn chunked_by_cost(&self, frame: &FrameContext<'_, B>) -> bool {
         match self {
             Self::Stage(stage) => stage.chunked_by_cost(frame),
-            Self::Cpu(index) => {
-                frame.granularity == Granularity::Adaptive && index.get(frame).0.items_per_job().is_none()
-            }
+            Self::Cpu(index) => index.get(frame).0.items_per_job().is_none(),
         }
     }
 
@@ -74,7 +72,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
                 let count = items.len();
                 let (result, took) =
                     frame.clock.measure(StageGroup::Nodes, || run_node_job(|| node.run(&node_frame, items, worker)));
-                if frame.granularity == Granularity::Adaptive && node.items_per_job().is_none() {
+                if node.items_per_job().is_none() {
                     frame.costs.add_sample(index.node, count, took);
                 }
                 result

@@ -1,32 +1,77 @@
 //! How finely a frame is divided into jobs.
 
-/// The job size of every stage that can be divided: of the objects' stages, and of each view's and pass's visibility,
-/// coarse depth, occlusion, fill, sort, instance, triangles and record (M 10.5, "Better Load Balancing"). It decides
-/// which worker does what, never the picture: bundles end at fixed batches, so every granularity draws the same bytes.
+use crate::command::DrawList;
+
+/// How finely a frame is divided into jobs, from the first command of a pass to its last (M 10.5, "Better Load
+/// Balancing"): the stages *fill*, *bin*, *sort*, *instance*, *triangles* and *record*. It decides which worker does
+/// what, never the picture.
+///
+/// Before that there are no draws. Updating objects and uploading them, which all cameras share, and culling them for a
+/// view are cut by measured cost in every mode; with [`PerCamera`](Self::PerCamera), culling is one job a view.
+///
+/// All but [`Adaptive`](Self::Adaptive) always run on all workers, also where one alone would be faster.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Granularity {
     /// By measured cost: each stage of each process is divided into as many jobs as its work is worth. It adapts to a
     /// scene, or to a change of it, within 30 frames.
     #[default]
     Adaptive,
-    /// One job per stage and camera, and one per stage for what all cameras share: M's first design.
+    /// One job for each stage of a camera's processes: M's first design.
     PerCamera,
-    /// One job per draw: M's "more advanced solution". Where the smallest item holds several draws, as a bundle does,
-    /// one job per item.
+    /// One job for each draw: M's "more advanced solution". What one job records is a bundle of one draw.
     PerDraw,
-    /// One job for this many objects or draws, rounded up to whole items. Not 0.
+    /// One job for this many draws. Not 0. What one job records is at most
+    /// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws a bundle, in bundles of equal size.
     Chunk(usize),
 }
 
 impl Granularity {
-    /// The number of items in a job, where an item has `units_per_item` objects or draws; `None` where the cost model
-    /// decides.
-    pub(super) fn items_per_job(self, units_per_item: usize) -> Option<usize> {
+    /// The number of draws in a job; `None` where something else decides.
+    pub(super) fn draws_per_job(self) -> Option<usize> {
+        match self {
+            Self::Adaptive | Self::PerCamera => None,
+            Self::PerDraw => Some(1),
+            Self::Chunk(draws) => Some(draws),
+        }
+    }
+
+    /// The number of items in a job that divides draws, where an item has up to `draws_per_item`; `None` where the
+    /// cost model decides.
+    pub(super) fn items_per_job(self, draws_per_item: usize) -> Option<usize> {
         match self {
             Self::Adaptive => None,
             Self::PerCamera => Some(usize::MAX),
-            Self::PerDraw => Some(1),
-            Self::Chunk(units) => Some(units.div_ceil(units_per_item)),
+            Self::PerDraw | Self::Chunk(_) => self.draws_per_job().map(|draws| draws.div_ceil(draws_per_item)),
         }
+    }
+
+    /// The number of batches in a bundle: a job records whole bundles.
+    pub(super) fn batches_per_bundle(self) -> usize {
+        let max = DrawList::BATCHES_PER_BUNDLE;
+        self.draws_per_job().map_or(max, |draws| draws.div_ceil(draws.div_ceil(max)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_records_whole_bundles() {
+        for draws in (1..2_000).chain([usize::MAX - 1, usize::MAX]) {
+            let granularity = Granularity::Chunk(draws);
+            let (bundle, bundles) = (
+                granularity.batches_per_bundle() as u128,
+                granularity.items_per_job(DrawList::BATCHES_PER_BUNDLE).unwrap() as u128,
+            );
+            assert!((1..=DrawList::BATCHES_PER_BUNDLE as u128).contains(&bundle));
+            // Rounded up to bundles of equal size.
+            assert!(
+                (draws as u128..draws as u128 + bundles).contains(&(bundle * bundles)),
+                "{draws}: {bundles} × {bundle}"
+            );
+        }
+        assert_eq!(Granularity::PerDraw.batches_per_bundle(), 1);
+        assert_eq!(Granularity::PerCamera.batches_per_bundle(), DrawList::BATCHES_PER_BUNDLE);
     }
 }

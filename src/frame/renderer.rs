@@ -321,7 +321,13 @@ impl<B: Backend> Renderer<B> {
         };
         let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, views, options, nodes)?;
-        graph.begin_frame(&mut self.tables, scene, views, &self.quality, self.scheduler.workers())?;
+        graph.begin_frame(
+            &mut self.tables,
+            scene,
+            views,
+            &self.quality,
+            (self.scheduler.workers(), self.granularity),
+        )?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);
@@ -338,6 +344,7 @@ impl<B: Backend> Renderer<B> {
             objects: &self.tables.objects,
             list_capacity: self.tables.objects.len() + self.tables.pieces.listed_objects(),
             generated: &nodes.declarations.generated,
+            records_bundles: self.granularity.draws_per_job().is_some(),
             quality: &self.quality,
             limits,
             rejections: self.tables.objects.rejections(),
@@ -366,6 +373,7 @@ impl<B: Backend> Renderer<B> {
             workers: self.scheduler.workers(),
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
         };
+        graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
             return Err(error_of_pass(error, graph, self.pass_runs.failures(), views).into());
         }

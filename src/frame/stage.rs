@@ -29,7 +29,7 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
     /// stage.
     fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
         let _ = frame;
-        matches!(self.info().chunking, Chunking::ByCost { .. }).then(|| items.len())
+        (self.info().chunking != Chunking::PerItem).then(|| items.len())
     }
 
     /// Does the work of one job.
@@ -62,10 +62,13 @@ pub(super) struct StageInfo {
 pub(super) enum Chunking {
     /// One item per job.
     PerItem,
-    /// As many items per job as the [`Granularity`] says, or as are worth a job.
-    ByCost {
-        /// The objects or batches in one item.
-        units_per_item: usize,
+    /// As many items per job as are worth a job. There are no draws yet that a [`Granularity`] could count: with
+    /// [`Granularity::PerCamera`], what a view does is one job.
+    ByCost,
+    /// As many items per job as the [`Granularity`] says.
+    ByDraws {
+        /// The most draws in one item.
+        draws_per_item: usize,
     },
 }
 
@@ -123,14 +126,20 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
     fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
         match self.stage.info().chunking {
             Chunking::PerItem => 1,
-            Chunking::ByCost { units_per_item } => {
-                frame.items_per_job(self.node, self.stage.width(frame), units_per_item)
+            _ if self.chunked_by_cost(frame) => frame.items_worth_a_job(self.node, self.stage.width(frame)),
+            Chunking::ByCost => usize::MAX,
+            Chunking::ByDraws { draws_per_item } => {
+                frame.granularity.items_per_job(draws_per_item).unwrap_or(usize::MAX)
             }
         }
     }
 
     fn chunked_by_cost(&self, frame: &FrameContext<'_, B>) -> bool {
-        frame.granularity == Granularity::Adaptive && matches!(self.stage.info().chunking, Chunking::ByCost { .. })
+        match self.stage.info().chunking {
+            Chunking::PerItem => false,
+            Chunking::ByCost => frame.granularity != Granularity::PerCamera || self.view.is_none(),
+            Chunking::ByDraws { .. } => frame.granularity == Granularity::Adaptive,
+        }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError> {
@@ -142,7 +151,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         if let Some(view) = self.tuned_view {
             frame.tables.occlusion[view].add_time(took);
         }
-        if frame.granularity == Granularity::Adaptive
+        if (frame.granularity == Granularity::Adaptive || self.chunked_by_cost(frame))
             && let Some(measured) = self.stage.measured_items(frame, items)
         {
             frame.costs.add_sample(self.node, measured, took);

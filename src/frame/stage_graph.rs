@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::FrameError;
 use super::frame_node::{CpuNodeIndex, FrameNode};
+use super::granularity::Granularity;
 use super::lent_nodes::{LentNodes, NodeKeys};
 use super::list_inputs::orders_by_bin;
 use super::occlusion_control::OcclusionControl;
@@ -299,7 +300,7 @@ impl<B: Backend> StageGraph<B> {
         scene: &SceneRef<'_>,
         views: &[RenderView],
         quality: &Quality,
-        workers: usize,
+        (workers, granularity): (usize, Granularity),
     ) -> Result<(), FrameError> {
         let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order, .. } = self.key.options;
         tables.set_keys(&self.table_keys, views);
@@ -309,7 +310,7 @@ impl<B: Backend> StageGraph<B> {
             let view = &views[pass.view_index];
             let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
             let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
-            table.begin_frame(selection, tables.objects.len(), culls_triangles, orders_by_bin);
+            table.begin_frame(selection, tables.objects.len(), culls_triangles, orders_by_bin, granularity);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_pieces(scene, conditions, &self.passes)?;

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
+use super::context::MAX_SEGMENTS;
+use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
 use super::pieces::{ListConditions, PieceTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
@@ -17,7 +19,7 @@ use super::views::FrameViews;
 use crate::backend::SceneLimits;
 use crate::chunked_array::ChunkedArray;
 use crate::command::{
-    BinnedSegment, Blending, Bucket, DrawList, RenderCommand, Selection, SortScratch, Splitters, Version,
+    BinnedSegment, Blending, Bucket, DrawList, Partition, RenderCommand, Selection, SortScratch, Splitters, Version,
 };
 use crate::leaked_guards::unlock;
 use crate::process::Pass;
@@ -164,10 +166,12 @@ pub(super) struct PassTable {
     pub(super) orders_by_bin: bool,
     /// One command for each visible object, by rank.
     pub(super) commands: ChunkedArray<RenderCommand>,
+    /// What divides the commands into buckets. With a fixed number of draws in a job, the partition does.
     pub(super) splitters: RwLock<Splitters>,
-    /// [`Splitters::MAX_BUCKETS`] of them, in a pass with commands.
+    pub(super) partition: RwLock<Partition>,
+    /// As many as a frame may have, in a pass with commands.
     pub(super) buckets: Vec<RwLock<Bucket>>,
-    /// [`DrawList::MAX_SEGMENTS`] of them, in a pass that orders objects by bin.
+    /// As many as a frame may have, in a pass that orders objects by bin.
     pub(super) segments: Vec<RwLock<BinnedSegment>>,
     pub(super) list: RwLock<DrawList>,
     /// What the list was made from; `None` if the next frame has to make it anew.
@@ -183,7 +187,9 @@ impl PassTable {
         objects: usize,
         culls_triangles: bool,
         orders_by_bin: bool,
+        granularity: Granularity,
     ) {
+        let parts = granularity.draws_per_job().map_or(0, |draws| objects.div_ceil(draws));
         unlock(&mut self.list);
         self.selection = selection;
         self.orders_by_bin = orders_by_bin;
@@ -196,10 +202,10 @@ impl PassTable {
             *self.triangles.get_mut() = PassTriangles::default();
         }
         if orders_by_bin {
-            self.segments.resize_with(DrawList::MAX_SEGMENTS, RwLock::default);
+            self.segments.resize_with(parts.max(MAX_SEGMENTS), RwLock::default);
         } else if selection.is_some() {
             self.commands.grow(objects, RenderCommand::EMPTY);
-            self.buckets.resize_with(Splitters::MAX_BUCKETS, RwLock::default);
+            self.buckets.resize_with(parts.max(Splitters::MAX_BUCKETS), RwLock::default);
         }
     }
 

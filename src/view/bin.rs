@@ -16,49 +16,68 @@ pub(crate) fn may_walk(selection: Selection) -> bool {
     selection.materials == MaterialShare::ALL
 }
 
-/// Makes a segment the opaque objects that a view sees and a process draws, ordered by bin: part `index` of `count`.
+/// Some of the objects that a view sees.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum ObjectsPart {
+    /// One of `count` parts that take about as long. All of them are all that the view sees.
+    Share { index: usize, count: usize },
+    /// Those whose rank, the index among the visible objects, is in this range.
+    Ranks(Range<usize>),
+}
+
+impl ObjectsPart {
+    /// The indices among `length` entries.
+    fn among(&self, length: usize) -> Range<usize> {
+        match *self {
+            Self::Share { index, count } => index * length / count..(index + 1) * length / count,
+            Self::Ranks(ref ranks) => ranks.clone(),
+        }
+    }
+}
+
+/// Makes a segment the opaque objects among a part of what a view sees that a process draws, ordered by bin.
 pub(crate) fn bin_visible(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
     filter: SelectionFilter<'_>,
-    (index, count): (usize, usize),
+    part: &ObjectsPart,
     segment: &mut BinnedSegment,
 ) {
-    let part = |length: usize| index * length / count..(index + 1) * length / count;
     let bins = table.bins();
-    if may_walk(selection)
+    if matches!(part, ObjectsPart::Share { .. })
+        && may_walk(selection)
         && visible.count() * WALK_THRESHOLD > table.len()
         && let Some(all) = table.objects_by_bin()
     {
         let is_opaque = |bin| bins.get(bin).state.blend() == Blend::None;
         let is_visible = |object: u32| visible.contains(object as usize);
         if filter.passes_all() {
-            segment.select(&all, part(all.len()), is_opaque, is_visible);
+            segment.select(&all, part.among(all.len()), is_opaque, is_visible);
         } else {
-            segment.select(&all, part(all.len()), is_opaque, |object| {
+            segment.select(&all, part.among(all.len()), is_opaque, |object| {
                 is_visible(object) && filter.passes(object as usize)
             });
         }
     } else {
         segment.clear();
-        collect(table, visible, selection, filter, part(visible.filled_word_count()), segment);
+        collect(table, visible, selection, filter, part.among(visible.count()), segment);
         segment.order(&bins);
     }
 }
 
-/// Appends the objects among some words of the visible set to a segment.
+/// Appends the objects of some ranks of the visible set to a segment.
 fn collect(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
     filter: SelectionFilter<'_>,
-    words: Range<usize>,
+    ranks: Range<usize>,
     segment: &mut BinnedSegment,
 ) {
     let in_block = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
     let mut reader = BlockReader::new(table);
-    visible.visit_words(words, |word, bits| {
+    visible.visit(ranks, |_, word, bits| {
         let block = reader.block(word / in_block);
         let first = word * VisibleSet::OBJECTS_PER_WORD;
         for object in set_bits(filter.pass(first, bits & block.opaque[word % in_block])).map(|bit| first + bit) {

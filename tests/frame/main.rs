@@ -11,6 +11,7 @@ mod declaring;
 mod deferred;
 mod determinism;
 mod failing_process;
+mod granularity;
 mod late_latch;
 mod left_out;
 mod layers;

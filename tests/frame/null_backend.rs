@@ -46,6 +46,7 @@ fn broken_rule(
         objects: &objects,
         list_capacity: objects.len(),
         generated: &[],
+        records_bundles: false,
         quality: &Quality::balanced(),
         limits: SceneLimits::NONE,
         rejections: &Rejections::default(),

@@ -99,9 +99,16 @@ fn a_frame_that_tests_for_occlusion_says_so() {
 }
 
 #[test]
-fn a_fixed_granularity_has_no_job_sizes() {
-    let (tuning, _) = record(3, (2, TICK), Granularity::PerDraw);
-    assert!(tuning.iter().all(|tuning| tuning.job_sizes.is_empty()));
+fn a_fixed_granularity_has_job_sizes_of_stages_without_draws_alone() {
+    for (granularity, expected) in [
+        (Granularity::PerDraw, ["coarse depth", "objects", "occlusion", "upload", "visibility"].as_slice()),
+        (Granularity::PerCamera, &["objects", "upload"]),
+    ] {
+        let (tuning, _) = record(3, (2, TICK), granularity);
+        let sizes = tuning.iter().flat_map(|tuning| &tuning.job_sizes);
+        let stages: BTreeSet<_> = sizes.filter_map(|size| size.labels.stage.as_deref()).collect();
+        assert!(stages.contains("objects") && stages.iter().all(|stage| expected.contains(stage)), "{stages:?}");
+    }
 }
 
 #[test]

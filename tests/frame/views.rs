@@ -82,7 +82,7 @@ fn graphs_can_be_exported_to_dot() {
 }
 
 #[test]
-fn bundles_hold_256_batches_with_any_granularity() {
+fn bundles_hold_256_batches_unless_the_granularity_asks_for_fewer() {
     let mut scene = field(3000);
     // Every object has a mesh of its own, so no commands merge.
     let (cube, stone) = (scene.as_scene_ref().meshes[0], scene.as_scene_ref().materials[0]);
@@ -93,7 +93,14 @@ fn bundles_hold_256_batches_with_any_granularity() {
         object.material = stone;
         scene.replace_object(handle, object).unwrap();
     }
-    for granularity in [Granularity::PerCamera, Granularity::PerDraw, Granularity::Chunk(300)] {
+    for (granularity, size) in [
+        (Granularity::Adaptive, 256),
+        (Granularity::PerCamera, 256),
+        (Granularity::PerDraw, 1),
+        (Granularity::Chunk(64), 64),
+        // Two bundles a job.
+        (Granularity::Chunk(300), 150),
+    ] {
         let (mut renderer, submitter) = renderer(2, granularity);
         let recorded = renderer.record(scene.as_scene_ref()).unwrap();
         let submitted = submitter.submit(recorded).unwrap();
@@ -101,7 +108,7 @@ fn bundles_hold_256_batches_with_any_granularity() {
         let passes = submitted.submission.passes.iter().filter(is_geometry);
         for (view, pass) in submitted.statistics.views.iter().zip(passes) {
             assert_eq!(view.batches, view.commands);
-            assert_eq!(view.bundles, view.batches.div_ceil(256));
+            assert_eq!(view.bundles, view.batches.div_ceil(size));
             assert!(view.bundles > 3);
             assert_eq!((pass.bundles, pass.batches), (view.bundles, view.batches));
         }

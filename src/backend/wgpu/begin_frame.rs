@@ -151,7 +151,10 @@ impl WgpuBackend {
 
             let (mut index, mut is_trial) = (0, false);
             if strategies.len() > 1 && pass.draws_commands {
-                let is_distinct = |index: usize, batches| strategies[index].is_distinct(batches);
+                let is_distinct = |index: usize, batches| {
+                    strategies[index].is_distinct(batches)
+                        && (strategies[index].divides_bundles() || !request.records_bundles)
+                };
                 (index, is_trial) = pipelines
                     .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
             }

@@ -5,7 +5,7 @@ use super::super::stage::{Chunking, Stage, StageInfo, StageJob};
 use super::super::stage_clock::StageGroup;
 use super::super::tables::PassTable;
 use crate::backend::{Backend, BackendError};
-use crate::view::{self, ObjectTable};
+use crate::view;
 
 /// Checks the objects that changed, and computes what all views need to know about them. If these are all objects, it also uploads
 /// them, while they are in the worker's caches. An item is a block with changed objects.
@@ -17,7 +17,7 @@ impl<B: Backend> Stage<B> for Objects {
             name: "objects",
             after: &[],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: ObjectTable::BLOCK_SIZE },
+            chunking: Chunking::ByCost,
             cost_kind: "objects",
             depends_on_occlusion: false,
         }
@@ -73,7 +73,7 @@ impl<B: Backend> Stage<B> for Upload {
             name: "upload",
             after: &["objects"],
             group: StageGroup::Record,
-            chunking: Chunking::ByCost { units_per_item: ObjectTable::BLOCK_SIZE },
+            chunking: Chunking::ByCost,
             cost_kind: "upload",
             depends_on_occlusion: false,
         }

@@ -6,7 +6,10 @@ use std::ops::Range;
 use std::panic::resume_unwind;
 use std::time::Duration;
 
-use super::super::context::FrameContext;
+use parking_lot::RwLock;
+
+use super::super::context::{FrameContext, MAX_SEGMENTS};
+use super::super::granularity::Granularity;
 use super::super::pass_recording::PassRecording;
 use super::super::pass_runs::{PassFailure, PassRuns};
 use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
@@ -27,7 +30,7 @@ impl<B: Backend> Stage<B> for Fill {
             name: "fill",
             after: &["compact"],
             group: StageGroup::Fill,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByDraws { draws_per_item: 1 },
             cost_kind: "fill",
             depends_on_occlusion: true,
         }
@@ -59,7 +62,7 @@ impl<B: Backend> Stage<B> for Fill {
     }
 }
 
-/// Chooses the splitters that divide the pass's commands into buckets.
+/// Divides the pass's commands into buckets.
 pub(super) struct Split {
     pub(super) pass: usize,
 }
@@ -88,11 +91,18 @@ impl<B: Backend> Stage<B> for Split {
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let table = &frame.tables.passes[self.pass];
         let count = frame.visible_count(self.pass);
-        // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
-        let buckets = count.div_ceil(frame.items_per_job(job.node, count, 1)).min(frame.workers);
+        if let Some(draws) = frame.granularity.draws_per_job() {
+            table.partition.write().divide(&table.commands, count, draws);
+            return Ok(());
+        }
         let mut splitters = table.splitters.write();
+        let buckets = match frame.granularity {
+            // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
+            Granularity::Adaptive => count.div_ceil(frame.items_worth_a_job(job.node, count)).min(frame.workers),
+            _ => 1,
+        };
         splitters.choose(&table.commands, count, buckets);
-        frame.report_job_size(job.node, count, count.div_ceil(splitters.bucket_count().max(1)));
+        frame.report_job_size(job.node, count, count.div_ceil(splitters.bucket_count()));
         Ok(())
     }
 }
@@ -119,17 +129,23 @@ impl<B: Backend> Stage<B> for Sort {
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        if frame.keeps_list(self.pass) { 0 } else { frame.tables.passes[self.pass].splitters.read().bucket_count() }
+        if frame.keeps_list(self.pass) { 0 } else { frame.bucket_count(self.pass) }
     }
 
     /// The bucket's share of the visible objects, drawn or not: the split knows only their number.
     fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
-        let buckets = frame.tables.passes[self.pass].splitters.read().bucket_count();
-        Some(frame.visible_count(self.pass) * items.len() / buckets)
+        Some(frame.visible_count(self.pass) * items.len() / frame.bucket_count(self.pass))
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let table = &frame.tables.passes[self.pass];
+        if frame.granularity.draws_per_job().is_some() {
+            let partition = table.partition.read();
+            for part in job.items {
+                partition.sort(part, &table.commands, &mut table.buckets[part].write().commands);
+            }
+            return Ok(());
+        }
         let (count, splitters) = (frame.visible_count(self.pass), table.splitters.read());
         let mut scratch = frame.tables.sort_scratch[job.worker.index()].lock();
         for bucket in job.items {
@@ -162,7 +178,7 @@ impl<B: Backend> Stage<B> for Instance {
     }
 
     fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        if frame.keeps_list(self.pass) { 0 } else { frame.tables.passes[self.pass].splitters.read().bucket_count() }
+        if frame.keeps_list(self.pass) { 0 } else { frame.bucket_count(self.pass) }
     }
 
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
@@ -206,9 +222,9 @@ impl<B: Backend> Stage<B> for Bin {
         let selection = table.selection.unwrap_or_default();
         let filter = SelectionFilter::new(objects, frame.request.scene, selection);
         for index in job.items {
-            let part = (index, frame.segment_count(self.pass));
+            let part = frame.part_of_segment(self.pass, index);
             let mut segment = table.segments[index].write();
-            view::bin_visible(objects, visible, selection, filter, part, &mut segment);
+            view::bin_visible(objects, visible, selection, filter, &part, &mut segment);
             if let Some(levels) = levels {
                 let bins = objects.bins();
                 let has_levels = |bin| frame.tables.mesh_levels.contains(bins.get(bin).mesh);
@@ -244,6 +260,7 @@ impl<B: Backend> Stage<B> for Join {
         let table = &frame.tables.passes[self.pass];
         let can_merge = |mesh| frame.can_merge(self.pass, mesh);
         let mut list = table.list.write();
+        list.set_batches_per_bundle(frame.granularity.batches_per_bundle());
         if frame.has_pieces(self.pass) {
             list.clear_own();
         } else {
@@ -251,11 +268,17 @@ impl<B: Backend> Stage<B> for Join {
         }
         *table.list_inputs.write() = None;
         if frame.orders_by_bin(self.pass) {
-            let mut segments =
-                array::from_fn::<_, { DrawList::MAX_SEGMENTS }, _>(|index| table.segments[index].write());
-            list.join_bins(&mut segments[..frame.segment_count(self.pass)], &frame.tables.objects.bins(), can_merge);
+            let (bins, count) = (frame.tables.objects.bins(), frame.segment_count(self.pass));
+            if count <= MAX_SEGMENTS {
+                // An array, so that no frame allocates for it.
+                let mut segments = array::from_fn::<_, MAX_SEGMENTS, _>(|index| table.segments[index].write());
+                list.join_bins(&mut segments[..count], &bins, can_merge);
+            } else {
+                let mut segments: Vec<_> = table.segments[..count].iter().map(RwLock::write).collect();
+                list.join_bins(&mut segments, &bins, can_merge);
+            }
         } else {
-            for bucket in &table.buckets[..table.splitters.read().bucket_count()] {
+            for bucket in &table.buckets[..frame.bucket_count(self.pass)] {
                 list.append(&mut bucket.write(), can_merge);
             }
         }
@@ -281,7 +304,7 @@ impl<B: Backend> Stage<B> for Triangles {
             name: "triangles",
             after: &["join"],
             group: StageGroup::Instance,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByDraws { draws_per_item: 1 },
             cost_kind: "triangles",
             depends_on_occlusion: true,
         }
@@ -367,7 +390,7 @@ impl<B: Backend> Stage<B> for Record {
             name: "record",
             after: &["prepare"],
             group: StageGroup::Record,
-            chunking: Chunking::ByCost { units_per_item: DrawList::BATCHES_PER_BUNDLE },
+            chunking: Chunking::ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE },
             cost_kind: "record",
             depends_on_occlusion: true,
         }

@@ -6,7 +6,7 @@ use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::Selection;
 use crate::scene::Blend;
-use crate::view::{Frustum, SelectionFilter};
+use crate::view::SelectionFilter;
 
 /// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
 pub(super) struct Visibility {
@@ -19,7 +19,7 @@ impl<B: Backend> Stage<B> for Visibility {
             name: "visibility",
             after: &["bins"],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
+            chunking: Chunking::ByCost,
             cost_kind: "visibility",
             depends_on_occlusion: false,
         }
@@ -48,7 +48,7 @@ impl<B: Backend> Stage<B> for Levels {
             name: "levels",
             after: &["visibility"],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: Frustum::WORD },
+            chunking: Chunking::ByCost,
             cost_kind: "levels",
             depends_on_occlusion: false,
         }
@@ -132,7 +132,7 @@ impl<B: Backend> Stage<B> for CoarseDepth {
             name: "coarse depth",
             after: &["occluders"],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByCost,
             cost_kind: "coarse depth",
             depends_on_occlusion: true,
         }
@@ -164,7 +164,7 @@ impl<B: Backend> Stage<B> for Occlusion {
             name: "occlusion",
             after: &["coarse depth"],
             group: StageGroup::Visibility,
-            chunking: Chunking::ByCost { units_per_item: 1 },
+            chunking: Chunking::ByCost,
             cost_kind: "occlusion",
             depends_on_occlusion: true,
         }

@@ -73,6 +73,12 @@ impl PassStrategy {
             || self.encoder_count(batches.div_ceil(DrawList::BATCHES_PER_BUNDLE)) > 1
     }
 
+    /// Whether each bundle of a pass is a part of its own.
+    pub(crate) fn divides_bundles(self) -> bool {
+        matches!(self.recording, RecordingStrategy::Bundles | RecordingStrategy::CachedBundles)
+            && self.encoding != EncodingStrategy::Split
+    }
+
     /// The number of encoders for a pass of `bundles` bundles.
     pub(crate) fn encoder_count(self, bundles: usize) -> usize {
         match self.encoding {
