@@ -10,15 +10,12 @@ use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
 use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
-use super::tables::FrameTables;
+use super::tables::{FrameTables, MAX_SEGMENTS};
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::AttachmentExtent;
 use crate::scene::Projection;
 use crate::view::{ObjectLevels, ObjectsPart, SelectionFilter};
-
-/// The most segments of a pass with adaptive granularity: one job joins them.
-pub(super) const MAX_SEGMENTS: usize = 32;
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;

@@ -6,7 +6,7 @@ mod backend_maintenance;
 mod blended_object_witness;
 mod budgeted_view;
 mod builder;
-mod column_check;
+mod change_check;
 mod context;
 mod cost_model;
 mod cpu_node;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use parking_lot::RwLockReadGuard;
 
 use super::backend_maintenance::BackendMaintenance;
-use super::column_check::ColumnCheck;
+use super::change_check::ChangeCheck;
 use super::context::FrameContext;
 use super::latched_views::LatchedViews;
 use super::lent_nodes::NodeDeclarations;
@@ -32,7 +32,7 @@ use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
 use crate::quality::{Quality, TransformPrecision};
-use crate::scene::{SceneError, SceneRef};
+use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
 use crate::unwind::CaughtSpan;
@@ -87,7 +87,7 @@ pub struct Renderer<B: Backend> {
     choices: Vec<TuningChoice>,
     node_declarations: NodeDeclarations,
     warnings: Warnings,
-    column_check: ColumnCheck,
+    change_check: ChangeCheck,
     backend_maintenance: BackendMaintenance,
     /// Whether the histories of the next frame are empty.
     forgets_histories: bool,
@@ -119,7 +119,7 @@ impl<B: Backend> Renderer<B> {
             choices: Vec::new(),
             node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
-            column_check: ColumnCheck::default(),
+            change_check: ChangeCheck::default(),
             backend_maintenance: BackendMaintenance::default(),
             forgets_histories: false,
         }
@@ -378,12 +378,7 @@ impl<B: Backend> Renderer<B> {
             return Err(error_of_pass(error, graph, self.pass_runs.failures(), views).into());
         }
         if cfg!(debug_assertions) {
-            let objects = &self.tables.objects;
-            let mut columns = plan.columns().to_vec();
-            columns.extend(draws.iter().filter_map(Draws::order_column));
-            let unreported = objects.unreported_change(scene).map(|object| SceneError::UnreportedChange { object });
-            let in_columns = self.column_check.check(scene, &columns, objects);
-            unreported.map_or(in_columns, Err)?;
+            self.change_check.check(&request)?;
         }
         let mut tuning = graph.tuning.update(graph.schedule.run_mode(), &self.tables, &self.backend, &frame)?;
         choices.append(&mut tuning.choices);

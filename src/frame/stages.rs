@@ -3,13 +3,15 @@
 //! A stage is a type that holds all about itself: its [`StageInfo`](super::stage::StageInfo), when a frame needs it, its width and
 //! its work. To add one, implement [`Stage`] and add a line to one of these lists.
 
+mod of_draw_list;
 mod of_frame;
 mod of_pass;
 mod of_pieces;
 mod of_view;
 
+use of_draw_list::{Bin, Fill, Instance, Join, Sort, Split};
 use of_frame::{Bins, Objects, Upload};
-use of_pass::{Bin, CullList, Fill, Finish, Instance, Join, Prepare, Record, Sort, Split, Triangles};
+use of_pass::{CullList, Finish, Prepare, Record, Triangles};
 use of_pieces::{ExecutePieces, RecordPieces};
 use of_view::{CoarseDepth, Compact, Levels, Occluders, Occlusion, Visibility};
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
-use super::context::MAX_SEGMENTS;
 use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
 use super::pieces::{ListConditions, PieceTable};
@@ -153,6 +152,9 @@ impl FrameTables {
         self.objects.rejections().count_all_once(RejectionReason::LightLimit, left_out);
     }
 }
+
+/// The most segments in which a pass orders its objects by bin with adaptive granularity: one job joins them.
+pub(super) const MAX_SEGMENTS: usize = 32;
 
 /// The alignment of a view's lights in a buffer that all devices support, in bytes.
 const LIGHT_ALIGNMENT: u64 = 256;

@@ -1,23 +1,38 @@
-//! Finds columns and layers that changed although the engine did not report it.
+//! Finds objects, columns and layers that changed although the engine did not report it.
 
+use crate::backend::FrameRequest;
+use crate::process::Draws;
 use crate::scene::{ColumnLayout, LayerMask, ObjectColumn, SceneError, SceneRef};
 use crate::view::ObjectTable;
 
 /// Copies of the columns that the latest frame read, and of the objects' layers. Only builds with debug assertions have any.
 #[derive(Debug, Default)]
-pub(super) struct ColumnCheck {
+pub(super) struct ChangeCheck {
     copies: Vec<(ColumnLayout, Vec<u8>)>,
 }
 
 /// The layers of objects are compared as a column is.
 const LAYERS: ObjectColumn<LayerMask> = ObjectColumn::new("layers of objects");
 
-impl ColumnCheck {
+impl ChangeCheck {
+    /// Compares what a frame read of its objects with the frame before.
+    ///
+    /// # Errors
+    /// If something changed, and the scene does not report its object.
+    pub(super) fn check(&mut self, request: &FrameRequest<'_>) -> Result<(), SceneError> {
+        let FrameRequest { plan, draws, scene, objects, .. } = *request;
+        let mut columns = plan.columns().to_vec();
+        columns.extend(draws.iter().filter_map(Draws::order_column));
+        let unreported = objects.unreported_change(scene).map(|object| SceneError::UnreportedChange { object });
+        let in_columns = self.check_columns(scene, &columns, objects);
+        unreported.map_or(in_columns, Err)
+    }
+
     /// Compares the columns that a frame read with those of the frame before, and copies them.
     ///
     /// # Errors
     /// If a value changed, and the scene does not report its object.
-    pub(super) fn check(
+    fn check_columns(
         &mut self,
         scene: &SceneRef<'_>,
         columns: &[ColumnLayout],
