@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drawloom::glam::{DVec3, Quat};
-use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
+use drawloom::scene::{Blend, Camera, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_testing::random::Random;
 
 pub const MESHES: u32 = 64;
@@ -23,19 +23,19 @@ const PICTURE: u32 = 64;
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn around_one(cameras: usize, objects: usize) -> Result<Scene, SceneError> {
-    let mut scene = scene_of_clouds([(DVec3::ZERO, objects)])?;
+    let mut scene = scene_of_clouds([(DVec3::ZERO, objects)], Blend::None)?;
     let around = directions(cameras).enumerate();
     scene.cameras = around.map(|(index, direction)| camera(index, direction * DISTANCE, DVec3::ZERO)).collect();
     Ok(scene)
 }
 
-/// Four cameras back to back, each with a cloud of its own.
+/// Four cameras back to back, each with a cloud of its own, all of this blending.
 ///
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.
-pub fn back_to_back(objects: [usize; 4]) -> Result<Scene, SceneError> {
+pub fn back_to_back(objects: [usize; 4], blend: Blend) -> Result<Scene, SceneError> {
     let centers: Vec<_> = directions(4).map(|direction| direction * DISTANCE).collect();
-    let mut scene = scene_of_clouds(centers.iter().copied().zip(objects))?;
+    let mut scene = scene_of_clouds(centers.iter().copied().zip(objects), blend)?;
     scene.cameras = centers.iter().enumerate().map(|(index, &center)| camera(index, DVec3::ZERO, center)).collect();
     Ok(scene)
 }
@@ -47,7 +47,7 @@ pub fn back_to_back(objects: [usize; 4]) -> Result<Scene, SceneError> {
 /// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn row(clouds: usize, objects: usize, cameras: usize) -> Result<Scene, SceneError> {
     let center = |cloud: usize| DVec3::X * (cloud as f64 * 50.0 * DISTANCE);
-    let mut scene = scene_of_clouds((0..clouds).map(|cloud| (center(cloud), objects)))?;
+    let mut scene = scene_of_clouds((0..clouds).map(|cloud| (center(cloud), objects)), Blend::None)?;
     let before = |cloud| camera(cloud, center(cloud) + DVec3::Z * DISTANCE, center(cloud));
     scene.cameras = (0..cameras).map(before).collect();
     Ok(scene)
@@ -65,7 +65,8 @@ fn camera(index: usize, position: DVec3, target: DVec3) -> Camera {
 }
 
 /// A scene of clouds, each given by its centre and number of boxes.
-fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<Scene, SceneError> {
+fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>, blend: Blend) -> Result<Scene, SceneError> {
+    let opacity = if blend == Blend::None { 1.0 } else { 0.5 };
     let mut random = Random::new();
     let mut scene = Scene::new();
     let (mut meshes, mut materials) = (Vec::new(), Vec::new());
@@ -74,7 +75,7 @@ fn scene_of_clouds(clouds: impl IntoIterator<Item = (DVec3, usize)>) -> Result<S
     }
     for index in 0..MATERIALS {
         let (name, diffuse) = (format!("paint {index}"), random.vector(0.2, 0.9));
-        materials.push(scene.add(Material { name, diffuse, ..Material::default() })?);
+        materials.push(scene.add(Material { name, diffuse, blend, opacity, ..Material::default() })?);
     }
     for (center, objects) in clouds {
         for _ in 0..objects {

@@ -1,14 +1,10 @@
 //! Predicted frame times with other numbers of workers.
 
 use std::error::Error;
-use std::sync::Arc;
 
-use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::report::{Replay, SchedulerCosts};
-use drawloom::scene::SceneRef;
-use drawloom::{Renderer, Submitter};
+use drawloom::timeline::Log;
 use drawloom_benches::statistics::median;
-use drawloom_benches::stopwatch::timed_frame;
 
 use crate::bounds::Bounds;
 
@@ -36,33 +32,18 @@ impl Prediction {
         Self { costs, times, measured: Vec::new(), bounds: is_adaptive.then(Bounds::default) }
     }
 
-    /// Draws three frames, one after another, and replays the last.
+    /// Replays a recorded frame. `measured` is how many seconds one like it took without a timeline.
     ///
     /// # Errors
-    /// Returns an error if a frame cannot be drawn or replayed.
-    pub fn replay(
-        &mut self,
-        renderer: &mut Renderer<WgpuBackend>,
-        submitter: &Submitter<WgpuBackend>,
-        scene: SceneRef<'_>,
-    ) -> Result<(), Box<dyn Error>> {
-        let (_, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
-        self.measured.push(time.cpu.as_secs_f64());
-        let timeline = Arc::clone(renderer.scheduler().timeline());
-        timeline.start();
-        for _ in 0..2 {
-            let recorded = renderer.record(scene)?;
-            submitter.submit(recorded)?.submission.wait()?;
-        }
-        timeline.stop();
-        let log = timeline.take();
-        let frame = log.frames.last().ok_or("no frame was recorded")?.number;
-        let replay = Replay::of_frame(&log, frame, self.costs)?;
+    /// Returns an error if the frame cannot be replayed.
+    pub fn add(&mut self, log: &Log, frame: u64, measured: f64) -> Result<(), Box<dyn Error>> {
+        let replay = Replay::of_frame(log, frame, self.costs)?;
+        self.measured.push(measured);
         for (workers, times) in &mut self.times {
             times.push(replay.frame_time(*workers).as_secs_f64());
         }
         if let Some(bounds) = &mut self.bounds {
-            bounds.add(&log, frame, self.costs)?;
+            bounds.add(log, frame, self.costs)?;
         }
         Ok(())
     }
