@@ -15,6 +15,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use clap::Parser;
 use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::handle::Handle;
