@@ -95,7 +95,7 @@ impl Json {
     }
 }
 
-/// The unit of UTF-16 of an escape such as `\\u00e9`, if a text begins with one.
+/// The unit of UTF-16 of an escape such as `\u00e9`, if a text begins with one.
 fn escaped_unit(text: &[u8]) -> Option<u16> {
     let digits = text.strip_prefix(b"\\u")?.get(..4)?;
     digits.iter().try_fold(0, |unit, &digit| Some(unit << 4 | char::from(digit).to_digit(16)? as u16))

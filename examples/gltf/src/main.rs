@@ -2,8 +2,9 @@
 //!
 //!     cargo run --release -p gltf_scene -- scene.glb --picture scene.png --time 1.5
 //!
-//! Its exit status is 0 if the picture is written; 1 if drawing or writing failed or there is no adapter, which may go
-//! well another time or on another machine; and 2 if the arguments or the file are wrong, which fails again.
+//! Its exit status is 0 if the picture is written; 1 if drawing or writing failed, or there are no threads or no
+//! adapter, which may go well another time or on another machine; and 2 if the arguments or the file are wrong, which
+//! fails again.
 
 use std::error::Error;
 use std::path::PathBuf;

@@ -87,7 +87,8 @@ fn wrapped(coordinate: f32, wrap: u32, edge: f32) -> f32 {
 
 // The image is in the upper left of the layer, so that the samplers would blend it with what is beside it.
 fn texel_of_part(
-    colors: texture_2d_array<f32>, size: vec2<u32>, wraps: vec2<u32>, uv: vec2<f32>, layer: u32, level: u32, nearest: bool,
+    colors: texture_2d_array<f32>, size: vec2<u32>, wraps: vec2<u32>, uv: vec2<f32>, layer: u32, level: u32,
+    nearest: bool,
 ) -> vec4<f32> {
     let position = vec2<f32>(within_period(uv.x, wraps.x), within_period(uv.y, wraps.y)) * vec2<f32>(size);
     if nearest {

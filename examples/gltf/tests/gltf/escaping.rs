@@ -6,13 +6,14 @@ use serde_json::{Value, json};
 use crate::fixture::{AT_REST, expect, load_memory};
 use crate::generate::builder::{Builder, glb};
 use crate::generate::deforming::{bending_tube, morphing_sphere};
-use crate::generate::static_scenes::{alpha_modes, lights_and_cameras};
+use crate::generate::static_scenes::{alpha_modes, lights_and_cameras, textured_square};
 use crate::invariants::{check_text, check_world};
 use gltf_scene::{GltfLimits, LoadOptions};
 
 pub const CASES: &[crate::Case] = &[
     ("names_are_escaped_wherever_they_are", names),
     ("strings_are_escaped_wherever_they_are", strings),
+    ("images_without_a_name_are_called_by_their_uri", images),
     ("long_names_are_cut", long),
 ];
 
@@ -107,6 +108,23 @@ fn check(builder: &Builder, whole: &Builder) -> Result<usize, Failed> {
         expect(turned.is_none(), || format!("{turned:?} turns what is behind it"))?;
     }
     Ok(seen)
+}
+
+fn images() -> Result<(), Failed> {
+    let images = [
+        (json!({"uri": "sky\u{1b}[31m.png"}), "image 0 (sky\\u{1b}[31m.png) is left out"),
+        (json!({"uri": "sky.png", "name": "the sky"}), "image 0 (the sky) is left out"),
+        (json!({"uri": "data:image/png;base64,AAAA"}), "image 0 is left out"),
+        (json!({"uri": "x".repeat(1000)}), &format!("image 0 ({}…) is left out", "x".repeat(80))),
+    ];
+    for (image, expected) in images {
+        let mut builder = textured_square();
+        builder.json["images"] = json!([image]);
+        let world = load_memory("no such folder/images.glb", builder.glb(), &AT_REST)?;
+        let is_named = world.warnings.len() == 1 && world.warnings[0].starts_with(expected);
+        expect(is_named, || format!("{:?}, not {expected:?}", world.warnings))?;
+    }
+    Ok(())
 }
 
 fn long() -> Result<(), Failed> {

@@ -1,5 +1,5 @@
-//! What holds of every file, whatever is in it: of the world that it is loaded as, and of the error that refuses it. The
-//! fuzz target `gltf` checks it, too.
+//! What holds of every file, whatever is in it: of the world that it is loaded as, and of the error that refuses it.
+//! The fuzz target `gltf` checks it, too.
 
 use std::cell::RefCell;
 use std::sync::Arc;

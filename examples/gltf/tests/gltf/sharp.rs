@@ -106,8 +106,8 @@ fn shared() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Images of 5 by 7 pixels, white on the left or above, and black elsewhere. Where they are clamped or mirrored at their
-/// right or lower edge they are black, in the first two mip levels and between those.
+/// Images of 5 by 7 pixels, white on the left or above, and black elsewhere. Where they are clamped or mirrored at
+/// their right or lower edge they are black, in the first two mip levels and between those.
 fn odd_edges() -> Result<(), Failed> {
     const SIZE: [f32; 2] = [960.0, 100.0];
     let image = |is_white: fn(u32, u32) -> bool| {
