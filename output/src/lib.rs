@@ -1,5 +1,5 @@
 //! What Drawloom's examples and benchmarks write: files, whole or not at all, and lines on the console, which end no
-//! program that cannot print them.
+//! program that cannot print them. With the feature `clap`, it parses the arguments of programs.
 //!
 //! A program names each of its files as an [`OutputFile`] or a [`PictureFile`] before it draws anything, so a name that cannot be written is an
 //! error at once. It writes the file when the content is there. The content goes to a temporary file in the same folder, reaches the disk, and

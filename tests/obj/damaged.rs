@@ -21,6 +21,7 @@ pub fn trials() -> Vec<Trial> {
         trial("damaged::utf_16_and_cr_are_read", utf_16_and_cr_are_read),
         trial("damaged::warnings_are_capped_and_counted", warnings_are_capped_and_counted),
         trial("damaged::control_characters_do_not_reach_messages", control_characters_do_not_reach_messages),
+        trial("damaged::a_file_whose_name_turns_text_is_found", a_file_whose_name_turns_text_is_found),
     ]
 }
 
@@ -234,7 +235,6 @@ fn control_characters_do_not_reach_messages() {
 }
 
 /// Windows puts such a mark in front of paths that are copied from its dialogs.
-#[test]
 fn a_file_whose_name_turns_text_is_found() {
     let text = format!("mtllib \u{202a}a.mtl\nusemtl one\n{TRIANGLE}");
     let imported = Folder::new().with("a.obj", text).with("\u{202a}a.mtl", "newmtl one\nKd 1 0 0\n").load().unwrap();
