@@ -1,6 +1,7 @@
 //! Spans of `tracing`, whose subscriber is code of the engine's.
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 use tracing::Span;
 
@@ -8,12 +9,15 @@ use super::{catch, discard};
 
 /// A span of `tracing`. If the subscriber panics, what it was told is lost, the panic hook gets the message, and
 /// nothing else happens.
-pub(crate) struct CaughtSpan(Option<Span>);
+///
+/// Clones share the span, so a clone does not call the subscriber. The last one that is dropped closes it.
+#[derive(Clone)]
+pub(crate) struct CaughtSpan(Option<Arc<Span>>);
 
 impl CaughtSpan {
     /// `make` calls a macro of `tracing`, or asks for the current span.
     pub(crate) fn new(make: impl FnOnce() -> Span) -> Self {
-        Self(catch(make).ok())
+        Self(catch(make).ok().filter(|span| !span.is_none()).map(Arc::new))
     }
 
     pub(crate) const fn none() -> Self {
@@ -22,7 +26,7 @@ impl CaughtSpan {
 
     /// For the `parent` of a macro.
     pub(crate) fn id(&self) -> Option<tracing::span::Id> {
-        self.0.as_ref().and_then(Span::id)
+        self.0.as_ref().and_then(|span| span.id())
     }
 
     /// Enters the span until the result is dropped.
@@ -37,12 +41,6 @@ impl CaughtSpan {
             // `catch` drops the payload of a panic, and ignores what that panics with.
             let _ = catch(|| span.with_subscriber(|(id, subscriber)| tell(id, subscriber)));
         }
-    }
-}
-
-impl Clone for CaughtSpan {
-    fn clone(&self) -> Self {
-        Self(self.0.as_ref().and_then(|span| catch(|| span.clone()).ok()))
     }
 }
 

@@ -6,8 +6,7 @@
 //! forgotten. Where an unwind would free memory that another thread still uses, an [`AbortOnUnwind`] guards the code as
 //! well. So soundness does not depend on every call being caught.
 //!
-//! These are all places where such code is called. `tests/boundary` makes the calls of backends, nodes and subscribers panic in turn, and
-//! those of processes, shaders, fences and loops; steps, predicates, clocks, hooks, jobs and loads panic in the tests of their modules.
+//! These are all places where such code is called. `tests/boundary` makes each of these calls panic in turn.
 //!
 //! | code | called in | its panic |
 //! | --- | --- | --- |
@@ -16,19 +15,22 @@
 //! | `Backend::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
 //! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `ProcessError::Panicked`, or `PlanError::Panicked` |
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
-//! | `PostStep`, `HelperStep` | `frame/plan_cache.rs`; `frame/helper/shared.rs` | `PlanError::Panicked`; `HelperErrorReason::Panicked` |
+//! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |
+//! | `Deformation`: `declare`, `shader`, `resources`, `cpu_shader` | `process/deferred/deformation.rs`, in calls of the process that deforms | as that of the process |
+//! | `HelperStep`, `ReadBack::read` of its source | `frame/helper/shared.rs` | `HelperErrorReason::Panicked` |
 //! | `CpuNode`: `name`, `declare` | `frame/lent_nodes.rs` | `FrameError::Panicked` with the node |
 //! | `CpuNode` and nodes of graphs: `width`, `run` and others | `graph/execute.rs` | `RunError::Panicked` with the node |
 //! | predicates of materials | `frame/view_filter.rs` | `FrameError::FilterPanicked` |
 //! | what follows a submission | `frame/frame_loop.rs` | `FrameLoopError::Panicked` |
 //! | callbacks of fences | `fence/state.rs` | an event |
 //! | `DeviceProgress` | `fence/device_progress.rs` | `FenceError::Device` |
-//! | jobs, loops, scopes | `task/job.rs`, `task/worker.rs`, `task/parallel_loop.rs` | [`JobPanic`] |
+//! | jobs, loops with their iterators, scopes | `task/job.rs`, `task/worker.rs`, `task/parallel_loop.rs`, `task/scheduler.rs` | [`JobPanic`] |
 //! | background jobs, loads | `task/background_job.rs`, `scene/asset_loader.rs` | [`JobPanic`]; `LoadError` |
 //! | hooks of the scheduler's threads | `task/builder.rs`, `task/worker_thread.rs` | `SchedulerError`, or an event |
 //! | clocks | `timeline/clock.rs` | an event; the time stands still |
 //! | subscribers of `tracing` | [`emit`], [`CaughtSpan`], and nowhere else: `tests/architecture` checks that | the event or span is lost |
-//! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`] | nothing |
+//! | what the engine passes to a call, or asks itself, on its own thread: `Parameters::update`, `MaterialPredicate::contains`, `Deferred::names`, `output` and `quality`, `obj::read`, `SurfaceFrame::present`, iterators and writers | there | unwinds to the engine's call, which has changed nothing that others use |
+//! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`], in which processes and deformations are wrapped when they are added | nothing |
 
 mod caught_span;
 mod contained;

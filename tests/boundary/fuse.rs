@@ -63,13 +63,18 @@ pub fn disarm() -> Option<&'static str> {
     BLOWN.lock().unwrap().take()
 }
 
+/// The calls of the kind since it was armed.
+pub fn calls() -> Vec<&'static str> {
+    CALLS.lock().unwrap().clone()
+}
+
 /// Calls `work`, and returns which of its calls of a kind to try: of those of each name the first two, the last one, and
 /// one between.
 pub fn calls_to_try(kind: Kind, work: impl FnOnce()) -> Vec<usize> {
     arm(kind, usize::MAX, true);
     work();
     disarm();
-    let calls = CALLS.lock().unwrap().clone();
+    let calls = calls();
     let mut chosen = BTreeSet::new();
     for name in calls.iter().collect::<BTreeSet<_>>() {
         let of_name: Vec<_> = (0..calls.len()).filter(|index| calls[*index] == *name).collect();

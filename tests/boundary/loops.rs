@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
 use drawloom::backend::NullBackend;
@@ -15,7 +16,7 @@ use drawloom::{Buffering, FinishedFrame, FrameLoop, FramePlace, Renderer};
 use crate::engine::{OwnBackend, OwnDevice, OwnProcess};
 use crate::frames::worlds;
 use crate::fuse::{self, Kind, Owned};
-use crate::{LONG, within_time};
+use crate::{LONG, wait_until, within_time};
 
 type Backend = OwnBackend<NullBackend>;
 
@@ -170,7 +171,35 @@ fn a_loop_goes_on_after_a_frame_is_refused_and_its_captures_panic() {
             assert_eq!(fuse::disarm().is_some_and(|name| name == "advance"), with_device);
             assert_eq!((told.drawn, told.errors.len()), (FRAMES, 1), "{:?}", told.errors);
             assert!(told.errors[0].contains("terrain"), "{:?}", told.errors);
+            assert_eq!(told.errors[0].contains("panicked"), with_device, "{:?}", told.errors);
         }
+    });
+}
+
+/// Nobody takes the last frames of a loop that has ended itself. They are dropped with it, or with a slot that is left.
+#[test]
+fn a_loop_that_has_ended_itself_is_dropped_though_its_last_frames_panic() {
+    within_time(|| {
+        let mut frames = new_loop(Buffering::Triple);
+        let scene = scene();
+        let left = frames.begin().0;
+        let (give, take) = mpsc::channel::<FrameLoop<Backend>>();
+        let (done, is_done) = mpsc::channel();
+        let (slot, _) = frames.begin();
+        let recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
+        slot.submit_then(recorded, move |_| {
+            drop(take.recv().unwrap());
+            done.send(()).unwrap();
+        });
+        give.send(frames).unwrap();
+        is_done.recv_timeout(LONG).expect("it hangs");
+        // Of the loop's values, the submission is left, and with it a destructor.
+        wait_until(|| fuse::alive() == 1, "the loop does not end");
+        thread::sleep(Duration::from_millis(50));
+        fuse::arm(Kind::Destructor, 0, true);
+        assert!(catch_unwind(AssertUnwindSafe(|| drop(left))).is_ok(), "it unwinds");
+        wait_until(|| fuse::alive() == 0, "the submission is kept");
+        assert_eq!(fuse::disarm(), Some("submission"));
     });
 }
 

@@ -8,8 +8,11 @@ mod builds;
 mod engine;
 mod frames;
 mod fuse;
+mod helpers;
 mod loops;
 mod preparations;
+#[cfg(feature = "wgpu")]
+mod raw;
 mod schedulers;
 
 use std::panic;

@@ -115,8 +115,8 @@ fn a_panic_when_a_failed_frame_is_discarded_is_told_with_why_it_failed() {
 fn a_panic_in_the_destructor_of_a_job_changes_nothing() {
     within_time(|| {
         let alive_before = fuse::alive();
-        for (index, has_text) in (0..12).map(|index| (index, index % 2 == 0)) {
-            fuse::arm(Kind::Destructor, index % 3, has_text);
+        for index in 0..8 {
+            fuse::arm(Kind::Destructor, index / 2 % 2, index < 4);
             let ended = catch_unwind(AssertUnwindSafe(|| {
                 let scheduler = Scheduler::new(1).unwrap();
                 let captured = Owned::new("captured by a job", ());
@@ -135,8 +135,7 @@ fn a_panic_in_the_destructor_of_a_job_changes_nothing() {
                     }
                 }
             }));
-            fuse::disarm();
-            assert!(ended.is_ok(), "{index} unwinds");
+            assert!(fuse::disarm().is_some() && ended.is_ok(), "{index} unwinds");
             assert_eq!(fuse::alive(), alive_before);
         }
     });

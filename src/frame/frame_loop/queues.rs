@@ -7,6 +7,7 @@ use parking_lot::{Condvar, Mutex};
 
 use super::Buffering;
 use crate::fence::{current_thread, list_wait};
+use crate::unwind::discard_all;
 
 /// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.
 /// `Task` is what the device thread does.
@@ -146,5 +147,13 @@ impl<Task, Awaited, Finished> LoopQueues<Task, Awaited, Finished> {
             }
             self.changed.wait(&mut state);
         }
+    }
+}
+
+/// The frames that nobody has taken. Whoever drops the last slot, or a thread of a loop that has ended itself, may drop
+/// them. No others are left: each holds a slot, and so the queues.
+impl<Task, Awaited, Finished> Drop for LoopQueues<Task, Awaited, Finished> {
+    fn drop(&mut self) {
+        discard_all(self.state.get_mut().finished.drain(..));
     }
 }

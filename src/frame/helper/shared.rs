@@ -27,7 +27,7 @@ pub(super) const MAX_ERRORS: usize = 16;
 /// What a helper, its callbacks and its jobs share.
 pub(super) struct Shared {
     pub(super) name: Arc<str>,
-    step: Box<dyn HelperStep>,
+    step: Contained<Box<dyn HelperStep>>,
     pub(super) source: HelperSource,
     /// The target that is read back.
     pub(super) target: String,
@@ -92,10 +92,19 @@ impl<B: Backend> UploadPicture for B {
 
 impl Shared {
     pub(super) fn new(scheduler: Arc<Scheduler>, step: impl HelperStep, source: HelperSource) -> Self {
-        let name: Arc<str> = step.name().into();
+        let (name, panic) = match catch(|| Arc::from(step.name())) {
+            Ok(name) => (name, None),
+            Err(panic) => (Arc::from("a step without a name"), Some(panic)),
+        };
         let target = Downsample::target_of(&name, &source);
-        let (step, state, shown) = (Box::new(step), Mutex::default(), SharedSelection::default());
-        Self { name, step, source, target, scheduler, state, shown }
+        let step: Box<dyn HelperStep> = Box::new(step);
+        let (step, state, shown) = (Contained::new(step), Mutex::default(), SharedSelection::default());
+        let shared = Self { name, step, source, target, scheduler, state, shown };
+        if let Some(JobPanic { message }) = panic {
+            let message = shared.add_error_of_all(&mut shared.state.lock(), HelperErrorReason::Panicked { message });
+            log(Some(message));
+        }
+        shared
     }
 
     /// See [`PostHelper::begin_frame`](super::PostHelper::begin_frame).

@@ -32,6 +32,8 @@ use crate::task::Scheduler;
 /// ```
 pub trait HelperStep: Send + Sync + 'static {
     /// Its name in errors, statistics and the timeline, and the first part of the names of its processes and its targets.
+    /// Called once, when the helper is made. If it panics, that is [reported](super::PostHelper::take_errors), and the
+    /// helper works as `a step without a name`.
     fn name(&self) -> &str;
 
     /// Computes the step, in a [background job](Scheduler::background): on a worker that nothing else needs. A later frame samples what it

@@ -114,7 +114,8 @@ impl Deferred {
 
     /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the sum
     /// of lights, to the post-processing steps added so far and to the shadow maps if there are any. It changes neither
-    /// the format of `radiance` nor how far the shadow maps of directional lights reach.
+    /// the format of `radiance` nor how far the shadow maps of directional lights reach. A panic of a step unwinds to the
+    /// caller; [`RendererBuilder::quality`](crate::RendererBuilder::quality) makes it an error.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
@@ -170,7 +171,8 @@ impl Deferred {
         self
     }
 
-    /// The target that the frame outputs.
+    /// The target that the frame outputs. Calls [`PostStep::process`] if processes are left out: a panic of a step unwinds
+    /// to the caller.
     pub fn output(&self) -> &'static str {
         if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
@@ -189,7 +191,8 @@ impl Deferred {
         !self.blends_floats && self.would_sum_blended_objects()
     }
 
-    /// The names of all processes that a frame may have, whatever the scene, in order.
+    /// The names of all processes that a frame may have, whatever the scene, in order. Asks steps and deformations, whose
+    /// panics unwind to the caller.
     pub fn names(&self) -> Vec<String> {
         self.build(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
     }
