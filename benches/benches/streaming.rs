@@ -7,7 +7,7 @@
 //! more. *Streamed* is the longest frame until everything is on the device, and how many it takes. *Through* so many MB is a world of which each
 //! frame brings a mesh and a texture and drops as many: its longest frame, and that divided by the median. Times are of
 //! `Renderer::record`, but in the last rows, which are of whole frames; two workers, on wgpu's `noop` device and on the machine's adapter, if
-//! there is one. `target/drawloom/streaming.json` has the same.
+//! there is one. `target/drawloom/streaming.json` has the same. The last line names the targets that were missed.
 
 use std::collections::VecDeque;
 use std::error::Error;

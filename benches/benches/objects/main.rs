@@ -14,7 +14,7 @@
 //!   cached bundles, and *direct* is single on as many workers as *multi*.
 //!
 //! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
-//! the device's time. Frames per second are those of the median round, and a ratio is the median of the rounds' own ratios.
+//! the device's time. Frames per second are those of the median round, and a ratio is that of two medians.
 //! `ceiling.rs` explains the ceiling. On the adapter there are also frames per second *until drawn*: each waits until the device has
 //! drawn the one before.
 //!
@@ -27,7 +27,7 @@
 //!
 //! Growth is the cost of an object in scenes of many objects, without instancing.
 //!
-//! `target/drawloom/objects.json` and `.svg` have the same.
+//! `target/drawloom/objects.json` and `.svg` have the same. The last line names the targets that were missed.
 
 mod ceiling;
 mod charts;

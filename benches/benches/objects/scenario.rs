@@ -158,8 +158,8 @@ impl Scenario {
         median(self.profiles.iter().map(value))
     }
 
-    /// How many times as fast it is, as the median of the rounds' own ratios.
+    /// How many times as fast it is: the ratio of the medians.
     fn ratio_to(&self, base: &Self) -> f64 {
-        median(base.samples.iter().zip(&self.samples).map(|(base, sample)| base.frame / sample.frame))
+        base.median(|sample| sample.frame) / self.median(|sample| sample.frame)
     }
 }

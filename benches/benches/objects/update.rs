@@ -76,13 +76,10 @@ pub fn measure(
         mean_frame(at_least, || contender.frame(&work))
     })?;
     let fps = |times: &[f64]| median(times.iter().copied()).recip();
-    let row = |(&workers, times): (&usize, &[Vec<f64>])| Row {
-        objects,
-        backend,
-        workers,
-        update_before_fps: fps(&times[0]),
-        update_beside_fps: fps(&times[1]),
-        ratio: median(times[0].iter().zip(&times[1]).map(|(before, beside)| before / beside)),
+    let row = |(&workers, times): (&usize, &[Vec<f64>])| {
+        let [update_before_fps, update_beside_fps] = [fps(&times[0]), fps(&times[1])];
+        let ratio = update_beside_fps / update_before_fps;
+        Row { objects, backend, workers, update_before_fps, update_beside_fps, ratio }
     };
     Ok(workers.iter().zip(times.chunks(2)).map(row).collect())
 }
