@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use data_url::DataUrl;
+use drawloom::text::Escaped;
 use percent_encoding::percent_decode_str;
 
 use crate::error::Problem;
@@ -15,11 +16,7 @@ use crate::text::excerpt;
 /// A path as messages show it.
 pub(crate) fn path_text(path: &Path) -> String {
     // All of it: a path that is cut cannot be found.
-    let mut shown = String::new();
-    for character in path.display().to_string().chars() {
-        shown += &excerpt(character.encode_utf8(&mut [0; 4]));
-    }
-    shown
+    Escaped(&path.display().to_string()).to_string()
 }
 
 /// Reads a regular file.

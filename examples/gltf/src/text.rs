@@ -1,26 +1,16 @@
 //! Text of files in messages, which reach terminals and reports.
 
+use drawloom::text::Escaped;
+
 /// How many characters of a text messages show.
 const MAX_CHARACTERS: usize = 80;
 
-/// The beginning of a text, without control characters and those that turn or break lines: they are escaped, so that
-/// none reaches a terminal.
+/// The beginning of a text, [escaped](Escaped).
 pub(crate) fn excerpt(text: &str) -> String {
-    let mut shown = String::new();
-    for (number, character) in text.chars().enumerate() {
-        if number == MAX_CHARACTERS {
-            shown.push('…');
-            break;
-        }
-        let breaks = matches!(character, '\u{2028}' | '\u{2029}');
-        let turns = matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-        if character.is_control() || breaks || turns {
-            shown.extend(character.escape_unicode());
-        } else {
-            shown.push(character);
-        }
+    match text.char_indices().nth(MAX_CHARACTERS) {
+        Some((end, _)) => format!("{}…", Escaped(&text[..end])),
+        None => Escaped(text).to_string(),
     }
-    shown
 }
 
 #[cfg(test)]
