@@ -196,6 +196,8 @@ mod tests {
             moves in prop::collection::vec((prop::array::uniform3(-1.0..1.0_f64), prop::array::uniform3(-1.0..1.0_f64)), 30),
         ) {
             let view = RenderView::new(&camera);
+            let is_oblique = camera.clip_plane.is_some_and(|plane| reaches_beyond_near_plane(&camera, &plane));
+            prop_assert_eq!(view.has_oblique_near_plane(), is_oblique);
             let [right, up, forward] = view.precise_picture_axes();
             let distance = 10_f64.powf(distance);
             let center = camera.position + match camera.projection {

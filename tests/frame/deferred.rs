@@ -281,19 +281,18 @@ fn a_kept_sum_of_lights_is_in_every_plan_of_a_quality_that_has_it() {
     let in_floats = planned(RadianceSum::Float, pipeline());
     assert_eq!([&in_floats[0], &in_floats[2]], ["geometry buffer", "sum of lights"]);
     assert!(in_floats.len() == 3 && in_floats[1].ends_with(" lights"), "{in_floats:?}");
-    // A process of the engine's draws over radiance, so no sum needs it.
-    let lights = || LightVolumes::new(LightKind::Point, GeometryFormats::default());
+    // A process of the engine's draws over radiance, so it adds nothing to the sum.
+    let own = LightVolumes::new(LightKind::Point, GeometryFormats::default());
+    let in_floats = planned(RadianceSum::Float, pipeline().replace("point lights", own));
+    assert!(in_floats.len() == 3 && in_floats[1] != "point lights", "{in_floats:?}");
     let classes = ["directional", "point", "spot", "hemispherical"];
     let names = || classes.iter().flat_map(|kind| [format!("{kind} lights"), format!("shadowed {kind} lights")]);
-    for is_replaced in [true, false] {
-        let without = |deferred: Deferred, name: String| {
-            if is_replaced { deferred.replace(name, lights()) } else { deferred.leave_out(name) }
-        };
-        let all_but_spots = names().filter(|name| name != "spot lights").fold(pipeline(), without);
-        assert_eq!(planned(RadianceSum::Shader, all_but_spots), summed);
-    }
+    let all_but_spots = names().filter(|name| name != "spot lights").fold(pipeline(), Deferred::leave_out);
+    assert_eq!(planned(RadianceSum::Shader, all_but_spots), summed);
     assert_eq!(planned(RadianceSum::Shader, names().fold(pipeline(), Deferred::leave_out)), geometry);
-    assert_eq!(planned(RadianceSum::Shader, Deferred::new().keep("sum of blended objects")), geometry);
+    let blended = |sum| planned(sum, Deferred::new().keep("sum of blended objects"));
+    assert_eq!(blended(RadianceSum::HalfFloat), geometry);
+    assert_eq!(blended(RadianceSum::Shader), ["geometry buffer", "transparency", "sum of blended objects"]);
 }
 
 struct Wind;
