@@ -29,7 +29,7 @@
 //! | hooks of the scheduler's threads | `task/builder.rs`, `task/worker_thread.rs` | `SchedulerError`, or an event |
 //! | clocks | `timeline/clock.rs` | an event; the time stands still |
 //! | subscribers of `tracing` | [`emit`], [`CaughtSpan`], and nowhere else: `tests/architecture` checks that | the event or span is lost |
-//! | what the engine passes to a call, or asks itself, on its own thread: `Parameters::update`, `MaterialPredicate::contains`, `Deferred::names`, `output` and `quality`, `obj::read`, `SurfaceFrame::present`, iterators and writers | there | unwinds to the engine's call, which has changed nothing that others use |
+//! | what the engine passes to a call, or asks itself, on its own thread: `Parameters::update`, `MaterialPredicate::contains`, `Deferred::names`, `output` and `quality`, `obj::read`, `SurfaceFrame::present`, iterators and writers | there | unwinds to the caller; nothing has changed but values of the engine's |
 //! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`], in which processes and deformations are wrapped when they are added | nothing |
 
 mod caught_span;
