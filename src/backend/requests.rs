@@ -37,8 +37,8 @@ pub struct FrameRequest<'a> {
     pub list_capacity: usize,
     /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes are finished.
     pub generated: &'a [Arc<GeneratedContents>],
-    /// Whether passes are recorded in bundles, which jobs divide, also where another way is cheaper: what a fixed
-    /// [`Granularity`](crate::Granularity) asks for.
+    /// Whether the backend records passes in bundles, even if another strategy is cheaper, unless the engine has fixed
+    /// one. Set for [`PerDraw`](crate::Granularity::PerDraw) and [`Chunk`](crate::Granularity::Chunk).
     pub records_bundles: bool,
     /// The frame's accuracy.
     pub quality: &'a Quality,

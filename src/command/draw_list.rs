@@ -25,19 +25,10 @@ pub struct DrawList {
     partial_batches: Vec<(u32, Range<u32>)>,
     /// The version of batches and objects, without the objects of pieces.
     version: Version,
-    bundle_size: BundleSize,
+    /// The number of batches in a bundle, if it is less than [`DrawList::BATCHES_PER_BUNDLE`].
+    bundle_size: Option<usize>,
     /// Scratch memory: the runs of all segments that are joined.
     run_order: Vec<SegmentRun>,
-}
-
-/// The number of batches in a bundle.
-#[derive(Clone, Copy, Debug)]
-struct BundleSize(usize);
-
-impl Default for BundleSize {
-    fn default() -> Self {
-        Self(DrawList::BATCHES_PER_BUNDLE)
-    }
 }
 
 /// A run of a segment. Runs are ordered as they are drawn.
@@ -58,7 +49,7 @@ impl DrawList {
     /// Sets the number of batches in a bundle, from 1 to [`BATCHES_PER_BUNDLE`](Self::BATCHES_PER_BUNDLE). Bundles of
     /// pieces are recorded once and keep that size.
     pub(crate) fn set_batches_per_bundle(&mut self, batches: usize) {
-        self.bundle_size = BundleSize(batches.clamp(1, Self::BATCHES_PER_BUNDLE));
+        self.bundle_size = (batches < Self::BATCHES_PER_BUNDLE).then_some(batches.max(1));
     }
 
     /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
@@ -264,10 +255,14 @@ impl DrawList {
         self.pieces.set_drawn(drawn, self.batches.len());
     }
 
+    fn batches_per_bundle(&self) -> usize {
+        self.bundle_size.unwrap_or(Self::BATCHES_PER_BUNDLE)
+    }
+
     /// The number of bundles that the batches fill. No bundle has batches of pieces and of other objects.
     pub fn bundle_count(&self) -> usize {
         let own = self.batches.len() - self.pieces.batch_count();
-        self.pieces.bundle_count() + own.div_ceil(self.bundle_size.0)
+        self.pieces.bundle_count() + own.div_ceil(self.batches_per_bundle())
     }
 
     /// The batches of one bundle.
@@ -286,8 +281,8 @@ impl DrawList {
         match index.checked_sub(self.pieces.bundle_count()) {
             None => self.pieces.bundle_range(index),
             Some(own) => {
-                let start = self.pieces.batch_count() + own * self.bundle_size.0;
-                start..self.batches.len().min(start + self.bundle_size.0)
+                let start = self.pieces.batch_count() + own * self.batches_per_bundle();
+                start..self.batches.len().min(start + self.batches_per_bundle())
             }
         }
     }

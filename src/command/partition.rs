@@ -3,15 +3,14 @@
 use super::{RenderCommand, SortKey};
 use crate::chunked_array::ChunkedArray;
 
-/// The commands of a pass, divided into parts of equal size. All commands of a part come before those of the next. The
-/// job of a part sorts it, and reads nothing else.
+/// The commands of a pass, divided into parts of equal size. All commands of a part come before those of the next, so the
+/// parts can be sorted independently.
 ///
-/// Dividing takes as long as sorting where parts are small, so this is for a granularity that asks for it:
-/// [`Splitters`](super::Splitters) take less time.
+/// Dividing is one job, and where parts are small it takes as long as sorting. So this is for a granularity that asks
+/// for it: [`Splitters`](super::Splitters) take less time.
 #[derive(Debug, Default)]
 pub(crate) struct Partition {
-    /// The key of each command, and its index, by which equal keys are ordered.
-    entries: Vec<(SortKey, u32)>,
+    commands: Vec<RenderCommand>,
     part_size: usize,
 }
 
@@ -20,43 +19,40 @@ impl Partition {
     /// out.
     pub(crate) fn divide(&mut self, commands: &ChunkedArray<RenderCommand>, count: usize, part_size: usize) {
         self.part_size = part_size;
-        self.entries.clear();
+        self.commands.clear();
         for (block, indices) in ChunkedArray::<RenderCommand>::block_ranges(0..count) {
-            let commands = commands.read(block);
-            let keys = commands.iter().map(|command| command.key);
-            let drawn = (indices.start as u32..).zip(keys.take(indices.len())).filter(|(_, key)| *key != SortKey::LAST);
-            self.entries.extend(drawn.map(|(index, key)| (key, index)));
+            let block = commands.read(block);
+            self.commands.extend(block[..indices.len()].iter().filter(|command| command.key != SortKey::LAST));
         }
-        divide(&mut self.entries, part_size);
+        divide(&mut self.commands, part_size);
     }
 
     /// The number of parts, at least 1.
     pub(crate) fn part_count(&self) -> usize {
-        self.entries.len().div_ceil(self.part_size.max(1)).max(1)
+        self.commands.len().div_ceil(self.part_size.max(1)).max(1)
     }
 
-    /// Sorts the commands of a part: by key, and equal keys by object. They lie in the order of their objects.
-    pub(crate) fn sort(&self, part: usize, commands: &ChunkedArray<RenderCommand>, sorted: &mut Vec<RenderCommand>) {
-        let start = self.entries.len().min(part * self.part_size);
-        let end = self.entries.len().min(start.saturating_add(self.part_size));
+    /// Sorts a copy of a part's commands into `sorted`: by key, and equal keys by object.
+    pub(crate) fn sort(&self, part: usize, sorted: &mut Vec<RenderCommand>) {
+        let start = self.commands.len().min(part * self.part_size);
+        let end = self.commands.len().min(start.saturating_add(self.part_size));
         sorted.clear();
-        sorted.extend(self.entries[start..end].iter().map(|&(_, index)| {
-            let (block, entry) = (index as usize / BLOCK_SIZE, index as usize % BLOCK_SIZE);
-            commands.read(block)[entry]
-        }));
-        sorted.sort_unstable_by_key(|command| (command.key, command.object));
+        sorted.extend_from_slice(&self.commands[start..end]);
+        sorted.sort_unstable_by_key(order);
     }
 }
 
-const BLOCK_SIZE: usize = ChunkedArray::<RenderCommand>::BLOCK_SIZE;
+fn order(command: &RenderCommand) -> (SortKey, u32) {
+    (command.key, command.object)
+}
 
-/// Moves entries until those of each part of `part_size` come before those of the next.
-fn divide(entries: &mut [(SortKey, u32)], part_size: usize) {
-    let parts = entries.len().div_ceil(part_size);
+/// Moves commands until those of each part of `part_size` come before those of the next.
+fn divide(commands: &mut [RenderCommand], part_size: usize) {
+    let parts = commands.len().div_ceil(part_size);
     if parts > 1 {
         let middle = parts / 2 * part_size;
-        entries.select_nth_unstable(middle);
-        let (before, after) = entries.split_at_mut(middle);
+        commands.select_nth_unstable_by_key(middle, order);
+        let (before, after) = commands.split_at_mut(middle);
         divide(before, part_size);
         divide(after, part_size);
     }
@@ -92,7 +88,7 @@ mod tests {
             prop_assert_eq!(partition.part_count(), expected.len().div_ceil(part_size).max(1));
             let (mut all, mut sorted) = (Vec::new(), vec![RenderCommand::EMPTY]);
             for part in 0..partition.part_count() {
-                partition.sort(part, &blocks, &mut sorted);
+                partition.sort(part, &mut sorted);
                 prop_assert!(sorted.len() == part_size || part + 1 == partition.part_count());
                 all.append(&mut sorted);
             }

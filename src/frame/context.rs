@@ -15,7 +15,7 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::AttachmentExtent;
 use crate::scene::Projection;
-use crate::view::{ObjectLevels, ObjectsPart, SelectionFilter};
+use crate::view::{ObjectLevels, SelectionFilter, VisibleRange};
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -120,14 +120,14 @@ impl<B: Backend> FrameContext<'_, B> {
         }
     }
 
-    /// What of a pass's objects is in one of its segments, by index.
-    pub(super) fn part_of_segment(&self, pass: usize, segment: usize) -> ObjectsPart {
+    /// The visible objects that a pass bins in one of its segments, by index.
+    pub(super) fn range_of_segment(&self, pass: usize, segment: usize) -> VisibleRange {
         match self.granularity.draws_per_job() {
             Some(draws) => {
                 let end = self.visible_count(pass);
-                ObjectsPart::Ranks(end.min(segment * draws)..end.min((segment + 1).saturating_mul(draws)))
+                VisibleRange::Ranks(end.min(segment * draws)..end.min((segment + 1).saturating_mul(draws)))
             }
-            None => ObjectsPart::Share { index: segment, count: self.segment_count(pass) },
+            None => VisibleRange::Share { index: segment, count: self.segment_count(pass) },
         }
     }
 
@@ -165,7 +165,7 @@ impl<B: Backend> FrameContext<'_, B> {
     }
 
     /// The number of a node's `width` items that are worth a job.
-    pub(super) fn items_worth_a_job(&self, node: usize, width: usize) -> usize {
+    pub(super) fn items_per_job_by_cost(&self, node: usize, width: usize) -> usize {
         self.costs.items_per_job(node, width, self.workers)
     }
 

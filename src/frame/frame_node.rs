@@ -51,7 +51,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for FrameNode<B> {
             Self::Stage(stage) => stage.chunk(frame),
             Self::Cpu(index) => {
                 let (node, node_frame) = index.get(frame);
-                let by_cost = || frame.items_worth_a_job(index.node, node.width(&node_frame));
+                let by_cost = || frame.items_per_job_by_cost(index.node, node.width(&node_frame));
                 node.items_per_job().unwrap_or_else(by_cost)
             }
         }

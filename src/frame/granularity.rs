@@ -9,7 +9,10 @@ use crate::command::DrawList;
 /// Before that there are no draws. Updating objects and uploading them, which all cameras share, and culling them for a
 /// view are cut by measured cost in every mode; with [`PerCamera`](Self::PerCamera), culling is one job a view.
 ///
-/// All but [`Adaptive`](Self::Adaptive) always run on all workers, also where one alone would be faster.
+/// Frames of all but [`Adaptive`](Self::Adaptive) are executed in parallel even where one worker alone would be faster. Two
+/// things are not divided: [pieces](crate::scene::Piece) keep their bundles of
+/// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws, and a backend whose recording strategy an engine has fixed
+/// records by that strategy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Granularity {
     /// By measured cost: each stage of each process is divided into as many jobs as its work is worth. It adapts to a
@@ -18,10 +21,11 @@ pub enum Granularity {
     Adaptive,
     /// One job for each stage of a camera's processes: M's first design.
     PerCamera,
-    /// One job for each draw: M's "more advanced solution". What one job records is a bundle of one draw.
+    /// One job for each draw, which is recorded as a bundle of its own: M's "more advanced solution". To divide commands into
+    /// parts of one, one job sorts them all.
     PerDraw,
-    /// One job for this many draws. Not 0. What one job records is at most
-    /// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws a bundle, in bundles of equal size.
+    /// One job for this many draws. Not 0. A job that records divides them into bundles of equal size, at most
+    /// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws each, and rounds up to whole bundles.
     Chunk(usize),
 }
 
@@ -37,7 +41,7 @@ impl Granularity {
 
     /// The number of items in a job that divides draws, where an item has up to `draws_per_item`; `None` where the
     /// cost model decides.
-    pub(super) fn items_per_job(self, draws_per_item: usize) -> Option<usize> {
+    pub(super) fn items_per_job_by_draws(self, draws_per_item: usize) -> Option<usize> {
         match self {
             Self::Adaptive => None,
             Self::PerCamera => Some(usize::MAX),
@@ -62,7 +66,7 @@ mod tests {
             let granularity = Granularity::Chunk(draws);
             let (bundle, bundles) = (
                 granularity.batches_per_bundle() as u128,
-                granularity.items_per_job(DrawList::BATCHES_PER_BUNDLE).unwrap() as u128,
+                granularity.items_per_job_by_draws(DrawList::BATCHES_PER_BUNDLE).unwrap() as u128,
             );
             assert!((1..=DrawList::BATCHES_PER_BUNDLE as u128).contains(&bundle));
             // Rounded up to bundles of equal size.

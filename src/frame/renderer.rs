@@ -321,13 +321,7 @@ impl<B: Backend> Renderer<B> {
         };
         let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, views, options, nodes)?;
-        graph.begin_frame(
-            &mut self.tables,
-            scene,
-            views,
-            &self.quality,
-            (self.scheduler.workers(), self.granularity),
-        )?;
+        graph.begin_frame(&mut self.tables, scene, views, &self.quality, self.scheduler.workers(), self.granularity)?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);

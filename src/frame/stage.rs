@@ -62,8 +62,7 @@ pub(super) struct StageInfo {
 pub(super) enum Chunking {
     /// One item per job.
     PerItem,
-    /// As many items per job as are worth a job. There are no draws yet that a [`Granularity`] could count: with
-    /// [`Granularity::PerCamera`], what a view does is one job.
+    /// By measured cost, since no draws exist yet. With [`Granularity::PerCamera`], one job a view.
     ByCost,
     /// As many items per job as the [`Granularity`] says.
     ByDraws {
@@ -126,10 +125,10 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
     fn chunk(&self, frame: &FrameContext<'_, B>) -> usize {
         match self.stage.info().chunking {
             Chunking::PerItem => 1,
-            _ if self.chunked_by_cost(frame) => frame.items_worth_a_job(self.node, self.stage.width(frame)),
+            _ if self.chunked_by_cost(frame) => frame.items_per_job_by_cost(self.node, self.stage.width(frame)),
             Chunking::ByCost => usize::MAX,
             Chunking::ByDraws { draws_per_item } => {
-                frame.granularity.items_per_job(draws_per_item).unwrap_or(usize::MAX)
+                frame.granularity.items_per_job_by_draws(draws_per_item).unwrap_or(usize::MAX)
             }
         }
     }

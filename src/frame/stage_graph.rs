@@ -300,7 +300,8 @@ impl<B: Backend> StageGraph<B> {
         scene: &SceneRef<'_>,
         views: &[RenderView],
         quality: &Quality,
-        (workers, granularity): (usize, Granularity),
+        workers: usize,
+        granularity: Granularity,
     ) -> Result<(), FrameError> {
         let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order, .. } = self.key.options;
         tables.set_keys(&self.table_keys, views);

@@ -11,8 +11,8 @@ use super::labels::Labels;
 pub struct FrameTuning {
     /// The choices among alternatives. Choices that the engine fixed are left out, and so are views and passes without a choice.
     pub choices: Vec<TuningChoice>,
-    /// The job sizes of the nodes of the frame's stage graph whose items are divided by cost. Empty unless the
-    /// [granularity](crate::Granularity) is adaptive.
+    /// The job sizes of the nodes of the frame's stage graph whose items are divided by cost: which these are depends on the
+    /// [granularity](crate::Granularity).
     pub job_sizes: Vec<JobSize>,
 }
 

@@ -18,14 +18,14 @@ pub(crate) fn may_walk(selection: Selection) -> bool {
 
 /// Some of the objects that a view sees.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum ObjectsPart {
+pub(crate) enum VisibleRange {
     /// One of `count` parts that take about as long. All of them are all that the view sees.
     Share { index: usize, count: usize },
     /// Those whose rank, the index among the visible objects, is in this range.
     Ranks(Range<usize>),
 }
 
-impl ObjectsPart {
+impl VisibleRange {
     /// The indices among `length` entries.
     fn among(&self, length: usize) -> Range<usize> {
         match *self {
@@ -35,17 +35,17 @@ impl ObjectsPart {
     }
 }
 
-/// Makes a segment the opaque objects among a part of what a view sees that a process draws, ordered by bin.
+/// Makes a segment the opaque objects among some of those that a view sees that a process draws, ordered by bin.
 pub(crate) fn bin_visible(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
     filter: SelectionFilter<'_>,
-    part: &ObjectsPart,
+    range: &VisibleRange,
     segment: &mut BinnedSegment,
 ) {
     let bins = table.bins();
-    if matches!(part, ObjectsPart::Share { .. })
+    if matches!(range, VisibleRange::Share { .. })
         && may_walk(selection)
         && visible.count() * WALK_THRESHOLD > table.len()
         && let Some(all) = table.objects_by_bin()
@@ -53,15 +53,15 @@ pub(crate) fn bin_visible(
         let is_opaque = |bin| bins.get(bin).state.blend() == Blend::None;
         let is_visible = |object: u32| visible.contains(object as usize);
         if filter.passes_all() {
-            segment.select(&all, part.among(all.len()), is_opaque, is_visible);
+            segment.select(&all, range.among(all.len()), is_opaque, is_visible);
         } else {
-            segment.select(&all, part.among(all.len()), is_opaque, |object| {
+            segment.select(&all, range.among(all.len()), is_opaque, |object| {
                 is_visible(object) && filter.passes(object as usize)
             });
         }
     } else {
         segment.clear();
-        collect(table, visible, selection, filter, part.among(visible.count()), segment);
+        collect(table, visible, selection, filter, range.among(visible.count()), segment);
         segment.order(&bins);
     }
 }

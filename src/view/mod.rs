@@ -41,7 +41,7 @@ mod triangle_culling;
 mod used_meshes;
 mod visible_set;
 
-pub(crate) use bin::{ObjectsPart, bin_visible, may_walk};
+pub(crate) use bin::{VisibleRange, bin_visible, may_walk};
 #[doc(hidden)]
 pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;

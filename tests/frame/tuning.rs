@@ -105,6 +105,8 @@ fn a_fixed_granularity_has_job_sizes_of_stages_without_draws_alone() {
         (Granularity::PerCamera, &["objects", "upload"]),
     ] {
         let (tuning, _) = record(3, (2, TICK), granularity);
+        // Nor a choice of the run mode: they are always parallel.
+        assert!(tuning.iter().all(|tuning| choices_of(tuning, TuningSubject::RunMode).is_empty()));
         let sizes = tuning.iter().flat_map(|tuning| &tuning.job_sizes);
         let stages: BTreeSet<_> = sizes.filter_map(|size| size.labels.stage.as_deref()).collect();
         assert!(stages.contains("objects") && stages.iter().all(|stage| expected.contains(stage)), "{stages:?}");

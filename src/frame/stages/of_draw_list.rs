@@ -93,7 +93,7 @@ impl<B: Backend> Stage<B> for Split {
         let mut splitters = table.splitters.write();
         let buckets = match frame.granularity {
             // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
-            Granularity::Adaptive => count.div_ceil(frame.items_worth_a_job(job.node, count)).min(frame.workers),
+            Granularity::Adaptive => count.div_ceil(frame.items_per_job_by_cost(job.node, count)).min(frame.workers),
             _ => 1,
         };
         splitters.choose(&table.commands, count, buckets);
@@ -137,7 +137,7 @@ impl<B: Backend> Stage<B> for Sort {
         if frame.granularity.draws_per_job().is_some() {
             let partition = table.partition.read();
             for part in job.items {
-                partition.sort(part, &table.commands, &mut table.buckets[part].write().commands);
+                partition.sort(part, &mut table.buckets[part].write().commands);
             }
             return Ok(());
         }
@@ -217,9 +217,9 @@ impl<B: Backend> Stage<B> for Bin {
         let selection = table.selection.unwrap_or_default();
         let filter = SelectionFilter::new(objects, frame.request.scene, selection);
         for index in job.items {
-            let part = frame.part_of_segment(self.pass, index);
+            let range = frame.range_of_segment(self.pass, index);
             let mut segment = table.segments[index].write();
-            view::bin_visible(objects, visible, selection, filter, &part, &mut segment);
+            view::bin_visible(objects, visible, selection, filter, &range, &mut segment);
             if let Some(levels) = levels {
                 let bins = objects.bins();
                 let has_levels = |bin| frame.tables.mesh_levels.contains(bins.get(bin).mesh);

@@ -10,7 +10,7 @@ use crate::command::DrawList;
 pub enum RecordingStrategy {
     /// Straight into the pass, on the worker that finishes it.
     Direct,
-    /// Into bundles of [`DrawList::BATCHES_PER_BUNDLE`] batches, each on any worker; the pass replays them.
+    /// Into [bundles](DrawList::bundle), each on any worker; the pass replays them.
     Bundles,
     /// Into bundles that are cached: a bundle whose batches, meshes, pipelines and bindings equal those of an earlier frame is
     /// replayed instead of recorded. Objects may move in between, as long as the view draws the same ones.
