@@ -39,7 +39,7 @@ impl<'a> Block<'a> {
         Self { backend, progress, schedulers: Vec::new(), settings: Vec::new() }
     }
 
-    /// Adds a pipeline of this crate with a device of its own. Settings with equally many workers share a scheduler.
+    /// Adds a pipeline of this crate.
     ///
     /// # Errors
     /// Returns an error if the renderer cannot be built.
@@ -49,6 +49,20 @@ impl<'a> Block<'a> {
         workers: usize,
         pipeline: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
     ) -> Result<(), Box<dyn Error>> {
+        let contender = self.pipeline(workers, pipeline)?;
+        self.add_contender(scene, Box::new(contender));
+        Ok(())
+    }
+
+    /// A pipeline of this crate with a device of its own. Those with equally many workers share a scheduler.
+    ///
+    /// # Errors
+    /// Returns an error if the renderer cannot be built.
+    pub fn pipeline(
+        &mut self,
+        workers: usize,
+        pipeline: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
+    ) -> Result<DrawloomPipeline, Box<dyn Error>> {
         let known = self.schedulers.iter().find(|scheduler| scheduler.workers() == workers).cloned();
         let scheduler = match known {
             Some(known) => known,
@@ -56,8 +70,7 @@ impl<'a> Block<'a> {
         };
         self.schedulers.push(Arc::clone(&scheduler));
         let (renderer, submitter) = pipeline(Renderer::builder(self.backend.open()?)).build(scheduler)?;
-        self.add_contender(scene, Box::new(DrawloomPipeline::new(renderer, submitter)));
-        Ok(())
+        Ok(DrawloomPipeline::new(renderer, submitter))
     }
 
     /// Adds any pipeline.

@@ -20,10 +20,40 @@ pub struct Field {
     pub lights: usize,
     /// Spot lights that cast shadows, high above the field.
     pub shadow_maps: usize,
+    pub sight: Sight,
+}
+
+/// Where the camera is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sight {
+    /// High above the field. It sees all objects and lights, and little behind what a light reaches.
+    #[default]
+    Above,
+    /// Low over one edge, so that there is much behind what a light reaches. It does not see all lights.
+    Across,
+}
+
+impl Sight {
+    pub const ALL: [Self; 2] = [Self::Above, Self::Across];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Above => "from above",
+            Self::Across => "across",
+        }
+    }
+
+    fn camera(self) -> Camera {
+        let (position, at) = match self {
+            Self::Above => (DVec3::new(0.0, 36.0, 38.0), DVec3::ZERO),
+            Self::Across => (DVec3::new(0.0, 3.0, HALF), DVec3::Y),
+        };
+        Camera::looking_at("main", position, at)
+    }
 }
 
 impl Field {
-    /// The field, with a camera that sees all objects and lights. All objects have one mesh, so that one instanced draw suffices.
+    /// The field. All objects have one mesh, so that one instanced draw suffices.
     ///
     /// # Errors
     /// Returns an error if the scene rejects a mesh, a material or an object.
@@ -55,10 +85,7 @@ impl Field {
         }
         scene.lights = (0..self.lights).map(|index| small_light(index, &mut random)).collect();
         scene.lights.extend((0..self.shadow_maps).map(|index| high_light(index, self.shadow_maps)));
-        scene.cameras.push(Camera {
-            size: extent.picture,
-            ..Camera::looking_at("main", DVec3::new(0.0, 36.0, 38.0), DVec3::ZERO)
-        });
+        scene.cameras.push(Camera { size: extent.picture, ..self.sight.camera() });
         Ok(scene)
     }
 

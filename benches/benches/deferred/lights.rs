@@ -122,7 +122,8 @@ pub fn measure(
     if backend == BackendName::Adapter {
         for &lights in extent.lights {
             let of_these = settings.iter().zip(&drawn).filter(|(_, (_, field))| field.lights == lights);
-            check_pictures(lights, of_these.map(|(setting, ((pipeline, _), _))| (*pipeline, setting)))?;
+            let pictures = of_these.map(|(setting, ((pipeline, _), _))| (pipeline.name(), setting));
+            check_same(&format!("{lights} lights"), pictures)?;
         }
     }
     Ok(rows)
@@ -138,25 +139,24 @@ fn check_visible(setting: &Setting, field: Field, extent: &Extent) -> Result<(),
     Ok(())
 }
 
-/// All pipelines must draw the same picture, so that their work is comparable.
-fn check_pictures<'a>(
-    lights: usize,
-    settings: impl Iterator<Item = (Pipeline, &'a Setting)>,
+/// All of these must draw the same picture, so that their work is comparable.
+///
+/// # Errors
+/// Returns an error that names the first one whose picture differs from that of the first of all.
+pub fn check_same<'a>(
+    what: &str,
+    settings: impl Iterator<Item = (&'static str, &'a Setting)>,
 ) -> Result<(), Box<dyn Error>> {
-    let mut first: Option<Picture> = None;
-    for (pipeline, setting) in settings {
+    let mut first: Option<(&str, Picture)> = None;
+    for (name, setting) in settings {
         let picture = setting.picture()?;
-        let Some(first) = &first else {
-            first = Some(picture);
+        let Some((first_name, first)) = &first else {
+            first = Some((name, picture));
             continue;
         };
         let share = share_that_differs(first, &picture);
         if share > MAX_DIFFERENT {
-            let name = pipeline.name();
-            return Err(format!(
-                "{lights} lights: {share:.4} of the picture of {name:?} differs from the deferred one"
-            )
-            .into());
+            return Err(format!("{what}: {share:.4} of the picture of {name:?} differs from {first_name:?}").into());
         }
     }
     Ok(())

@@ -1,5 +1,5 @@
-//! The cost of the deferred pipeline: by the number of lights, beside three forward pipelines that draw the same picture; by the
-//! number of shadow maps; and with and without a depth pre-pass.
+//! The cost of the deferred pipeline: by the number of lights, beside three forward pipelines that draw the same picture; with light
+//! volumes and with scissor rectangles (L 4.2.1); by the number of shadow maps; and with and without a depth pre-pass.
 //!
 //!     cargo bench -p drawloom-benches --bench deferred
 //!     cargo bench -p drawloom-benches --bench deferred -- --quick
@@ -13,6 +13,9 @@
 //! - *draw per light* is written in plain wgpu, on one thread: it draws all objects, and then adds each light to the objects that it reaches.
 //! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its cluster.
 //!
+//! Scissor rectangles take the place of light volumes in the deferred pipeline: a raw pass draws a triangle that covers the picture for
+//! each light, within the rectangle of what the light reaches. With the depth test, the triangle is as far away as that.
+//!
 //! `target/drawloom/deferred.json` has the same. The last line names the targets that were missed.
 
 mod block;
@@ -24,7 +27,9 @@ mod loop_over_lights;
 mod plain_forward;
 mod pre_pass;
 mod report;
+mod scissors;
 mod shadows;
+mod volumes;
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -54,6 +59,8 @@ pub struct Extent {
     picture: [u32; 2],
     boxes: usize,
     lights: &'static [usize],
+    /// The numbers of lights of light volumes and scissors.
+    volumes: &'static [usize],
     shadow_maps: &'static [usize],
 }
 
@@ -64,6 +71,7 @@ impl Extent {
         picture: [640, 360],
         boxes: 1_000,
         lights: &[0, 1, 3, 10, 30, 100, 300, 1_000],
+        volumes: &[10, 100, 1_000],
         shadow_maps: &[0, 1, 2, 4, 8, 16],
     };
     const QUICK: Self = Self {
@@ -72,6 +80,7 @@ impl Extent {
         picture: [192, 108],
         boxes: 100,
         lights: &[0, 1, 30, 1_000],
+        volumes: &[30, 1_000],
         shadow_maps: &[0, 1, 16],
     };
 }
@@ -89,13 +98,15 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut report = Report::new(&extent, adapter_name());
     for backend in backends {
         report.lights.extend(lights::measure(&extent, backend, &workers, &progress)?);
+        report.volumes.extend(volumes::measure(&extent, backend, &progress)?);
         report.shadows.extend(shadows::measure(&extent, backend, &workers, &progress)?);
         report.depth_pre_pass.extend(pre_pass::measure(&extent, backend, &workers, &progress)?);
     }
     progress.finish_and_clear();
     report.print();
-    let targets = lights::targets(&report.lights);
-    targets.print("Targets and results, on one worker, beside the renderers written by hand");
+    let mut targets = lights::targets(&report.lights);
+    volumes::add_targets(&report.volumes, &mut targets);
+    targets.print("Targets and results, on one worker, beside what is written by hand");
     if !arguments.backend.is_quick() {
         report.write()?;
     }

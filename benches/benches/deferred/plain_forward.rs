@@ -5,8 +5,8 @@
 mod clusters;
 mod device;
 mod draw_per_light;
-mod picture;
-mod visible_scene;
+pub mod picture;
+pub mod visible_scene;
 
 use std::error::Error;
 use std::time::Instant;

@@ -7,7 +7,7 @@ use drawloom_benches::results;
 use drawloom_output::print_line;
 use serde::Serialize;
 
-use crate::{Extent, lights, pre_pass, shadows};
+use crate::{Extent, lights, pre_pass, shadows, volumes};
 
 /// The results.
 #[derive(Serialize)]
@@ -19,6 +19,7 @@ pub struct Report {
     boxes: usize,
     adapter: Option<String>,
     pub lights: Vec<lights::Row>,
+    pub volumes: Vec<volumes::Row>,
     pub shadows: Vec<shadows::Row>,
     pub depth_pre_pass: Vec<pre_pass::Row>,
 }
@@ -32,6 +33,7 @@ impl Report {
             boxes: extent.boxes,
             adapter,
             lights: Vec::new(),
+            volumes: Vec::new(),
             shadows: Vec::new(),
             depth_pre_pass: Vec::new(),
         }
@@ -48,6 +50,7 @@ impl Report {
             "CPU ms: from the scene's hand-over to the return of submit; device ms: from the call of submit until drawn\n"
         );
         lights::print(&self.lights);
+        volumes::print(&self.volumes);
         shadows::print(&self.shadows);
         pre_pass::print(&self.depth_pre_pass);
     }

@@ -146,7 +146,7 @@ impl Slices {
     /// Covers the distances that lights reach.
     fn new(near: f32, lights: impl Iterator<Item = SeenLight>) -> Self {
         let (nearest, farthest) = lights.fold((f32::INFINITY, near), |(nearest, farthest), light| {
-            (nearest.min(light.center[2] - light.range), farthest.max(light.center[2] + light.range))
+            (nearest.min(light.center[2] - light.radius), farthest.max(light.center[2] + light.radius))
         });
         let nearest = nearest.clamp(near, farthest);
         // Slightly more, so that the farthest point is in the last slice.
@@ -160,7 +160,7 @@ impl Slices {
     }
 }
 
-/// Calls `visit` for each cluster that a light's sphere may reach: for each slice and each row of tiles, the columns within
+/// Calls `visit` for each cluster that a light may reach: for each slice and each row of tiles, the columns within
 /// the sphere's extent there.
 fn visit_clusters(
     picture: &Picture,
@@ -169,14 +169,14 @@ fn visit_clusters(
     [columns, rows]: [u32; 2],
     mut visit: impl FnMut(u32),
 ) {
-    let SeenLight { center: [x, y, z], range } = picture.seen(light);
-    let (near, far) = ((z - range).max(picture.near), z + range);
+    let SeenLight { center: [x, y, z], radius } = picture.seen(light);
+    let (near, far) = ((z - radius).max(picture.near), z + radius);
     if far <= near {
         return;
     }
     for slice in slices.of(near) as usize..=slices.of(far) as usize {
         let distances = [slices.begins[slice].max(near), slices.begins[slice + 1].min(far)];
-        let extent_squared = range * range - squared_distance(z, distances);
+        let extent_squared = radius * radius - squared_distance(z, distances);
         if extent_squared <= 0.0 {
             continue;
         }

@@ -59,17 +59,19 @@ impl VisibleScene {
             }
         }
         self.spheres.fill_up();
-        let reaches = |light: &&Light| match **light {
-            Light::Point { position, range, .. }
-            | Light::Spot { position, range, .. }
-            | Light::Hemispherical { position, range, .. } => view.frustum.intersects_sphere(position, range),
-            _ => true,
-        };
         self.lights.clear();
-        self.lights.extend(scene.lights.iter().filter(reaches).map(|light| GpuLight::new(light, eye, None)));
+        self.lights.extend(lights_in(scene, &view));
         self.view = Some(GpuView::new(&view, scene.ambient, self.lights.len()).ok_or(FAR)?);
         Ok(())
     }
+}
+
+/// The lights that reach a view, in the order of the scene.
+pub fn lights_in(scene: &SceneRef<'_>, view: &RenderView) -> impl Iterator<Item = GpuLight> {
+    let reaches = |light: &&Light| {
+        light.bounding_sphere().is_none_or(|(center, radius)| view.frustum.intersects_sphere(center, radius))
+    };
+    scene.lights.iter().filter(reaches).map(|light| GpuLight::new(light, view.camera.position, None))
 }
 
 impl Spheres {
