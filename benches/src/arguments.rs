@@ -103,7 +103,7 @@ impl WorkersArguments {
 }
 
 /// The number of cores that this process may use, or of workers that a scheduler may have, if that is less.
-fn cores() -> usize {
+pub(crate) fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(Scheduler::MAX_WORKERS)
 }
 

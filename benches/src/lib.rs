@@ -11,6 +11,7 @@ pub mod backends;
 pub mod chart;
 pub mod city;
 pub mod clouds;
+pub mod cpu_time;
 pub mod harness;
 pub mod mirror;
 pub mod moving;

@@ -11,8 +11,11 @@ use drawloom_benches::statistics::median;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use crate::runner::{Runner, Sample};
+use crate::runner::{Division, Runner, Sample};
 use crate::{Extent, world};
+
+/// Each is a view, beside the camera's.
+const LIGHTS: usize = 1;
 
 /// A row of the table.
 #[derive(Serialize)]
@@ -40,13 +43,13 @@ pub fn measure(
         let scheduler = Arc::new(Scheduler::new(workers)?);
         for &objects in extent.growth {
             sizes.push((objects, workers));
-            runners.push((world::new(objects)?, Runner::new(backend.open()?, &scheduler, false)?));
+            runners.push((world::new(objects, LIGHTS)?, Runner::new(backend.open()?, &scheduler, Division::OWN)?));
         }
     }
     let samples = Harness::new(rounds, progress)
         .measure(&mut runners, |(world, runner), _round| runner.sample(world, Duration::ZERO))?;
     let row = |((objects, workers), samples): ((usize, usize), Vec<Sample>)| {
-        let object_views = (objects * world::VIEWS) as f64;
+        let object_views = (objects * (1 + LIGHTS)) as f64;
         let frame = median(samples.iter().map(|sample| sample.frame));
         Row { objects, backend, workers, ns_per_object_view: frame * 1e9 / object_views }
     };

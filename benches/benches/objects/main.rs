@@ -20,10 +20,16 @@
 //!
 //! The second table says where the time of a frame goes. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
 //! *Load* is how busy the calling thread is, and the mean of the other workers. *API* is the share of the work in calls of wgpu. Loads and
-//! shares are those of a frame after each sample that the timeline records.
+//! shares are those of a frame after each sample that the timeline records. *CPU use* is the share of all cores' time that the process
+//! uses until frames are drawn: where it is small, the device is what limits frames, and threads win nothing (L 6).
 //!
-//! The third table has an engine's update, which takes 0.1 µs an object in all and runs on all workers: before recording, or beside
-//! submission, when the world is no longer borrowed.
+//! The third table has an engine's update, which takes 0.1 µs an object in all and runs on all workers: before recording; beside
+//! submission, when the world is no longer borrowed; or in a `FrameLoop`, where another thread submits, and two frames are in flight.
+//! These times have the device's in them.
+//!
+//! The fourth table has the splits of L 5. *By process* is a job for the geometry buffer and for each shadow map, each of which is
+//! recorded straight into its pass; *by material* also splits the geometry buffer, into as many processes as there are workers; *by draws*
+//! is this crate's division, into bundles that are not kept.
 //!
 //! Growth is the cost of an object in scenes of many objects, without instancing.
 //!
@@ -35,6 +41,7 @@ mod growth;
 mod report;
 mod runner;
 mod scenario;
+mod splits;
 mod update;
 mod world;
 
@@ -66,6 +73,8 @@ pub struct Extent {
     /// Least duration of a sample.
     sample: [Duration; 2],
     objects: &'static [usize],
+    /// The objects of the table of splits.
+    splits: &'static [usize],
     /// The same for the table of growth.
     growth_warm_up: [usize; 2],
     growth_rounds: [usize; 2],
@@ -79,6 +88,7 @@ impl Extent {
         rounds: [41, 15],
         sample: [Duration::from_millis(4), Duration::ZERO],
         objects: &[7, 16, 106, 1_006, 2_006, 10_000, 100_000],
+        splits: &[1_006, 2_006, 10_000],
         growth_warm_up: [40, 5],
         growth_rounds: [15, 5],
         growth: &[10_000, 100_000, 1_000_000],
@@ -89,6 +99,7 @@ impl Extent {
         rounds: [3, 1],
         sample: [Duration::ZERO; 2],
         objects: &[7, 106, 1_006],
+        splits: &[1_006],
         growth_warm_up: [1, 1],
         growth_rounds: [3, 1],
         growth: &[1_000, 10_000],
@@ -109,6 +120,9 @@ fn run() -> Result<(), Box<dyn Error>> {
         for &objects in extent.objects {
             report.scenarios.extend(scenario::measure(&extent, backend, objects, &workers, &progress)?);
             report.updates.extend(update::measure(&extent, backend, objects, &workers, &progress)?);
+        }
+        for &objects in extent.splits {
+            report.splits.extend(splits::measure(&extent, backend, objects, &workers, &progress)?);
         }
         report.growth.extend(growth::measure(&extent, backend, &workers, &progress)?);
     }

@@ -9,7 +9,7 @@ use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use serde::Serialize;
 
-use crate::{Extent, charts, growth, scenario, update};
+use crate::{Extent, charts, growth, scenario, splits, update};
 
 /// The results.
 pub struct Report {
@@ -18,6 +18,7 @@ pub struct Report {
     growth_rounds: [usize; 2],
     pub scenarios: Vec<scenario::Row>,
     pub updates: Vec<update::Row>,
+    pub splits: Vec<splits::Row>,
     pub growth: Vec<growth::Row>,
 }
 
@@ -27,13 +28,15 @@ pub struct Report {
 enum Row<'a> {
     Scenario(&'a scenario::Row),
     Update(&'a update::Row),
+    Split(&'a splits::Row),
     Growth(&'a growth::Row),
 }
 
 impl Report {
     pub fn new(extent: &Extent) -> Self {
         let Extent { name, rounds, growth_rounds, .. } = *extent;
-        Self { extent: name, rounds, growth_rounds, scenarios: Vec::new(), updates: Vec::new(), growth: Vec::new() }
+        let (scenarios, updates, splits, growth) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { extent: name, rounds, growth_rounds, scenarios, updates, splits, growth }
     }
 
     pub fn print(&self) {
@@ -46,11 +49,34 @@ impl Report {
         );
         self.print_rates();
         print_line!(
-            "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; API: the share of the work in calls of wgpu\n"
+            "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; CPU use: the share of all cores' time until frames are drawn; API: the share of the work in calls of wgpu\n"
         );
         self.print_shares();
-        print_line!("An engine's update on all workers, frames per second: before record, and beside submit\n");
-        let mut table = Table::new(&["objects", "backend", "workers", "before", "beside", "ratio"]);
+        self.print_updates();
+        self.print_splits();
+        print_line!("Growth: no instancing; medians of {many_noop} and {many_adapter} rounds\n");
+        let mut table = Table::new(&["objects", "backend", "workers", "ns per object and view"]);
+        for row in &self.growth {
+            let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
+            table.row([objects, backend, row.workers.to_string(), format!("{:.1}", row.ns_per_object_view)]);
+        }
+        table.print();
+    }
+
+    fn print_updates(&self) {
+        print_line!(
+            "An engine's update on all workers, frames per second with the device's time; ratios: to before record\n"
+        );
+        let mut table = Table::new(&[
+            "objects",
+            "backend",
+            "workers",
+            "before record",
+            "beside submit",
+            "in a loop",
+            "ratio, beside",
+            "in a loop",
+        ]);
         for row in &self.updates {
             table.row([
                 row.objects.to_string(),
@@ -58,15 +84,41 @@ impl Report {
                 row.workers.to_string(),
                 format!("{:.1}", row.update_before_fps),
                 format!("{:.1}", row.update_beside_fps),
-                format!("{:.2}", row.ratio),
+                format!("{:.1}", row.update_in_loop_fps),
+                format!("{:.2}", row.beside_ratio),
+                format!("{:.2}", row.in_loop_ratio),
             ]);
         }
         table.print();
-        print_line!("Growth: no instancing; medians of {many_noop} and {many_adapter} rounds\n");
-        let mut table = Table::new(&["objects", "backend", "workers", "ns per object and view"]);
-        for row in &self.growth {
-            let (objects, backend) = (row.objects.to_string(), row.backend.name().to_owned());
-            table.row([objects, backend, row.workers.to_string(), format!("{:.1}", row.ns_per_object_view)]);
+    }
+
+    fn print_splits(&self) {
+        print_line!(
+            "Splits: ratios of fps, to single; until drawn: by material to by process, with the device's time\n"
+        );
+        let mut table = Table::new(&[
+            "objects",
+            "shadow maps",
+            "backend",
+            "workers",
+            "single fps",
+            "by process",
+            "by material",
+            "by draws",
+            "until drawn",
+        ]);
+        for row in &self.splits {
+            table.row([
+                row.objects.to_string(),
+                row.shadow_maps.to_string(),
+                row.backend.name().to_owned(),
+                row.workers.to_string(),
+                format!("{:.1}", row.single_fps),
+                format!("{:.2}", row.by_process_ratio),
+                format!("{:.2}", row.by_material_ratio),
+                format!("{:.2}", row.by_draws_ratio),
+                optional(row.by_material_drawn_ratio, 2),
+            ]);
         }
         table.print();
     }
@@ -86,9 +138,6 @@ impl Report {
             "direct",
             "ceiling",
         ]);
-        let optional = |figure: Option<f64>, decimals: usize| {
-            figure.map_or(String::new(), |figure| format!("{figure:.decimals$}"))
-        };
         for row in &self.scenarios {
             let [objects, backend, workers, instancing] = configuration(row);
             table.row([
@@ -121,6 +170,8 @@ impl Report {
             "multi held %",
             "load of the caller %",
             "of the others %",
+            "single CPU use %",
+            "multi CPU use %",
             "single API %",
             "multi API %",
         ]);
@@ -141,6 +192,8 @@ impl Report {
                 percent(row.multi_held_share),
                 percent(caller),
                 if others.is_empty() { String::new() } else { percent(mean) },
+                optional(row.single_cpu_use.map(|share| share * 100.0), 0),
+                optional(row.multi_cpu_use.map(|share| share * 100.0), 0),
                 percent(row.single_api_share),
                 percent(row.multi_api_share),
             ]);
@@ -166,6 +219,12 @@ impl Report {
                 targets.at_least(figure, 0.9, row.ratio / row.ceiling);
             }
         }
+        let has_target = |row: &&splits::Row| row.backend == BackendName::Noop && row.workers == 2;
+        for row in self.splits.iter().filter(has_target) {
+            let figure =
+                format!("{} objects, {} shadow maps, by draws ÷ best split of L 5", row.objects, row.shadow_maps);
+            targets.at_least(figure, 1.0, row.by_draws_ratio / row.by_process_ratio.max(row.by_material_ratio));
+        }
         let has_target = |row: &&growth::Row| row.backend == BackendName::Noop && row.workers == 2;
         let growth: Vec<_> = self.growth.iter().filter(has_target).collect();
         if let [first, .., last] = growth[..] {
@@ -180,7 +239,8 @@ impl Report {
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         let scenarios = self.scenarios.iter().map(Row::Scenario);
         let updates = self.updates.iter().map(Row::Update);
-        let rows: Vec<_> = scenarios.chain(updates).chain(self.growth.iter().map(Row::Growth)).collect();
+        let splits = self.splits.iter().map(Row::Split);
+        let rows: Vec<_> = scenarios.chain(updates).chain(splits).chain(self.growth.iter().map(Row::Growth)).collect();
         results::write_json("objects.json", &rows)?;
         charts::draw(&results::file("objects.svg")?, &self.scenarios)
     }
@@ -190,4 +250,9 @@ impl Report {
 fn configuration(row: &scenario::Row) -> [String; 4] {
     let instancing = if row.instancing { "on" } else { "off" };
     [row.objects.to_string(), row.backend.name().to_owned(), row.workers.to_string(), instancing.to_owned()]
+}
+
+/// A cell, which is empty without a figure.
+fn optional(figure: Option<f64>, decimals: usize) -> String {
+    figure.map_or(String::new(), |figure| format!("{figure:.decimals$}"))
 }

@@ -1,6 +1,7 @@
 //! A renderer, and the times of its frames.
 
 use std::error::Error;
+use std::iter::repeat_n;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,16 +10,31 @@ use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::timeline::Run;
 use drawloom::view::ShadowMaps;
-use drawloom::{Renderer, RendererBuilder, Submitter};
+use drawloom::{Granularity, Renderer, RendererBuilder, Submitter};
+use drawloom_benches::cpu_time::CpuUse;
 use drawloom_benches::moving::Moving;
 use drawloom_benches::stopwatch::{mean_frame, timed_frame};
 
-use crate::world::{PICTURE, VIEWS};
+use crate::world::PICTURE;
 
 /// A renderer with timed frames.
 pub struct Runner {
     pub renderer: Renderer<WgpuBackend>,
     pub submitter: Submitter<WgpuBackend>,
+}
+
+/// How a renderer divides its work.
+#[derive(Clone, Copy, Debug)]
+pub struct Division {
+    pub instancing: bool,
+    pub granularity: Granularity,
+    /// See [`Deferred::geometry_shares`].
+    pub geometry_shares: usize,
+}
+
+impl Division {
+    /// The crate's own, without instancing.
+    pub const OWN: Self = Self { instancing: false, granularity: Granularity::Adaptive, geometry_shares: 1 };
 }
 
 /// Mean times of several frames, in seconds.
@@ -29,6 +45,8 @@ pub struct Sample {
     pub borrowed: f64,
     /// From the hand-over of the scene until the device has drawn it.
     pub until_drawn: f64,
+    /// The share of all cores' time that this process used, its driver included; NaN where that cannot be measured.
+    pub cpu_use: f64,
 }
 
 /// What the timeline tells about a frame.
@@ -48,11 +66,14 @@ const API_STAGES: [&str; 4] = ["upload", "prepare", "record", "finish"];
 impl Runner {
     /// # Errors
     /// Returns an error if the renderer cannot be built.
-    pub fn new(backend: WgpuBackend, scheduler: &Arc<Scheduler>, instancing: bool) -> Result<Self, Box<dyn Error>> {
+    pub fn new(backend: WgpuBackend, scheduler: &Arc<Scheduler>, division: Division) -> Result<Self, Box<dyn Error>> {
+        let Division { instancing, granularity, geometry_shares } = division;
         let shadow_maps = Some(ShadowMaps { side: PICTURE, ..ShadowMaps::default() });
-        let builder: RendererBuilder<_> =
-            Renderer::builder(backend).deferred(Deferred::to_picture().shadow_maps(shadow_maps));
-        let (renderer, submitter) = builder.instancing(instancing).build(Arc::clone(scheduler))?;
+        let shares = u32::try_from(geometry_shares)?;
+        let deferred = Deferred::to_picture().shadow_maps(shadow_maps).geometry_shares(shares);
+        let builder: RendererBuilder<_> = Renderer::builder(backend).deferred(deferred);
+        let (renderer, submitter) =
+            builder.instancing(instancing).granularity(granularity).build(Arc::clone(scheduler))?;
         Ok(Self { renderer, submitter })
     }
 
@@ -62,13 +83,15 @@ impl Runner {
     /// Returns an error if a frame cannot be drawn, or if a view does not see all objects.
     pub fn sample(&mut self, world: &mut Moving, at_least: Duration) -> Result<Sample, Box<dyn Error>> {
         let (mut borrowed, mut until_drawn, mut frames) = (Duration::ZERO, Duration::ZERO, 0);
+        let cpu_use = CpuUse::begin();
         let frame = mean_frame(at_least, || {
             world.step();
             let scene = world.as_scene_ref();
             let Self { renderer, submitter } = self;
             let (submitted, time) = timed_frame(renderer, submitter, scene, WgpuSubmission::wait)?;
             let visible = submitted.statistics.views.iter().map(|view| view.visible);
-            if !visible.clone().eq([scene.object_count(); VIEWS]) {
+            // The camera's view, and one a light.
+            if !visible.clone().eq(repeat_n(scene.object_count(), 1 + scene.lights.len())) {
                 let visible: Vec<_> = visible.collect();
                 return Err(format!("of {} objects, views see {visible:?}", scene.object_count()).into());
             }
@@ -78,7 +101,7 @@ impl Runner {
             Ok::<_, Box<dyn Error>>(time.cpu)
         })?;
         let mean = |time: Duration| time.as_secs_f64() / f64::from(frames);
-        Ok(Sample { frame, borrowed: mean(borrowed), until_drawn: mean(until_drawn) })
+        Ok(Sample { frame, borrowed: mean(borrowed), until_drawn: mean(until_drawn), cpu_use: cpu_use.share() })
     }
 
     /// Draws a frame, and tells where its time goes.
@@ -110,6 +133,13 @@ impl Runner {
                     api += chunk.duration();
                 }
             }
+        }
+        let has = |stage: &str| {
+            let mut nodes = log.runs.iter().flat_map(|run| &run.graph.nodes);
+            nodes.any(|node| node.labels.stage.as_deref() == Some(stage))
+        };
+        if let Some(stage) = API_STAGES.into_iter().find(|stage| !has(stage)) {
+            return Err(format!("no job of the frame is of the stage {stage:?}").into());
         }
         let share = |part: Duration, of: Duration| part.as_secs_f64() / of.as_secs_f64();
         Ok(Profile {

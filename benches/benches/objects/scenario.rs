@@ -13,7 +13,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::ceiling::ceiling;
-use crate::runner::{Profile, Runner, Sample};
+use crate::runner::{Division, Profile, Runner, Sample};
 use crate::{Extent, world};
 
 /// A row of L's table.
@@ -43,6 +43,10 @@ pub struct Row {
     pub multi_held_share: f64,
     /// How busy each worker of *multi* is, as a share of the frame. The first is the calling thread.
     pub multi_loads: Vec<f64>,
+    /// The share of all cores' time that the process used until frames were drawn, its driver included; `None` where that cannot be
+    /// measured.
+    pub single_cpu_use: Option<f64>,
+    pub multi_cpu_use: Option<f64>,
     /// The share of the work that is calls of wgpu.
     pub single_api_share: f64,
     pub multi_api_share: f64,
@@ -83,7 +87,7 @@ pub fn measure(
             Some(strategy) => opened.recording_strategy(strategy)?,
             None => opened,
         };
-        let runner = Runner::new(opened, scheduler, instancing)?;
+        let runner = Runner::new(opened, scheduler, Division { instancing, ..Division::OWN })?;
         scenarios.push(Scenario { runner, samples: Vec::new(), profiles: Vec::new() });
         Ok::<_, Box<dyn Error>>(scenarios.len() - 1)
     };
@@ -97,7 +101,7 @@ pub fn measure(
         let multi = [add(None, &scheduler, false)?, add(None, &scheduler, true)?];
         parallel.push(Parallel { scheduler, direct, multi });
     }
-    let mut world = world::new(objects)?;
+    let mut world = world::new(objects, 1)?;
     let mut harness = Harness::new(rounds, progress);
     for round in harness.rounds(scenarios.len()) {
         let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
@@ -118,6 +122,8 @@ pub fn measure(
         let drawn_fps = |scenario: &Scenario| {
             (backend == BackendName::Adapter).then(|| scenario.median(|sample| sample.until_drawn).recip())
         };
+        let cpu_use =
+            |scenario: &Scenario| Some(scenario.median(|sample| sample.cpu_use)).filter(|used| !used.is_nan());
         let held_share = |scenario: &Scenario| scenario.median(|sample| sample.borrowed / sample.frame);
         Row {
             objects,
@@ -142,6 +148,8 @@ pub fn measure(
             single_held_share: held_share(single),
             multi_held_share: held_share(multi),
             multi_loads: (0..workers).map(|worker| multi.median_of_profiles(|profile| profile.loads[worker])).collect(),
+            single_cpu_use: cpu_use(single),
+            multi_cpu_use: cpu_use(multi),
             single_api_share: single.median_of_profiles(|profile| profile.api_share),
             multi_api_share: multi.median_of_profiles(|profile| profile.api_share),
         }

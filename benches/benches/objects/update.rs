@@ -1,12 +1,13 @@
 //! An engine's update beside submission (L 3): the world is given back when recording ends, so all workers may update it for the next
-//! frame, while the calling thread submits this one.
+//! frame, while the calling thread or that of a `FrameLoop` submits this one.
 
 use std::error::Error;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use drawloom::backend::WgpuSubmission;
+use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::task::{Scheduler, Scope};
+use drawloom::{Buffering, FinishedFrame, FrameLoop};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::moving::Moving;
@@ -16,7 +17,7 @@ use drawloom_benches::work::Work;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use crate::runner::Runner;
+use crate::runner::{Division, Runner};
 use crate::{Extent, world};
 
 /// What the update of an object takes, and the objects of a job.
@@ -29,11 +30,15 @@ pub struct Row {
     pub objects: usize,
     pub backend: BackendName,
     pub workers: usize,
-    /// Frames per second, without the device's time, of update, record and submit one after another.
+    /// Frames per second, with the device's time, of update, record and submit one after another.
     pub update_before_fps: f64,
     /// The same with the update while the frame is submitted.
     pub update_beside_fps: f64,
-    pub ratio: f64,
+    /// The same with two frames in flight, which a thread of their own submits.
+    pub update_in_loop_fps: f64,
+    /// Of the two to the first.
+    pub beside_ratio: f64,
+    pub in_loop_ratio: f64,
 }
 
 /// When the engine updates its world.
@@ -44,12 +49,25 @@ enum Update {
 }
 
 struct Contender {
-    runner: Runner,
     world: Moving,
-    update: Update,
+    frames: Frames,
 }
 
-/// Measures both orders with all numbers of workers, interleaved.
+enum Frames {
+    /// One at a time.
+    Plain {
+        runner: Box<Runner>,
+        update: Update,
+    },
+    InFlight(FrameLoop<WgpuBackend>),
+}
+
+/// Frames in flight of [`Buffering::Double`].
+const IN_FLIGHT: usize = 2;
+/// A sample of frames in flight has at least as many.
+const LEAST: usize = 8;
+
+/// Measures the three orders with all numbers of workers, interleaved.
 ///
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
@@ -66,45 +84,104 @@ pub fn measure(
     let mut contenders = Vec::new();
     for &workers in workers {
         let scheduler = Arc::new(Scheduler::new(workers)?);
+        let runner = || Runner::new(backend.open()?, &scheduler, Division::OWN);
         for update in [Update::BeforeRecord, Update::BesideSubmit] {
-            let runner = Runner::new(backend.open()?, &scheduler, false)?;
-            contenders.push(Contender { runner, world: world::new(objects)?, update });
+            let frames = Frames::Plain { runner: Box::new(runner()?), update };
+            contenders.push(Contender { world: world::new(objects, 1)?, frames });
         }
+        let Runner { renderer, submitter } = runner()?;
+        let frames = Frames::InFlight(FrameLoop::new(renderer, submitter, Buffering::Double)?);
+        contenders.push(Contender { world: world::new(objects, 1)?, frames });
     }
     let times = Harness::new(rounds, progress).measure(&mut contenders, |contender, round| {
         let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
-        mean_frame(at_least, || contender.frame(&work))
+        contender.sample(at_least, &work)
     })?;
     let fps = |times: &[f64]| median(times.iter().copied()).recip();
     let row = |(&workers, times): (&usize, &[Vec<f64>])| {
-        let [update_before_fps, update_beside_fps] = [fps(&times[0]), fps(&times[1])];
-        let ratio = update_beside_fps / update_before_fps;
-        Row { objects, backend, workers, update_before_fps, update_beside_fps, ratio }
+        let [update_before_fps, update_beside_fps, update_in_loop_fps] = [0, 1, 2].map(|order| fps(&times[order]));
+        Row {
+            objects,
+            backend,
+            workers,
+            update_before_fps,
+            update_beside_fps,
+            update_in_loop_fps,
+            beside_ratio: update_beside_fps / update_before_fps,
+            in_loop_ratio: update_in_loop_fps / update_before_fps,
+        }
     };
-    Ok(workers.iter().zip(times.chunks(2)).map(row).collect())
+    Ok(workers.iter().zip(times.chunks(3)).map(row).collect())
 }
 
 impl Contender {
-    /// Draws a frame, and waits until the device is idle again. Returns the time without that.
-    fn frame(&mut self, work: &Work) -> Result<Duration, Box<dyn Error>> {
-        let Self { runner: Runner { renderer, submitter }, world, update } = self;
-        let scheduler = Arc::clone(renderer.scheduler());
-        let start = Instant::now();
-        if *update == Update::BeforeRecord {
-            scheduler.scope(|scope| spawn_update(scope, world, work))?;
+    /// The mean time of frames, in seconds, of one or more until they have taken `at_least`.
+    fn sample(&mut self, at_least: Duration, work: &Work) -> Result<f64, Box<dyn Error>> {
+        let Self { world, frames } = self;
+        match frames {
+            Frames::Plain { runner, update } => {
+                let scheduler = Arc::clone(runner.renderer.scheduler());
+                mean_frame(at_least, || frame(runner, &scheduler, world, *update, work))
+            }
+            Frames::InFlight(frames) => in_flight(frames, world, at_least, work),
         }
-        let recorded = renderer.record(world.as_scene_ref())?;
-        let submitted = match update {
-            Update::BeforeRecord => submitter.submit(recorded)?,
-            Update::BesideSubmit => scheduler.scope(|scope| {
-                spawn_update(scope, world, work);
-                submitter.submit(recorded)
-            })??,
-        };
-        let elapsed = start.elapsed();
-        WgpuSubmission::wait(&submitted.submission)?;
-        Ok(elapsed)
     }
+}
+
+/// Draws a frame, and waits until the device is idle again.
+fn frame(
+    Runner { renderer, submitter }: &mut Runner,
+    scheduler: &Scheduler,
+    world: &mut Moving,
+    update: Update,
+    work: &Work,
+) -> Result<Duration, Box<dyn Error>> {
+    let start = Instant::now();
+    if update == Update::BeforeRecord {
+        scheduler.scope(|scope| spawn_update(scope, world, work))?;
+    }
+    let recorded = renderer.record(world.as_scene_ref())?;
+    let submitted = match update {
+        Update::BeforeRecord => submitter.submit(recorded)?,
+        Update::BesideSubmit => scheduler.scope(|scope| {
+            spawn_update(scope, world, work);
+            submitter.submit(recorded)
+        })??,
+    };
+    WgpuSubmission::wait(&submitted.submission)?;
+    Ok(start.elapsed())
+}
+
+/// Draws frames, of which two are in flight, and waits for the last. The first two are not counted.
+fn in_flight(
+    frames: &mut FrameLoop<WgpuBackend>,
+    world: &mut Moving,
+    at_least: Duration,
+    work: &Work,
+) -> Result<f64, Box<dyn Error>> {
+    let scheduler = Arc::clone(frames.renderer().scheduler());
+    let (mut begun, mut start) = (0, Instant::now());
+    let elapsed = loop {
+        let (slot, finished) = frames.begin();
+        check(finished)?;
+        if begun == IN_FLIGHT {
+            start = Instant::now();
+        }
+        if begun >= IN_FLIGHT + LEAST && start.elapsed() >= at_least {
+            break start.elapsed();
+        }
+        scheduler.scope(|scope| spawn_update(scope, world, work))?;
+        slot.submit(frames.renderer().record(world.as_scene_ref())?);
+        begun += 1;
+    };
+    // Whoever holds all slots has waited for all frames.
+    let slots = [(); IN_FLIGHT].map(|()| frames.begin());
+    slots.into_iter().try_for_each(|(_, finished)| check(finished))?;
+    Ok(elapsed.as_secs_f64() / (begun - IN_FLIGHT) as f64)
+}
+
+fn check(finished: Vec<FinishedFrame<WgpuBackend>>) -> Result<(), Box<dyn Error>> {
+    finished.into_iter().try_for_each(|frame| frame.outcome.map(drop)).map_err(Into::into)
 }
 
 /// Spawns the jobs of an update: one moves the objects, the others have the remaining work of [`CHUNK`] objects each.

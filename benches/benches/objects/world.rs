@@ -7,8 +7,6 @@ use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneE
 use drawloom_benches::moving::{Motion, Moving};
 use drawloom_testing::random::Random;
 
-/// The main camera's view, and the light's.
-pub const VIEWS: usize = 2;
 /// Width and height of the picture and the shadow map. They are small, as the CPU part is measured and a software device would share
 /// the cores.
 pub const PICTURE: u32 = 64;
@@ -17,10 +15,13 @@ pub const PICTURE: u32 = 64;
 const ORIGINALS: usize = 7;
 /// In metres. From there a box needs no subdivision in the light's map: its edges subtend at most 5°.
 const LIGHT_HEIGHT: f64 = 20.0;
+const LIGHT_DISTANCE: f64 = 1.0;
 
+/// The scene with this many lights, each of which casts shadows.
+///
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.
-pub fn new(objects: usize) -> Result<Moving, SceneError> {
+pub fn new(objects: usize, lights: usize) -> Result<Moving, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();
     let mut originals = Vec::new();
@@ -37,12 +38,12 @@ pub fn new(objects: usize) -> Result<Moving, SceneError> {
     scene
         .cameras
         .push(Camera { size: [PICTURE; 2], ..Camera::looking_at("main", DVec3::new(0.0, 6.0, 10.0), DVec3::ZERO) });
-    scene.lights.push(Light::Hemispherical {
-        position: DVec3::Y * LIGHT_HEIGHT,
+    scene.lights.extend((0..lights).map(|index| Light::Hemispherical {
+        position: DVec3::new(index as f64 * LIGHT_DISTANCE, LIGHT_HEIGHT, 0.0),
         direction: Vec3::NEG_Y,
-        intensity: Vec3::splat(300.0),
+        intensity: Vec3::splat(300.0 / lights as f32),
         range: 40.0,
         casts_shadow: true,
-    });
+    }));
     Ok(Moving::new(scene, Motion::Everything))
 }

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
+use drawloom_benches::cpu_time::cpu_time;
 use drawloom_benches::work::Record;
 
 use crate::Failure;
@@ -82,16 +83,16 @@ impl<'a> Timer<'a> {
             }
             Pace::CpuTime { interval, frames } => {
                 paced(interval, PACED_WARM_UP, &mut frame)?;
-                let before = cpu_time();
+                let before = cpu_time().unwrap_or_default();
                 paced(interval, frames, &mut frame)?;
-                self.samples.push((cpu_time() - before).as_secs_f64() / frames as f64);
+                self.samples.push((cpu_time().unwrap_or_default() - before).as_secs_f64() / frames as f64);
             }
             Pace::Asleep { idle } => {
                 thread::sleep(START_UP);
                 frame()?;
-                let before = cpu_time();
+                let before = cpu_time().unwrap_or_default();
                 thread::sleep(idle);
-                self.samples.push((cpu_time() - before).as_secs_f64() / idle.as_secs_f64());
+                self.samples.push((cpu_time().unwrap_or_default() - before).as_secs_f64() / idle.as_secs_f64());
             }
             Pace::Wakes { .. } => return Err("a row of single jobs has no frames".into()),
             Pace::Check { record, check } => {
@@ -196,17 +197,4 @@ impl WakeLatency {
         }
         Ok(*began - *submitted)
     }
-}
-
-/// CPU time of all threads of this process.
-#[cfg(target_os = "linux")]
-fn cpu_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
-}
-
-/// No row uses it on this platform.
-#[cfg(not(target_os = "linux"))]
-fn cpu_time() -> Duration {
-    Duration::ZERO
 }
