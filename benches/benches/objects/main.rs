@@ -15,13 +15,13 @@
 //!
 //! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
 //! the device's time. Frames per second are those of the median round, and a ratio is that of two medians.
-//! `ceiling.rs` explains the ceiling. On the adapter there are also frames per second *until drawn*: each waits until the device has
-//! drawn the one before.
+//! `ceiling.rs` explains the ceiling. On the adapter there are also frames per second that are *drawn*: with two in flight, so that the
+//! longer of the CPU's part and the device's says how many there are, as in L 6.
 //!
 //! The second table says where the time of a frame goes. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
 //! *Load* is how busy the calling thread is, and the mean of the other workers. *API* is the share of the work in calls of wgpu. Loads and
 //! shares are those of a frame after each sample that the timeline records. *CPU use* is the share of all cores' time that the process
-//! uses until frames are drawn: where it is small, the device is what limits frames, and threads win nothing (L 6).
+//! uses with two frames in flight: where it is small, the device says how many frames there are, and threads win nothing (L 6).
 //!
 //! The third table has an engine's update, which takes 0.1 µs an object in all and runs on all workers: before recording; beside
 //! submission, when the world is no longer borrowed; or in a `FrameLoop`, where another thread submits, and two frames are in flight.

@@ -45,11 +45,11 @@ impl Report {
         print_line!("{} run{note}: medians of {noop} rounds on noop and {adapter} on the adapter", self.extent);
         print_line!("adapter: {}", adapter_name().as_deref().unwrap_or("none"));
         print_line!(
-            "fps: frames of record + submit per second; until drawn: with the device's time; ratios: of fps, to single\n"
+            "fps: frames of record + submit per second; drawn: with the device's time, two in flight; ratios: of fps, to single\n"
         );
         self.print_rates();
         print_line!(
-            "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; CPU use: the share of all cores' time until frames are drawn; API: the share of the work in calls of wgpu\n"
+            "Held: the time, and the share of the frame, in which the world is borrowed; load: of the calling thread, and the mean of the other workers; CPU use: the share of all cores' time with two frames in flight; API: the share of the work in calls of wgpu\n"
         );
         self.print_shares();
         self.print_updates();
@@ -131,12 +131,13 @@ impl Report {
             "instancing",
             "single fps",
             "multi fps",
-            "single, until drawn",
-            "multi, until drawn",
             "ratio",
             "one worker, cached",
             "direct",
             "ceiling",
+            "single, drawn",
+            "multi, drawn",
+            "ratio, drawn",
         ]);
         for row in &self.scenarios {
             let [objects, backend, workers, instancing] = configuration(row);
@@ -147,12 +148,13 @@ impl Report {
                 instancing,
                 format!("{:.1}", row.single_fps),
                 format!("{:.1}", row.multi_fps),
-                optional(row.single_drawn_fps, 1),
-                optional(row.multi_drawn_fps, 1),
                 format!("{:.2}", row.ratio),
                 optional(row.cached_ratio, 2),
                 optional(row.direct_ratio, 2),
                 format!("{:.2}", row.ceiling),
+                optional(row.single_drawn_fps, 1),
+                optional(row.multi_drawn_fps, 1),
+                optional(row.drawn_ratio, 2),
             ]);
         }
         table.print();

@@ -2,8 +2,9 @@
 
 use std::error::Error;
 use std::iter::repeat_n;
+use std::mem;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
@@ -45,9 +46,20 @@ pub struct Sample {
     pub borrowed: f64,
     /// From the hand-over of the scene until the device has drawn it.
     pub until_drawn: f64,
+}
+
+/// Frames of which two are in flight, as drivers keep them by themselves (L 6): what takes longest, the CPU's part or the device's,
+/// says how many there are.
+#[derive(Clone, Copy, Debug)]
+pub struct InFlight {
+    /// Mean time of a frame, in seconds.
+    pub frame: f64,
     /// The share of all cores' time that this process used, its driver included; NaN where that cannot be measured.
     pub cpu_use: f64,
 }
+
+/// Frames that are measured in flight, at least.
+const LEAST_IN_FLIGHT: u32 = 4;
 
 /// What the timeline tells about a frame.
 pub struct Profile {
@@ -83,7 +95,6 @@ impl Runner {
     /// Returns an error if a frame cannot be drawn, or if a view does not see all objects.
     pub fn sample(&mut self, world: &mut Moving, at_least: Duration) -> Result<Sample, Box<dyn Error>> {
         let (mut borrowed, mut until_drawn, mut frames) = (Duration::ZERO, Duration::ZERO, 0);
-        let cpu_use = CpuUse::begin();
         let frame = mean_frame(at_least, || {
             world.step();
             let scene = world.as_scene_ref();
@@ -101,7 +112,30 @@ impl Runner {
             Ok::<_, Box<dyn Error>>(time.cpu)
         })?;
         let mean = |time: Duration| time.as_secs_f64() / f64::from(frames);
-        Ok(Sample { frame, borrowed: mean(borrowed), until_drawn: mean(until_drawn), cpu_use: cpu_use.share() })
+        Ok(Sample { frame, borrowed: mean(borrowed), until_drawn: mean(until_drawn) })
+    }
+
+    /// Draws frames for at least this long, each of which waits until the device has drawn the one before the last.
+    ///
+    /// # Errors
+    /// Returns an error if a frame cannot be drawn.
+    pub fn in_flight(&mut self, world: &mut Moving, at_least: Duration) -> Result<InFlight, Box<dyn Error>> {
+        let mut submit = || {
+            world.step();
+            let recorded = self.renderer.record(world.as_scene_ref())?;
+            Ok::<_, Box<dyn Error>>(self.submitter.submit(recorded)?.submission)
+        };
+        let (mut before, mut last) = (submit()?, submit()?);
+        before.wait()?;
+        let (start, cpu_use, mut frames) = (Instant::now(), CpuUse::begin(), 0);
+        while frames < LEAST_IN_FLIGHT || start.elapsed() < at_least {
+            before = mem::replace(&mut last, submit()?);
+            before.wait()?;
+            frames += 1;
+        }
+        let in_flight = InFlight { frame: start.elapsed().as_secs_f64() / f64::from(frames), cpu_use: cpu_use.share() };
+        last.wait()?;
+        Ok(in_flight)
     }
 
     /// Draws a frame, and tells where its time goes.

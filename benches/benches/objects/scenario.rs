@@ -13,7 +13,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::ceiling::ceiling;
-use crate::runner::{Division, Profile, Runner, Sample};
+use crate::runner::{Division, InFlight, Profile, Runner, Sample};
 use crate::{Extent, world};
 
 /// A row of L's table.
@@ -26,9 +26,11 @@ pub struct Row {
     pub instancing: bool,
     pub single_fps: f64,
     pub multi_fps: f64,
-    /// Frames per second if each waits until the device has drawn the one before: on the adapter only, like the next.
+    /// Frames per second with the device's time, of which two are in flight: on the adapter only, like the next two.
     pub single_drawn_fps: Option<f64>,
     pub multi_drawn_fps: Option<f64>,
+    /// The ratio of those.
+    pub drawn_ratio: Option<f64>,
     pub ratio: f64,
     /// The ratio of one worker that replays cached bundles. Without instancing only, like the next.
     pub cached_ratio: Option<f64>,
@@ -43,7 +45,7 @@ pub struct Row {
     pub multi_held_share: f64,
     /// How busy each worker of *multi* is, as a share of the frame. The first is the calling thread.
     pub multi_loads: Vec<f64>,
-    /// The share of all cores' time that the process used until frames were drawn, its driver included; `None` where that cannot be
+    /// The share of all cores' time that the process uses with two frames in flight, its driver included; `None` where that cannot be
     /// measured.
     pub single_cpu_use: Option<f64>,
     pub multi_cpu_use: Option<f64>,
@@ -56,6 +58,7 @@ pub struct Row {
 struct Scenario {
     runner: Runner,
     samples: Vec<Sample>,
+    in_flight: Vec<InFlight>,
     profiles: Vec<Profile>,
 }
 
@@ -88,7 +91,7 @@ pub fn measure(
             None => opened,
         };
         let runner = Runner::new(opened, scheduler, Division { instancing, ..Division::OWN })?;
-        scenarios.push(Scenario { runner, samples: Vec::new(), profiles: Vec::new() });
+        scenarios.push(Scenario { runner, samples: Vec::new(), in_flight: Vec::new(), profiles: Vec::new() });
         Ok::<_, Box<dyn Error>>(scenarios.len() - 1)
     };
     let one = Arc::new(Scheduler::new(1)?);
@@ -105,10 +108,11 @@ pub fn measure(
     let mut harness = Harness::new(rounds, progress);
     for round in harness.rounds(scenarios.len()) {
         let at_least = if round.is_warm_up() { Duration::ZERO } else { backend.of(extent.sample) };
-        harness.round(&mut scenarios, |Scenario { runner, samples, profiles }| {
+        harness.round(&mut scenarios, |Scenario { runner, samples, in_flight, profiles }| {
             let sample = runner.sample(&mut world, at_least)?;
             if !round.is_warm_up() {
                 samples.push(sample);
+                in_flight.push(runner.in_flight(&mut world, at_least)?);
                 profiles.push(runner.profile(&mut world)?);
             }
             Ok::<_, Box<dyn Error>>(())
@@ -119,11 +123,12 @@ pub fn measure(
         let multi = &scenarios[parallel.multi[usize::from(instancing)]];
         let workers = parallel.scheduler.workers();
         let wake = parallel.scheduler.wake_up_cost().as_secs_f64();
-        let drawn_fps = |scenario: &Scenario| {
-            (backend == BackendName::Adapter).then(|| scenario.median(|sample| sample.until_drawn).recip())
+        let on_adapter = backend == BackendName::Adapter;
+        let drawn_fps =
+            |scenario: &Scenario| on_adapter.then(|| scenario.median_in_flight(|in_flight| in_flight.frame).recip());
+        let cpu_use = |scenario: &Scenario| {
+            Some(scenario.median_in_flight(|in_flight| in_flight.cpu_use)).filter(|used| !used.is_nan())
         };
-        let cpu_use =
-            |scenario: &Scenario| Some(scenario.median(|sample| sample.cpu_use)).filter(|used| !used.is_nan());
         let held_share = |scenario: &Scenario| scenario.median(|sample| sample.borrowed / sample.frame);
         Row {
             objects,
@@ -134,6 +139,7 @@ pub fn measure(
             multi_fps: multi.median(|sample| sample.frame).recip(),
             single_drawn_fps: drawn_fps(single),
             multi_drawn_fps: drawn_fps(multi),
+            drawn_ratio: on_adapter.then(|| multi.drawn_ratio_to(single)),
             ratio: multi.ratio_to(single),
             cached_ratio: (!instancing).then(|| scenarios[cached].ratio_to(single)),
             direct_ratio: (!instancing).then(|| scenarios[parallel.direct].ratio_to(single)),
@@ -162,6 +168,10 @@ impl Scenario {
         median(self.samples.iter().map(value))
     }
 
+    fn median_in_flight(&self, value: impl Fn(&InFlight) -> f64) -> f64 {
+        median(self.in_flight.iter().map(value))
+    }
+
     fn median_of_profiles(&self, value: impl Fn(&Profile) -> f64) -> f64 {
         median(self.profiles.iter().map(value))
     }
@@ -169,5 +179,10 @@ impl Scenario {
     /// How many times as fast it is: the ratio of the medians.
     fn ratio_to(&self, base: &Self) -> f64 {
         base.median(|sample| sample.frame) / self.median(|sample| sample.frame)
+    }
+
+    /// The same with the device's time.
+    fn drawn_ratio_to(&self, base: &Self) -> f64 {
+        base.median_in_flight(|in_flight| in_flight.frame) / self.median_in_flight(|in_flight| in_flight.frame)
     }
 }
