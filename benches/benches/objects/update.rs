@@ -56,7 +56,7 @@ struct Contender {
 enum Frames {
     /// One at a time.
     Plain {
-        runner: Box<Runner>,
+        runner: Runner,
         update: Update,
     },
     InFlight(FrameLoop<WgpuBackend>),
@@ -86,7 +86,7 @@ pub fn measure(
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let runner = || Runner::new(backend.open()?, &scheduler, Division::OWN);
         for update in [Update::BeforeRecord, Update::BesideSubmit] {
-            let frames = Frames::Plain { runner: Box::new(runner()?), update };
+            let frames = Frames::Plain { runner: runner()?, update };
             contenders.push(Contender { world: world::new(objects, 1)?, frames });
         }
         let Runner { renderer, submitter } = runner()?;
