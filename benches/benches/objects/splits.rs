@@ -31,7 +31,7 @@ pub struct Row {
     pub single_fps: f64,
     /// To that: a job for the geometry buffer and for each shadow map.
     pub by_process_ratio: f64,
-    /// The same with the geometry buffer as a process for each worker, each of which has a share of the materials.
+    /// The same with the geometry buffer as a process for each worker, at most as many as there are materials, which they share.
     pub by_material_ratio: f64,
     /// As many jobs for each as its draws are worth.
     pub by_draws_ratio: f64,
@@ -56,7 +56,10 @@ impl Split {
         let whole = Division { granularity: Granularity::PerCamera, ..Division::OWN };
         let (strategy, division) = match self {
             Self::ByProcess => (RecordingStrategy::Direct, whole),
-            Self::ByMaterial => (RecordingStrategy::Direct, Division { geometry_shares: scheduler.workers(), ..whole }),
+            Self::ByMaterial => (
+                RecordingStrategy::Direct,
+                Division { geometry_shares: scheduler.workers().min(world::ORIGINALS), ..whole },
+            ),
             Self::ByDraws => (RecordingStrategy::Bundles, Division::OWN),
         };
         Runner::new(backend.open()?.recording_strategy(strategy)?, scheduler, division)

@@ -11,8 +11,8 @@ use drawloom_testing::random::Random;
 /// the cores.
 pub const PICTURE: u32 = 64;
 
-/// The number of objects with positions of their own.
-const ORIGINALS: usize = 7;
+/// The number of objects with positions, meshes and materials of their own.
+pub const ORIGINALS: usize = 7;
 /// In metres. From there a box needs no subdivision in the light's map: its edges subtend at most 5°.
 const LIGHT_HEIGHT: f64 = 20.0;
 const LIGHT_DISTANCE: f64 = 1.0;
