@@ -17,9 +17,18 @@ const HOUSES: f64 = 0.7;
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.
 pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
+    with_street_mesh(boxes, picture, None)
+}
+
+/// The same city, whose objects in the streets have a mesh of their own, which fits into a cube from −1 to 1. They remain boxes without it.
+///
+/// # Errors
+/// Returns an error if the scene rejects a mesh, a material or an object.
+pub fn with_street_mesh(boxes: usize, picture: [u32; 2], street_mesh: Option<Mesh>) -> Result<Scene, SceneError> {
     let mut random = Random::new();
     let mut scene = Scene::new();
-    let mesh = scene.add(Mesh::cuboid("box".to_owned(), Vec3::splat(2.0))?)?;
+    let house_mesh = scene.add(Mesh::cuboid("box".to_owned(), Vec3::splat(2.0))?)?;
+    let street_mesh = street_mesh.map_or(Ok(house_mesh), |mesh| scene.add(mesh))?;
     let material = scene.add(Material::default())?;
     let houses = (boxes as f64 * HOUSES) as usize;
     let side = (houses as f64).sqrt().ceil() as usize;
@@ -45,6 +54,7 @@ pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
         let angle = if is_rotated { random.between(0.0, 1.57) } else { 0.0 };
         // A rotated box must still fit into its lot.
         let half = half.map(|half| if is_rotated { half * 0.7 } else { half });
+        let mesh = if is_house { house_mesh } else { street_mesh };
         let object = RenderObject::new(mesh, material, DVec3::new(x, height * 0.5, z));
         let scale = Vec3::new(half[0] as f32, height as f32 * 0.5, half[1] as f32);
         scene.add_object(RenderObject { scale, orientation: Quat::from_rotation_y(angle as f32), ..object })?;

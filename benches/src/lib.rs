@@ -16,6 +16,7 @@ pub mod harness;
 pub mod mirror;
 pub mod moving;
 pub mod results;
+pub mod sphere;
 pub mod spinning;
 pub mod statistics;
 pub mod stopwatch;
