@@ -20,7 +20,8 @@ pub fn new(boxes: usize, picture: [u32; 2]) -> Result<Scene, SceneError> {
     with_street_mesh(boxes, picture, None)
 }
 
-/// The same city, whose objects in the streets have a mesh of their own, which fits into a cube from −1 to 1. They remain boxes without it.
+/// The same city, whose objects in the streets have a mesh of their own, which fits into a cube from −1 to 1. They
+/// remain boxes without it.
 ///
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.

@@ -4,8 +4,8 @@ use std::f32::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use drawloom::scene::{LevelOfDetail, Mesh, SceneError, Topology, Vertex};
 
-/// A sphere around the origin, of radius 1: `rings` rings from pole to pole, each of twice as many segments. Of its `levels` levels of
-/// detail each has half as many rings as the one before.
+/// A sphere around the origin, of radius 1: `rings` rings from pole to pole, each of twice as many segments. Of its
+/// `levels` levels of detail each has half as many rings as the one before.
 ///
 /// # Errors
 /// Returns an error if there are fewer than two rings at the coarsest level, or too many vertices.

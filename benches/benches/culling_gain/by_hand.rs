@@ -1,5 +1,5 @@
-//! A renderer in plain wgpu, on one thread: what an engine writes by hand for a scene that stands still. It culls objects by the frustum and
-//! for occlusion, and draws an instanced draw for each mesh.
+//! A renderer in plain wgpu, on one thread: what an engine writes by hand for a scene that stands still. It culls
+//! objects by the frustum and for occlusion, and draws an instanced draw for each mesh.
 
 use std::error::Error;
 use std::time::Instant;

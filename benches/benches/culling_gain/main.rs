@@ -4,21 +4,24 @@
 //!     cargo bench -p drawloom-benches --bench culling_gain -- --quick
 //!     cargo bench -p drawloom-benches --bench culling_gain -- --backend noop --workers 1,2
 //!
-//! One process draws all objects in one colour. The scene stands still and the camera moves, so each frame culls anew. Renderers are
-//! interleaved, one frame each in a round; times are medians. *CPU* is from the hand-over of the scene to the return of submit, *device*
-//! from the call of submit until the frame is drawn.
+//! One process draws all objects in one colour. The scene stands still and the camera moves, so each frame culls anew.
+//! Renderers are interleaved, one frame each in a round; times are medians. *CPU* is from the hand-over of the scene to
+//! the return of submit, *device* from the call of submit until the frame is drawn.
 //!
-//! **Occlusion**: a city of boxes, in whose streets there are boxes, or balls of many triangles, seen from a street, where most objects are
-//! hidden, and from above the roofs. Three renderers are written by hand in plain wgpu, on one thread, and differ in their culling alone:
+//! **Occlusion**: a city of boxes, in whose streets there are boxes, or balls of many triangles, seen from a street,
+//! where most objects are hidden, and from above the roofs. Three renderers are written by hand in plain wgpu, on one
+//! thread, and differ in their culling alone:
 //!
 //! - *none* draws all objects in the frustum;
 //! - *coarse depth* draws those that this crate's coarse depth buffer leaves, which is called directly;
-//! - *queries* draws those that are not known to be hidden, and asks the device whether bounding boxes are: `queries.rs`. On noop, whose
-//!   queries find nothing, a depth buffer whose tiles are pixels answers outside of the measured time.
+//! - *queries* draws those that are not known to be hidden, and asks the device whether bounding boxes are:
+//!   `queries.rs`. On noop, whose queries find nothing, a depth buffer whose tiles are pixels answers outside of the
+//!   measured time.
 //!
-//! Those of this crate decide by the CPU time that they measure whether a frame tests for occlusion: *tested in* is the share of frames
-//! that do. A reference in f64 tells which objects cover a pixel. *Left* are the hidden objects that are drawn, and *missing* the visible
-//! ones that are not drawn, because a result is late. The benchmark fails if one is missing although the camera stands still.
+//! Those of this crate decide by the CPU time that they measure whether a frame tests for occlusion: *tested in* is the
+//! share of frames that do. A reference in f64 tells which objects cover a pixel. *Left* are the hidden objects that
+//! are drawn, and *missing* the visible ones that are not drawn, because a result is late. The benchmark fails if one
+//! is missing although the camera stands still.
 //!
 //! **Triangles**: spheres with triangle culling on and off, and with levels of detail.
 //!

@@ -29,7 +29,10 @@ fn vertex(@location(0) position: vec3<f32>, @builtin(instance_index) instance: u
 
 // A box as a strip of 14 vertices: each bit is a side of the box.
 @vertex
-fn box_vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> @builtin(position) vec4<f32> {
+fn box_vertex(
+    @builtin(vertex_index) index: u32,
+    @builtin(instance_index) instance: u32,
+) -> @builtin(position) vec4<f32> {
     let object = objects[listed[instance]];
     let side = (vec3<u32>(0x287au, 0x02afu, 0x31e3u) >> vec3<u32>(index)) & vec3<u32>(1u);
     return clip_position(object, object.box_center.xyz + object.box_half.xyz * (vec3<f32>(side) * 2.0 - 1.0));

@@ -1,8 +1,10 @@
-//! Occlusion queries on the device, as Coherent Hierarchical Culling uses them (Bittner et al. 2004, Mattausch et al. 2008).
+//! Occlusion queries on the device, as Coherent Hierarchical Culling uses them (Bittner et al. 2004, Mattausch et al.
+//! 2008).
 //!
-//! A frame draws the objects that are not known to be hidden, and then tests bounding boxes against the depths that they left. Objects that are
-//! hidden are tested in every frame, several by one query, since most of them stay hidden. Those that are drawn are tested once in some frames.
-//! Results are read where they cost no wait: [`FRAMES_LATE`] frames later.
+//! A frame draws the objects that are not known to be hidden, and then tests bounding boxes against the depths that
+//! they left. Objects that are hidden are tested in every frame, several by one query, since most of them stay hidden.
+//! Those that are drawn are tested once in some frames. Results are read where they cost no wait: [`FRAMES_LATE`]
+//! frames later.
 
 use std::collections::VecDeque;
 use std::error::Error;
@@ -11,8 +13,9 @@ use std::sync::mpsc::{self, Receiver};
 
 use drawloom::wgpu;
 
-/// The frames between a query and the first frame that uses its result. The device draws a frame while the CPU records the next, so
-/// a result of the frame before is not there yet. The benchmark waits for each frame, and still takes no result sooner.
+/// The frames between a query and the first frame that uses its result. The device draws a frame while the CPU records
+/// the next, so a result of the frame before is not there yet. The benchmark waits for each frame, and still takes no
+/// result sooner.
 pub const FRAMES_LATE: u64 = 2;
 
 /// The frames between two tests of an object that is drawn.
@@ -28,7 +31,7 @@ const READBACKS: usize = FRAMES_LATE as usize + 1;
 #[derive(Clone, Copy, Default)]
 struct Knowledge {
     is_hidden: bool,
-    /// The frame after the latest one that had it in the frustum.
+    /// The latest frame that had it in the frustum.
     seen: u64,
 }
 
@@ -46,17 +49,20 @@ pub struct QueryBatch {
 
 /// Knows which objects are hidden, and chooses those to test.
 pub struct QueryScheduler {
+    /// The latest frame. The first is 2, so that no object was in the frustum of the one before.
     frame: u64,
     objects: Vec<Knowledge>,
+    /// Memory for the drawn objects that a frame tests.
+    retested: Vec<u32>,
 }
 
 impl QueryScheduler {
     pub fn new(objects: usize) -> Self {
-        Self { frame: 0, objects: vec![Knowledge::default(); objects] }
+        Self { frame: 1, objects: vec![Knowledge::default(); objects], retested: Vec::new() }
     }
 
-    /// Begins a frame: divides the objects in the frustum into those to draw and those to test. `is_near` says of an object whose box the
-    /// near plane may cut that it is always drawn.
+    /// Begins a frame: divides the objects in the frustum into those to draw and those to test. `is_near` says of an
+    /// object whose box the near plane may cut that it is always drawn.
     pub fn begin_frame(
         &mut self,
         in_frustum: &[u32],
@@ -69,13 +75,14 @@ impl QueryScheduler {
         batch.answers = None;
         batch.tested.clear();
         batch.queries.clear();
-        let mut retested = Vec::new();
+        let Self { objects, retested, .. } = self;
+        retested.clear();
         for &object in in_frustum {
-            let known = &mut self.objects[object as usize];
+            let known = &mut objects[object as usize];
             let is_new = known.seen != self.frame - 1;
             known.seen = self.frame;
             // What was known of an object that was out of the frustum holds no more.
-            known.is_hidden &= !is_new && !is_near(object);
+            known.is_hidden = known.is_hidden && !is_new && !is_near(object);
             if known.is_hidden {
                 batch.tested.push(object);
                 continue;
@@ -89,7 +96,7 @@ impl QueryScheduler {
         let hidden = batch.tested.len() as u32;
         let groups = (0..hidden).step_by(GROUP).map(|first| first..hidden.min(first + GROUP as u32));
         batch.queries.extend(groups.chain((0..retested.len() as u32).map(|index| hidden + index..hidden + index + 1)));
-        batch.tested.extend(retested);
+        batch.tested.extend_from_slice(retested);
     }
 
     /// Takes over the results of a batch.
@@ -157,7 +164,8 @@ impl QueryDevice {
         }
     }
 
-    /// Hands over all results that have arrived and are late enough for the frame that `scheduler` begins next. Does not wait.
+    /// Hands over all results that have arrived and are late enough for the frame that `scheduler` begins next. Does
+    /// not wait.
     ///
     /// # Errors
     /// Returns an error if the device is lost.
@@ -186,7 +194,8 @@ impl QueryDevice {
         self.spare.pop().unwrap_or_default()
     }
 
-    /// Encodes the queries of a batch: `begin` begins a pass with a query set, and `draw` draws the boxes of some of the tested objects.
+    /// Encodes the queries of a batch: `begin` begins a pass with a query set, and `draw` draws the boxes of some of
+    /// the tested objects.
     pub fn encode<'a>(
         &'a self,
         encoder: &mut wgpu::CommandEncoder,
