@@ -51,7 +51,7 @@ pub struct Quality {
     ///
     /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
     /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
-    /// a while. It requires that an engine's own shaders draw opaque objects exactly as their meshes are, or say that
+    /// a while, whatever it saves on the device. It requires that an engine's own shaders draw opaque objects exactly as their meshes are, or say that
     /// they [discard](crate::process::CommandDraws::discards) parts of them or
     /// [deform](crate::process::CommandDraws::deformation) them; objects that they move in another way must have bounds
     /// other than their mesh's.
