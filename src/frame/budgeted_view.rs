@@ -90,8 +90,8 @@ impl Rung {
     /// The view at its best.
     pub(super) const BEST: Self = Self::Drawn(ViewForm::BEST);
 
-    /// The cameras of the view on this rung.
-    pub(super) fn cameras(self, cameras: &[Camera]) -> impl Iterator<Item = Camera> {
+    /// The cameras of the view on this rung, of those that it has at its best: for an engine that chooses forms itself.
+    pub fn cameras(self, cameras: &[Camera]) -> impl Iterator<Item = Camera> {
         let form = match self {
             Self::Drawn(form) => Some(form),
             Self::LeftOut => None,

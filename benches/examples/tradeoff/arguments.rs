@@ -4,17 +4,23 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 use drawloom::demo;
-use drawloom::scene::{Scene, obj};
+use drawloom::scene::obj;
 use drawloom_output::print_diagnostic;
-use drawloom_testing::scenes::everything::everything;
 
 use crate::Failure;
+use crate::every_knob::every_knob;
+use crate::subject::Subject;
+
+/// The names of the project's scenes.
+const COLONNADE: &str = "colonnade";
+const EVERY_KNOB: &str = "every-knob";
 
 /// Measures the frame time and the error of each quality knob on a scene.
 #[derive(Parser)]
 #[command(name = "tradeoff")]
 pub struct Arguments {
-    /// An OBJ file. Default: the scene that comes with the project, or a small one for a quick run.
+    /// An OBJ file, or a scene of the project's: `colonnade`, which is the default, or `every-knob`, a small one in which every knob has an
+    /// effect, with levels of detail, mirrors and an impostor. That is the default of a quick run.
     pub scene: Option<PathBuf>,
 
     /// The camera path: `sway` moves a little to the side, `orbit` around the scene; or a file with a line `x,y,z,tx,ty,tz` for each
@@ -38,8 +44,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// A small scene unless one is named, small pictures from one position of the path, and no rounds. Errors are measured, except that of
-    /// maps that are drawn every few frames; times are those of cold frames, and inaccurate.
+    /// A small scene unless one is named, small pictures from two positions of the path, or from the last one where no picture is kept from
+    /// the first, and no rounds. Errors are measured; times are those of cold frames, and inaccurate.
     #[arg(long)]
     pub quick: bool,
 }
@@ -70,7 +76,7 @@ impl Arguments {
 
     /// Positions of a path that the program makes: a multiple of all shadow map intervals, unless the run is a quick one.
     pub fn path_positions(&self) -> usize {
-        if self.quick { 1 } else { 4 }
+        if self.quick { 2 } else { 4 }
     }
 
     /// Width and height in pixels.
@@ -80,22 +86,30 @@ impl Arguments {
 
     /// The scene's name in reports and file names.
     pub fn scene_name(&self) -> String {
-        let default = if self.quick { "everything" } else { "colonnade" };
+        let default = if self.quick { EVERY_KNOB } else { COLONNADE };
         let stem = self.scene.as_ref().and_then(|path| path.file_stem());
         stem.map_or_else(|| default.to_owned(), |stem| stem.to_string_lossy().into_owned())
     }
 
+    /// Whether every knob should have an effect in the scene.
+    pub fn has_every_knob(&self) -> bool {
+        self.scene.as_ref().map_or(self.quick, |path| path.as_os_str() == EVERY_KNOB)
+    }
+
     /// # Errors
     /// Returns an error if the file cannot be read.
-    pub fn load_scene(&self) -> Result<Scene, Failure> {
-        let Some(path) = &self.scene else {
-            return if self.quick { Ok(everything()) } else { Ok(demo::colonnade()?) };
+    pub fn load_subject(&self) -> Result<Subject, Failure> {
+        if self.has_every_knob() {
+            return every_knob();
+        }
+        let Some(path) = self.scene.as_ref().filter(|path| path.as_os_str() != COLONNADE) else {
+            return Ok(Subject::of_scene(demo::colonnade()?));
         };
         let mut imported = obj::load(path)?;
         for warning in &imported.warnings {
             print_diagnostic!("warning: {warning}");
         }
         demo::add_camera_and_lights(&mut imported.scene);
-        Ok(imported.scene)
+        Ok(Subject::of_scene(imported.scene))
     }
 }

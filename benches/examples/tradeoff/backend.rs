@@ -6,14 +6,17 @@ use std::time::{Duration, Instant};
 use drawloom::backend::{Backend, Picture, SoftwareBackend, SoftwareSubmission, WgpuBackend, WgpuSubmission};
 use drawloom::command::RenderCommand;
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
-use drawloom::quality::Quality;
-use drawloom::scene::SceneRef;
+use drawloom::scene::{SceneRef, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom::{Renderer, Submitter};
 use drawloom_testing::adapter;
 
 use crate::Failure;
 use crate::arguments::{Arguments, BackendName};
+use crate::configuration::Configuration;
+use crate::shown_views::{Impostor, Mirror};
+use crate::subject::{IMPOSTOR, MIRRORS, Subject};
 
 /// A backend with timed frames and readable targets.
 pub trait BackendUnderTest {
@@ -23,9 +26,11 @@ pub trait BackendUnderTest {
     /// One word for file names.
     fn kind(&self) -> &'static str;
 
+    /// Draws the next frame as if it were the first, with these settings.
+    ///
     /// # Errors
-    /// Returns an error if the renderer rejects the quality.
-    fn set_quality(&mut self, quality: &Quality) -> Result<(), Failure>;
+    /// Returns an error if the renderer rejects them.
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), Failure>;
 
     /// # Errors
     /// Returns an error if the frame fails.
@@ -53,15 +58,18 @@ pub struct FrameTime {
     pub frame: Duration,
     /// Objects that occlusion culling removed.
     pub occluded: usize,
+    /// How many frames ago the oldest picture was drawn that a mirror shows.
+    pub age: u32,
 }
 
 impl FrameTime {
-    /// The mean of several frames.
+    /// The mean of several frames, and the greatest age.
     pub fn mean(times: &[Self]) -> Self {
         let count = times.len().max(1) as u32;
         let mean = |of: fn(&Self) -> Duration| times.iter().map(of).sum::<Duration>() / count;
         let occluded = times.iter().map(|time| time.occluded).sum::<usize>() / times.len().max(1);
-        Self { cpu: mean(|time| time.cpu), frame: mean(|time| time.frame), occluded }
+        let age = times.iter().map(|time| time.age).max().unwrap_or(0);
+        Self { cpu: mean(|time| time.cpu), frame: mean(|time| time.frame), occluded, age }
     }
 }
 
@@ -69,33 +77,35 @@ impl FrameTime {
 ///
 /// # Errors
 /// Returns an error if wgpu is requested and there is no adapter.
-pub fn open(arguments: &Arguments) -> Result<Box<dyn BackendUnderTest>, Failure> {
+pub fn open(arguments: &Arguments, subject: &Subject) -> Result<Box<dyn BackendUnderTest>, Failure> {
     if arguments.backend == Some(BackendName::Software) {
-        return software();
+        return software(subject);
     }
     match adapter::device() {
         Ok((device, queue)) => {
             let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-            Ok(Box::new(Runner::new(WgpuBackend::new(device, queue)?, scheduler)?))
+            Ok(Box::new(Runner::new(WgpuBackend::new(device, queue)?, scheduler, subject)?))
         }
-        Err(_) if arguments.backend.is_none() => software(),
+        Err(_) if arguments.backend.is_none() => software(subject),
         Err(error) => Err(error),
     }
 }
 
-/// Opens the reference: the software backend in f64, with [`Quality::exact`].
+/// Opens the reference: the software backend in f64, with [`Configuration::exact`].
 ///
 /// # Errors
 /// Returns an error if the renderer cannot be built.
-pub fn reference() -> Result<Box<dyn BackendUnderTest>, Failure> {
-    let mut runner = Runner::new(SoftwareBackend::reference(), Arc::new(Scheduler::new(1)?))?;
-    runner.set_quality(&Quality::exact())?;
-    Ok(Box::new(runner))
+pub fn reference(subject: &Subject) -> Result<Box<dyn BackendUnderTest>, Failure> {
+    Ok(Box::new(Runner::new(SoftwareBackend::reference(), Arc::new(Scheduler::new(1)?), subject)?))
 }
 
-fn software() -> Result<Box<dyn BackendUnderTest>, Failure> {
+fn software(subject: &Subject) -> Result<Box<dyn BackendUnderTest>, Failure> {
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-    Ok(Box::new(Runner::new(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler)?))
+    Ok(Box::new(Runner::new(SoftwareBackend::new(Arc::clone(&scheduler)), scheduler, subject)?))
+}
+
+fn deferred(maps: ShadowMaps) -> Deferred {
+    Deferred::new().shadow_maps(Some(maps)).post(ToneMapping::default()).post(Fxaa::default())
 }
 
 /// A renderer on one backend.
@@ -103,16 +113,26 @@ struct Runner<B: Backend> {
     name: String,
     renderer: Renderer<B>,
     submitter: Submitter<B>,
+    maps: ShadowMaps,
     views: Vec<String>,
     last: Option<B::Submission>,
 }
 
 impl<B: Backend> Runner<B> {
-    fn new(backend: B, scheduler: Arc<Scheduler>) -> Result<Self, Failure> {
+    fn new(backend: B, scheduler: Arc<Scheduler>, subject: &Subject) -> Result<Self, Failure> {
         let name = backend.adapter_name();
-        let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
-        let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
-        Ok(Self { name, renderer, submitter, views: Vec::new(), last: None })
+        let Configuration { maps, quality, .. } = Configuration::exact();
+        let mut builder = Renderer::builder(backend).deferred(deferred(maps)).quality(quality);
+        let mut after = None;
+        for (_, (view, surface)) in subject.mirrors.iter().zip(MIRRORS) {
+            builder = builder.process(Mirror { view, surface, after });
+            after = Some(view);
+        }
+        if subject.impostor.is_some() {
+            builder = builder.process(Impostor);
+        }
+        let (renderer, submitter) = builder.build(scheduler)?;
+        Ok(Self { name, renderer, submitter, maps, views: Vec::new(), last: None })
     }
 }
 
@@ -128,8 +148,14 @@ where
         B::Submission::KIND
     }
 
-    fn set_quality(&mut self, quality: &Quality) -> Result<(), Failure> {
-        Ok(self.renderer.set_quality(*quality)?)
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), Failure> {
+        if self.maps != configuration.maps {
+            self.renderer.set_deferred(deferred(configuration.maps))?;
+            self.maps = configuration.maps;
+        }
+        self.renderer.set_quality(configuration.quality)?;
+        self.renderer.forget_previous_frames();
+        Ok(())
     }
 
     fn draw(&mut self, scene: SceneRef<'_>) -> Result<FrameTime, Failure> {
@@ -139,10 +165,13 @@ where
         let cpu = start.elapsed();
         submitted.submission.wait_until_drawn()?;
         let frame = start.elapsed();
-        let occluded = submitted.statistics.views.iter().map(|view| view.occluded).sum();
+        let views = &submitted.statistics.views;
+        let occluded = views.iter().map(|view| view.occluded).sum();
+        let mirrors = views.iter().filter(|view| view.kind == ViewKind::Reflection && view.name != IMPOSTOR);
+        let age = mirrors.map(|view| view.age).max().unwrap_or(0);
         self.views = submitted.statistics.views.into_iter().map(|view| view.name).collect();
         self.last = Some(submitted.submission);
-        Ok(FrameTime { cpu, frame, occluded })
+        Ok(FrameTime { cpu, frame, occluded, age })
     }
 
     fn read(&self, target: &str) -> Result<Picture, Failure> {

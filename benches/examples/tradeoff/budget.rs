@@ -1,14 +1,15 @@
 //! Searches for the most accurate settings within a frame time budget.
 
-use drawloom::quality::Quality;
-use drawloom::scene::{Camera, Scene};
+use drawloom::scene::Camera;
 use drawloom_output::print_line;
 
 use crate::Failure;
 use crate::backend::BackendUnderTest;
+use crate::configuration::Configuration;
 use crate::measure::time_along;
 use crate::results::Results;
 use crate::settings::{Knob, Setting};
+use crate::subject::Subject;
 
 /// Starts at the most accurate settings, and turns down the knob that saves most time per error until a frame fits. Then turns knobs
 /// back up, greatest error first, as long as the frame still fits. Prints the result. Combinations are measured, as their savings do
@@ -19,16 +20,17 @@ use crate::settings::{Knob, Setting};
 pub fn search(
     budget_ms: f64,
     backend: &mut dyn BackendUnderTest,
-    scene: &Scene,
+    subject: &mut Subject,
     path: &[Camera],
     settings: &[Setting],
     results: &Results,
 ) -> Result<(), Failure> {
-    let exact = Quality::exact();
-    let mut time_of =
-        |quality: &Quality| Ok::<_, Failure>(time_along(backend, scene, path, quality)?.frame.as_secs_f64() * 1e3);
-    let mut quality = exact;
-    let mut time = time_of(&quality)?;
+    let exact = Configuration::exact();
+    let mut time_of = |configuration: &Configuration| {
+        Ok::<_, Failure>(time_along(backend, subject, path, configuration)?.frame.as_secs_f64() * 1e3)
+    };
+    let mut configuration = exact;
+    let mut time = time_of(&configuration)?;
     let mut reduced: Vec<&Setting> = Vec::new();
     let mut steps = steps(settings, results);
     while time > budget_ms {
@@ -36,16 +38,16 @@ pub fn search(
             print_line!("No setting fits into {budget_ms} ms: with {} a frame takes {time:.2} ms.", names(&reduced));
             return Ok(());
         };
-        let changed = step.knob.changed(&quality, &step.quality);
+        let changed = step.knob.changed(&configuration, &step.configuration);
         // Some settings exclude each other.
-        if quality == changed || changed.check().is_err() {
+        if configuration == changed || changed.quality.check().is_err() {
             continue;
         }
         let faster = time_of(&changed)?;
         if faster < time {
             reduced.retain(|other| other.knob != step.knob);
             reduced.push(step);
-            (quality, time) = (changed, faster);
+            (configuration, time) = (changed, faster);
         }
     }
     let error_of = |step: &Setting| {
@@ -58,23 +60,23 @@ pub fn search(
     let mut by_error = reduced.clone();
     by_error.sort_by(|one, other| error_of(other).total_cmp(&error_of(one)));
     for step in by_error {
-        let changed = step.knob.changed(&quality, &exact);
-        if changed.check().is_err() {
+        let changed = step.knob.changed(&configuration, &exact);
+        if changed.quality.check().is_err() {
             continue;
         }
         let slower = time_of(&changed)?;
         if slower <= budget_ms {
             reduced.retain(|other| other.knob != step.knob);
-            (quality, time) = (changed, slower);
+            (configuration, time) = (changed, slower);
         }
     }
     print_line!("The most accurate settings found that fit into {budget_ms} ms take {time:.2} ms:\n");
     if reduced.is_empty() {
-        print_line!("Quality::exact()");
+        print_line!("exact");
     } else {
-        print_line!("Quality::exact() with {}", names(&reduced));
+        print_line!("exact with {}", names(&reduced));
     }
-    print_line!("\n{quality:#?}");
+    print_line!("\n{configuration:#?}");
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use crate::settings::Knob;
 /// # Errors
 /// Returns an error if a file cannot be written.
 pub fn draw(folder: &Path, results: &Results) -> Result<(), Failure> {
-    for knob in Knob::ALL {
+    for knob in results.knobs() {
         let entries = of_knob(&results.entries, knob);
         // The entry of exact has another metric.
         let metric = entries.iter().find(|entry| entry.knob == knob.name()).map_or("", |entry| &entry.metric);

@@ -5,14 +5,13 @@ use std::f64::consts::PI;
 
 use drawloom::command::RenderCommand;
 use drawloom::quality::{DepthKey, Quality, TransformPrecision};
-use drawloom::scene::{Blend, Camera, Light, Material, Mesh, Scene};
+use drawloom::scene::{Blend, Camera, Light, Material, Scene};
 
-use crate::Failure;
 use crate::measure::{Measurement, Measurements};
-use crate::paraboloid;
 use crate::settings::{Knob, Setting};
+use crate::subject::Subject;
 use crate::targets::{colors, directions};
-use crate::vertices;
+use crate::{Failure, impostor, levels, paraboloid, vertices};
 
 /// The error of a knob.
 pub struct KnobError {
@@ -39,14 +38,17 @@ struct Case<'a> {
 /// Returns an error if a target cannot be decoded.
 pub fn of(
     setting: &Setting,
-    scene: &Scene,
+    subject: &Subject,
     path: &[Camera],
     measurements: &Measurements,
     measured: &Measurement,
 ) -> Result<KnobError, Failure> {
+    let scene = &subject.scene;
     let camera = path.last().ok_or("the path has no position")?;
     let exact = measurements.settings.first().ok_or("nothing was measured")?;
-    let case = Case { scene, camera, quality: &setting.quality, measured, exact };
+    let configuration = &setting.configuration;
+    let quality = &configuration.quality;
+    let case = Case { scene, camera, quality, measured, exact };
     match setting.knob {
         Knob::Preset => Ok(KnobError {
             error: Some(measured.from_reference.rmse * 255.0),
@@ -55,8 +57,8 @@ pub fn of(
             bound: (setting.name == "exact").then_some(2.0),
             oracle: "f64 reference",
         }),
-        Knob::OpaqueOrder => Ok(case.order(setting.quality.opaque_order, &measured.contents.opaque, Blend::None)),
-        Knob::BlendedOrder => Ok(case.order(setting.quality.blended_order, &measured.contents.blended, Blend::Alpha)),
+        Knob::OpaqueOrder => Ok(case.order(quality.opaque_order, &measured.contents.opaque, Blend::None)),
+        Knob::BlendedOrder => Ok(case.order(quality.blended_order, &measured.contents.blended, Blend::Alpha)),
         // Culling must not remove visible objects.
         Knob::Culling => Ok(KnobError { bound: Some(0.0), ..case.pixels_that_differ() }),
         // It has an effect only if an object is occluded.
@@ -68,9 +70,37 @@ pub fn of(
         Knob::Normals | Knob::Vertices => case.normals(setting.knob),
         Knob::Diffuse => case.diffuse(),
         Knob::LevelOfDetail => {
-            let has_levels = scene.assets().iter::<Mesh>().any(|(_, mesh)| !mesh.levels().is_empty());
-            let error = has_levels.then_some(measured.differing[1]);
+            let error = levels::greatest_error(scene, camera, &measured.contents.opaque);
+            Ok(of_levels(error, f64::from(quality.level_of_detail)))
+        }
+        Knob::ViewLevelOfDetail => {
+            let mirrors = subject.mirror_cameras(camera);
+            let commands = &measured.contents.mirrored;
+            let error = mirrors.first().and_then(|mirror| levels::greatest_error(scene, mirror, commands));
+            let scale = configuration.mirrors.level_of_detail_scale;
+            Ok(of_levels(error, f64::from(quality.level_of_detail * scale)))
+        }
+        Knob::Cascades | Knob::MaxDistance => {
+            let is_sun = |light: &Light| matches!(light, Light::Directional { casts_shadow: true, .. });
+            let error = scene.lights.iter().any(is_sun).then_some(measured.differing[1]);
             Ok(KnobError { error, ..case.pixels_that_visibly_differ() })
+        }
+        Knob::Redraw => Ok(KnobError {
+            error: Some(f64::from(measured.age)),
+            metric: "frames that a mirror's picture is old",
+            bound: Some(f64::from(configuration.mirrors.interval - 1)),
+            oracle: "the frames that drew the view",
+        }),
+        Knob::ViewSize | Knob::ViewCameras | Knob::ViewLeftOut => Ok(case.pixels_that_visibly_differ()),
+        Knob::ImpostorAngle => {
+            let max_angle = configuration.impostor.unwrap_or_default();
+            Ok(KnobError {
+                error: impostor::greatest_displacement(subject, path, max_angle),
+                metric: "degrees over the original's radius",
+                // Beside the angle, what the f32 of the picture's camera rounds: a millionth of the radius.
+                bound: Some(max_angle + 1e-6_f64.to_degrees()),
+                oracle: "f64 rays through the impostor",
+            })
         }
         Knob::ShadowSide | Knob::ShadowFilter | Knob::ShadowBias | Knob::ShadowInterval => {
             Ok(case.pixels_that_visibly_differ())
@@ -85,13 +115,18 @@ pub fn of(
             oracle: "exact",
         }),
         Knob::Transforms => Ok(KnobError {
-            error: vertices::greatest_error(scene, camera, setting.quality.transforms),
+            error: vertices::greatest_error(scene, camera, quality.transforms),
             metric: "pixels",
             // The bound holds for camera-relative transforms, at any distance from the world's origin.
-            bound: (setting.quality.transforms == TransformPrecision::CameraRelative).then_some(1e-3),
+            bound: (quality.transforms == TransformPrecision::CameraRelative).then_some(1e-3),
             oracle: "f64 from the camera's definition",
         }),
     }
+}
+
+/// The error of levels of detail, of at most so many pixels.
+fn of_levels(error: Option<f64>, pixels: f64) -> KnobError {
+    KnobError { error, metric: "pixels", bound: Some(pixels), oracle: "the stated errors of the levels, in f64" }
 }
 
 impl Case<'_> {

@@ -1,4 +1,7 @@
-//! The cost of accuracy on a scene: measures the frame time and the error of every knob of `Quality` alone, and of the presets.
+//! The cost of accuracy on a scene: measures the frame time and the error of every knob alone, and of the presets.
+//!
+//! Most knobs are fields of `Quality`. The pipeline's `ShadowMaps` have the number of cascades and how far they reach, a `Camera` how often
+//! it is drawn and the angle of an impostor that is kept, and a view of a `ViewBudget` the forms in which it is drawn.
 //!
 //!     cargo run --release -p drawloom-benches --example tradeoff
 //!     cargo run --release -p drawloom-benches --example tradeoff -- scene.obj --camera-path orbit --budget-ms 8
@@ -9,13 +12,19 @@ mod budget;
 mod camera_path;
 mod charts;
 mod comparison;
+mod configuration;
 mod errors;
+mod every_knob;
 mod front;
+mod impostor;
+mod levels;
 mod measure;
 mod page;
 mod paraboloid;
 mod results;
 mod settings;
+mod shown_views;
+mod subject;
 mod targets;
 mod vertices;
 
@@ -37,9 +46,9 @@ type Failure = Box<dyn Error>;
 fn main() -> ExitCode {
     tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
     let outcome = run(&Arguments::checked());
-    drawloom_output::exit_code(
-        outcome.and_then(|is_within| is_within.then_some(()).ok_or_else(|| "an error is above its bound".into())),
-    )
+    drawloom_output::exit_code(outcome.and_then(|is_within| {
+        is_within.then_some(()).ok_or_else(|| "an error is above its bound, or a knob has no effect".into())
+    }))
 }
 
 /// Prints the number of invisible triangles, which CPU culling would save the device (S 9.6).
@@ -65,18 +74,18 @@ fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
     );
 }
 
-/// Returns whether every measured error is within its bound.
+/// Returns whether every measured error is within its bound, and every knob has an effect in the scene that should have one for each.
 fn run(arguments: &Arguments) -> Result<bool, Failure> {
-    let scene = arguments.load_scene()?;
-    let path = camera_path::of(&scene, arguments)?;
-    let settings = settings::all();
-    let mut backend = backend::open(arguments)?;
+    let mut subject = arguments.load_subject()?;
+    let path = camera_path::of(&subject.scene, arguments)?;
+    let settings = settings::all(&subject);
+    let mut backend = backend::open(arguments, &subject)?;
     print_line!("drawn by {}", backend.name());
 
-    let measurements = Measurements::take(&mut *backend, &scene, &path, &settings, arguments)?;
-    let results = Results::new(arguments.scene_name(), backend.name(), &scene, &path, &settings, &measurements)?;
+    let measurements = Measurements::take(&mut *backend, &mut subject, &path, &settings, arguments)?;
+    let results = Results::new(arguments.scene_name(), backend.name(), &subject, &path, &settings, &measurements)?;
     results.print();
-    print_culled_triangles(&scene, &path);
+    print_culled_triangles(&subject.scene, &path);
 
     let folder = drawloom_benches::results::folder()?;
     let pictures = folder.join("tradeoff").join(format!("{}-{}", results.scene(), backend.kind()));
@@ -87,7 +96,7 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
     page::write(&pictures, &results, &measurements)?;
 
     if let Some(budget) = arguments.budget_ms {
-        budget::search(budget, &mut *backend, &scene, &path, &settings, &results)?;
+        budget::search(budget, &mut *backend, &mut subject, &path, &settings, &results)?;
     }
     let exceeded: Vec<_> = results.exceeded().collect();
     for entry in &exceeded {
@@ -99,5 +108,9 @@ fn run(arguments: &Arguments) -> Result<bool, Failure> {
             entry.metric
         );
     }
-    Ok(exceeded.is_empty())
+    let without_effect: Vec<_> = results.without_effect().filter(|_| arguments.has_every_knob()).collect();
+    for knob in &without_effect {
+        print_diagnostic!("{} changes nothing in a scene for every knob", knob.name());
+    }
+    Ok(exceeded.is_empty() && without_effect.is_empty())
 }

@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use drawloom::backend::Picture;
 use drawloom::command::RenderCommand;
-use drawloom::quality::Quality;
-use drawloom::scene::{Camera, Scene, SceneRef};
+use drawloom::scene::Camera;
 use drawloom_benches::harness::{Harness, Rounds, progress_bar};
 use drawloom_benches::statistics::median_duration;
 
@@ -13,7 +12,9 @@ use crate::Failure;
 use crate::arguments::Arguments;
 use crate::backend::{self, BackendUnderTest, FrameTime};
 use crate::comparison::{Distance, share_that_differs};
+use crate::configuration::Configuration;
 use crate::settings::Setting;
+use crate::subject::{MIRRORS, Subject};
 
 /// The measurements of all settings, in their order.
 pub struct Measurements {
@@ -26,11 +27,11 @@ pub struct Measurements {
 pub struct Measurement {
     /// Mean times along the path, by round.
     pub times: Vec<FrameTime>,
-    /// At the first position of the path.
+    /// At the last position of the path.
     pub picture: Picture,
     /// At the last position of the path.
     pub contents: FrameContents,
-    /// The distance from the pictures of [`Quality::exact`].
+    /// The distance from the pictures of [`Configuration::exact`].
     pub from_exact: Distance,
     /// The distance from the reference's pictures.
     pub from_reference: Distance,
@@ -38,6 +39,8 @@ pub struct Measurement {
     pub differing: [f64; 2],
     /// Objects that occlusion culling removed, in all pictures.
     pub occluded: usize,
+    /// How many frames before its own the oldest picture was drawn that a mirror showed.
+    pub age: u32,
 }
 
 /// The minimum difference of 255 that is visible when switching between two pictures.
@@ -49,6 +52,8 @@ pub struct FrameContents {
     pub opaque: Vec<RenderCommand>,
     /// The transparency's commands, in order.
     pub blended: Vec<RenderCommand>,
+    /// The geometry buffer's commands in the first mirror's view, in order.
+    pub mirrored: Vec<RenderCommand>,
     /// The light's index in the scene and the commands of each shadow map.
     pub shadow_maps: Vec<(usize, Vec<RenderCommand>)>,
     pub normal: Picture,
@@ -64,9 +69,12 @@ impl FrameContents {
     fn of(backend: &dyn BackendUnderTest) -> Result<Self, Failure> {
         let light_of = |name: &String| name.strip_prefix("shadow of light ")?.parse().ok();
         let maps = backend.views().iter().enumerate().filter_map(|(view, name)| Some((view, light_of(name)?)));
+        let is_mirror = |name: &String| name.rsplit_once('/').is_some_and(|(_, view)| view == MIRRORS[0].0);
+        let mirror = backend.views().iter().position(is_mirror);
         Ok(Self {
             opaque: backend.commands("geometry buffer", 0),
             blended: backend.commands("transparency", 0),
+            mirrored: mirror.map_or_else(Vec::new, |view| backend.commands("geometry buffer", view)),
             shadow_maps: maps.map(|(view, light)| (light, backend.commands("shadow casters", view))).collect(),
             normal: backend.read("normal")?,
             diffuse: backend.read("diffuse")?,
@@ -84,7 +92,7 @@ impl Measurements {
     /// Returns an error if a frame fails.
     pub fn take(
         backend: &mut dyn BackendUnderTest,
-        scene: &Scene,
+        subject: &mut Subject,
         path: &[Camera],
         settings: &[Setting],
         arguments: &Arguments,
@@ -94,11 +102,13 @@ impl Measurements {
         progress.set_length((path.len() + settings.len()) as u64);
 
         let mut reference = Vec::new();
-        let mut reference_backend = backend::reference()?;
+        let mut reference_backend = backend::reference(subject)?;
+        let exact = Configuration::exact();
+        let mut run = Run::new(&mut *reference_backend, subject, &exact)?;
         for camera in path {
             progress.set_message("the reference in f64");
-            reference_backend.draw(with_camera(scene, camera))?;
-            reference.push(reference_backend.read("picture")?);
+            run.draw(camera)?;
+            reference.push(run.backend.read("picture")?);
             progress.inc(1);
         }
         drop(reference_backend);
@@ -107,11 +117,13 @@ impl Measurements {
         let mut measurements: Vec<Measurement> = Vec::new();
         for (index, setting) in settings.iter().enumerate() {
             progress.set_message(format!("pictures of {}: {}", setting.knob.name(), setting.name));
-            let drawn = draw_pictures(backend, scene, path, setting)?;
+            // What keeps no pictures looks the same wherever the path begins.
+            let from = if arguments.quick && index > 0 && !setting.keeps_pictures() { path.len() - 1 } else { 0 };
+            let drawn = draw_pictures(backend, subject, &path[from..], &setting.configuration)?;
             if index == 0 {
                 exact.clone_from(&drawn.pictures);
             }
-            measurements.push(drawn.compare(backend, &exact, &reference, rounds == 0)?);
+            measurements.push(drawn.compare(backend, &exact[from..], &reference[from..], rounds == 0)?);
             progress.inc(1);
         }
 
@@ -120,7 +132,7 @@ impl Measurements {
             &mut contenders,
             |setting, _round| {
                 progress.set_message(format!("times of {}: {}", setting.knob.name(), setting.name));
-                time_along(backend, scene, path, &setting.quality)
+                time_along(backend, subject, path, &setting.configuration)
             },
         )?;
         for (measurement, times) in measurements.iter_mut().zip(times) {
@@ -149,23 +161,49 @@ struct Pictures {
     times: Vec<FrameTime>,
 }
 
+/// The frames of a configuration.
+struct Run<'a> {
+    backend: &'a mut dyn BackendUnderTest,
+    subject: &'a mut Subject,
+    configuration: &'a Configuration,
+    /// The camera of the impostor's picture in the frame before.
+    impostor: Option<Camera>,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        backend: &'a mut dyn BackendUnderTest,
+        subject: &'a mut Subject,
+        configuration: &'a Configuration,
+    ) -> Result<Self, Failure> {
+        backend.configure(configuration)?;
+        Ok(Self { backend, subject, configuration, impostor: None })
+    }
+
+    fn draw(&mut self, camera: &Camera) -> Result<FrameTime, Failure> {
+        let (cameras, impostor) = self.subject.cameras(camera, self.configuration, self.impostor.as_ref())?;
+        self.impostor = impostor;
+        self.backend.draw(self.subject.with_cameras(&cameras))
+    }
+}
+
 /// Draws each position of the path. Occlusion culling, if enabled, runs in each picture, whether it is worth it or not.
 fn draw_pictures(
     backend: &mut dyn BackendUnderTest,
-    scene: &Scene,
+    subject: &mut Subject,
     path: &[Camera],
-    setting: &Setting,
+    configuration: &Configuration,
 ) -> Result<Pictures, Failure> {
     let mut drawn = Pictures { pictures: Vec::new(), times: Vec::new() };
-    backend.set_quality(&setting.quality)?;
+    let mut run = Run::new(backend, subject, configuration)?;
     for camera in path {
-        if setting.quality.occlusion.is_some() {
+        if configuration.quality.occlusion.is_some() {
             // A change of quality makes the next frame try occlusion culling again.
-            backend.set_quality(&Quality::exact())?;
-            backend.set_quality(&setting.quality)?;
+            run.backend.configure(&Configuration::exact())?;
+            run.backend.configure(configuration)?;
         }
-        drawn.times.push(backend.draw(with_camera(scene, camera))?);
-        drawn.pictures.push(backend.read("picture")?);
+        drawn.times.push(run.draw(camera)?);
+        drawn.pictures.push(run.backend.read("picture")?);
     }
     Ok(drawn)
 }
@@ -189,9 +227,10 @@ impl Pictures {
             contents: FrameContents::of(backend)?,
             from_exact: distance(&pictures, exact)?,
             from_reference: distance(&pictures, reference)?,
-            picture: pictures.into_iter().next().ok_or("the path has no position")?,
+            picture: pictures.into_iter().next_back().ok_or("the path has no position")?,
             differing,
             occluded: times.iter().map(|time| time.occluded).sum(),
+            age: FrameTime::mean(&times).age,
         })
     }
 }
@@ -202,22 +241,17 @@ impl Pictures {
 /// Returns an error if a frame fails.
 pub fn time_along(
     backend: &mut dyn BackendUnderTest,
-    scene: &Scene,
+    subject: &mut Subject,
     path: &[Camera],
-    quality: &Quality,
+    configuration: &Configuration,
 ) -> Result<FrameTime, Failure> {
-    backend.set_quality(quality)?;
+    let mut run = Run::new(backend, subject, configuration)?;
     let start = path.first().ok_or("the path has no position")?;
     for _ in 0..WARM_UP {
-        backend.draw(with_camera(scene, start))?;
+        run.draw(start)?;
     }
-    let times: Vec<_> = path.iter().map(|camera| backend.draw(with_camera(scene, camera))).collect::<Result<_, _>>()?;
+    let times: Vec<_> = path.iter().map(|camera| run.draw(camera)).collect::<Result<_, _>>()?;
     Ok(FrameTime::mean(&times))
-}
-
-/// The scene with this camera alone.
-fn with_camera<'a>(scene: &'a Scene, camera: &'a Camera) -> SceneRef<'a> {
-    SceneRef { cameras: std::slice::from_ref(camera), ..scene.as_scene_ref() }
 }
 
 fn distance(pictures: &[Picture], others: &[Picture]) -> Result<Distance, Failure> {

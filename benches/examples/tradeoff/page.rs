@@ -4,20 +4,20 @@ use std::fmt::Write;
 use std::path::Path;
 
 use drawloom::backend::Picture;
+use drawloom::view::ShadowMaps;
 use drawloom_output::{OutputError, OutputFile, PictureFile, path_text, print_line};
 
 use crate::Failure;
 use crate::charts::file_name;
 use crate::measure::Measurements;
 use crate::results::{Entry, Results, short};
-use crate::settings::Knob;
 
-/// Writes the pictures of the path's first position, and `index.html`.
+/// Writes the pictures of the path's last position, and `index.html`.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written.
 pub fn write(folder: &Path, results: &Results, measurements: &Measurements) -> Result<(), Failure> {
-    let reference = measurements.reference.first().ok_or("the path has no position")?;
+    let reference = measurements.reference.last().ok_or("the path has no position")?;
     save(&folder.join("reference.png"), reference)?;
     for (number, measured) in measurements.settings.iter().enumerate() {
         save(&folder.join(picture_name(number)), &measured.picture)?;
@@ -54,11 +54,13 @@ fn html(results: &Results) -> String {
     // Writing to a string does not fail.
     let _ = write!(
         page,
-        "<title>{title}</title><h1>{title}</h1><p>Each knob alone, all else as in <code>Quality::exact</code>; hover over a \
+        "<title>{title}</title><h1>{title}</h1><p>Each knob alone, all else exact: <code>Quality::exact</code>, {cascades} cascades, \
+         every view at its best, and no impostor. A knob is a field of <code>Quality</code>, unless another type is named. Hover over a \
          picture for how it differs from the reference in f64, sixteen times.</p><img class=chart src=\"front.svg\" alt=\"Pareto \
-         front\">"
+         front\">",
+        cascades = ShadowMaps::MAX_CASCADES,
     );
-    for knob in Knob::ALL {
+    for knob in results.knobs() {
         let of_knob = |(_, entry): &(usize, &Entry)| entry.knob == knob.name();
         let own: Vec<_> = results.entries.iter().enumerate().filter(of_knob).collect();
         let _ = write!(

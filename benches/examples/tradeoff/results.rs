@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use drawloom::scene::{Camera, Scene};
+use drawloom::scene::Camera;
 use drawloom_output::{OutputFile, path_text, print_line};
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +11,7 @@ use crate::Failure;
 use crate::errors::{self, KnobError};
 use crate::measure::Measurements;
 use crate::settings::{Knob, Setting};
+use crate::subject::Subject;
 
 /// The results on one scene.
 pub struct Results {
@@ -37,9 +38,9 @@ pub struct Entry {
     pub bound: Option<f64>,
     /// The oracle that the error is measured against.
     pub oracle: String,
-    /// Distance of the picture from that of `Quality::exact`: 0 to 1.
+    /// Distance of the picture from that of `Configuration::exact`: 0 to 1.
     pub rmse: f64,
-    /// Similarity of the picture to that of `Quality::exact`: 1 if they are equal.
+    /// Similarity of the picture to that of `Configuration::exact`: 1 if they are equal.
     pub mssim: f64,
     /// Distance of the picture from the f64 reference: 0 to 1.
     pub rmse_from_reference: f64,
@@ -69,14 +70,15 @@ impl Results {
     pub fn new(
         scene_name: String,
         backend: &str,
-        scene: &Scene,
+        subject: &Subject,
         path: &[Camera],
         settings: &[Setting],
         measurements: &Measurements,
     ) -> Result<Self, Failure> {
         let mut entries = Vec::new();
         for (setting, measured) in settings.iter().zip(&measurements.settings) {
-            let KnobError { error, metric, bound, oracle } = errors::of(setting, scene, path, measurements, measured)?;
+            let KnobError { error, metric, bound, oracle } =
+                errors::of(setting, subject, path, measurements, measured)?;
             entries.push(Entry {
                 scene: scene_name.clone(),
                 backend: backend.to_owned(),
@@ -111,6 +113,18 @@ impl Results {
     /// The entries with errors that exceed their bounds.
     pub fn exceeded(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| entry.exceeds())
+    }
+
+    /// The knobs that were measured, in the order of reports.
+    pub fn knobs(&self) -> impl Iterator<Item = Knob> {
+        Knob::ALL.into_iter().filter(|knob| self.entries.iter().any(|entry| entry.knob == knob.name()))
+    }
+
+    /// The knobs that change nothing in the scene, whatever their setting, and those that were not measured.
+    pub fn without_effect(&self) -> impl Iterator<Item = Knob> {
+        let has_error =
+            |knob: &Knob| self.entries.iter().any(|entry| entry.knob == knob.name() && entry.error.is_some());
+        Knob::ALL.into_iter().filter(move |knob| !has_error(knob))
     }
 
     /// The Pareto front, from the fastest to the most accurate.

@@ -1,20 +1,33 @@
 //! The settings that are measured: each knob alone at each of its settings, and the presets.
 
+use drawloom::ViewForm;
 use drawloom::quality::{
     CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, RadianceSum, ShadowQuality, ToneCurve,
     TransformPrecision, VertexFormat,
 };
+use drawloom::view::ShadowMaps;
 
-/// A setting of one knob, with all others as in [`Quality::exact`]; or a preset.
+use crate::configuration::Configuration;
+use crate::subject::Subject;
+
+/// A setting of one knob, with all others as in [`Configuration::exact`]; or a preset.
 #[derive(Clone, Debug)]
 pub struct Setting {
     pub knob: Knob,
     /// Its name in reports.
     pub name: String,
-    pub quality: Quality,
+    pub configuration: Configuration,
 }
 
-/// A quality knob.
+impl Setting {
+    /// Whether its frames show pictures of earlier frames.
+    pub fn keeps_pictures(&self) -> bool {
+        let Configuration { quality, mirrors, impostor, .. } = self.configuration;
+        quality.shadows.interval > 1 || mirrors.interval > 1 || impostor.is_some()
+    }
+}
+
+/// What trades accuracy for speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Knob {
     Preset,
@@ -36,11 +49,19 @@ pub enum Knob {
     RadianceSum,
     ToneCurve,
     Transforms,
+    Cascades,
+    MaxDistance,
+    Redraw,
+    ViewSize,
+    ViewLevelOfDetail,
+    ViewCameras,
+    ViewLeftOut,
+    ImpostorAngle,
 }
 
 impl Knob {
     /// All knobs, in the order of reports.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 27] = [
         Self::Preset,
         Self::OpaqueOrder,
         Self::BlendedOrder,
@@ -60,9 +81,17 @@ impl Knob {
         Self::RadianceSum,
         Self::ToneCurve,
         Self::Transforms,
+        Self::Cascades,
+        Self::MaxDistance,
+        Self::Redraw,
+        Self::ViewSize,
+        Self::ViewLevelOfDetail,
+        Self::ViewCameras,
+        Self::ViewLeftOut,
+        Self::ImpostorAngle,
     ];
 
-    /// The name of the field of `Quality`.
+    /// Where an engine sets it: a field of `Quality`, unless a type is named.
     pub fn name(self) -> &'static str {
         match self {
             Self::Preset => "preset",
@@ -84,45 +113,111 @@ impl Knob {
             Self::RadianceSum => "radiance_sum",
             Self::ToneCurve => "tone_curve",
             Self::Transforms => "transforms",
+            Self::Cascades => "ShadowMaps.cascades",
+            Self::MaxDistance => "ShadowMaps.max_distance",
+            Self::Redraw => "Camera.redraw",
+            Self::ViewSize => "ViewForm.size",
+            Self::ViewLevelOfDetail => "ViewForm.level_of_detail_scale",
+            Self::ViewCameras => "ViewForm.max_cameras",
+            Self::ViewLeftOut => "Rung.LeftOut",
+            Self::ImpostorAngle => "Camera.impostor",
         }
     }
 
-    /// `quality` with this knob set as in `other`.
-    pub fn changed(self, quality: &Quality, other: &Quality) -> Quality {
-        let mut changed = *quality;
+    /// `configuration` with this knob set as in `other`.
+    pub fn changed(self, configuration: &Configuration, other: &Configuration) -> Configuration {
+        let mut changed = *configuration;
+        let (quality, others) = (&mut changed.quality, &other.quality);
+        let (form, forms) = (&mut changed.mirrors, &other.mirrors);
         match self {
             Self::Preset => changed = *other,
-            Self::OpaqueOrder => changed.opaque_order = other.opaque_order,
-            Self::BlendedOrder => changed.blended_order = other.blended_order,
-            Self::Culling => changed.culling = other.culling,
-            Self::Occlusion => changed.occlusion = other.occlusion,
-            Self::Normals => changed.normals = other.normals,
-            Self::Diffuse => changed.diffuse = other.diffuse,
-            Self::Vertices => changed.vertices = other.vertices,
-            Self::LevelOfDetail => changed.level_of_detail = other.level_of_detail,
-            Self::DepthPrePass => changed.depth_pre_pass = other.depth_pre_pass,
-            Self::ShadowSide => changed.shadows.side = other.shadows.side,
-            Self::ShadowFilter => changed.shadows.filter = other.shadows.filter,
-            Self::ShadowBias => changed.shadows.bias = other.shadows.bias,
-            Self::ShadowInterval => changed.shadows.interval = other.shadows.interval,
-            Self::ShadowEdge => changed.shadows.widest_edge = other.shadows.widest_edge,
-            Self::LightCutOff => changed.light_cut_off = other.light_cut_off,
-            Self::RadianceSum => changed.radiance_sum = other.radiance_sum,
-            Self::ToneCurve => changed.tone_curve = other.tone_curve,
-            Self::Transforms => changed.transforms = other.transforms,
+            Self::OpaqueOrder => quality.opaque_order = others.opaque_order,
+            Self::BlendedOrder => quality.blended_order = others.blended_order,
+            Self::Culling => quality.culling = others.culling,
+            Self::Occlusion => quality.occlusion = others.occlusion,
+            Self::Normals => quality.normals = others.normals,
+            Self::Diffuse => quality.diffuse = others.diffuse,
+            Self::Vertices => quality.vertices = others.vertices,
+            Self::LevelOfDetail => quality.level_of_detail = others.level_of_detail,
+            Self::DepthPrePass => quality.depth_pre_pass = others.depth_pre_pass,
+            Self::ShadowSide => quality.shadows.side = others.shadows.side,
+            Self::ShadowFilter => quality.shadows.filter = others.shadows.filter,
+            Self::ShadowBias => quality.shadows.bias = others.shadows.bias,
+            Self::ShadowInterval => quality.shadows.interval = others.shadows.interval,
+            Self::ShadowEdge => quality.shadows.widest_edge = others.shadows.widest_edge,
+            Self::LightCutOff => quality.light_cut_off = others.light_cut_off,
+            Self::RadianceSum => quality.radiance_sum = others.radiance_sum,
+            Self::ToneCurve => quality.tone_curve = others.tone_curve,
+            Self::Transforms => quality.transforms = others.transforms,
+            Self::Cascades => changed.maps.cascades = other.maps.cascades,
+            Self::MaxDistance => changed.maps.max_distance = other.maps.max_distance,
+            Self::Redraw => form.interval = forms.interval,
+            Self::ViewSize => form.size = forms.size,
+            Self::ViewLevelOfDetail => form.level_of_detail_scale = forms.level_of_detail_scale,
+            Self::ViewCameras => form.max_cameras = forms.max_cameras,
+            Self::ViewLeftOut => changed.draws_mirrors = other.draws_mirrors,
+            Self::ImpostorAngle => changed.impostor = other.impostor,
         }
         changed
     }
 }
 
-/// All settings; [`Quality::exact`] first.
-pub fn all() -> Vec<Setting> {
+/// All settings of what the subject has; [`Configuration::exact`] first.
+pub fn all(subject: &Subject) -> Vec<Setting> {
+    let exact = Configuration::exact();
     let mut settings = Vec::new();
-    let mut add = |knob, name: &str, quality| settings.push(Setting { knob, name: name.to_owned(), quality });
-    let exact = Quality::exact();
-    for (name, quality) in [("exact", exact), ("balanced", Quality::balanced()), ("fast", Quality::fast())] {
-        add(Knob::Preset, name, quality);
+    let mut add =
+        |knob, name: &str, configuration| settings.push(Setting { knob, name: name.to_owned(), configuration });
+    add(Knob::Preset, "exact", exact);
+    add(Knob::Preset, "balanced", Configuration::preset(Quality::balanced()));
+    add(Knob::Preset, "fast", Configuration::preset(Quality::fast()));
+    add_of_quality(|knob, name, quality| add(knob, name, Configuration { quality, ..exact }));
+    add_of_maps(|knob, name, maps| add(knob, name, Configuration { maps, ..exact }));
+    if !subject.mirrors.is_empty() {
+        add_of_mirrors(&mut add);
     }
+    if subject.impostor.is_some() {
+        for degrees in [0.0, 2.0, 5.0] {
+            let impostor = Some(degrees);
+            add(Knob::ImpostorAngle, &format!("{degrees}°"), Configuration { impostor, ..exact });
+        }
+    }
+    settings
+}
+
+fn add_of_maps(mut add: impl FnMut(Knob, &str, ShadowMaps)) {
+    let exact = Configuration::exact().maps;
+    for cascades in 1..exact.cascades {
+        add(Knob::Cascades, &cascades.to_string(), ShadowMaps { cascades, ..exact });
+    }
+    for max_distance in [7.5, 15.0, 30.0] {
+        add(Knob::MaxDistance, &format!("{max_distance} m"), ShadowMaps { max_distance, ..exact });
+    }
+}
+
+fn add_of_mirrors(mut add: impl FnMut(Knob, &str, Configuration)) {
+    let exact = Configuration::exact();
+    let best = ViewForm::BEST;
+    let drawn = |mirrors| Configuration { mirrors, ..exact };
+    for interval in [2, 4] {
+        add(Knob::Redraw, &format!("{interval} frames"), drawn(ViewForm { interval, ..best }));
+    }
+    for size in [0.5, 0.25] {
+        add(Knob::ViewSize, &size.to_string(), drawn(ViewForm { size, ..best }));
+    }
+    for level_of_detail_scale in [2.0, 4.0] {
+        // There is nothing to scale in `exact`.
+        let quality = Quality { level_of_detail: 1.0, ..exact.quality };
+        let configuration = Configuration { quality, ..drawn(ViewForm { level_of_detail_scale, ..best }) };
+        add(Knob::ViewLevelOfDetail, &format!("{level_of_detail_scale} × 1 pixel"), configuration);
+    }
+    add(Knob::ViewCameras, "1 of 2", drawn(ViewForm { max_cameras: 1, ..best }));
+    add(Knob::ViewLeftOut, "left out", Configuration { draws_mirrors: false, ..exact });
+}
+
+/// The settings of the fields of [`Quality`].
+fn add_of_quality(mut add: impl FnMut(Knob, &str, Quality)) {
+    let exact = Quality::exact();
 
     let far = 1000.0;
     let key = |bits, curve| DepthKey { bits, curve };
@@ -196,5 +291,4 @@ pub fn all() -> Vec<Setting> {
     add(Knob::ToneCurve, "clipped", Quality { tone_curve: ToneCurve::Clipped, ..exact });
     add(Knob::Transforms, "camera-relative", exact);
     add(Knob::Transforms, "absolute", Quality { transforms: TransformPrecision::Absolute, ..exact });
-    settings
 }

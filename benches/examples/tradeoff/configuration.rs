@@ -1,0 +1,38 @@
+//! Everything that a knob sets.
+
+use drawloom::quality::Quality;
+use drawloom::view::ShadowMaps;
+use drawloom::{Rung, ViewForm};
+
+/// The values of all knobs, wherever an engine sets them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Configuration {
+    /// Of the renderer.
+    pub quality: Quality,
+    /// Of the deferred pipeline. [`Configuration::quality`] sets the side, the bias and the filter.
+    pub maps: ShadowMaps,
+    /// The form of the mirrors' views.
+    pub mirrors: ViewForm,
+    /// Whether the mirrors' views are drawn at all.
+    pub draws_mirrors: bool,
+    /// The `max_angle` of [`Camera::impostor`](drawloom::scene::Camera::impostor), in degrees. `None` draws the original.
+    pub impostor: Option<f64>,
+}
+
+impl Configuration {
+    /// The most accurate one.
+    pub fn exact() -> Self {
+        let maps = ShadowMaps { cascades: ShadowMaps::MAX_CASCADES, ..ShadowMaps::default() };
+        Self { quality: Quality::exact(), maps, mirrors: ViewForm::BEST, draws_mirrors: true, impostor: None }
+    }
+
+    /// A preset of [`Quality`], with what an engine gets that sets nothing else.
+    pub fn preset(quality: Quality) -> Self {
+        Self { quality, maps: ShadowMaps::default(), ..Self::exact() }
+    }
+
+    /// The rung of the mirrors' views.
+    pub fn rung(&self) -> Rung {
+        if self.draws_mirrors { Rung::Drawn(self.mirrors) } else { Rung::LeftOut }
+    }
+}
