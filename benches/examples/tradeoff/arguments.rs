@@ -64,7 +64,7 @@ impl Arguments {
     pub fn checked() -> Self {
         let mut arguments: Self = drawloom_output::parse_arguments();
         if arguments.quick {
-            (arguments.width, arguments.rounds) = (240, 0);
+            (arguments.width, arguments.rounds) = (160, 0);
         }
         if arguments.budget_ms.is_some_and(|budget| !(budget > 0.0 && budget.is_finite())) {
             let error = <Self as clap::CommandFactory>::command()

@@ -1,8 +1,11 @@
 //! Everything that a knob sets.
 
 use drawloom::quality::Quality;
+use drawloom::scene::LayerMask;
 use drawloom::view::ShadowMaps;
 use drawloom::{Rung, ViewForm};
+
+use crate::subject::NO_CASTER;
 
 /// The values of all knobs, wherever an engine sets them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,17 +25,21 @@ pub struct Configuration {
 impl Configuration {
     /// The most accurate one.
     pub fn exact() -> Self {
-        let maps = ShadowMaps { cascades: ShadowMaps::MAX_CASCADES, ..ShadowMaps::default() };
+        let maps = ShadowMaps { cascades: ShadowMaps::MAX_CASCADES, ..default_maps() };
         Self { quality: Quality::exact(), maps, mirrors: ViewForm::BEST, draws_mirrors: true, impostor: None }
     }
 
     /// A preset of [`Quality`], with what an engine gets that sets nothing else.
     pub fn preset(quality: Quality) -> Self {
-        Self { quality, maps: ShadowMaps::default(), ..Self::exact() }
+        Self { quality, maps: default_maps(), ..Self::exact() }
     }
 
     /// The rung of the mirrors' views.
     pub fn rung(&self) -> Rung {
         if self.draws_mirrors { Rung::Drawn(self.mirrors) } else { Rung::LeftOut }
     }
+}
+
+fn default_maps() -> ShadowMaps {
+    ShadowMaps { layers: LayerMask(!NO_CASTER.0), ..ShadowMaps::default() }
 }

@@ -9,26 +9,25 @@ use drawloom_testing::scenes::leveled::globe;
 use drawloom_testing::scenes::square;
 
 use crate::Failure;
-use crate::subject::{ImpostorSquare, MIRRORS, ORIGINAL, SQUARE, SQUARE_TYPE, Subject};
+use crate::subject::{ImpostorSquare, MIRRORS, NO_CASTER, ORIGINAL, SQUARE, SQUARE_TYPE, Subject};
 
 /// The layer of what is neither a mirror's surface nor the impostor or its original.
 const WORLD: LayerMask = LayerMask::layer(0);
 
-/// Where the globes with levels of detail stand: some before the wall, one behind it, and the others beside it up to 40 m away.
-const GLOBES: [[f64; 3]; 9] = [
-    [-5.0, 1.0, -1.0],
-    [5.2, 1.0, -2.0],
-    [0.0, 1.0, -9.0],
-    [-9.0, 1.0, -4.0],
-    [9.5, 1.0, -6.0],
-    [-14.0, 1.0, -11.0],
-    [16.0, 1.0, -15.0],
-    [-24.0, 1.0, -22.0],
-    [30.0, 1.0, -30.0],
+/// Where the globes with levels of detail stand, and their radii: some before the wall, one behind it, others beside it up to 40 m away, and
+/// the last behind the camera, where the first mirror shows it.
+const GLOBES: [[f64; 4]; 10] = [
+    [-5.0, 1.0, -1.0, 1.0],
+    [5.2, 1.0, -2.0, 1.0],
+    [0.0, 1.0, -9.0, 1.0],
+    [-9.0, 1.0, -4.0, 1.0],
+    [9.5, 1.0, -6.0, 1.0],
+    [-14.0, 1.0, -11.0, 1.0],
+    [16.0, 1.0, -15.0, 1.0],
+    [-24.0, 1.0, -22.0, 1.0],
+    [30.0, 1.0, -30.0, 1.0],
+    [4.0, 1.8, 13.0, 2.5],
 ];
-
-/// Columns and rows of the ground's tiles, which are 12 m wide.
-const GROUND: [u32; 2] = [7, 4];
 
 /// The centre of the globes that the impostor stands for, and the radius around them.
 const CLUSTER: (DVec3, f64) = (DVec3::new(3.9, 1.2, 2.0), 1.0);
@@ -48,16 +47,12 @@ pub fn every_knob() -> Result<Subject, Failure> {
     let clay = scene.add(Material { diffuse: Vec3::new(0.6, 0.4, 0.3), ..Material::default() })?;
     let leaf = scene.add(Material { diffuse: Vec3::new(0.2, 0.5, 0.2), ..Material::default() })?;
 
-    // In tiles: hemispherical lights draw no edges that are long and near.
-    for tile in 0..GROUND[0] * GROUND[1] {
-        let [column, row] = [tile % GROUND[0], tile / GROUND[0]].map(f64::from);
-        let position = DVec3::new((column - f64::from(GROUND[0] - 1) * 0.5) * 12.0, -0.02, 6.0 - row * 12.0);
-        let object = RenderObject { layers: WORLD, ..RenderObject::new(plate, clay, position) };
-        let orientation = Quat::from_rotation_x(-FRAC_PI_2);
-        scene.add_object(RenderObject { orientation, scale: Vec3::splat(6.0), ..object })?;
-    }
-    for position in GLOBES {
-        scene.add_object(RenderObject { layers: WORLD, ..RenderObject::new(globe, clay, DVec3::from(position)) })?;
+    let mut ground = RenderObject::new(plate, clay, DVec3::Y * -0.02);
+    (ground.orientation, ground.scale) = (Quat::from_rotation_x(-FRAC_PI_2), Vec3::splat(80.0));
+    scene.add_object(RenderObject { layers: NO_CASTER, ..ground })?;
+    for [x, y, z, radius] in GLOBES {
+        let globe = RenderObject::new(globe, clay, DVec3::new(x, y, z));
+        scene.add_object(RenderObject { layers: WORLD, scale: Vec3::splat(radius as f32), ..globe })?;
     }
 
     let (center, radius) = CLUSTER;

@@ -25,6 +25,9 @@ pub const ORIGINAL: LayerMask = LayerMask::layer(3);
 /// The layer of the impostor's square.
 pub const SQUARE: LayerMask = LayerMask::layer(4);
 
+/// The layer of what is lit and casts no shadow: wide ground would fill the maps.
+pub const NO_CASTER: LayerMask = LayerMask::layer(5);
+
 /// The material type of the impostor's square, so that the pipeline does not draw it.
 pub const SQUARE_TYPE: MaterialType<u32> = MaterialType::new("impostor");
 
