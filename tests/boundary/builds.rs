@@ -92,7 +92,7 @@ struct Still {
 impl<R: Real> DeformationCpuShader<R> for Still {
     fn deform(&self, _: &PassInputs<'_, R>, _: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexInput<R> {
         call(Kind::Step, "deform");
-        vertex.clone()
+        *vertex
     }
 }
 

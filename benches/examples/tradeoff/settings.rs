@@ -177,7 +177,7 @@ pub fn all(subject: &Subject) -> Vec<Setting> {
         add_of_mirrors(&mut add);
     }
     if subject.impostor.is_some() {
-        for degrees in [0.0, 2.0, 5.0] {
+        for degrees in [0.0, 0.5, 2.0, 5.0] {
             let impostor = Some(degrees);
             add(Knob::ImpostorAngle, &format!("{degrees}°"), Configuration { impostor, ..exact });
         }
