@@ -102,6 +102,20 @@ impl WorkersArguments {
     }
 }
 
+/// The number of workers of a run that has one only. Peers run on as many threads.
+#[derive(Args)]
+pub struct WorkerCountArgument {
+    /// Measures with this number of workers, at most as many as there are cores; by default, with as many.
+    #[arg(long, value_name = "NUMBER", value_parser = |text: &str| worker_count(text, cores()))]
+    workers: Option<usize>,
+}
+
+impl WorkerCountArgument {
+    pub fn count(&self) -> usize {
+        self.workers.unwrap_or_else(cores)
+    }
+}
+
 /// The number of cores that this process may use, or of workers that a scheduler may have, if that is less.
 pub(crate) fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(Scheduler::MAX_WORKERS)
@@ -165,6 +179,24 @@ mod tests {
             let bound = format!("from 1 to {}, the number of cores here", cores());
             assert!(error.to_string().contains(&bound), "{text:?}: {error}");
         }
+    }
+
+    #[test]
+    fn a_run_with_one_number_of_workers_has_that_of_the_cores_by_default() {
+        #[derive(Parser)]
+        struct OneNumber {
+            #[command(flatten)]
+            workers: WorkerCountArgument,
+        }
+        let count = |arguments: &[&str]| {
+            let parsed = OneNumber::try_parse_from(["bench"].iter().chain(arguments));
+            parsed.map(|arguments| arguments.workers.count()).map_err(|error| error.kind())
+        };
+        assert_eq!(count(&[]), Ok(cores()));
+        assert_eq!(count(&["--workers", "1"]), Ok(1));
+        assert_eq!(count(&["--workers=0"]), Err(ErrorKind::ValueValidation));
+        assert_eq!(count(&["--workers=1,1"]), Err(ErrorKind::ValueValidation));
+        assert_eq!(count(&[&format!("--workers={}", cores() + 1)]), Err(ErrorKind::ValueValidation));
     }
 
     #[test]

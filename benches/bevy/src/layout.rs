@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-/// Width and height of each picture, in pixels.
+/// Objects of the largest scenes. Bevy has 176 bytes for each object of each camera in one buffer, and four cameras.
+pub const MAX_OBJECTS: u32 = 1_000_000;
+/// Width and height of pictures that nobody asked for in another size, in pixels.
 pub const PICTURE: u32 = 256;
 /// Cube meshes. They are equal, but are assets of their own.
 pub const MESHES: usize = 4;
@@ -28,6 +30,8 @@ const TURN: u32 = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     AllObjects,
+    /// Neither objects nor cameras.
+    Nothing,
     /// Every hundredth object.
     FewObjects,
     /// The cameras turn, and no object moves.
@@ -41,6 +45,8 @@ pub struct Layout {
     pub name: &'static str,
     pub objects: usize,
     pub cameras: usize,
+    /// Width and height of each camera's picture, in pixels.
+    pub picture: u32,
     pub motion: Motion,
     /// Whether Drawloom's objects are entities of a `bevy_ecs` world, rather than arrays.
     pub has_entities: bool,
@@ -49,12 +55,17 @@ pub struct Layout {
 impl Layout {
     /// All objects move, before one camera.
     pub const fn objects(objects: usize) -> Self {
-        Self { name: "objects", objects, cameras: 1, motion: Motion::AllObjects, has_entities: false }
+        Self { name: "objects", objects, cameras: 1, picture: PICTURE, motion: Motion::AllObjects, has_entities: false }
     }
 
     /// One object of a hundred moves.
     pub const fn few(objects: usize) -> Self {
         Self { name: "few", motion: Motion::FewObjects, ..Self::objects(objects) }
+    }
+
+    /// Nothing moves.
+    pub const fn still(objects: usize) -> Self {
+        Self { name: "still", motion: Motion::Nothing, ..Self::objects(objects) }
     }
 
     /// The camera turns.
@@ -91,7 +102,7 @@ impl Layout {
         match self.motion {
             Motion::AllObjects => true,
             Motion::FewObjects => object.is_multiple_of(100),
-            Motion::Cameras => false,
+            Motion::Nothing | Motion::Cameras => false,
         }
     }
 

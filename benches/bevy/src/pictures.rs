@@ -7,7 +7,7 @@ use drawloom::wgpu;
 use drawloom_output::PictureFile;
 
 use crate::contender::{Contender, Failure};
-use crate::layout::{Layout, PICTURE};
+use crate::layout::Layout;
 
 /// A pixel's channels are at most this where no object is.
 const BACKGROUND: u8 = 8;
@@ -17,15 +17,17 @@ const MIXED: u8 = 12;
 const SILHOUETTE_TOLERANCE: f64 = 0.05;
 const COLOR_TOLERANCE: f64 = 0.05;
 
-/// Reads a texture of [`PICTURE`]² pixels of four bytes.
+/// Reads a texture of pixels of four bytes.
 ///
 /// # Errors
 /// Returns an error if it cannot be read.
 pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Result<Vec<u8>, Failure> {
-    let bytes_per_row = PICTURE * 4;
+    let wgpu::Extent3d { width, height, .. } = texture.size();
+    let row = width * 4;
+    let bytes_per_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
-        size: u64::from(bytes_per_row * PICTURE),
+        size: u64::from(bytes_per_row) * u64::from(height),
         usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
         mapped_at_creation: false,
     });
@@ -41,7 +43,8 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
     });
     device.poll(wgpu::PollType::wait_indefinitely())?;
     receiver.recv()??;
-    Ok(buffer.get_mapped_range(..)?.to_vec())
+    let padded = buffer.get_mapped_range(..)?;
+    Ok(padded.chunks_exact(bytes_per_row as usize).flat_map(|padded| &padded[..row as usize]).copied().collect())
 }
 
 /// Compares the contenders' pictures of the same frame, camera by camera, and saves them into `folder`, if there is one.
@@ -56,7 +59,7 @@ pub fn compare(contenders: &mut [Box<dyn Contender>], layout: &Layout, folder: O
             let picture = contender.picture(camera)?;
             if let Some(folder) = folder {
                 let file = format!("{}-{}-{camera}-{name}.png", layout.name, layout.objects);
-                PictureFile::new(folder.join(file))?.write([PICTURE; 2], &picture)?;
+                PictureFile::new(folder.join(file))?.write([layout.picture; 2], &picture)?;
             }
             let colors: Vec<_> = picture.chunks_exact(4).map(Color::of).collect();
             if first.is_empty() {

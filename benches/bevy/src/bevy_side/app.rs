@@ -92,8 +92,8 @@ fn run_schedules_serially(world: &mut World) {
     }
 }
 
-/// The thread that calls `update` works for the pool while it waits. A pool of one thread would not share loops at all. The other pools
-/// have nothing to do here; each must have a thread.
+/// The thread that calls `update` works for the pool while it waits. A pool of one thread does not share loops at all, as one worker would
+/// not, so two workers are a pool of two as well. The other pools have nothing to do here; each must have a thread.
 fn task_pools(threads: usize) -> TaskPoolOptions {
     let exactly = |threads| TaskPoolThreadAssignmentPolicy {
         min_threads: threads,
@@ -105,7 +105,7 @@ fn task_pools(threads: usize) -> TaskPoolOptions {
     TaskPoolOptions {
         io: exactly(1),
         async_compute: exactly(1),
-        compute: exactly((threads - 1).max(2)),
+        compute: exactly(if threads == 1 { 1 } else { (threads - 1).max(2) }),
         ..TaskPoolOptions::default()
     }
 }

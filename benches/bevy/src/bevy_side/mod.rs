@@ -8,7 +8,9 @@ mod scene;
 use std::time::{Duration, Instant};
 
 use bevy_app::{App, AppLabel, SubApps};
+use bevy_pbr::MeshUniform;
 use bevy_render::RenderApp;
+use bevy_render::render_resource::ShaderType;
 use bevy_render::renderer::{RenderDevice, RenderQueue};
 use drawloom::wgpu;
 use drawloom_benches::backends::BackendName;
@@ -32,7 +34,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Default => "bevy",
             Self::SerialSchedules => "bevy-serial-schedules",
@@ -48,6 +50,11 @@ impl Mode {
     fn is_pipelined(self) -> bool {
         self == Self::Pipelined
     }
+}
+
+/// What Bevy has for each object of each camera in one buffer.
+pub fn bytes_per_object() -> u64 {
+    MeshUniform::min_size().get()
 }
 
 /// A Bevy app.

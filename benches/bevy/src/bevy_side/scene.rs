@@ -28,7 +28,7 @@ use bevy_transform::components::Transform;
 use drawloom::wgpu;
 
 use super::Mode;
-use crate::layout::{self, Layout, Motion, PICTURE};
+use crate::layout::{self, Layout, Motion};
 
 /// An object that moves.
 #[derive(Component)]
@@ -81,7 +81,7 @@ pub fn spawn(world: &mut World, layout: &Layout, mode: Mode, device: &RenderDevi
         Transform::default().looking_to(Vec3::from_array(layout::LIGHT), Vec3::Y),
     ));
     let spawn = |(index, position)| {
-        let (camera, texture) = spawn_camera(world, index, position, device);
+        let (camera, texture) = spawn_camera(world, layout.picture, (index, position), device);
         if layout.motion == Motion::Cameras {
             world.entity_mut(camera).insert(Turning);
         }
@@ -117,11 +117,17 @@ fn spawn_objects(world: &mut World, layout: &Layout, mode: Mode) {
     }
 }
 
-fn spawn_camera(world: &mut World, index: usize, position: [f64; 3], device: &RenderDevice) -> (Entity, wgpu::Texture) {
+/// Adds the camera of this index and position. Its picture is square.
+fn spawn_camera(
+    world: &mut World,
+    side: u32,
+    (index, position): (usize, [f64; 3]),
+    device: &RenderDevice,
+) -> (Entity, wgpu::Texture) {
     let format = wgpu::TextureFormat::Rgba8UnormSrgb;
     let texture = device.wgpu_device().create_texture(&wgpu::TextureDescriptor {
         label: Some("picture"),
-        size: wgpu::Extent3d { width: PICTURE, height: PICTURE, depth_or_array_layers: 1 },
+        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
@@ -131,7 +137,7 @@ fn spawn_camera(world: &mut World, index: usize, position: [f64; 3], device: &Re
     });
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     let handle = ManualTextureViewHandle(index as u32);
-    let target = ManualTextureView { texture_view: view.into(), size: UVec2::splat(PICTURE), view_format: format };
+    let target = ManualTextureView { texture_view: view.into(), size: UVec2::splat(side), view_format: format };
     world.resource_mut::<ManualTextureViews>().insert(handle, target);
     let camera = world.spawn((
         Camera3d::default(),

@@ -13,7 +13,7 @@ use crate::layout::{self, Layout, Motion};
 pub struct Arrays {
     surroundings: Surroundings,
     motion: Motion,
-    /// The objects that move, if they are few.
+    /// The objects that move, unless all do.
     moving: Vec<u32>,
     positions: Vec<DVec3>,
     orientations: Vec<Quat>,
@@ -29,7 +29,7 @@ impl Arrays {
         let objects = 0..layout.objects;
         let moving = match layout.motion {
             Motion::AllObjects => Vec::new(),
-            Motion::FewObjects | Motion::Cameras => {
+            Motion::FewObjects | Motion::Nothing | Motion::Cameras => {
                 (0..).zip(objects.clone()).filter(|&(_, object)| layout.moves(object)).map(|(index, _)| index).collect()
             }
         };
@@ -55,6 +55,7 @@ impl World for Arrays {
                 positions.iter_mut().for_each(|position| *position += step);
             })?,
             Motion::FewObjects => self.moving.iter().for_each(|&object| self.positions[object as usize] += step),
+            Motion::Nothing => {}
             Motion::Cameras => self.surroundings.turn(frame),
         }
         Ok(())
@@ -71,7 +72,7 @@ impl World for Arrays {
             // As Bevy knows by itself which components changed. The first frame is derived anew in any case.
             changes: match self.motion {
                 Motion::AllObjects => Changes::Unknown,
-                Motion::FewObjects | Motion::Cameras => Changes::Objects(&self.moving),
+                Motion::FewObjects | Motion::Nothing | Motion::Cameras => Changes::Objects(&self.moving),
             },
             ..self.surroundings.as_scene_ref()
         })

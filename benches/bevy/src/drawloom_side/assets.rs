@@ -40,7 +40,7 @@ impl Surroundings {
         let camera = |(index, position)| Camera {
             projection: Projection::Perspective { field_of_view: layout::FIELD_OF_VIEW },
             near: layout::NEAR,
-            size: [layout::PICTURE; 2],
+            size: [layout.picture; 2],
             ..Camera::looking_at(format!("camera {index}"), DVec3::from_array(position), DVec3::ZERO)
         };
         let cameras = layout.cameras().enumerate().map(camera).collect();

@@ -45,6 +45,8 @@ pub struct Drawloom {
 }
 
 impl Drawloom {
+    pub const NAME: &str = "drawloom";
+
     /// # Errors
     /// Returns an error if no device or renderer can be created.
     pub fn new(backend: BackendName, layout: &Layout, threads: usize) -> Result<Self, Failure> {
@@ -68,7 +70,7 @@ impl Drawloom {
 
 impl Contender for Drawloom {
     fn name(&self) -> &'static str {
-        "drawloom"
+        Self::NAME
     }
 
     fn color(&self) -> usize {
