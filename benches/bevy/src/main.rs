@@ -21,15 +21,16 @@
 //!
 //! Drawloom is told what moves in *few*, *turn* and *still*, as Bevy knows by itself.
 //!
-//! On the no-op backend the device does nothing and takes no time. Bevy leaves more to it: compute shaders compute the matrices of its
-//! objects, cull them and write their draws. Drawloom culls and makes draws on the CPU. So the ratios of the no-op backend are as good
-//! for Bevy as those of a device that is infinitely fast. On the adapter, *drawn* has the device's time, measured alike for all: until
-//! it is idle.
+//! On the no-op backend the device does nothing and takes no time. Bevy leaves more to it: compute shaders compute the
+//! matrices of its objects, cull them and write their draws. Drawloom culls and makes draws on the CPU. So the ratios
+//! of the no-op backend are as good for Bevy as those of a device that is infinitely fast. On the adapter, *drawn* has
+//! the device's time, measured alike for all: until it is idle.
 //!
 //! The contenders are interleaved, in bursts of frames. Before they are measured, each must hand every object of every camera to the
 //! device; on the adapter the pictures of a frame must cover the same pixels with the same brightest channel, but for a few.
 //!
-//! The last line names the scenes in which a mode of Bevy is faster. Files are written at the end of a run, each in one step.
+//! The last line names the scenes in which a mode of Bevy is faster. Files are written at the end of a run, each in one
+//! step.
 
 mod bevy_side;
 mod contender;
@@ -45,6 +46,7 @@ use std::process::ExitCode;
 use clap::{Parser, value_parser};
 use drawloom_benches::arguments::WorkerCountArgument;
 use drawloom_benches::backends::BackendName;
+use drawloom_benches::chart::grouped;
 use drawloom_benches::harness::progress_bar;
 use drawloom_output::{OutputFile, create_folder, print_diagnostic};
 
@@ -79,7 +81,12 @@ struct Arguments {
     #[command(flatten)]
     workers: WorkerCountArgument,
     /// Width and height of each picture, in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = layout::PICTURE, value_parser = value_parser!(u32).range(64..=4096))]
+    #[arg(
+        long,
+        value_name = "PIXELS",
+        default_value_t = layout::PICTURE,
+        value_parser = value_parser!(u32).range(64..=4096)
+    )]
     picture: u32,
     /// Writes the results as JSON.
     #[arg(long, value_name = "FILE")]
@@ -194,9 +201,11 @@ fn drawable(mut layouts: Vec<Layout>, backend: BackendName) -> Result<Vec<Layout
         let fits = needed <= allowed;
         if !fits {
             print_diagnostic!(
-                "The scene {} with {} objects is left out: Bevy has {needed} bytes of objects in a buffer, and this adapter allows {allowed}.",
+                "{}, {} objects, is left out: Bevy needs a buffer of {} bytes, and this adapter binds at most {}.",
                 layout.name,
-                layout.objects
+                grouped(layout.objects as f64),
+                grouped(needed as f64),
+                grouped(allowed as f64)
             );
         }
         fits

@@ -29,7 +29,8 @@ pub struct Extent {
 /// measured when the others are gone.
 const GROUPS: [&[Mode]; 2] = [&[Mode::Default, Mode::SerialSchedules, Mode::DeviceCulling], &[Mode::Pipelined]];
 
-/// From this many objects on, over all cameras, a scene is measured in fewer bursts: its frames take long, and vary less.
+/// From this many objects on, over all cameras, a scene is measured in fewer bursts: its frames take long, and vary
+/// less.
 const MANY_OBJECTS: usize = 500_000;
 
 /// Frames before the first burst: Drawloom measures costs and orders its objects in them.

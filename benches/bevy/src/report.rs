@@ -167,7 +167,8 @@ impl Report {
         table.print();
     }
 
-    /// In no scene is a frame of Bevy's fastest mode shorter: on noop until submit returns, on the adapter until the device is idle.
+    /// In no scene is a frame of Bevy's fastest mode shorter: on noop until submit returns, on the adapter until the
+    /// device is idle.
     pub fn targets(&self) -> Targets {
         let mut targets = Targets::new();
         for rows in self.scenes() {

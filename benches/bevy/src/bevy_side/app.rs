@@ -92,8 +92,9 @@ fn run_schedules_serially(world: &mut World) {
     }
 }
 
-/// The thread that calls `update` works for the pool while it waits. A pool of one thread does not share loops at all, as one worker would
-/// not, so two workers are a pool of two as well. The other pools have nothing to do here; each must have a thread.
+/// The thread that calls `update` works for the pool while it waits. A pool of one thread does not share loops at all:
+/// that is right for one worker, but two are a pool of two. The other pools have nothing to do here; each must have a
+/// thread.
 fn task_pools(threads: usize) -> TaskPoolOptions {
     let exactly = |threads| TaskPoolThreadAssignmentPolicy {
         min_threads: threads,

@@ -19,7 +19,7 @@ use bevy_render::{ExtractSchedule, Render, RenderSystems};
 use crate::contender::Failure;
 
 /// The longest time in which a frame is rendered.
-const TIMEOUT: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_mins(10);
 
 /// Counts frames, and on request what they draw.
 #[derive(Clone, Default, Resource)]
