@@ -52,7 +52,7 @@ impl WarningList {
                 ui.label(rejection.reason.name());
                 ui.label(rejection.count.to_string());
                 ui.label(format!("index {}", rejection.first));
-                ui.label(rejection.name.as_deref().map(|name| Escaped(name).to_string()).unwrap_or_default());
+                ui.label(rejection.name.as_deref().map(|name| Escaped::new(name).to_string()).unwrap_or_default());
                 ui.label(match self.frames - frame {
                     0 => "in the latest frame".to_owned(),
                     ago => format!("{ago} frames ago"),

@@ -2,7 +2,6 @@
 
 use std::fmt::{self, Display, Write as _};
 use std::io::{self, ErrorKind, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
@@ -11,14 +10,9 @@ use drawloom::text::Escaped;
 /// The first error of the standard output, until it is [taken](check_output).
 static OUTPUT_ERROR: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// A path as text, [`Escaped`].
-pub fn path_text(path: &Path) -> String {
-    text(path.display())
-}
-
 /// What a file holds, such as a name, as text on one line, [`Escaped`].
 pub fn text(text: impl Display) -> String {
-    Escaped(&text.to_string()).to_string()
+    Escaped::new(&text.to_string()).to_string()
 }
 
 /// Prints a line on the standard output, [`Escaped`] except for line feeds and tabs.
@@ -128,7 +122,7 @@ fn escaped_lines(text: impl AsRef<str>) -> String {
     let is_layout = |character: char| matches!(character, '\n' | '\t');
     let parts = text.as_ref().split_inclusive(is_layout).map(|part| {
         let end = part.trim_end_matches(is_layout).len();
-        [&Escaped(&part[..end]).to_string(), &part[end..]].concat()
+        [&Escaped::new(&part[..end]).to_string(), &part[end..]].concat()
     });
     parts.collect()
 }
@@ -142,8 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn control_characters_in_paths_are_escaped() {
-        assert_eq!(path_text(Path::new("a/été\u{1b}[31m\n.png")), "a/été\\u{1b}[31m\\u{a}.png");
+    fn control_characters_in_names_are_escaped() {
         assert_eq!(text("\u{7}\u{9b}\r\t\u{7f}\u{202e}"), "\\u{7}\\u{9b}\\u{d}\\u{9}\\u{7f}\\u{202e}");
     }
 

@@ -7,11 +7,10 @@ use drawloom::glam::{DAffine3, DQuat, DVec3};
 use crate::accessors::Accessors;
 use crate::document::Source;
 use crate::element::{Element, Kind};
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::json::Json;
 use crate::keyframes::Keyframes;
 use crate::nodes::{LocalTransform, Nodes};
-use crate::text::excerpt;
 use crate::transforms::decompose;
 use crate::warnings::Warnings;
 

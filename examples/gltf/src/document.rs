@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::element::{Element, Kind};
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::files::read_uri;
 use crate::glb::split;
 use crate::json::Json;
 use crate::limits::{Budget, GltfLimits, Limit};
-use crate::text::excerpt;
 use crate::version::check_version;
 use crate::warnings::Warnings;
 

@@ -2,10 +2,9 @@
 
 use std::fmt::{self, Display};
 
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::files::is_data;
 use crate::json::Json;
-use crate::text::excerpt;
 
 /// A kind of element. Each has an array in the file, and elements refer to others by their index in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

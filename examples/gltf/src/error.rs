@@ -4,9 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use drawloom::scene::SceneError;
-
-use crate::files::path_text;
-use crate::text::excerpt;
+use drawloom::text::{self, path_text};
 
 /// A file that cannot be loaded, and why.
 #[derive(Debug, thiserror::Error)]
@@ -223,6 +221,11 @@ impl Problem {
     pub(crate) fn is_of_file(&self) -> bool {
         matches!(self, Self::OverLimit { .. })
     }
+}
+
+/// The beginning of a text of a file, as messages quote it.
+pub(crate) fn excerpt(text: &str) -> String {
+    text::excerpt(text, 80)
 }
 
 fn at_least(amount: u64, field: &str) -> String {

@@ -6,18 +6,11 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use data_url::DataUrl;
-use drawloom::text::Escaped;
+use drawloom::text::path_text;
 use percent_encoding::percent_decode_str;
 
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::limits::Limit;
-use crate::text::excerpt;
-
-/// A path as messages show it.
-pub(crate) fn path_text(path: &Path) -> String {
-    // All of it: a path that is cut cannot be found.
-    Escaped(&path.display().to_string()).to_string()
-}
 
 /// Reads a regular file.
 ///

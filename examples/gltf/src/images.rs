@@ -11,10 +11,9 @@ use indicatif::ProgressBar;
 
 use crate::document::{Bytes, Source};
 use crate::element::{Element, Kind};
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::files::read_uri;
 use crate::limits::Limit;
-use crate::text::excerpt;
 use crate::warnings::Warnings;
 
 /// Images that are being decoded, with their names in messages.

@@ -54,7 +54,6 @@ mod surface;
 mod surface_kind;
 #[cfg(feature = "draw")]
 mod surfaces;
-mod text;
 mod texture_arrays;
 mod texture_slots;
 mod transforms;

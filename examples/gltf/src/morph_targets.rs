@@ -4,7 +4,7 @@ use drawloom::glam::Vec3;
 
 use crate::accessors::Accessors;
 use crate::element::Element;
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::warnings::Warnings;
 
 /// How many numbers a vertex has for each morph target: the differences of its position, its normal and its tangent.
@@ -44,7 +44,7 @@ impl MorphTargets {
             let (target, element) = (primitive.inner(json), format!("morph target {number} of {primitive}"));
             for (name, _) in json.members() {
                 if !matches!(&**name, "POSITION" | "NORMAL" | "TANGENT") && !name.starts_with('_') {
-                    warnings.add(format!("{element}: its {} is ignored", crate::text::excerpt(name)));
+                    warnings.add(format!("{element}: its {} is ignored", excerpt(name)));
                 }
             }
             let mut parts = Vec::new();

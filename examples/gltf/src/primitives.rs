@@ -6,7 +6,7 @@ use drawloom::scene::{Mesh, Topology, Vertex};
 use crate::accessors::Accessors;
 use crate::attributes::{COLOR, JOINTS, NUMBER, SECOND_UV, TANGENT, WEIGHTS};
 use crate::element::{Element, Kind};
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::morph_targets::{MorphTargets, check_count};
 use crate::triangles::triangle_list;
 use crate::vertex_joints::VertexJoints;
@@ -199,7 +199,7 @@ fn warn_of_ignored(attributes: &Element<'_>, warnings: &mut Warnings) {
         ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0", "JOINTS_0", "WEIGHTS_0"];
     for (name, _) in attributes.json.members() {
         if !name.starts_with('_') && !READ.contains(&&**name) {
-            let name = crate::text::excerpt(name);
+            let name = excerpt(name);
             let reason = match name.split_once('_') {
                 Some(("JOINTS" | "WEIGHTS", _)) => ": four joints move a vertex at most",
                 _ => "",

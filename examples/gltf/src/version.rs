@@ -1,8 +1,7 @@
 //! The version of glTF that a file is of.
 
-use crate::error::Problem;
+use crate::error::{Problem, excerpt};
 use crate::json::Json;
-use crate::text::excerpt;
 use crate::warnings::Warnings;
 
 /// Checks that a loader of glTF 2.0 can read the file.

@@ -3,8 +3,8 @@
 use std::fmt::{self, Display, Formatter};
 use std::io;
 
-use super::excerpt::excerpt;
 use crate::scene::SceneError;
+use crate::text;
 
 /// Why an OBJ file could not be loaded. Every message names the file.
 #[derive(Debug, thiserror::Error)]
@@ -293,6 +293,11 @@ impl ObjWarning {
             Self::FannedPolygons { .. } => "model with crossing polygons",
         }
     }
+}
+
+/// The beginning of a text of a file, as messages quote it.
+pub(super) fn excerpt(text: &str) -> String {
+    text::excerpt(text, 160)
 }
 
 /// A keyword whose statements were left out.

@@ -1,7 +1,6 @@
 //! Counts statements that are left out, by keyword.
 
-use super::error::{IgnoredKeyword, ObjWarning};
-use super::excerpt::excerpt;
+use super::error::{IgnoredKeyword, ObjWarning, excerpt};
 use super::warnings::Warnings;
 
 /// The most keywords that are named: a file that is not OBJ has as many as it has lines.

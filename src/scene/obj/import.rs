@@ -17,7 +17,7 @@ use super::warnings::Warnings;
 use super::{emission, material};
 use crate::handle::Handle;
 use crate::scene::{Material, Mesh, RenderObject, Scene, SceneError, Topology, VERTEX_COLOR};
-use crate::text::Escaped;
+use crate::text::{Escaped, path_text};
 
 /// A scene from an OBJ file, without cameras.
 #[derive(Debug, Default)]
@@ -83,7 +83,7 @@ pub fn load_within(path: impl AsRef<Path>, limits: &ObjLimits) -> Result<Importe
     let path = path.as_ref();
     let file = path.display().to_string();
     let reader = files::open(path, Limit::new("scene_bytes", limits.scene_bytes))
-        .map_err(|source| ObjError::Unreadable { file: Escaped(&file).to_string(), source })?;
+        .map_err(|source| ObjError::Unreadable { file: path_text(path), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let open = |name: &str, limit: Limit| Ok(Box::new(files::open(&folder.join(name), limit)?) as Box<dyn Stream>);
     import(&file, reader, &open, limits)
@@ -122,7 +122,7 @@ pub fn read_within(
 ) -> Result<Imported, ObjError> {
     Limit::new("scene_bytes", limits.scene_bytes)
         .check(bytes.len() as u64)
-        .map_err(|source| ObjError::Unreadable { file: Escaped(file).to_string(), source })?;
+        .map_err(|source| ObjError::Unreadable { file: Escaped::new(file).to_string(), source })?;
     let open = |name: &str, limit: Limit| {
         let bytes = fetch(name)?;
         limit.check(bytes.len() as u64)?;
@@ -132,7 +132,7 @@ pub fn read_within(
 }
 
 fn import(file: &str, reader: impl BufRead, open: Open<'_>, limits: &ObjLimits) -> Result<Imported, ObjError> {
-    let file = Escaped(file).to_string();
+    let file = Escaped::new(file).to_string();
     let mut warnings = Warnings::new(limits.warnings);
     let mut preprocessed = Statements::new(reader, limits.line_bytes)
         .and_then(|statements| Preprocessed::new(statements, &file, &mut warnings))

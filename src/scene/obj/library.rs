@@ -7,8 +7,7 @@ use std::io::{self, BufRead};
 
 use glam::Vec3;
 
-use super::error::ObjWarning;
-use super::excerpt::excerpt;
+use super::error::{ObjWarning, excerpt};
 use super::files::{PossibleName, possible_names};
 use super::ignored::IgnoredStatements;
 use super::statements::{Statements, without_comment};

@@ -9,7 +9,6 @@
 
 mod emission;
 mod error;
-mod excerpt;
 mod files;
 mod geometry;
 mod ignored;

@@ -14,8 +14,7 @@ use std::io::{self, BufRead};
 
 use glam::DVec3;
 
-use super::error::ObjWarning;
-use super::excerpt::excerpt;
+use super::error::{ObjWarning, excerpt};
 use super::ignored::IgnoredStatements;
 use super::statements::{Statements, without_comment};
 use super::warnings::Warnings;

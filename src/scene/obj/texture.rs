@@ -81,7 +81,7 @@ pub(super) fn decode(
 
 /// The message of an error on one line, without control characters: some of decoders end with a line feed, or quote the file.
 fn message(error: impl ToString) -> String {
-    Escaped(error.to_string().trim()).to_string()
+    Escaped::new(error.to_string().trim()).to_string()
 }
 
 /// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
