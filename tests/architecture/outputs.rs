@@ -36,7 +36,10 @@ fn written_directly(sources: &[Source]) -> Vec<String> {
 const PRINTERS: [&str; 7] = ["print", "println", "eprint", "eprintln", "dbg", "stdout", "stderr"];
 
 /// What of clap ends a program, and prints the arguments as they are.
-const PARSERS: [&str; 4] = ["::parse()", "::parse_from(", ".get_matches()", "error.exit()"];
+const PARSERS: [&str; 5] = ["::parse()", "::parse_from(", ".get_matches()", ".exit()", "Error::exit"];
+
+/// What else is left: an event loop, and a span.
+const OTHER_EXITS: [&str; 2] = ["event_loop.exit()", "self.tracing.exit()"];
 
 /// Aborts the process, and says why where nothing else can.
 const MAY_PRINT: &str = "src/unwind/mod.rs";
@@ -69,7 +72,8 @@ fn printed_directly(sources: &[Source]) -> Vec<String> {
                 is_whole && if printer.starts_with("std") { names_stream } else { rest.starts_with('!') }
             })
         };
-        let parses = |parser: &&str| code.contains(*parser);
+        let parsing = OTHER_EXITS.iter().fold(code.to_owned(), |code, exit| code.replace(exit, ""));
+        let parses = |parser: &&str| parsing.contains(*parser);
         !code.starts_with("//") && (PRINTERS.iter().any(prints) || PARSERS.iter().any(parses))
     })
 }
@@ -114,6 +118,9 @@ fn a_line_that_is_printed_directly_is_found() {
         "Arguments::parse_from(arguments)",
         "command.get_matches()",
         "unwrap_or_else(|error| error.exit())",
+        "unwrap_or_else(|e| e.exit())",
+        "    .exit()",
+        "unwrap_or_else(clap::Error::exit)",
     ] {
         assert_eq!(count(line), 1, "{line}");
     }
@@ -128,6 +135,7 @@ fn a_line_that_is_printed_directly_is_found() {
         "let count: usize = text.parse()?;",
         "Self::try_parse_from(arguments)?",
         "event_loop.exit();",
+        "Opened { at, span: self.tracing.exit() }",
     ] {
         assert_eq!(count(line), 0, "{line}");
     }
