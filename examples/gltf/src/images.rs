@@ -13,6 +13,7 @@ use crate::document::{Bytes, Source};
 use crate::element::{Element, Kind};
 use crate::error::{Problem, excerpt};
 use crate::files::read_uri;
+use crate::jpeg::keeps_coefficients;
 use crate::limits::Limit;
 use crate::warnings::Warnings;
 
@@ -112,7 +113,7 @@ fn encoded(source: &Source, image: &Element<'_>, all: &Limit) -> Result<Encoded,
     let decoder = reader.into_decoder().map_err(|error| failed(error.to_string()))?;
     let (size, color) = (<[u32; 2]>::from(decoder.dimensions()), decoder.color_type());
     drop(decoder);
-    let taken = bytes_at_once(size, color, is_jpeg.then_some(bytes.len() as u64));
+    let taken = bytes_at_once(size, color, is_jpeg.then_some(&bytes));
     Limit::new("texture_bytes", limit).take(image, taken, 1)?;
     all.take(image, pixel_count(size), 4)?;
     Ok(Encoded { bytes, spare_bytes: (limit - taken).max(MIN_SPARE_BYTES) })
@@ -121,16 +122,19 @@ fn encoded(source: &Source, image: &Element<'_>, all: &Limit) -> Result<Encoded,
 /// What a decoder may always allocate beside the pixels, for rows and metadata.
 const MIN_SPARE_BYTES: u64 = 1 << 20;
 
-/// The greatest number of bytes that an image takes at once while it is decoded and reduced. `of_jpeg` is the number of
-/// bytes of its file if that is a JPEG.
-fn bytes_at_once(size: [u32; 2], color: ColorType, of_jpeg: Option<u64>) -> u64 {
+/// The greatest number of bytes that an image takes at once while it is decoded and reduced. `jpeg` is its file if that
+/// is a JPEG.
+fn bytes_at_once(size: [u32; 2], color: ColorType, jpeg: Option<&[u8]>) -> u64 {
     let pixels = pixel_count(size);
     let as_rgba = pixels.saturating_mul(4);
     let decoded = pixels.saturating_mul(color.bytes_per_pixel().into());
-    // The decoder copies the file. If the JPEG is progressive it keeps up to four coefficients of two bytes for each
-    // pixel, in blocks of up to 32 by 32.
+    // The decoder of JPEGs copies the file, and may keep up to four coefficients of two bytes for each pixel, in blocks
+    // of up to 32 by 32.
     let padded = pixel_count(size.map(|side| side.next_multiple_of(32)));
-    let of_decoder = of_jpeg.map_or(0, |of_file| padded.saturating_mul(8).saturating_add(of_file));
+    let of_decoder = jpeg.map_or(0, |file| {
+        let of_coefficients = if keeps_coefficients(file) { padded.saturating_mul(8) } else { 0 };
+        of_coefficients.saturating_add(file.len() as u64)
+    });
     let converted = if color == ColorType::Rgba8 { as_rgba } else { decoded.saturating_add(as_rgba) };
     let reduced = reduced_size(size).map_or(0, |size| pixel_count(size) * 4);
     decoded.saturating_add(of_decoder).max(converted).max(as_rgba.saturating_add(reduced))

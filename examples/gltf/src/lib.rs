@@ -36,6 +36,7 @@ mod error;
 mod files;
 mod glb;
 mod images;
+mod jpeg;
 mod json;
 mod keyframes;
 mod lights;

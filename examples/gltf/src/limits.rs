@@ -38,13 +38,14 @@ pub struct GltfLimits {
     pub pose_bytes: u64,
     /// The objects: one for each primitive of each node's mesh. Default: 1 Mi.
     pub objects: u64,
-    /// The lights: one for each node that has one. Every pixel adds up all lights. Default: 1,024.
+    /// The lights: one for each node whose light is not dark. Every pixel adds up all lights. Default: 1,024.
     pub lights: u64,
     /// The bytes of an image before it is decoded. Default: 256 MiB.
     pub texture_file_bytes: u64,
     /// The bytes that an image takes at once while it is decoded: 4 for each pixel, and as many as the file's format
-    /// has where that is not RGBA of 8 bits; 8 more for each pixel of a JPEG. A PNG may have 1 MiB of metadata beyond
-    /// the limit. Background jobs decode several images at once. Default: 1 GiB.
+    /// has where that is not RGBA of 8 bits. The decoder of a JPEG takes its file once more, and 8 bytes for each pixel
+    /// if the JPEG is progressive or has a scan for each component. A PNG may have 1 MiB of metadata beyond the limit.
+    /// Background jobs decode several images at once. Default: 1 GiB.
     pub texture_bytes: u64,
     /// The bytes that all images take together: those of their files, also if they cannot be decoded, and 4 for each
     /// pixel. The texture arrays that are made of them, with mip levels, take as much again at most. Default: 1 GiB.

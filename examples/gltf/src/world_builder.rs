@@ -175,7 +175,10 @@ impl<'a, 'w> WorldBuilder<'a, 'w> {
         }
         if let Some((first, count)) = left_out {
             let reason = format!("`GltfLimits::lights` is {greatest}");
-            self.warnings.add(format!("{count} lights are left out, and {first} is the first of them: {reason}"));
+            self.warnings.add(match count {
+                1 => format!("{first} is left out: {reason}"),
+                _ => format!("{count} lights are left out, and {first} is the first of them: {reason}"),
+            });
         }
         let mut shadows = 0;
         for light in &mut self.scene.lights {

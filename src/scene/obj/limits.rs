@@ -24,8 +24,9 @@ pub struct ObjLimits {
     /// The bytes of the file of a texture. Default: 256 MiB.
     pub texture_file_bytes: u64,
     /// The bytes that a texture takes while it is decoded, which are known before: 4 for each pixel, and besides those of
-    /// the file's own format where a channel has more than 8 bits, and the coefficients of a progressive JPEG. Scaling
-    /// takes no more. Default: 256 MiB, which is enough for the largest [`Texture`](crate::scene::Texture).
+    /// the file's own format where a channel has more than 8 bits, and the coefficients of a JPEG that is
+    /// progressive or has a scan for each component. Scaling takes no more. Default: 256 MiB, which is enough for the largest
+    /// [`Texture`](crate::scene::Texture).
     pub texture_bytes: u64,
     /// The bytes that all textures of the scene take together, 4 for each pixel. Default: 4 GiB.
     pub all_textures_bytes: u64,

@@ -30,7 +30,7 @@ pub(super) fn decode(
     result: Limit,
     decoded: &mut Limit,
 ) -> Result<Pixels, String> {
-    let components = match progressive_components(&mut file) {
+    let components = match kept_components(&mut file) {
         // The decoder will say so.
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => 0,
         found => found.map_err(message)?,
@@ -84,31 +84,40 @@ fn message(error: impl ToString) -> String {
     Escaped::new(error.to_string().trim()).to_string()
 }
 
-/// The number of components of a progressive JPEG, and 0 for any other file. Its decoder keeps 16 bits of each until the last
-/// scan is read.
+/// The number of components of a JPEG that is progressive, or whose first scan lacks some of them. Its decoder keeps 16 bits
+/// of each until the last scan is read. 0 for any other file, which is decoded row by row.
 ///
 /// # Errors
 /// If reading fails, or a JPEG ends before its first scan.
-fn progressive_components(file: &mut (impl BufRead + Seek)) -> io::Result<u64> {
+fn kept_components(file: &mut (impl BufRead + Seek)) -> io::Result<u64> {
     if !file.fill_buf()?.starts_with(b"\xff\xd8") {
         return Ok(0);
     }
     file.consume(2);
+    let mut of_frame = 0;
     loop {
-        match next_marker(file)? {
-            // The header of a progressive frame: its length, bits, height, width, and number of components.
-            0xc2 | 0xc6 | 0xca | 0xce => {
-                let [_, _, _, _, _, _, _, components] = read_array(file)?;
-                return Ok(u64::from(components));
+        let marker = next_marker(file)?;
+        // Its own two bytes count.
+        let length = u16::from_be_bytes(read_array(file)?);
+        let mut read = 2;
+        match marker {
+            // The header of a frame, sequential up to 0xc1: bits, height, width, and number of components.
+            0xc0 | 0xc1 | 0xc2 | 0xc6 | 0xca | 0xce => {
+                let [_, _, _, _, _, components] = read_array(file)?;
+                if marker > 0xc1 {
+                    return Ok(u64::from(components));
+                }
+                of_frame = components;
+                read += 6;
             }
-            // The first scan.
-            0xda => return Ok(0),
-            _ => {
-                // Its own two bytes count.
-                let length = u16::from_be_bytes(read_array(file)?);
-                file.seek_relative(i64::from(length) - 2)?;
+            // The first scan: its number of components.
+            0xda => {
+                let [of_scan] = read_array(file)?;
+                return Ok(if of_scan == of_frame { 0 } else { u64::from(of_frame) });
             }
+            _ => {}
         }
+        file.seek_relative(i64::from(length) - read)?;
     }
 }
 
@@ -381,15 +390,19 @@ mod tests {
     }
 
     fn components(file: &[u8]) -> u64 {
-        progressive_components(&mut Cursor::new(file)).unwrap_or(0)
+        kept_components(&mut Cursor::new(file)).unwrap_or(0)
     }
 
     #[test]
-    fn the_coefficients_of_a_progressive_jpeg_count() {
+    fn the_coefficients_that_the_decoder_of_a_jpeg_keeps_count() {
         let mut file = Vec::new();
         let encoder = image::codecs::jpeg::JpegEncoder::new(&mut file);
         encoder.write_image(&[7; 600 * 3], 30, 20, ExtendedColorType::Rgb8).unwrap();
         assert_eq!(components(&file), 0);
+        // A scan for each component.
+        let scan = file.windows(2).position(|marker| marker == [0xff, 0xda]).unwrap();
+        let split = [&file[..scan + 4], &[1], &file[scan + 5..]].concat();
+        assert_eq!(components(&split), 3);
         let header = file.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
         file[header + 1] = 0xc2;
         assert_eq!(components(&file), 3);
@@ -404,7 +417,7 @@ mod tests {
             let skipping = [&file[..header], skipped, &file[header..]].concat();
             assert_eq!(components(&skipping), 3, "{skipped:?}");
             let in_pieces = BufReader::with_capacity(header + 4, Cursor::new(&skipping));
-            assert_eq!(progressive_components(&mut { in_pieces }).unwrap(), 3, "{skipped:?}");
+            assert_eq!(kept_components(&mut { in_pieces }).unwrap(), 3, "{skipped:?}");
             let error = decode_named("a.jpg", skipping, 5999).map(drop).unwrap_err();
             assert!(error.contains("it takes 6000 bytes"), "{skipped:?}: {error}");
         }

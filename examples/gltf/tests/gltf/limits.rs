@@ -226,7 +226,7 @@ fn images() -> Result<(), Failed> {
     let limits = GltfLimits { texture_bytes: 300 * 100 * 12 - 1, ..GltfLimits::DEFAULT };
     left_out(&large, limits, "image 1 takes 8000000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
     left_out(&deep, limits, "image 1 takes 360000 bytes or more, and `GltfLimits::texture_bytes` is 359999")?;
-    // What another format is converted from is there meanwhile, and what a decoder of JPEGs may keep.
+    // What another format is converted from is there meanwhile, and what a decoder of JPEGs keeps.
     let rgb = image::DynamicImage::from(image::RgbImage::new(300, 100));
     let encoded = |image: &image::DynamicImage, format: image::ImageFormat| -> Result<Vec<u8>, Failed> {
         let mut bytes = std::io::Cursor::new(Vec::new());
@@ -234,11 +234,20 @@ fn images() -> Result<(), Failed> {
         Ok(bytes.into_inner())
     };
     let jpeg = encoded(&rgb, image::ImageFormat::Jpeg)?;
-    let of_jpeg = 300 * 100 * 3 + 320 * 128 * 8 + jpeg.len() as u64;
+    // As far as the headers go, which is all that is read before the limit is checked.
+    let progressive = {
+        let mut jpeg = jpeg.clone();
+        let frame = jpeg.windows(2).position(|pair| pair == [0xff, 0xc0]).ok_or("there is a frame")?;
+        jpeg[frame + 1] = 0xc2;
+        jpeg
+    };
+    let of_progressive = 300 * 100 * 3 + 320 * 128 * 8 + jpeg.len() as u64;
+    let limits = GltfLimits { texture_bytes: of_progressive - 1, ..GltfLimits::DEFAULT };
+    left_out(&progressive, limits, &format!("image 1 takes {of_progressive} bytes or more, and"))?;
     let converted = [
         (encoded(&rgb, image::ImageFormat::Png)?, 300 * 100 * 7),
         (encoded(&rgb.to_luma8().into(), image::ImageFormat::Png)?, 300 * 100 * 5),
-        (jpeg, of_jpeg),
+        (jpeg, 300 * 100 * 7),
     ];
     for (image, bytes) in converted {
         let limits = GltfLimits { texture_bytes: bytes - 1, ..GltfLimits::DEFAULT };
@@ -310,14 +319,19 @@ fn lights() -> Result<(), Failed> {
     expect(count >= 4 && whole.warnings.is_empty(), || format!("{count} lights, {:?}", whole.warnings))?;
     let enough = load(count as u64)?;
     expect(light_count(&enough) == count && enough.warnings.is_empty(), || format!("{:?}", enough.warnings))?;
-    let less = load(count as u64 - 2)?;
-    let limit = count - 2;
-    let expected = format!(
-        "2 lights are left out, and light 0 (lamp) of node {} is the first of them: `GltfLimits::lights` is {limit}",
-        nodes[4],
-    );
-    let is_named = less.warnings == [expected.as_str()];
-    expect(light_count(&less) == limit && is_named, || format!("{:?}, not {expected:?}", less.warnings))
+    let first = |node: usize| format!("light 0 (lamp) of node {}", nodes[node]);
+    let beyond = [
+        (1, format!("{} is left out", first(6))),
+        (2, format!("2 lights are left out, and {} is the first of them", first(4))),
+    ];
+    for (left_out, named) in beyond {
+        let limit = count - left_out;
+        let less = load(limit as u64)?;
+        let expected = format!("{named}: `GltfLimits::lights` is {limit}");
+        let is_named = less.warnings == [expected.as_str()];
+        expect(light_count(&less) == limit && is_named, || format!("{:?}, not {expected:?}", less.warnings))?;
+    }
+    Ok(())
 }
 
 /// Draws a scene with a second image.
