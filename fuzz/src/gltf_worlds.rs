@@ -7,7 +7,7 @@ use gltf_scene::{LoadOptions, load_bytes};
 use indicatif::ProgressBar;
 
 #[path = "../../examples/gltf/tests/gltf/invariants.rs"]
-mod invariants;
+pub(crate) mod invariants;
 
 use invariants::{SMALL_LIMITS, check_error, check_world};
 

@@ -10,9 +10,10 @@ use libtest_mimic::{Failed, Trial};
 /// Set in the environment of the program.
 const IS_PROGRAM: &str = "DRAWLOOM_ARGUMENTS_PROGRAM";
 
-/// What argument a test passes: escape sequences of one and two bytes, a bell, and a line of its own.
-const FORGED: &str = "\u{1b}[31mred\u{7}\u{9b}2J\nerror: forged";
-const ESCAPED: &str = "\\u{1b}[31mred\\u{7}\\u{9b}2J\\u{a}error: forged";
+/// What argument a test passes: escape sequences of one and two bytes, a bell, a character that turns
+/// text, and lines of its own.
+const FORGED: &str = "\u{1b}[31mred\u{7}\u{9b}2J\u{202e}\u{2028}\nerror: forged";
+const ESCAPED: &str = "\\u{1b}[31mred\\u{7}\\u{9b}2J\\u{202e}\\u{2028}\\u{a}error: forged";
 
 /// Draws leaves.
 #[derive(Parser)]
@@ -71,10 +72,11 @@ fn wrong() -> Result<(), Failed> {
     for arguments in [&["--count", FORGED][..], &["--tree", FORGED], &[FORGED], &[&option], &["--count", "1", FORGED]] {
         let output = run(arguments, None)?;
         let errors = String::from_utf8(output.stderr)?;
+        let is_active = |one: char| one.is_control() && one != '\n' || matches!(one, '\u{2028}' | '\u{202e}');
         ensure(output.status.code() == Some(2) && output.stdout.is_empty(), &(arguments, &output.status, &errors))?;
         ensure(errors.starts_with("error: ") && errors.contains(ESCAPED), &(arguments, &errors))?;
         ensure(errors.lines().count() > 1 && errors.ends_with(".\n"), &errors)?;
-        ensure(!errors.contains(|one: char| one.is_control() && one != '\n'), &(arguments, &errors))?;
+        ensure(!errors.contains(is_active), &(arguments, &errors))?;
         ensure(errors.lines().filter(|line| line.starts_with("error: ")).count() == 1, &(arguments, &errors))?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! No control character of a file reaches a terminal or a report, wherever in the file it is.
+//! No character of a file that does more than show reaches a terminal or a report, wherever in the file it is.
 
 use libtest_mimic::Failed;
 use serde_json::{Value, json};
@@ -17,8 +17,9 @@ pub const CASES: &[crate::Case] = &[
     ("long_names_are_cut", long),
 ];
 
-/// A title of a window, a colour, and an 8-bit control.
-const ATTACK: &str = "m\u{1b}]0;title\u{7}\u{1b}[31m\u{9b}2J\r\n\u{202e}";
+/// A title of a window, a colour, an 8-bit control, ends of lines, and all that turns the direction of text.
+const ATTACK: &str = "m\u{1b}]0;title\u{7}\u{1b}[31m\u{9b}2J\r\n\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\
+                      \u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\u{2068}\u{2069}";
 
 /// Every element has a name, and something is wrong with it.
 fn names() -> Result<(), Failed> {
@@ -104,8 +105,6 @@ fn check(builder: &Builder, whole: &Builder) -> Result<usize, Failed> {
         texts.iter().try_for_each(|text| check_text(text))?;
         let is_escaped = |text: &&String| text.contains("m\\u{1b}]0;title\\u{7}");
         seen += texts.iter().filter(is_escaped).count();
-        let turned = texts.iter().find(|text| text.contains('\u{202e}'));
-        expect(turned.is_none(), || format!("{turned:?} turns what is behind it"))?;
     }
     Ok(seen)
 }

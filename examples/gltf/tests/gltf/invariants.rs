@@ -69,7 +69,7 @@ pub fn check_world(world: &World, limits: &GltfLimits) -> Result<(), String> {
 /// Checks what is said of a file that is refused.
 ///
 /// # Errors
-/// If it does not name the file, or has a control character.
+/// If it does not name the file, or has a [forbidden](is_forbidden) character.
 pub fn check_error(error: &LoadError, file: &str) -> Result<(), String> {
     let text = error.to_string();
     expect(text.starts_with(file) && text.len() > file.len() + 10, || format!("{text:?} does not say what is wrong"))?;
@@ -77,10 +77,20 @@ pub fn check_error(error: &LoadError, file: &str) -> Result<(), String> {
 }
 
 /// # Errors
-/// If it has a control character.
+/// If it has a [forbidden](is_forbidden) character, or is long.
 pub fn check_text(text: &str) -> Result<(), String> {
-    expect(!text.chars().any(char::is_control), || format!("{text:?} has a control character"))?;
+    let forbidden = text.chars().find(|character| is_forbidden(*character));
+    expect(forbidden.is_none(), || format!("{text:?} has the character {forbidden:?}"))?;
     expect(text.len() < 2000, || format!("{text:?} is long"))
+}
+
+/// Whether no message may have a character: terminals obey it, it breaks lines, or it turns the direction of text.
+pub fn is_forbidden(character: char) -> bool {
+    const OTHERS: [char; 14] = [
+        '\u{2028}', '\u{2029}', '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}',
+        '\u{202e}', '\u{2066}', '\u{2067}', '\u{2068}', '\u{2069}',
+    ];
+    character.is_control() || OTHERS.contains(&character)
 }
 
 fn expect(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {

@@ -77,7 +77,7 @@ fn extreme(rng: &mut Rng) -> Value {
     let values = [
         json!(null),
         json!(true),
-        json!("a\u{1b}[31m\u{7}"),
+        json!("a\u{1b}[31m\u{7}\u{202e}\u{2028}"),
         json!({}),
         json!([]),
         json!([0]),
