@@ -215,7 +215,8 @@ fn warnings_are_capped_and_counted() {
 
 fn control_characters_do_not_reach_messages() {
     // Ends of lines, and all that turns the direction of text.
-    let others = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\u{2068}\u{2069}";
+    let others = "\u{2028}\u{2029}\u{61c}\u{200e}\u{200f}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\
+                  \u{2068}\u{2069}";
     let hostile = &format!("\u{1b}]0;title\u{7}\u{9b}31m\u{0}{others}.");
     let is_forbidden = |character: char| character.is_control() || others.contains(character);
     let text = format!(
