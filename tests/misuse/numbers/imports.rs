@@ -1,10 +1,11 @@
-//! Limits of imports.
+//! Limits of imports, and of what their messages quote.
 
 use std::io;
 
 use drawloom::scene::Assets;
 use drawloom::scene::obj::{self, ObjLimits};
 use drawloom::task::Scheduler;
+use drawloom::text::excerpt;
 use libtest_mimic::Failed;
 use std::sync::Arc;
 
@@ -28,8 +29,16 @@ pub const CASES: &[NumberCase] = &[
         ],
         check: limits,
     },
+    NumberCase { name: "excerpts_of_any_length", numbers: &["text::excerpt"], check: excerpts },
     NumberCase { name: "loads_of_any_priority", numbers: &["scene::AssetLoader::load"], check: loads },
 ];
+
+fn excerpts() -> Result<(), Failed> {
+    for (count, expected) in [(0, "…"), (3, "é\\u{a}表…"), (4, "é\\u{a}表b"), (usize::MAX, "é\\u{a}表b")] {
+        same(excerpt("é\n表b", count).as_str(), expected, format_args!("the first {count} characters"))?;
+    }
+    same(excerpt("", 0).as_str(), "", "nothing")
+}
 
 const SCENE: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl one\nf 1/1 2/1 3/1\nnonsense\nnonsense\n";
 const LIBRARY: &str = "newmtl one\nmap_Kd a.png\n";
