@@ -13,7 +13,7 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 #[cfg(any(feature = "wgpu", feature = "software", test))]
 use super::Topology;
-use super::chunk_holder::ChunkHolder;
+use super::chunk_users::ChunkUsers;
 use crate::leaked_guards::unlock;
 
 /// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
@@ -229,7 +229,7 @@ pub struct GeneratedContents {
     layout: GeneratedLayout,
     chunks: Vec<RwLock<Chunk>>,
     /// By chunk.
-    holders: Vec<ChunkHolder>,
+    users: Vec<ChunkUsers>,
     count: Mutex<usize>,
 }
 
@@ -265,25 +265,25 @@ impl GeneratedContents {
         all.try_reserve_exact(layout.bytes()).ok()?;
         // Otherwise the compiler may leave out memory that nobody uses.
         drop(black_box(all));
-        let mut holders = Vec::new();
-        holders.try_reserve_exact(layout.chunk_count()).ok()?;
+        let mut users = Vec::new();
+        users.try_reserve_exact(layout.chunk_count()).ok()?;
         for index in 0..layout.chunk_count() {
             // No more than the bytes of all chunks, and the rest of a word.
             let words = (layout.chunk_range(index).len() * layout.stride).div_ceil(size_of::<u128>());
             // Another thread may have taken memory since.
             let words = try_zeroed_slice_box(words).ok()?;
             chunks.push(RwLock::new(Chunk { words, is_filled: false }));
-            holders.push(ChunkHolder::default());
+            users.push(ChunkUsers::default());
         }
-        Some(Self { layout, chunks, holders, count: Mutex::new(layout.capacity) })
+        Some(Self { layout, chunks, users, count: Mutex::new(layout.capacity) })
     }
 
     fn reset(&mut self) {
         *self.count.get_mut() = self.layout.capacity;
-        for (chunk, holder) in self.chunks.iter_mut().zip(&mut self.holders) {
+        for (chunk, users) in self.chunks.iter_mut().zip(&mut self.users) {
             unlock(chunk);
             chunk.get_mut().is_filled = false;
-            holder.clear();
+            users.clear();
         }
     }
 
@@ -317,7 +317,7 @@ impl GeneratedContents {
     pub(crate) fn fill<T: Pod>(&self, chunk: usize) -> Result<impl DerefMut<Target = [T]> + use<'_, T>, ChunkError> {
         let elements = self.layout.chunk_range(chunk).len();
         let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
-        let mut guard = self.holders[chunk].wait(|time| lock.try_write_for(time)).ok_or(ChunkError::Held)?;
+        let mut guard = self.users[chunk].wait(|time| lock.try_write_for(time)).ok_or(ChunkError::Held)?;
         guard.is_filled = true;
         let bytes = elements * self.layout.stride;
         Ok(RwLockWriteGuard::map(guard, move |chunk| {
@@ -336,7 +336,7 @@ impl GeneratedContents {
         let range = self.layout.chunk_range(chunk);
         let elements = range.end.min(self.count()).saturating_sub(range.start);
         let lock = self.chunks.get(chunk).ok_or(ChunkError::Unknown)?;
-        let guard = self.holders[chunk].wait(|time| lock.try_read_for(time)).ok_or(ChunkError::Held)?;
+        let guard = self.users[chunk].wait(|time| lock.try_read_for(time)).ok_or(ChunkError::Held)?;
         if elements > 0 && !guard.is_filled {
             return Err(ChunkError::Unfilled);
         }

@@ -8,7 +8,7 @@ use glam::{DVec3, Quat, Vec3};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::Bounds;
-use super::chunk_holder::ChunkHolder;
+use super::chunk_users::ChunkUsers;
 
 /// A column of a scene that [CPU nodes](crate::CpuNode) write while the frame is recorded, before the stages read it: positions that an
 /// animation moves, or a simulation. The engine lends its own storage, so nothing is copied, and has it back when
@@ -41,7 +41,7 @@ pub struct NodeColumn<'a, T> {
 /// A chunk: lent for writing until it is read for the first time.
 struct Chunk<'a, T> {
     writable: Mutex<Option<&'a mut [T]>>,
-    holder: ChunkHolder,
+    users: ChunkUsers,
     readable: OnceLock<&'a [T]>,
 }
 
@@ -54,7 +54,7 @@ impl<'a, T> NodeColumn<'a, T> {
         let length = values.len();
         let chunk = |values| Chunk {
             writable: Mutex::new(Some(values)),
-            holder: ChunkHolder::default(),
+            users: ChunkUsers::default(),
             readable: OnceLock::new(),
         };
         Self { chunks: values.chunks_mut(Self::CHUNK).map(chunk).collect(), length }
@@ -86,8 +86,8 @@ impl<'a, T> NodeColumn<'a, T> {
     /// # Panics
     /// If there is no such chunk.
     pub fn write(&self, chunk: usize) -> Result<ColumnChunk<'_, 'a, T>, ChunkInUse> {
-        let Chunk { writable, holder, .. } = &self.chunks[chunk];
-        let values = holder.wait(|time| writable.try_lock_for(time)).filter(|values| values.is_some());
+        let Chunk { writable, users, .. } = &self.chunks[chunk];
+        let values = users.wait(|time| writable.try_lock_for(time)).filter(|values| values.is_some());
         let values = values.ok_or(ChunkInUse { chunk })?;
         Ok(ColumnChunk { values, first: chunk * Self::CHUNK })
     }
@@ -97,10 +97,10 @@ impl<'a, T> NodeColumn<'a, T> {
     /// # Panics
     /// If there is no such chunk, or nobody lets go of it: see [`write`](Self::write).
     pub fn read(&self, chunk: usize) -> &[T] {
-        let Chunk { writable, holder, readable } = &self.chunks[chunk];
+        let Chunk { writable, users, readable } = &self.chunks[chunk];
         let freeze = || {
             let mut writable =
-                holder.wait(|time| writable.try_lock_for(time)).expect("a job holds a chunk that is read");
+                users.wait(|time| writable.try_lock_for(time)).expect("a job holds a chunk that is read");
             writable.take().map_or(&[][..], |values| values)
         };
         readable.get_or_init(freeze)

@@ -94,20 +94,20 @@ impl MachineClock {
 }
 
 /// The function that the engine supplies as a clock.
-pub(crate) type EngineFunction = Contained<Box<dyn Fn() -> Duration + Send + Sync>>;
+pub(crate) type ClockFn = Contained<Box<dyn Fn() -> Duration + Send + Sync>>;
 
 /// A clock that the engine supplies. Workers read it between two jobs, where a panic must not unwind.
 ///
 /// If it panics, it is not called again, and time stops at its latest reading.
 pub(super) struct EngineClock {
-    call: EngineFunction,
+    call: ClockFn,
     /// The latest reading of any thread. Relaxed: it hands nothing over.
     latest: AtomicU64,
     panic: OnceLock<JobPanic>,
 }
 
 impl EngineClock {
-    pub(super) fn new(call: EngineFunction) -> Self {
+    pub(super) fn new(call: ClockFn) -> Self {
         Self { call, latest: AtomicU64::new(0), panic: OnceLock::new() }
     }
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use crossbeam_utils::CachePadded;
 
 use super::chunk_timer::ChunkTimer;
-use super::clock::{Clock, ClockReader, EngineClock, EngineFunction};
+use super::clock::{Clock, ClockFn, ClockReader, EngineClock};
 use super::event_store::{EventStore, Events, FrameSource, frames_of};
 use super::frame_tuning::FrameTuning;
 use super::log::{Chunk, Counter, Graph, Idle, IdleKind, Log, Run, WorkerLog};
@@ -44,7 +44,7 @@ pub(crate) struct TimelineSettings {
     /// The capacity of each worker's track, in events.
     pub(crate) capacity: Option<usize>,
     /// The engine's clock, to be used instead of the machine's.
-    pub(crate) clock: Option<EngineFunction>,
+    pub(crate) clock: Option<ClockFn>,
 }
 
 impl TimelineSettings {

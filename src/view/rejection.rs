@@ -121,8 +121,8 @@ pub enum RejectionReason {
     /// frame can name.
     ObjectLimit,
     /// An object's mesh [cannot be drawn](crate::backend::Backend::check_mesh) by the backend: as a rule, it is larger
-    /// than the device's buffers. Or CPU nodes have filled a [generated](crate::scene::Mesh::generated) mesh with what is
-    /// no mesh: the software backend finds that when it draws a frame, so frames that begin after that count the
+    /// than the device's buffers. Or CPU nodes have filled a [generated](crate::scene::Mesh::generated) mesh with
+    /// invalid data. The software backend finds that when it draws a frame, so only frames that begin later count the
     /// objects. A warning names each such mesh, with the reason.
     UndrawableMesh,
     /// An object's material, or its values of the engine's own, are beyond what the backend

@@ -17,7 +17,7 @@ pub(super) fn warn_of_undeclared_discards(process: &str, draws: &Draws<'_>, befo
     }
     let may_hide = draws.hides() && commands.selection.blending != Blending::Blended;
     if let Some(fragment) = commands.fragment.filter(|_| may_hide)
-        && leaves_out_pixels([Some(fragment), commands.masked.map(|masked| masked.fragment)], before, own)
+        && leaves_out_pixels(fragment, commands.masked.map(|masked| masked.fragment), before, own)
     {
         let process = process.to_owned();
         emit_unlocked(move || {
@@ -30,9 +30,9 @@ pub(super) fn warn_of_undeclared_discards(process: &str, draws: &Draws<'_>, befo
     }
 }
 
-/// Whether the first of a process's fragment entry points, the other of which is that of masked objects, discards pixels or
-/// returns a depth. `own` are the process's own texts of WGSL, each with what it is.
-fn leaves_out_pixels([fragment, masked]: [Option<&str>; 2], before: &str, own: &[(&str, &str)]) -> bool {
+/// Whether a process's fragment entry point discards pixels or returns a depth; `masked` is the one of masked objects, which
+/// may. `own` are the process's own texts of WGSL, each with what it is.
+fn leaves_out_pixels(fragment: &str, masked: Option<&str>, before: &str, own: &[(&str, &str)]) -> bool {
     let may_leave_out = |text: &str| text.contains("discard") || text.contains("frag_depth");
     let around_masked = |text| masked.and_then(|masked| around_function(text, masked)).unwrap_or([text, ""]);
     // Parsing takes about as long as wgpu needs to make the module.
@@ -43,7 +43,7 @@ fn leaves_out_pixels([fragment, masked]: [Option<&str>; 2], before: &str, own: &
     // An error means that it uses extensions of the language that only the device knows.
     let Ok(module) = wgsl::parse_str(&texts.join("\n")) else { return false };
     let mut entry_points = module.entry_points.iter();
-    let is_drawn = |name: &str, stage| Some(name) == fragment && stage == ShaderStage::Fragment;
+    let is_drawn = |name: &str, stage| name == fragment && stage == ShaderStage::Fragment;
     let entry_point = entry_points.find(|entry_point| is_drawn(&entry_point.name, entry_point.stage));
     entry_point.is_some_and(|entry_point| {
         returns_depth(&module, &entry_point.function) || discards(&module, &entry_point.function.body)
@@ -98,8 +98,9 @@ mod tests {
 
     #[test]
     fn discarded_pixels_and_returned_depths_are_found() {
-        let entry_points = [Some("fragment"), Some("masked_fragment")];
-        let found = |text: &str| leaves_out_pixels(entry_points, "const A: u32 = 1u;", &[("shader", text)]);
+        let found = |text: &str| {
+            leaves_out_pixels("fragment", Some("masked_fragment"), "const A: u32 = 1u;", &[("shader", text)])
+        };
         for body in [
             "discard;",
             "if x > 1.0 { discard; }",

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use parking_lot::Mutex;
 
-/// The jobs that have taken a chunk and may hold it: several may read it at once. The latest of each thread, until it ends.
+/// Jobs that may hold the chunk: one entry a thread, its latest job.
 #[derive(Default)]
-pub(super) struct ChunkHolder(Mutex<Vec<NodeJob>>);
+pub(super) struct ChunkUsers(Mutex<Vec<NodeJob>>);
 
 /// A job of a CPU node, or what a thread does between two of them.
 #[derive(Clone)]
@@ -38,7 +38,7 @@ const MAX_IDLE_SLICES: u32 = 200;
 /// All slices: a minute. A thread that seems to work may wait for this one, such as in a loop of which this is a part.
 const MAX_SLICES: u32 = 12_000;
 
-impl ChunkHolder {
+impl ChunkUsers {
     /// Takes a chunk with `try_lock`, which waits for a given time. `None` if it is held by this job, by one that has
     /// leaked its guard, by one that waits for another chunk itself, or by any for a minute.
     pub(super) fn wait<G>(&self, try_lock: impl Fn(Duration) -> Option<G>) -> Option<G> {
@@ -115,12 +115,12 @@ mod tests {
     #[derive(Default)]
     struct Chunk {
         value: Mutex<u32>,
-        holder: ChunkHolder,
+        users: ChunkUsers,
     }
 
     impl Chunk {
         fn take(&self) -> Option<MutexGuard<'_, u32>> {
-            self.holder.wait(|slice| self.value.try_lock_for(slice))
+            self.users.wait(|slice| self.value.try_lock_for(slice))
         }
     }
 
@@ -146,8 +146,8 @@ mod tests {
     /// Of two jobs that read a chunk, the one that came last ends first.
     #[test]
     fn a_job_waits_for_every_reader_of_a_chunk() {
-        let (value, holder) = (RwLock::new(3), ChunkHolder::default());
-        let read = || holder.wait(|slice| value.try_read_for(slice));
+        let (value, users) = (RwLock::new(3), ChunkUsers::default());
+        let read = || users.wait(|slice| value.try_read_for(slice));
         let (first_reads, is_read) = mpsc::channel();
         thread::scope(|threads| {
             threads.spawn(|| {
@@ -162,7 +162,7 @@ mod tests {
             is_read.recv().unwrap();
             assert_eq!(threads.spawn(|| run_node_job(|| read().as_deref().copied())).join().unwrap(), Some(3));
             run_node_job(|| assert_eq!(read().as_deref(), Some(&3)));
-            let written = run_node_job(|| holder.wait(|slice| value.try_write_for(slice)).map(|mut value| *value = 7));
+            let written = run_node_job(|| users.wait(|slice| value.try_write_for(slice)).map(|mut value| *value = 7));
             assert_eq!(written, Some(()));
         });
         assert_eq!(*value.read(), 7);
