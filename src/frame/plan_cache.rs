@@ -12,8 +12,8 @@ use crate::view::ShadowMaps;
 /// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
 pub(super) struct PlanCache {
     deferred: Option<Deferred>,
-    /// What every plan has, whatever the scene requires.
-    kept: Requirements,
+    /// What every plan has, whatever the scene requires; `None` until the next plan if the backend changed.
+    kept: Option<Requirements>,
     processes: Vec<Arc<dyn RenderProcess>>,
     outputs: Vec<String>,
     shadow_maps: ShadowMaps,
@@ -25,7 +25,8 @@ impl PlanCache {
     /// A cache with the plan of an empty scene.
     ///
     /// # Errors
-    /// If the processes make no frame, either for an empty scene or for one that requires everything.
+    /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend or on one that
+    /// replaces it.
     pub(super) fn new(
         deferred: Option<Deferred>,
         processes: Vec<Arc<dyn RenderProcess>>,
@@ -39,15 +40,14 @@ impl PlanCache {
         if let Some(deferred) = &deferred {
             catch_panics(|| deferred.check())?;
             compile(Some(deferred), &processes, &outputs, &all)?;
+            let replaced = deferred.clone().with_float_blending(!deferred.blends_floats());
+            compile(Some(&replaced), &processes, &outputs, &all)?;
         }
-        let kept = match &deferred {
-            Some(deferred) => catch_panics(|| Ok(deferred.kept_requirements()))?,
-            None => Requirements::default(),
-        };
+        let kept = kept_requirements(deferred.as_ref())?;
         let nothing = Requirements::default().union(kept);
         let current = Arc::new(compile(deferred.as_ref(), &processes, &outputs, &nothing)?);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
-        Ok(Self { deferred, kept, processes, outputs, shadow_maps, compiled, current })
+        Ok(Self { deferred, kept: Some(kept), processes, outputs, shadow_maps, compiled, current })
     }
 
     /// A cache with another deferred pipeline.
@@ -63,11 +63,12 @@ impl PlanCache {
         self.deferred.as_ref()
     }
 
-    /// Sets whether the backend can blend floats. Plans are compiled anew if that changes.
+    /// Sets whether the backend can blend floats. If that changes, plans are compiled anew, and what they keep is determined anew.
     pub(super) fn set_float_blending(&mut self, blends_floats: bool) {
         if let Some(deferred) = self.deferred.take() {
             if deferred.blends_floats() != blends_floats {
                 self.compiled.clear();
+                self.kept = None;
             }
             self.deferred = Some(deferred.with_float_blending(blends_floats));
         }
@@ -125,7 +126,11 @@ impl PlanCache {
     /// If the processes make no frame.
     fn plan_for(&mut self, requirements: Requirements) -> Result<Arc<FramePlan>, PlanError> {
         let Some(deferred) = &self.deferred else { return Ok(Arc::clone(&self.current)) };
-        let requirements = requirements.union(self.kept);
+        let kept = match self.kept {
+            Some(kept) => kept,
+            None => *self.kept.insert(kept_requirements(Some(deferred))?),
+        };
+        let requirements = requirements.union(kept);
         if let Some(plan) = self.compiled.get(&requirements) {
             return Ok(Arc::clone(plan));
         }
@@ -152,6 +157,11 @@ impl PlanCache {
     pub(super) fn count(&self) -> usize {
         self.compiled.len()
     }
+}
+
+/// What every plan has, whatever the scene requires.
+fn kept_requirements(deferred: Option<&Deferred>) -> Result<Requirements, PlanError> {
+    catch_panics(|| Ok(deferred.map_or_else(Requirements::default, Deferred::kept_requirements)))
 }
 
 fn compile(

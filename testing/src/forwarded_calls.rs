@@ -3,10 +3,6 @@
 /// The methods of [`Backend`](drawloom::backend::Backend) that a wrapper of the backend `inner` passes on as they are.
 macro_rules! forward_unchanged_calls {
     () => {
-        fn can_blend_floats(&self) -> bool {
-            self.inner.can_blend_floats()
-        }
-
         fn uploaded_bytes(&self) -> u64 {
             self.inner.uploaded_bytes()
         }
@@ -82,9 +78,13 @@ macro_rules! forward_unchanged_calls {
     };
 }
 
-/// Those of them that say what the backend can hold.
+/// Those of them that say what the backend can hold and do.
 macro_rules! forward_limits {
     () => {
+        fn can_blend_floats(&self) -> bool {
+            self.inner.can_blend_floats()
+        }
+
         fn limits(&self) -> ::drawloom::backend::SceneLimits {
             self.inner.limits()
         }

@@ -11,13 +11,19 @@ use crate::forwarded_calls::{forward_recording_calls, forward_unchanged_calls};
 pub struct LimitedBackend<B> {
     inner: B,
     limits: SceneLimits,
+    lacks_float_blending: bool,
 }
 
 impl<B> LimitedBackend<B> {
     /// The backend with these limits. A mesh fits if its vertices, at their full size, fit in a buffer, and so do its
     /// indices.
     pub fn new(inner: B, limits: SceneLimits) -> Self {
-        Self { inner, limits }
+        Self { inner, limits, lacks_float_blending: false }
+    }
+
+    /// The same, as if it could not blend floats.
+    pub fn without_float_blending(self) -> Self {
+        Self { lacks_float_blending: true, ..self }
     }
 
     /// The backend that does the work.
@@ -34,6 +40,10 @@ impl<B: Backend> Backend for LimitedBackend<B> {
 
     forward_unchanged_calls!();
     forward_recording_calls!();
+
+    fn can_blend_floats(&self) -> bool {
+        !self.lacks_float_blending && self.inner.can_blend_floats()
+    }
 
     fn limits(&self) -> SceneLimits {
         self.limits

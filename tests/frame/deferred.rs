@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::NullBackend;
+use drawloom::backend::{Backend, NullBackend, SceneLimits};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, GeometryFormats, LightVolumes,
@@ -13,6 +13,7 @@ use drawloom::scene::{Camera, LayerMask, Light, LightKind, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::{RejectionReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
+use drawloom_testing::limited::LimitedBackend;
 use drawloom_testing::scenes::everything::{dark, everything};
 use drawloom_testing::scenes::sized;
 
@@ -56,7 +57,7 @@ fn build_error(builder: RendererBuilder<NullBackend>) -> PlanError {
 }
 
 /// The names of the processes that draw a scene, in order.
-fn processes(renderer: &mut Renderer<NullBackend>, scene: &Scene) -> Vec<String> {
+fn processes<B: Backend>(renderer: &mut Renderer<B>, scene: &Scene) -> Vec<String> {
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     renderer.plan().processes().iter().map(|planned| planned.name.clone()).collect()
 }
@@ -184,9 +185,17 @@ fn unknown_names_are_refused_and_known_ones_are_listed() {
         (no_maps, "shadow casters"),
         (no_pre_pass, "depth pre-pass"),
     ] {
-        let names = deferred.names();
+        // Those of other qualities too.
+        let sums = ["sum of lights", "sum of blended objects", "tiles of lights"].map(str::to_owned);
+        let names = [deferred.names(), sums.to_vec()].concat();
         let PlanError::NoSuchProcess { name, known } = build_error(builder(deferred)) else { panic!("{wrong}") };
         assert_eq!((name.as_str(), known), (wrong, names.join(", ")));
+    }
+    let PlanError::NoSuchProcess { known, .. } = build_error(builder(Deferred::to_picture().keep("fog"))) else {
+        panic!("fog is known")
+    };
+    for name in known.split(", ") {
+        assert!(build(builder(Deferred::to_picture().keep(name))).is_ok(), "{name}");
     }
 }
 
@@ -293,6 +302,72 @@ fn a_kept_sum_of_lights_is_in_every_plan_of_a_quality_that_has_it() {
     let blended = |sum| planned(sum, Deferred::new().keep("sum of blended objects"));
     assert_eq!(blended(RadianceSum::HalfFloat), geometry);
     assert_eq!(blended(RadianceSum::Shader), ["geometry buffer", "transparency", "sum of blended objects"]);
+}
+
+/// A backend that can blend floats or cannot.
+fn backend(blends_floats: bool) -> LimitedBackend<NullBackend> {
+    let backend = LimitedBackend::new(NullBackend, SceneLimits::NONE);
+    if blends_floats { backend } else { backend.without_float_blending() }
+}
+
+fn with_sum(radiance_sum: RadianceSum) -> Quality {
+    Quality { radiance_sum, ..Quality::balanced() }
+}
+
+#[test]
+fn what_is_kept_follows_a_backend_that_is_replaced() {
+    let build = |kept: &str, blends_floats| {
+        let deferred = Deferred::new().keep(kept);
+        let builder = Renderer::builder(backend(blends_floats)).deferred(deferred);
+        builder.quality(with_sum(RadianceSum::Float)).build(Arc::new(Scheduler::new(1).unwrap())).unwrap()
+    };
+    for kept in ["tiles of lights", "sum of lights", "sum of blended objects"] {
+        let expected = [false, true].map(|blends_floats| processes(&mut build(kept, blends_floats).0, &empty()));
+        assert_ne!(expected[0], expected[1], "{kept}");
+        let (mut renderer, mut submitter) = build(kept, true);
+        for blends_floats in [true, false, true, false] {
+            submitter = renderer.replace_backend(backend(blends_floats));
+            assert_eq!(processes(&mut renderer, &empty()), expected[usize::from(blends_floats)], "{kept}");
+        }
+        drop(submitter);
+    }
+}
+
+/// On a device on which they would have no effect as well: the backend may be replaced.
+#[test]
+fn tiles_of_lights_are_left_out_only_without_the_sum_that_reads_them() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let build = |deferred: Deferred, sum, blends_floats| {
+        let builder = Renderer::builder(backend(blends_floats)).deferred(deferred).quality(with_sum(sum));
+        builder.build(Arc::clone(&scheduler))
+    };
+    let without_tiles = || Deferred::new().leave_out("tiles of lights");
+    let is_named = |error: String| error.contains("\"light tiles\"") && error.contains("sum of lights");
+    for (sum, blends_floats) in [
+        (RadianceSum::Float, true),
+        (RadianceSum::Float, false),
+        (RadianceSum::Shader, true),
+        (RadianceSum::Shader, false),
+    ] {
+        let error = build(without_tiles(), sum, blends_floats).err().expect("it is refused").to_string();
+        assert!(is_named(error), "{sum:?} {blends_floats}");
+        let (mut renderer, submitter) = build(without_tiles().leave_out("sum of lights"), sum, blends_floats).unwrap();
+        drop(submitter);
+        for blends_floats in [!blends_floats, blends_floats] {
+            drop(renderer.replace_backend(backend(blends_floats)));
+            let names = processes(&mut renderer, &everything());
+            assert!(names.iter().all(|name| name != "tiles of lights" && name != "sum of lights"), "{names:?}");
+        }
+    }
+    // Nothing reads them, until the quality changes.
+    let (mut renderer, submitter) = build(without_tiles(), RadianceSum::HalfFloat, true).unwrap();
+    drop(submitter);
+    let before = processes(&mut renderer, &everything());
+    for sum in [RadianceSum::Float, RadianceSum::Shader] {
+        assert!(is_named(renderer.set_quality(with_sum(sum)).unwrap_err().to_string()), "{sum:?}");
+        drop(renderer.replace_backend(backend(false)));
+        assert_eq!(processes(&mut renderer, &everything()), before);
+    }
 }
 
 struct Wind;

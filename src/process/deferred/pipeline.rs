@@ -34,6 +34,9 @@ use crate::view::{LightClass, ShadowMaps};
 ///   not blend floats, it takes their place, and "tiles of lights" precedes it: that marks the lights that reach each tile.
 /// - "sum of blended objects" follows transparency, on devices that blend floats.
 ///
+/// The shipped "sum of lights" reads the tiles, so renderers refuse a pipeline that leaves out the tiles alone: with [`RadianceSum::Float`]
+/// on every device.
+///
 /// A process of lights or of transparency that the engine [replaces](Self::replace) draws over `radiance` as ever.
 ///
 /// ```
@@ -273,13 +276,17 @@ impl Deferred {
             return Err(PlanError::ShadowMaps { problem });
         }
         let complete = Self { left_out: Vec::new(), ..self.clone() };
-        let names = complete.names();
         // Which processes sum depends on the quality and the device, and these may change.
         let with_sum = |radiance_sum| Self { radiance_sum, blends_floats: true, ..complete.clone() }.names();
-        let sums = [RadianceSum::Float, RadianceSum::Shader].map(with_sum).concat();
+        let mut known = complete.names();
+        for name in [RadianceSum::Float, RadianceSum::Shader].into_iter().flat_map(with_sum) {
+            if !known.contains(&name) {
+                known.push(name);
+            }
+        }
         let mut named = self.replaced.iter().map(|(name, _)| name).chain(self.left_out.iter().chain(&self.kept));
-        match named.find(|name| !names.contains(name) && !sums.contains(name)) {
-            Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: names.join(", ") }),
+        match named.find(|name| !known.contains(name)) {
+            Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: known.join(", ") }),
             None => Ok(()),
         }
     }
