@@ -3,7 +3,7 @@
 use crate::handle::Handle;
 use crate::process::{Deferred, Requirements};
 use crate::scene::{Assets, Material, SceneRef};
-use crate::view::{ObjectTable, RejectionReason, Rejections, set_bits};
+use crate::view::{ObjectTable, RejectionReason, set_bits};
 
 /// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes no difference.
 ///
@@ -11,8 +11,8 @@ use crate::view::{ObjectTable, RejectionReason, Rejections, set_bits};
 /// are searched when the witness stops needing it, and without a witness when a material starts to need it.
 ///
 /// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is visible changes
-/// with every step of a camera, and the processes of a frame should not. So do objects that the device has no room for, because how
-/// many have room follows from the processes, which the witness decides about.
+/// with every step of a camera, and the processes of a frame should not. Objects beyond the device's room count too: the room depends on
+/// the processes, which depend on the witness.
 #[derive(Debug, Default)]
 pub(super) struct BlendedObjectWitness {
     materials: BlendedMaterials,
@@ -60,11 +60,16 @@ impl BlendedObjectWitness {
         self.witness.is_some()
     }
 
-    /// Counts the witness if the pipeline draws it in half floats because the backend cannot blend floats.
-    pub(super) fn count_half_floats(&self, deferred: Option<&Deferred>, rejections: &Rejections) {
+    /// Counts an object if the pipeline draws it in half floats because the backend cannot blend floats: the witness, or another one if
+    /// that has no room in the table.
+    pub(super) fn count_half_floats(&self, scene: &SceneRef<'_>, deferred: Option<&Deferred>, objects: &ObjectTable) {
         let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
-        if let Some(Witness { object, .. }) = witness {
-            rejections.count(RejectionReason::HalfFloatBlending, object);
+        let drawn = witness.and_then(|Witness { object, .. }| match object < objects.len() {
+            true => Some(object),
+            false => (0..objects.len()).find(|object| self.materials.contains(scene.materials[*object])),
+        });
+        if let Some(object) = drawn {
+            objects.rejections().count(RejectionReason::HalfFloatBlending, object);
         }
     }
 }

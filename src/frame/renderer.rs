@@ -295,8 +295,8 @@ impl<B: Backend> Renderer<B> {
         let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
-        self.tables.blended_object.count_half_floats(self.plans.deferred(), self.tables.objects.rejections());
         self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
+        self.tables.blended_object.count_half_floats(scene, self.plans.deferred(), &self.tables.objects);
         let interval = self.quality.shadows.interval;
         let maps = self.plans.shadow_maps().map(|maps| MapSettings { maps, interval, limits });
         let requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.rejections())?;

@@ -12,10 +12,12 @@ use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 #[cfg(feature = "wgpu")]
 use drawloom::process::{CommandDraws, Declare, Draws, RenderProcess, StorageBuffer};
+use drawloom::quality::{Quality, RadianceSum};
 #[cfg(feature = "wgpu")]
 use drawloom::scene::SceneRef;
-use drawloom::scene::{Mesh, RenderObject, Scene, Topology, Vertex};
+use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 use drawloom::task::Scheduler;
+use drawloom::view::RejectionReason;
 #[cfg(feature = "wgpu")]
 use drawloom_testing::adapter;
 use drawloom_testing::limited::LimitedBackend;
@@ -88,6 +90,32 @@ fn another_backend_is_asked_anew() {
         }
     }
     drop(submitter);
+}
+
+#[test]
+fn an_object_without_room_is_not_counted_as_drawn_in_half_floats() {
+    let backend = LimitedBackend::new(NullBackend, LIMITS).without_float_blending();
+    let quality = Quality { radiance_sum: RadianceSum::Float, ..Quality::balanced() };
+    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let mut scene = field(70);
+    let stone = scene.as_scene_ref().materials[0];
+    let glass = scene.add(Material { blend: Blend::Alpha, ..Material::default() }).unwrap();
+    let handles: Vec<_> = scene.objects().collect();
+    let (last, first_without_room) = (63, 64);
+    for blended in [&[69][..], &[69, 3], &[3], &[69, last], &[first_without_room], &[5, 66], &[]] {
+        for (object, handle) in handles.iter().enumerate() {
+            let material = if blended.contains(&object) { glass } else { stone };
+            let object = scene.object(*handle).unwrap();
+            scene.replace_object(*handle, RenderObject { material, ..object }).unwrap();
+        }
+        let statistics = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap().statistics;
+        let counted = |reason| statistics.rejections.iter().find(|rejection| rejection.reason == reason);
+        assert_eq!(counted(RejectionReason::ObjectLimit).map(|found| (found.count, found.first)), Some((6, 64)));
+        let expected = blended.iter().copied().find(|object| *object < first_without_room).map(|first| (1, first));
+        let found = counted(RejectionReason::HalfFloatBlending).map(|found| (found.count, found.first));
+        assert_eq!(found, expected, "{blended:?}");
+    }
 }
 
 /// In the place of transparency: its buffer is larger than any of the noop device.
