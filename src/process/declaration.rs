@@ -59,7 +59,8 @@ impl Declare {
     }
 
     /// Tests against the depth that another process wrote, without writing it, and writes the [stencil](super::Stencil) beside it. What
-    /// has the stored depth passes the test, so that objects which are drawn already can be marked.
+    /// has the stored depth passes the test, so that objects which are drawn already can be marked. In the map of a directional light, what
+    /// is beyond the far plane may pass: see [`Self::matches_depth`].
     pub fn marks_stencil(&mut self, target: &str) {
         self.access(target, Access::MarkStencil);
     }
@@ -75,6 +76,10 @@ impl Declare {
     }
 
     /// Draws only where its depth equals the depth that another process wrote, without writing it.
+    ///
+    /// In the map of a directional light, devices with [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES) clamp the
+    /// depth of what is beyond the far plane to 0, which equals the cleared depth. So that all devices draw the same, the fragment shader
+    /// discards pixels whose `position.z` is at most 0.
     pub fn matches_depth(&mut self, target: &str) {
         self.access(target, Access::MatchDepth);
     }

@@ -31,7 +31,7 @@ pub const CASES: &[Case] = &[
     ("hidden_objects_are_marked_where_a_test_fails", hidden_objects),
     ("a_process_that_tests_the_stencil_alone_draws_hidden_objects", through_walls),
     ("objects_that_the_stencil_test_leaves_out_hide_nothing", masked),
-    ("a_process_that_tests_the_stencil_alone_draws_nothing_beyond_the_far_plane_of_a_suns_map", in_a_map),
+    ("a_process_that_tests_a_stencil_or_matches_depth_draws_nothing_beyond_the_far_plane_of_a_suns_map", in_a_map),
     ("a_process_that_has_no_stencil_is_named", without),
 ];
 
@@ -140,6 +140,14 @@ const COVERED: &str = "
     fn fragment(in: Corner) -> @location(0) vec4<f32> {
         return vec4<f32>(1.0);
     }
+
+    @fragment
+    fn before_far_plane(in: Corner) -> @location(0) vec4<f32> {
+        if in.clip.z <= 0.0 {
+            discard;
+        }
+        return vec4<f32>(1.0);
+    }
 ";
 
 /// A field of which every third object is to be marked.
@@ -155,10 +163,16 @@ fn pipeline() -> Deferred {
         .formats(GeometryFormats { depth: Format::Depth32FloatStencil8, ..GeometryFormats::default() })
 }
 
-/// Draws what a light sees in white, with a stencil that leaves out nothing.
-struct SeenByLight {
-    /// Whether the stencil is beside a depth that another process has cleared.
-    is_beside_depth: bool,
+/// Draws what a light sees in white, with a test that leaves out nothing of it.
+struct SeenByLight(MapTest);
+
+/// How a process tests the depth or the stencil of a map.
+#[derive(Clone, Copy, Debug)]
+enum MapTest {
+    OwnStencil,
+    StencilBesideDepth,
+    MarkedStencil,
+    MatchedDepth,
 }
 
 impl RenderProcess for SeenByLight {
@@ -169,51 +183,68 @@ impl RenderProcess for SeenByLight {
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Shadow);
         declare.clears_color("seen", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
-        match self.is_beside_depth {
-            true => declare.tests_stencil("cleared"),
-            false => declare.clears_depth("stencil", Format::Stencil8),
+        match self.0 {
+            MapTest::OwnStencil => declare.clears_depth("stencil", Format::Stencil8),
+            MapTest::StencilBesideDepth => declare.tests_stencil("map depth"),
+            MapTest::MarkedStencil => declare.marks_stencil("map depth"),
+            MapTest::MatchedDepth => declare.matches_depth("map depth"),
         }
     }
 
     fn draws(&self) -> Draws<'_> {
-        let stencil = Some(Stencil::test(Comparison::Always, 0));
-        Draws::Commands(CommandDraws { shader: COVERED, writes_depth: false, stencil, ..CommandDraws::default() })
+        let (fragment, stencil) = match self.0 {
+            MapTest::OwnStencil | MapTest::StencilBesideDepth => {
+                ("fragment", Some(Stencil::test(Comparison::Always, 0)))
+            }
+            MapTest::MarkedStencil => ("before_far_plane", Some(Stencil::mark(3))),
+            MapTest::MatchedDepth => ("before_far_plane", None),
+        };
+        let fragment = Some(fragment);
+        Draws::Commands(CommandDraws {
+            shader: COVERED,
+            fragment,
+            writes_depth: false,
+            stencil,
+            ..CommandDraws::default()
+        })
     }
 }
 
-/// Draws nothing.
-struct Cleared;
+/// Draws the depth of all objects that a light sees.
+struct MapDepth;
 
-impl RenderProcess for Cleared {
+impl RenderProcess for MapDepth {
     fn name(&self) -> &str {
-        "cleared"
+        "map depth"
     }
 
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Shadow);
-        declare.clears_depth("cleared", Format::Depth32FloatStencil8);
+        declare.clears_depth("map depth", Format::Depth32FloatStencil8);
     }
 
     fn draws(&self) -> Draws<'_> {
-        let selection = Selection::OPAQUE.in_layers(MARKED);
-        Draws::Commands(CommandDraws { shader: SURFACE_SHADER, fragment: None, selection, ..CommandDraws::default() })
+        Draws::Commands(CommandDraws { shader: COVERED, fragment: None, ..CommandDraws::default() })
     }
 }
 
 /// Each triangle of the pillar reaches from a sun's map to beyond its far plane, where it would cover further pixels of the
-/// map. Devices without depth clip control leave these out by themselves.
+/// map. Devices without depth clip control leave these out by themselves. The tower reaches to in front of the near plane,
+/// where all devices draw it.
 fn in_a_map() -> Result<(), Failed> {
     let mut panels = Panel::closed_box(DVec3::new(0.5, -200.0, -1.0), DVec3::new(0.2, 201.0, 0.2));
+    panels.extend(Panel::closed_box(DVec3::new(-0.6, 100.2, 0.4), DVec3::new(0.2, 100.0, 0.2)));
     panels.push(Panel::facing(DVec3::ZERO, DVec3::Y, 1.0));
     let panel_scene = PanelScene { panels, lights: vec![sun(DVec3::new(0.2, -0.9, -0.3).normalize())], maps: MAPS };
     let scene = panel_scene.scene(&[camera(DVec3::new(1.0, 4.5, 3.0), DVec3::ZERO, 45.0)])?;
-    for is_beside_depth in [true, false] {
+    for test in [MapTest::OwnStencil, MapTest::StencilBesideDepth, MapTest::MarkedStencil, MapTest::MatchedDepth] {
         let mut pictures = Vec::new();
         for missing in [wgpu::Features::empty(), WgpuBackend::DEPTH_CLIP_FEATURES] {
             let mut fixture = Fixture::on(adapter::device_without(missing)?, 2, |builder| {
                 let deferred = Deferred::to_picture().shadow_maps(Some(MAPS));
-                let builder = if is_beside_depth { builder.process(Cleared) } else { builder };
-                builder.deferred(deferred).process(SeenByLight { is_beside_depth }).output("seen")
+                let needs_depth = !matches!(test, MapTest::OwnStencil);
+                let builder = if needs_depth { builder.process(MapDepth) } else { builder };
+                builder.deferred(deferred).process(SeenByLight(test)).output("seen")
             })?;
             let recorded = fixture.record(&scene)?;
             let maps = recorded.statistics().views.iter().position(|view| view.kind == ViewKind::Shadow);
@@ -224,9 +255,7 @@ fn in_a_map() -> Result<(), Failed> {
             return Err(format!("{white} of {} bytes are white", pictures[1].len()).into());
         }
         let differing = pictures[0].iter().zip(&pictures[1]).filter(|(found, expected)| found != expected).count();
-        expect(differing == 0, || {
-            format!("beside a depth: {is_beside_depth}: {differing} bytes differ, {white} are white")
-        })?;
+        expect(differing == 0, || format!("{test:?}: {differing} bytes differ, {white} are white"))?;
     }
     Ok(())
 }

@@ -48,8 +48,9 @@ impl PipelineInputs {
     /// Whether there are pipelines of their own for views that [clamp depth](crate::view::RenderView::clamps_depth).
     pub(super) fn has_clamped_pipelines(&self) -> bool {
         let has_geometry = matches!(self.key.vertices, VertexSource::Meshes(_) | VertexSource::Procedural(_));
-        // What is beyond the far plane is clamped too, and only a depth test leaves it out. A test for what is drawn already needs the
-        // same depth, and passes beyond the far plane where nothing is drawn.
+        // What is beyond the far plane is clamped too, to depth 0. A test for a greater depth leaves it out; without a depth test it would
+        // be drawn. Processes that match depths or mark a stencil need the depths of a process that clamps, so they clamp as well, and
+        // their declarations say what passes beyond the far plane.
         let tests_depth =
             self.attachments.depth.is_some_and(|depth| depth.format.has_depth() && depth.access != Access::TestStencil);
         let can_clamp = has_geometry && self.draws_maps && tests_depth;
