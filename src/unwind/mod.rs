@@ -6,7 +6,8 @@
 //! forgotten. Where an unwind would free memory that another thread still uses, an [`AbortOnUnwind`] guards the code as
 //! well. So soundness does not depend on every call being caught.
 //!
-//! These are all places where such code is called. `tests/boundary` makes each of these calls panic in turn.
+//! These are all places where such code is called. `tests/boundary` makes each of these calls panic in turn, except the iterators
+//! and writers that the engine passes to a call, and `SurfaceFrame::present`, which needs a window.
 //!
 //! | code | called in | its panic |
 //! | --- | --- | --- |

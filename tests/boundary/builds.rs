@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use drawloom::backend::{NullBackend, SoftwareBackend};
+use drawloom::backend::{NullBackend, SceneLimits, SoftwareBackend};
 use drawloom::glam::Vec3;
 use drawloom::process::{
     CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, Draws, Fxaa, PassInputs, PostStep, RenderProcess,
@@ -14,6 +14,7 @@ use drawloom::raster::Real;
 use drawloom::scene::{LayerMask, Light, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, Granularity, Renderer, RendererBuilder, Submitter};
+use drawloom_testing::limited::LimitedBackend;
 
 use crate::engine::{OwnBackend, OwnProcess, Subject};
 use crate::frames::worlds;
@@ -125,7 +126,7 @@ impl RenderProcess for Replacement {
     }
 }
 
-fn deferred() -> Deferred {
+pub fn deferred() -> Deferred {
     let inner = Fxaa::default().process("post-processed 1", "picture");
     let replacement = Replacement { inner, _dropped: Owned::new("replacement", ()) };
     let deferred = Deferred::new().post(ToneMapping::default()).post(OwnStep::new()).replace("fxaa", replacement);
@@ -276,5 +277,33 @@ fn what_is_not_built_is_dropped() {
             }
             assert_eq!(fuse::alive(), alive_before, "{name}");
         }
+    });
+}
+
+/// What a pipeline keeps depends on whether the backend blends floats, and is determined anew for another backend.
+#[test]
+fn a_panic_of_a_deformation_in_the_first_frame_of_another_backend_is_an_error() {
+    within_time(|| {
+        let scheduler = Arc::new(Scheduler::new(1).unwrap());
+        let open = |blends_floats: bool| {
+            let limited = LimitedBackend::new(NullBackend, SceneLimits::NONE);
+            OwnBackend::new(if blends_floats { limited } else { limited.without_float_blending() }, false)
+        };
+        let [scene, _] = worlds();
+        let builder = Renderer::builder(open(true)).deferred(deferred());
+        let (mut renderer, mut submitter) = builder.build(scheduler).unwrap();
+        for has_text in [true, false] {
+            for blends_floats in [false, true] {
+                fuse::arm(Kind::Step, 0, has_text);
+                let replaced = catch_unwind(AssertUnwindSafe(|| renderer.replace_backend(open(blends_floats))));
+                submitter = replaced.unwrap_or_else(|_| panic!("it unwinds"));
+                let recorded = catch_unwind(AssertUnwindSafe(|| renderer.record(scene.as_scene_ref()).map(drop)));
+                assert_eq!(fuse::disarm(), Some("deformation's name"));
+                let error = recorded.expect("it unwinds").unwrap_err().to_string();
+                assert!(error.contains("panicked") && error.ends_with(PLANNED) == has_text, "{error}");
+                drop(submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap());
+            }
+        }
+        drop(submitter);
     });
 }

@@ -5,6 +5,7 @@
 //! The table in `src/unwind/mod.rs` lists the calls. These hold with debug assertions and without.
 
 mod builds;
+mod callers;
 mod engine;
 mod frames;
 mod fuse;
