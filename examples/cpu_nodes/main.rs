@@ -53,7 +53,12 @@ const PICTURE: [u32; 2] = [960, 540];
 const RECORDED_FRAMES: u32 = 30;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_writer(drawloom_output::diagnostics)
+        .without_time()
+        .with_target(false)
+        .init();
     drawloom_output::exit_code(run(&drawloom_output::parse_arguments::<Arguments>()))
 }
 

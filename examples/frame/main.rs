@@ -40,7 +40,12 @@ use report::Report;
 use sequence::Sequence;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_writer(drawloom_output::diagnostics)
+        .without_time()
+        .with_target(false)
+        .init();
     let arguments = Arguments::checked(std::env::args_os()).unwrap_or_else(|error| drawloom_output::exit_with(error));
     let with_causes = |error: Box<dyn Error>| with_causes(error.as_ref());
     match Input::load(&arguments).map_err(with_causes) {

@@ -44,7 +44,12 @@ use world::World;
 const SKY: Vec3 = Vec3::new(0.55, 0.68, 0.86);
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_writer(drawloom_output::diagnostics)
+        .without_time()
+        .with_target(false)
+        .init();
     drawloom_output::exit_code(run(&Arguments::checked()))
 }
 

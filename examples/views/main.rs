@@ -58,7 +58,12 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_writer(drawloom_output::diagnostics)
+        .without_time()
+        .with_target(false)
+        .init();
     drawloom_output::exit_code(run(&drawloom_output::parse_arguments::<Arguments>()))
 }
 

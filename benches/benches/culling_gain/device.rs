@@ -314,7 +314,7 @@ fn new_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, drawn: Dr
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState::default(),
-        fragment: draws_objects.then(|| wgpu::FragmentState {
+        fragment: draws_objects.then_some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("fragment"),
             compilation_options,

@@ -40,27 +40,27 @@ pub struct Row {
     pub by_material_drawn_ratio: Option<f64>,
 }
 
-/// Each frame records everything anew: with draws straight into the pass, as L's command buffers are, or into bundles, which several
+/// What is one job. Each frame records everything anew: with draws straight into the pass, as L's command buffers are, or into bundles, which several
 /// workers can record for one pass.
 #[derive(Clone, Copy)]
 enum Split {
-    ByProcess,
-    ByMaterial,
-    ByDraws,
+    Process,
+    Material,
+    Draws,
 }
 
 impl Split {
-    const ALL: [Self; 3] = [Self::ByProcess, Self::ByMaterial, Self::ByDraws];
+    const ALL: [Self; 3] = [Self::Process, Self::Material, Self::Draws];
 
     fn runner(self, backend: BackendName, scheduler: &Arc<Scheduler>) -> Result<Runner, Box<dyn Error>> {
         let whole = Division { granularity: Granularity::PerCamera, ..Division::OWN };
         let (strategy, division) = match self {
-            Self::ByProcess => (RecordingStrategy::Direct, whole),
-            Self::ByMaterial => (
+            Self::Process => (RecordingStrategy::Direct, whole),
+            Self::Material => (
                 RecordingStrategy::Direct,
                 Division { geometry_shares: scheduler.workers().min(world::ORIGINALS), ..whole },
             ),
-            Self::ByDraws => (RecordingStrategy::Bundles, Division::OWN),
+            Self::Draws => (RecordingStrategy::Bundles, Division::OWN),
         };
         Runner::new(backend.open()?.recording_strategy(strategy)?, scheduler, division)
     }
@@ -81,7 +81,7 @@ pub fn measure(
     progress.set_message(format!("{objects} objects, split, {}", backend.name()));
     let mut rows = Vec::new();
     for shadow_maps in SHADOW_MAPS {
-        let mut runners = vec![Split::ByProcess.runner(backend, &Arc::new(Scheduler::new(1)?))?];
+        let mut runners = vec![Split::Process.runner(backend, &Arc::new(Scheduler::new(1)?))?];
         for &workers in workers {
             let scheduler = Arc::new(Scheduler::new(workers)?);
             for split in Split::ALL {

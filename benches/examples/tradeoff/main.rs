@@ -44,7 +44,12 @@ use results::Results;
 type Failure = Box<dyn Error>;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt().with_writer(drawloom_output::diagnostics).without_time().with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_writer(drawloom_output::diagnostics)
+        .without_time()
+        .with_target(false)
+        .init();
     let outcome = run(&Arguments::checked());
     drawloom_output::exit_code(outcome.and_then(|is_within| {
         is_within.then_some(()).ok_or_else(|| "an error is above its bound, or a knob has no effect".into())

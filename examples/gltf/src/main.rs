@@ -51,7 +51,11 @@ struct Arguments {
 
 fn main() -> ExitCode {
     // What Drawloom and wgpu warn of.
-    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_max_level(LevelFilter::WARN)
+        .with_writer(drawloom_output::diagnostics)
+        .init();
     let arguments: Arguments = drawloom_output::parse_arguments();
     // That threads cannot be started is no fault of the arguments.
     let scheduler = match Scheduler::with_available_parallelism() {

@@ -27,7 +27,11 @@ use options::Options;
 fn main() -> ExitCode {
     let options: Options = drawloom_output::parse_arguments();
     // What Drawloom and wgpu warn of.
-    tracing_subscriber::fmt().with_max_level(LevelFilter::WARN).with_writer(drawloom_output::diagnostics).init();
+    tracing_subscriber::fmt()
+        .with_ansi(false)
+        .with_max_level(LevelFilter::WARN)
+        .with_writer(drawloom_output::diagnostics)
+        .init();
     drawloom_output::exit_code(run(options))
 }
 
