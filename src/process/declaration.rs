@@ -78,8 +78,8 @@ impl Declare {
     /// Draws only where its depth equals the depth that another process wrote, without writing it.
     ///
     /// In the map of a directional light, devices with [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES) clamp the
-    /// depth of what is beyond the far plane to 0, which equals the cleared depth. So that all devices draw the same, the fragment shader
-    /// discards pixels whose `position.z` is at most 0.
+    /// depth of what is beyond the far plane to 0, which equals the cleared depth. A fragment shader that discards pixels whose
+    /// `@builtin(position)` has a z of at most 0 draws the same on all devices.
     pub fn matches_depth(&mut self, target: &str) {
         self.access(target, Access::MatchDepth);
     }
