@@ -464,6 +464,23 @@ fn every_frame_has_every_place() {
 }
 
 #[test]
+fn a_process_after_lighting_may_draw_depth_with_every_sum_of_lights() {
+    for radiance_sum in [RadianceSum::HalfFloat, RadianceSum::Float, RadianceSum::Shader] {
+        let trees = own("trees", |declare| {
+            declare.draws_over("radiance");
+            declare.draws_depth("depth");
+            declare.at(Place::AfterLighting);
+        });
+        let quality = Quality { radiance_sum, ..Quality::balanced() };
+        let mut renderer = build(builder(Deferred::to_picture()).quality(quality).process(trees)).unwrap();
+        let names = processes(&mut renderer, &everything());
+        let index = |name: &str| names.iter().position(|other| other == name).unwrap();
+        let lights: Vec<_> = names.iter().filter(|name| name.contains("lights")).collect();
+        assert!(!lights.is_empty() && lights.iter().all(|name| index(name) < index("trees")), "{names:?}");
+    }
+}
+
+#[test]
 fn an_ambiguous_order_or_an_unknown_name_is_refused() {
     let after = |name: &'static str, other: &'static str| {
         own(name, move |declare| {

@@ -28,10 +28,9 @@ pub(super) fn order_constraints(
             later.chain_slot.is_some() && earlier.chain_slot.is_some() && later.chain_slot > earlier.chain_slot
         };
         for later in added.iter().filter(follows) {
-            let is_written_by_both = |target: &str| later.declaration.written().any(|other| other == target);
-            if earlier.declaration.views == later.declaration.views
-                && earlier.declaration.written().any(is_written_by_both)
-            {
+            // Also what the later one only reads: so what is ordered after that comes after the earlier one, too.
+            let is_used = |target: &str| later.declaration.accesses.iter().any(|(other, _)| other == target);
+            if earlier.declaration.views == later.declaration.views && earlier.declaration.written().any(is_used) {
                 orders.push((earlier.id, later.id));
             }
         }
