@@ -147,6 +147,7 @@ mod loom_tests {
     use super::{Clock, Duration, Entry, IdleKind, Track};
     use crate::sync::Arc;
     use crate::timeline::clock::EngineClock;
+    use crate::unwind::Contained;
 
     #[test]
     fn an_open_idle_interval_is_read_after_the_closed_ones_before_it() {
@@ -156,7 +157,7 @@ mod loom_tests {
             let reader = thread::spawn({
                 let track = Arc::clone(&track);
                 move || {
-                    let clock = Clock::Engine(EngineClock::new(Box::new(|| Duration::ZERO)));
+                    let clock = Clock::Engine(EngineClock::new(Contained::new(Box::new(|| Duration::ZERO))));
                     let open = track.idle_until(Duration::from_nanos(4), &clock);
                     let mut closed = Vec::new();
                     let take = |entry| match entry {
