@@ -87,7 +87,7 @@ fn elements() -> Result<(), Failed> {
         (
             textured_square,
             |it| image(it, json!({"uri": "nowhere.png"})),
-            "image 1 is left out: nowhere.png cannot be read",
+            "image 1 (nowhere.png) is left out: nowhere.png cannot be read",
         ),
         (textured_square, |it| image(it, json!({"uri": "https://example.com/a.png"})), "has a scheme other than data"),
         (

@@ -423,7 +423,20 @@ fn hierarchies() -> Result<(), Failed> {
         expect(is_named && world.object_count() >= 1, || format!("{:?}, not {expected:?}", world.warnings))?;
         check_world(&world, &GltfLimits::DEFAULT)?;
     }
-    Ok(())
+
+    // A child of two parents is where one that only the first of them has is.
+    let positions = |children_of_other: Value| {
+        let mut builder = textured_square();
+        for (x, children) in [(1, json!([first + 2])), (2, children_of_other)] {
+            builder.root(json!({"translation": [x, 0, 0], "children": children}));
+        }
+        builder.push("nodes", json!({"mesh": 0}));
+        let world = load_memory("parents.glb", builder.glb(), &AT_REST)?;
+        let columns = world.columns();
+        Ok::<_, Failed>(world.as_scene_ref(&columns).positions.to_vec())
+    };
+    let (below_both, below_first) = (positions(json!([first + 2]))?, positions(json!([]))?);
+    expect(below_both == below_first, || format!("{below_both:?}, not {below_first:?}"))
 }
 
 fn warnings() -> Result<(), Failed> {

@@ -164,10 +164,20 @@ const CHANGES: &[Malformed] = &[
         "skin 0 has 2 inverse bind matrices, but 3 joints",
     ),
     (bending_tube_at_rest, |it| it.json["skins"][0]["joints"] = json!([]), "skin 0 has no joints"),
-    (bending_tube_at_rest, |it| set_first_float(it, 5, -1.0), "mesh 0 primitive 0 has a negative weight at vertex 0"),
+    (bending_tube_at_rest, |it| set_number(it, 6, 3, 0.5), "skin 0 has an inverse bind matrix 0 that is not affine"),
     (
         bending_tube_at_rest,
-        |it| set_first_float(it, 7, 5.0),
+        |it| {
+            let index = it.json["nodes"].as_array().map_or(0, Vec::len);
+            it.push("nodes", json!({"children": [index]}));
+            it.json["skins"][0]["joints"][2] = json!(index);
+        },
+        "one of whose joints is in no place",
+    ),
+    (bending_tube_at_rest, |it| set_number(it, 5, 0, -1.0), "mesh 0 primitive 0 has a negative weight at vertex 0"),
+    (
+        bending_tube_at_rest,
+        |it| set_number(it, 7, 0, 5.0),
         "animation 0 (bend) channel 0 has no times, or ones that do not increase",
     ),
     (
@@ -216,10 +226,10 @@ fn set_float(it: &mut Builder, view: usize, index: usize, number: f32) {
     set_word(it, view, index, number.to_bits());
 }
 
-/// Changes the first number of an accessor.
-fn set_first_float(it: &mut Builder, accessor: usize, number: f32) {
+/// Changes a number of an accessor.
+fn set_number(it: &mut Builder, accessor: usize, index: usize, number: f32) {
     let view = it.json["accessors"][accessor]["bufferView"].as_u64().unwrap_or(0) as usize;
-    set_float(it, view, 0, number);
+    set_float(it, view, index, number);
 }
 
 /// Changes a joint of the first vertex.
