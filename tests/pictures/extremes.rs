@@ -14,6 +14,7 @@ pub const CASES: &[Case] = &[
     ("a_black_surface_stays_black_in_any_light", black),
     ("a_shade_close_to_a_bright_lamp_casts_its_shadow", shade),
     ("edges_too_long_for_a_paraboloid_are_counted_once_per_object", coarse),
+    ("edges_too_long_because_shorter_ones_take_too_many_triangles_are_counted", too_many_triangles),
 ];
 
 /// A wall of 2 m at the origin that faces +Z, and a camera 5 m in front of it.
@@ -71,12 +72,27 @@ fn coarse() -> Result<(), Failed> {
     let object = RenderObject::new(mesh, material, DVec3::NEG_Z * 9.0);
     scene.add_object(RenderObject { scale: Vec3::splat(1e4), ..object })?;
     scene.lights = vec![lamp(1.0, 5.0, true), lamp(2.0, 5.0, true)];
+    expect_coarse(&scene, 1)
+}
+
+/// A wall of 8,192 triangles at 10 cm from a lamp: their edges, of 4.4 cm, are halved three times, which takes 2¹⁹
+/// triangles.
+fn too_many_triangles() -> Result<(), Failed> {
+    let mut scene = wall(0.5)?;
+    let mesh = scene.as_scene_ref().meshes[0];
+    scene.replace(mesh, square(Topology::TriangleList).subdivided(0.05, 10_000))?;
+    scene.lights = vec![lamp(0.1, 5.0, true)];
+    expect_coarse(&scene, 0)
+}
+
+/// Draws two frames, each of which counts this object as coarse, and no other.
+fn expect_coarse(scene: &Scene, object: usize) -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for _ in 0..2 {
-        let recorded = fixture.record(&scene)?;
+        let recorded = fixture.record(scene)?;
         let rejections = recorded.statistics().rejections.iter();
         let counts: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
-        if counts != [(RejectionReason::CoarseEdges, 1, 1)] {
+        if counts != [(RejectionReason::CoarseEdges, 1, object)] {
             return Err(format!("{counts:?}").into());
         }
         fixture.submit(recorded)?;
