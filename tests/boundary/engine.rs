@@ -24,7 +24,7 @@ use drawloom::timeline::{Labels, TuningChoice};
 use drawloom::{CpuNode, NodeAccesses, NodeFrame};
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
-use tracing::{Event, Metadata, Subscriber};
+use tracing::{Event, Level, Metadata, Subscriber};
 use tracing_core::span::Current;
 
 use crate::fuse::{Kind, Owned, call, panic_as_planned};
@@ -387,6 +387,9 @@ pub struct OwnSubscriber {
 /// How many events and spans it was told of for the first time.
 pub static CALLSITES: AtomicUsize = AtomicUsize::new(0);
 
+/// How many errors it was told of.
+pub static ERRORS: AtomicUsize = AtomicUsize::new(0);
+
 fn subscriber(name: &'static str) {
     call(Kind::Subscriber, name);
 }
@@ -424,7 +427,10 @@ impl Subscriber for OwnSubscriber {
         true
     }
 
-    fn event(&self, _: &Event<'_>) {
+    fn event(&self, event: &Event<'_>) {
+        if *event.metadata().level() == Level::ERROR {
+            ERRORS.fetch_add(1, Ordering::Relaxed);
+        }
         subscriber("event");
     }
 

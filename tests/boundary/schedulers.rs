@@ -2,12 +2,14 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use drawloom::backend::SoftwareBackend;
 use drawloom::scene::{AssetLoader, Changes, Material, Mesh, Scene, SceneError};
 use drawloom::task::{AffinityMask, Scheduler, SchedulerBuilder, SchedulerError};
 
+use crate::engine::ERRORS;
 use crate::frames::Fixture;
 use crate::fuse::{self, Kind, Owned, PLANNED, call};
 use crate::within_time;
@@ -50,10 +52,11 @@ fn expected() -> Vec<u8> {
 fn a_panic_in_any_hook_is_an_error_that_names_it() {
     within_time(|| {
         let (expected, alive_before) = (expected(), fuse::alive());
-        let mut panicked = Vec::new();
+        let (mut panicked, mut errors) = (Vec::new(), 0);
         for index in 0.. {
             let has_text = index % 2 == 0;
             fuse::arm(Kind::Hook, index, has_text);
+            let errors_before = ERRORS.load(Ordering::Relaxed);
             let built = catch_unwind(|| with_hooks().build());
             let built = built.unwrap_or_else(|_| panic!("hook {index} unwinds"));
             let ended_by = match built {
@@ -67,6 +70,7 @@ fn a_panic_in_any_hook_is_an_error_that_names_it() {
                 Err(SchedulerError::StartHook { panic, .. }) => Some(("on_start", panic)),
                 Err(error) => panic!("hook {index}: {error}"),
             };
+            errors += ERRORS.load(Ordering::Relaxed) - errors_before;
             let Some(blown) = fuse::disarm() else { break };
             assert_eq!(ended_by.as_ref().map_or("on_stop", |(hook, _)| hook), blown);
             if let Some((_, panic)) = ended_by {
@@ -78,6 +82,9 @@ fn a_panic_in_any_hook_is_an_error_that_names_it() {
             // Another worker may still run the last job, which keeps the scheduler.
             crate::wait_until(|| fuse::alive() == alive_before, "the scheduler is kept");
         }
+        // The subscriber may have panicked at the first of these errors.
+        let stops = panicked.iter().filter(|hook| **hook == "on_stop").count();
+        assert!(stops >= 2 && (stops - 1..=stops).contains(&errors), "{errors} errors of {stops} ends of threads");
         panicked.sort_unstable();
         panicked.dedup();
         assert_eq!(panicked, ["affinity", "name", "on_start", "on_stop"]);
