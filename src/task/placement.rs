@@ -110,6 +110,48 @@ mod linux {
             }
         }
     }
+
+    #[cfg(all(test, not(drawloom_model_check)))]
+    mod tests {
+        use std::sync::Arc;
+        use std::sync::atomic::{AtomicUsize, Ordering};
+
+        use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
+
+        use super::{CpuSet, NONE, Pid, Placement};
+
+        /// Counts the events at which the list of threads is locked, and those at which it is not.
+        struct Hears {
+            placement: Arc<Placement>,
+            counts: [Arc<AtomicUsize>; 2],
+        }
+
+        impl<S: tracing::Subscriber> Layer<S> for Hears {
+            fn on_event(&self, _: &tracing::Event<'_>, _: Context<'_, S>) {
+                let is_unlocked = self.placement.threads.try_lock().is_some();
+                self.counts[usize::from(is_unlocked)].fetch_add(1, Ordering::Relaxed);
+            }
+        }
+
+        #[test]
+        fn what_cannot_be_placed_is_told_without_a_lock() {
+            let placement = Arc::new(Placement::new());
+            // Linux numbers no thread like this.
+            let missing = Pid::from_raw(i32::MAX).unwrap();
+            placement.threads.lock().extend([(missing, CpuSet::new()); 2]);
+            placement.is_enabled.store(true, Ordering::Relaxed);
+            let counts = <[Arc<AtomicUsize>; 2]>::default();
+            let hears = Hears { placement: Arc::clone(&placement), counts: counts.clone() };
+            tracing::subscriber::with_default(tracing_subscriber::registry().with(hears), || {
+                placement.avoid_current_processor();
+                // It is disabled then, on whichever processor the next call is.
+                placement.avoided.store(NONE, Ordering::Relaxed);
+                placement.avoid_current_processor();
+            });
+            // One for each thread, and one for all.
+            assert_eq!(counts.map(|count| count.load(Ordering::Relaxed)), [0, 3]);
+        }
+    }
 }
 
 #[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
