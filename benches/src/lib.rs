@@ -15,6 +15,7 @@ pub mod cpu_time;
 pub mod harness;
 pub mod mirror;
 pub mod moving;
+pub mod plain;
 pub mod results;
 pub mod sphere;
 pub mod spinning;

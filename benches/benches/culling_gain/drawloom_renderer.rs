@@ -4,43 +4,15 @@ use std::error::Error;
 use std::sync::Arc;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
-use drawloom::command::Selection;
-use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 use drawloom::quality::Quality;
 use drawloom::task::Scheduler;
 use drawloom::timeline::TuningSubject;
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use drawloom_benches::backends::BackendName;
+use drawloom_benches::plain::Plain;
 use drawloom_benches::stopwatch::{FrameTime, timed_frame};
 
 use crate::walk::Walk;
-
-/// Draws all opaque objects in one colour.
-struct Plain;
-
-impl RenderProcess for Plain {
-    fn name(&self) -> &str {
-        "plain"
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
-        declare.clears_depth("depth of plain", Format::Depth32Float);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        let shader = "
-            @vertex
-            fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
-                return clip_position(relative_position(drawn_object(in.instance), in.position));
-            }
-            @fragment
-            fn fragment() -> @location(0) vec4<f32> {
-                return vec4<f32>(1.0);
-            }";
-        Draws::Commands(CommandDraws { shader, selection: Selection::OPAQUE, ..CommandDraws::default() })
-    }
-}
 
 /// A renderer and the walk that it draws.
 pub struct DrawloomRenderer {

@@ -22,12 +22,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::WgpuBackend;
-use drawloom::command::Selection;
-use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::{Harness, Rounds, progress_bar};
+use drawloom_benches::plain::Plain;
 use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::stopwatch::timed_frame;
@@ -175,33 +174,6 @@ impl Contender {
             Self::Drawloom(runner) => runner.frame(),
             Self::ByHand(loop_by_hand) => loop_by_hand.frame(),
         }
-    }
-}
-
-/// Draws all opaque objects in one colour.
-struct Plain;
-
-impl RenderProcess for Plain {
-    fn name(&self) -> &str {
-        "plain"
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        declare.clears_color("plain", Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
-        declare.clears_depth("depth of plain", Format::Depth32Float);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        let shader = "
-            @vertex
-            fn vertex(in: VertexInput) -> @builtin(position) vec4<f32> {
-                return clip_position(relative_position(drawn_object(in.instance), in.position));
-            }
-            @fragment
-            fn fragment() -> @location(0) vec4<f32> {
-                return vec4<f32>(1.0);
-            }";
-        Draws::Commands(CommandDraws { shader, selection: Selection::OPAQUE, ..CommandDraws::default() })
     }
 }
 
