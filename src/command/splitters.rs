@@ -29,6 +29,16 @@ impl Splitters {
     /// The most buckets. The job of each reads every key of the pass.
     pub const MAX_BUCKETS: usize = 32;
 
+    /// The most buckets that are worth their cost for a pass with `count` commands, where all passes that are sorted have about
+    /// `of_all`: twice the workers that the pass gets if each gets them by its commands, so that a worker that ends early
+    /// finds another bucket. The job of a bucket reads every key of the pass, so more are wasted work.
+    pub(crate) fn max_buckets(workers: usize, count: usize, of_all: usize) -> usize {
+        let of_all = of_all.max(1);
+        // Rounded up, but for less than a quarter of a bucket: passes that are alike never have quite the same count.
+        let quarters = (8 * workers).saturating_mul(count) / of_all;
+        quarters.div_ceil(4).clamp(1, workers)
+    }
+
     /// Chooses the splitters of `buckets` buckets for the first `count` commands, or of fewer where buckets would be
     /// smaller than [`Splitters::MIN_COMMANDS_PER_BUCKET`].
     pub(crate) fn choose(&mut self, commands: &ChunkedArray<RenderCommand>, count: usize, buckets: usize) {
@@ -132,6 +142,18 @@ mod tests {
         Many,
         /// So that a sample of the first commands would not be one of all.
         Ascending,
+    }
+
+    #[test]
+    fn passes_share_the_workers_by_their_commands() {
+        // Four alike on two workers are a job each, and on sixteen eight jobs each.
+        for count in [99, 100, 101] {
+            assert_eq!([1, 2, 4, 16].map(|workers| Splitters::max_buckets(workers, count, 400)), [1, 1, 2, 8]);
+        }
+        // One that has nearly all of them gets all workers, the others one each.
+        assert_eq!([20, 1].map(|count| Splitters::max_buckets(8, count, 23)), [8, 1]);
+        // In a first frame nothing is known of the others.
+        assert_eq!([0, 5, usize::MAX].map(|count| Splitters::max_buckets(2, count, 0)), [1, 2, 2]);
     }
 
     #[test]

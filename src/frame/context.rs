@@ -12,7 +12,7 @@ use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
 use super::tables::{FrameTables, MAX_SEGMENTS};
 use crate::backend::{Backend, FrameRequest, PassRequest};
-use crate::command::DrawList;
+use crate::command::{DrawList, Splitters};
 use crate::process::AttachmentExtent;
 use crate::scene::Projection;
 use crate::view::{ObjectLevels, SelectionFilter, VisibleRange};
@@ -43,6 +43,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) workers: usize,
     /// The number of passes that order their objects by bin.
     pub(super) binning_passes: usize,
+    /// How many objects all passes that sort drew in the frame before: when one is sorted, others may not be counted yet.
+    pub(super) sorted_before: usize,
 }
 
 impl<B: Backend> FrameContext<'_, B> {
@@ -129,6 +131,11 @@ impl<B: Backend> FrameContext<'_, B> {
             }
             None => VisibleRange::Share { index: segment, count: self.segment_count(pass) },
         }
+    }
+
+    /// The most buckets that are worth their cost in a pass, which shares the workers with the other passes that sort.
+    pub(super) fn max_buckets(&self, pass: usize) -> usize {
+        Splitters::max_buckets(self.workers, self.visible_count(pass), self.sorted_before)
     }
 
     /// The number of buckets in which a pass sorts and merges its commands, once they are divided.

@@ -366,6 +366,13 @@ impl<B: Backend> Renderer<B> {
             culls_triangles,
             workers: self.scheduler.workers(),
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
+            sorted_before: self
+                .tables
+                .passes
+                .iter()
+                .filter(|table| !table.orders_by_bin)
+                .map(|table| table.drawn_before)
+                .sum(),
         };
         graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {

@@ -166,6 +166,8 @@ pub(super) struct PassTable {
     pub(super) selection: Option<Selection>,
     /// Whether it orders them by bin, and not by depth.
     pub(super) orders_by_bin: bool,
+    /// How many objects it drew in the frame before.
+    pub(super) drawn_before: usize,
     /// One command for each visible object, by rank.
     pub(super) commands: ChunkedArray<RenderCommand>,
     /// What divides the commands into buckets. With a fixed number of draws in a job, the partition does.
@@ -193,6 +195,7 @@ impl PassTable {
     ) {
         let parts = granularity.draws_per_job().map_or(0, |draws| objects.div_ceil(draws));
         unlock(&mut self.list);
+        self.drawn_before = self.list.get_mut().objects.len();
         self.selection = selection;
         self.orders_by_bin = orders_by_bin;
         if selection.is_none() || culls_triangles {

@@ -92,8 +92,9 @@ impl<B: Backend> Stage<B> for Split {
         }
         let mut splitters = table.splitters.write();
         let buckets = match frame.granularity {
-            // The job of a bucket reads every key of the pass, so more buckets than workers are wasted work.
-            Granularity::Adaptive => count.div_ceil(frame.items_per_job_by_cost(job.node, count)).min(frame.workers),
+            Granularity::Adaptive => {
+                count.div_ceil(frame.items_per_job_by_cost(job.node, count)).min(frame.max_buckets(self.pass))
+            }
             _ => 1,
         };
         splitters.choose(&table.commands, count, buckets);
