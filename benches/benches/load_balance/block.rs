@@ -164,14 +164,14 @@ impl Block<'_> {
         Ok((time, visible.sum()))
     }
 
-    /// Draws frames, one after another: one is timed, and the last is recorded, with equally warm caches, and replayed.
+    /// Draws frames, one after another. The last is recorded and replayed, and the one that draws the same, a period before, is timed.
     fn recorded_frames(&self, runner: &mut Runner<'_>) -> Result<(), Box<dyn Error>> {
         let timeline = Arc::clone(runner.renderer.scheduler().timeline());
         let mut timed = 0.0;
-        // A whole period, so that all modes go on with the same frame.
-        for left in (0..PERIOD).rev() {
+        // Whole periods, so that all modes go on with the same frame.
+        for left in (0..2 * PERIOD).rev() {
             match left {
-                2 => timed = self.frame(runner)?.0.cpu.as_secs_f64(),
+                PERIOD => timed = self.frame(runner)?.0.cpu.as_secs_f64(),
                 1 => {
                     timeline.start();
                     self.frame(runner)?;

@@ -27,7 +27,6 @@ impl Mode {
         Self::of("adaptive", Granularity::Adaptive),
     ];
     pub const SERIAL: usize = 0;
-    pub const PER_CAMERA: usize = 1;
     pub const ADAPTIVE: usize = 7;
 
     const fn of(name: &'static str, granularity: Granularity) -> Self {

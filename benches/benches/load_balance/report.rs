@@ -54,8 +54,6 @@ pub struct Report {
     errors: Vec<ReplayError>,
     /// What bounds the predictions for adaptive.
     bounds: Vec<(Place, Bounds)>,
-    /// On `uneven` in motion, with two workers: adaptive against per-camera.
-    against_per_camera: Vec<(BackendName, f64)>,
 }
 
 /// A predicted time and the measured one.
@@ -76,14 +74,7 @@ impl ReplayError {
 
 impl Report {
     pub fn new(extent: &Extent) -> Self {
-        Self {
-            extent: extent.name,
-            rounds: extent.rounds,
-            rows: Vec::new(),
-            errors: Vec::new(),
-            bounds: Vec::new(),
-            against_per_camera: Vec::new(),
-        }
+        Self { extent: extent.name, rounds: extent.rounds, rows: Vec::new(), errors: Vec::new(), bounds: Vec::new() }
     }
 
     pub fn add(&mut self, block: &Block<'_>, measured: &Measured) {
@@ -115,9 +106,6 @@ impl Report {
                 submit_ms: Some(median(results.submit.iter().copied()) * 1e3),
                 predicted: false,
             });
-        }
-        if (place.0, place.1, block.workers) == (Kind::Moving, "uneven", 2) {
-            self.against_per_camera.push((block.backend, against(Mode::PER_CAMERA, Mode::ADAPTIVE)));
         }
         self.add_predictions(block, measured);
     }
@@ -307,9 +295,6 @@ impl Report {
             let place = format!("{}, {}", row.scene, row.kind.name());
             targets.at_least(format!("{place}: adaptive, of the best fixed mode"), bound, row.ratio_to_best_mode);
             targets.at_least(format!("{place}: adaptive, of serial"), 0.97, row.speedup_vs_serial);
-        }
-        for &(_, ratio) in self.against_per_camera.iter().filter(|block| block.0 == BackendName::Noop) {
-            targets.at_least("uneven, moving: adaptive, of per-camera", 1.5, ratio);
         }
         let is_large = |row: &&Row| is_of(row, bounds::WORKERS, true) && row.scene.ends_with("-large");
         for row in self.rows.iter().filter(is_large).filter(|row| row.kind == Kind::Moving) {
