@@ -43,7 +43,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) workers: usize,
     /// The number of passes that order their objects by bin.
     pub(super) binning_passes: usize,
-    /// How many objects all passes that sort drew in the frame before: when one is sorted, others may not be counted yet.
+    /// How many objects all passes that sort put into their lists in the frame before: when one is sorted, others may not be counted yet.
     pub(super) sorted_before: usize,
 }
 
@@ -135,7 +135,11 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// The most buckets that are worth their cost in a pass, which shares the workers with the other passes that sort.
     pub(super) fn max_buckets(&self, pass: usize) -> usize {
-        Splitters::max_buckets(self.workers, self.visible_count(pass), self.sorted_before)
+        let count = match self.tables.passes[pass].listed_before {
+            0 => self.visible_count(pass),
+            listed => listed,
+        };
+        Splitters::max_buckets(self.workers, count, self.sorted_before)
     }
 
     /// The number of buckets in which a pass sorts and merges its commands, once they are divided.

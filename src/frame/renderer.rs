@@ -371,7 +371,7 @@ impl<B: Backend> Renderer<B> {
                 .passes
                 .iter()
                 .filter(|table| !table.orders_by_bin)
-                .map(|table| table.drawn_before)
+                .map(|table| table.listed_before)
                 .sum(),
         };
         graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);

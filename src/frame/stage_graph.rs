@@ -307,11 +307,12 @@ impl<B: Backend> StageGraph<B> {
         tables.set_keys(&self.table_keys, views);
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
+        let frame = tables.version(0).frame;
         for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
             let view = &views[pass.view_index];
             let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
             let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
-            table.begin_frame(selection, tables.objects.len(), culls_triangles, orders_by_bin, granularity);
+            table.begin_frame(frame, selection, tables.objects.len(), culls_triangles, orders_by_bin, granularity);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_pieces(scene, conditions, &self.passes)?;

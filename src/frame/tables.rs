@@ -166,8 +166,8 @@ pub(super) struct PassTable {
     pub(super) selection: Option<Selection>,
     /// Whether it orders them by bin, and not by depth.
     pub(super) orders_by_bin: bool,
-    /// How many objects it drew in the frame before.
-    pub(super) drawn_before: usize,
+    /// How many objects it put into the list in the frame before; 0 if that kept its list.
+    pub(super) listed_before: usize,
     /// One command for each visible object, by rank.
     pub(super) commands: ChunkedArray<RenderCommand>,
     /// What divides the commands into buckets. With a fixed number of draws in a job, the partition does.
@@ -184,9 +184,10 @@ pub(super) struct PassTable {
 }
 
 impl PassTable {
-    /// Begins a frame of `objects` objects. The list is kept as that of a frame with the same inputs.
+    /// Begins the frame of this number, of `objects` objects. The list is kept as that of a frame with the same inputs.
     pub(super) fn begin_frame(
         &mut self,
+        frame: u64,
         selection: Option<Selection>,
         objects: usize,
         culls_triangles: bool,
@@ -195,7 +196,10 @@ impl PassTable {
     ) {
         let parts = granularity.draws_per_job().map_or(0, |draws| objects.div_ceil(draws));
         unlock(&mut self.list);
-        self.drawn_before = self.list.get_mut().objects.len();
+        let list = self.list.get_mut();
+        // A list that cannot be kept has no version.
+        let was_made = list.version() == Version::default() || list.version().frame + 1 == frame;
+        self.listed_before = if was_made { list.objects.len() } else { 0 };
         self.selection = selection;
         self.orders_by_bin = orders_by_bin;
         if selection.is_none() || culls_triangles {
@@ -223,5 +227,25 @@ impl PassTable {
     fn clear_list(&mut self) {
         self.list.get_mut().clear();
         self.invalidate();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_counts_in_the_frame_after_it_was_made_and_not_while_it_is_kept() {
+        let mut table = PassTable::default();
+        let begin = |table: &mut PassTable, frame| {
+            table.begin_frame(frame, Some(Selection::default()), 10, false, false, Granularity::Adaptive);
+            table.listed_before
+        };
+        table.list.get_mut().objects.extend(0..10);
+        table.list.get_mut().set_version(Version { frame: 3, index: 0 });
+        assert_eq!([4, 5, 6].map(|frame| begin(&mut table, frame)), [10, 0, 0]);
+        // One that is made anew in each frame.
+        table.list.get_mut().set_version(Version::default());
+        assert_eq!([7, 8].map(|frame| begin(&mut table, frame)), [10, 10]);
     }
 }
