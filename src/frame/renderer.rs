@@ -366,13 +366,7 @@ impl<B: Backend> Renderer<B> {
             culls_triangles,
             workers: self.scheduler.workers(),
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
-            sorted_before: self
-                .tables
-                .passes
-                .iter()
-                .filter(|table| !table.orders_by_bin)
-                .map(|table| table.listed_before)
-                .sum(),
+            sorted_before: self.tables.sorted_before(),
         };
         graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);
         if let Err(error) = graph.schedule.run(&self.scheduler, &context) {

@@ -129,6 +129,11 @@ impl FrameTables {
         self.passes.iter_mut().for_each(PassTable::invalidate);
     }
 
+    /// How many objects all passes that sort put into their lists in the frame before.
+    pub(super) fn sorted_before(&self) -> usize {
+        self.passes.iter().filter(|table| !table.orders_by_bin).map(|table| table.listed_before).sum()
+    }
+
     /// The version of what the frame makes for a view or pass, by index.
     pub(super) fn version(&self, index: usize) -> Version {
         Version { frame: self.frames, index }
