@@ -129,7 +129,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     progress.finish_and_clear();
     report.print();
     let targets = report.targets();
-    targets.print("Targets and results on noop with two workers, without instancing");
+    targets.print("Targets and results on noop");
     if !arguments.backend.is_quick() {
         report.write()?;
     }

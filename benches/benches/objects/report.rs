@@ -203,7 +203,8 @@ impl Report {
         table.print();
     }
 
-    /// The targets, and what was reached on `noop`: with two workers, without instancing, or with more workers than processes.
+    /// The targets on `noop`: frames and growth with two workers and without instancing, splits with more workers than
+    /// processes.
     pub fn targets(&self) -> Targets {
         let mut targets = Targets::new();
         let has_target = |row: &&scenario::Row| row.backend == BackendName::Noop && row.workers == 2 && !row.instancing;
@@ -221,7 +222,8 @@ impl Report {
                 targets.at_least(figure, 0.9, row.ratio / row.ceiling);
             }
         }
-        // Where there is a process for each worker, L's splits suffice: draws are divided for those workers that have none.
+        // With a process for each worker, L's split by process suffices. By material there is always one for each, so with
+        // more workers the best split is still a peer.
         let has_target = |row: &&splits::Row| row.backend == BackendName::Noop && row.workers > 1 + row.shadow_maps;
         for row in self.splits.iter().filter(has_target) {
             let figure = format!(
