@@ -22,7 +22,8 @@ impl SceneLimits {
     pub const NONE: Self = Self { buffer_bytes: u64::MAX, binding_bytes: u64::MAX, texture_layers: 256 };
 
     /// The maximum number of objects if shaders read columns of up to `column_stride` bytes an object. Each object also
-    /// takes 64 bytes itself. Objects at higher indices are counted as [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
+    /// takes 64 bytes itself. Objects at higher indices are counted as
+    /// [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
     pub fn max_objects(&self, column_stride: usize) -> usize {
         elements(self.binding_bytes, column_stride.max(size_of::<GpuObject>()))
     }

@@ -29,9 +29,9 @@ impl Splitters {
     /// The most buckets. The job of each reads every key of the pass.
     pub const MAX_BUCKETS: usize = 32;
 
-    /// The most buckets that are worth their cost for a pass with `count` commands, where all passes that are sorted have about
-    /// `of_all`: twice the workers that the pass gets if each gets them by its commands, so that a worker that ends early
-    /// finds another bucket. The job of a bucket reads every key of the pass, so more are wasted work.
+    /// The most buckets that are worth their cost for a pass with `count` commands, where all passes that are sorted
+    /// have about `of_all`: twice its share of the workers, by commands, so that a worker that ends early finds another
+    /// bucket. The job of a bucket reads every key of the pass, so more are wasted work.
     pub(crate) fn max_buckets(workers: usize, count: usize, of_all: usize) -> usize {
         let of_all = of_all.max(1);
         // Rounded up, but for less than a quarter of a bucket: passes that are alike never have quite the same count.

@@ -43,7 +43,8 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) workers: usize,
     /// The number of passes that order their objects by bin.
     pub(super) binning_passes: usize,
-    /// How many objects all passes that sort put into their lists in the frame before: when one is sorted, others may not be counted yet.
+    /// How many objects all passes that sort put into their lists in the frame before: when one is sorted, others may
+    /// not be counted yet.
     pub(super) sorted_before: usize,
 }
 

@@ -164,7 +164,8 @@ impl Block<'_> {
         Ok((time, visible.sum()))
     }
 
-    /// Draws frames, one after another. The last is recorded and replayed, and the one that draws the same, a period before, is timed.
+    /// Draws frames, one after another. The last is recorded and replayed, and the frame of the same content, a period
+    /// before, is timed.
     fn recorded_frames(&self, runner: &mut Runner<'_>) -> Result<(), Box<dyn Error>> {
         let timeline = Arc::clone(runner.renderer.scheduler().timeline());
         let mut timed = 0.0;

@@ -222,8 +222,8 @@ impl Report {
                 targets.at_least(figure, 0.9, row.ratio / row.ceiling);
             }
         }
-        // With a process for each worker, L's split by process suffices. By material there is always one for each, so with
-        // more workers the best split is still a peer.
+        // With a process for each worker, L's split by process suffices. By material there is always one for each, so
+        // with more workers the best split is still a peer.
         let has_target = |row: &&splits::Row| row.backend == BackendName::Noop && row.workers > 1 + row.shadow_maps;
         for row in self.splits.iter().filter(has_target) {
             let figure = format!(
