@@ -26,12 +26,13 @@ pub struct Row {
     pub ns_per_object_view: f64,
 }
 
-/// Measures all numbers of objects with all numbers of workers, interleaved.
+/// Measures these numbers of objects with all numbers of workers, interleaved.
 ///
 /// # Errors
 /// Returns an error if a frame cannot be drawn.
 pub fn measure(
     extent: &Extent,
+    objects: &[usize],
     backend: BackendName,
     workers: &[usize],
     progress: &ProgressBar,
@@ -41,7 +42,7 @@ pub fn measure(
     let (mut sizes, mut runners) = (Vec::new(), Vec::new());
     for &workers in workers {
         let scheduler = Arc::new(Scheduler::new(workers)?);
-        for &objects in extent.growth {
+        for &objects in objects {
             sizes.push((objects, workers));
             runners.push((world::new(objects, LIGHTS)?, Runner::new(backend.open()?, &scheduler, Division::OWN)?));
         }

@@ -3,6 +3,7 @@
 //!     cargo bench -p drawloom-benches --bench objects
 //!     cargo bench -p drawloom-benches --bench objects -- --quick
 //!     cargo bench -p drawloom-benches --bench objects -- --backend noop --workers 2,8
+//!     cargo bench -p drawloom-benches --bench objects -- --backend adapter --max-objects 10000
 //!
 //! L's scene holds 7 to 2,006 objects; further objects have the positions of existing ones, so that they cost the device little.
 //! All of them move a little in every frame. The deferred pipeline draws them with one hemispherical light that casts shadows, so
@@ -62,6 +63,17 @@ struct Arguments {
     backend: BackendArguments,
     #[command(flatten)]
     workers: WorkersArguments,
+    /// Leaves out scenes of more objects, which take minutes on an adapter that is a CPU.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(7..))]
+    max_objects: Option<u64>,
+}
+
+impl Arguments {
+    /// Those of the numbers of objects that are to be measured.
+    fn within_limit(&self, objects: &'static [usize]) -> Vec<usize> {
+        let max_objects = self.max_objects.unwrap_or(u64::MAX);
+        objects.iter().copied().filter(|&objects| objects as u64 <= max_objects).collect()
+    }
 }
 
 /// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
@@ -117,14 +129,15 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut report = Report::new(&extent);
     let workers = arguments.workers.parallel_counts();
     for backend in arguments.backend.backends()? {
-        for &objects in extent.objects {
+        for objects in arguments.within_limit(extent.objects) {
             report.scenarios.extend(scenario::measure(&extent, backend, objects, &workers, &progress)?);
             report.updates.extend(update::measure(&extent, backend, objects, &workers, &progress)?);
         }
-        for &objects in extent.splits {
+        for objects in arguments.within_limit(extent.splits) {
             report.splits.extend(splits::measure(&extent, backend, objects, &workers, &progress)?);
         }
-        report.growth.extend(growth::measure(&extent, backend, &workers, &progress)?);
+        let objects = arguments.within_limit(extent.growth);
+        report.growth.extend(growth::measure(&extent, &objects, backend, &workers, &progress)?);
     }
     progress.finish_and_clear();
     report.print();
