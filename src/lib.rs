@@ -34,7 +34,8 @@
 //! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
 //! - [`CpuNode`] is work of an engine's own among the jobs of a frame, and [`scene::GeneratedBuffer`] what the same frame draws of it.
 //! - [`timeline`] tells what ran where and when; `report`, behind its feature, why a frame took as long as it did.
-//! - [`task::Scheduler`] and [`graph::FrameGraph`] stand on their own, for an engine's other work.
+//! - [`task::Scheduler`] and [`graph::FrameGraph`] are of `drawloom-jobs`, a crate that stands on its own, for an
+//!   engine's other work.
 //!
 //! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded Rendering"),
 //! **L** (Lorenzon and Clua, "A Novel Multithreaded Rendering System based on a Deferred Approach", SBGames 2009) and
@@ -76,18 +77,11 @@
 //! each by [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the span or event is lost,
 //! and nothing else.
 
+#![forbid(unsafe_code)]
+
 // Each module uses only modules above it; `tests/architecture` fails otherwise.
-mod sync;
 mod unwind;
 mod leaked_guards;
-pub mod text;
-pub mod fence;
-pub mod timeline;
-mod tuning;
-pub mod task;
-#[doc(hidden)]
-pub mod chunked_array;
-pub mod graph;
 pub mod quality;
 pub mod handle;
 pub mod scene;
@@ -99,13 +93,14 @@ pub mod view;
 pub mod process;
 pub mod backend;
 mod frame;
-#[cfg(feature = "report")]
-pub mod report;
 #[cfg(feature = "wgpu")]
 pub mod guide;
 
 pub use backend::ViewQueue;
 pub use bytemuck;
+#[cfg(feature = "report")]
+pub use drawloom_jobs::report;
+pub use drawloom_jobs::{fence, graph, task, text, timeline};
 pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
     FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,

@@ -11,7 +11,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use arbitrary::{Arbitrary, Unstructured};
 use drawloom::graph::{FrameGraph, Node, NodeError, RunError, Schedule};
 use drawloom::task::{Scheduler, Worker};
-use drawloom_testing::graph_oracle::{GraphModel, Oracle, Role, check_compiled};
+#[path = "../../jobs/tests/graph/graph_model.rs"]
+mod graph_model;
+
+use graph_model::{GraphModel, Oracle, Role, check_compiled};
 use libfuzzer_sys::fuzz_target;
 
 const MAX_NODES: usize = 12;

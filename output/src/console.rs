@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
-use drawloom::text::Escaped;
+use drawloom_jobs::text::Escaped;
 
 /// The first error of the standard output, until it is [taken](check_output).
 static OUTPUT_ERROR: Mutex<Option<io::Error>> = Mutex::new(None);

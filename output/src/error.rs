@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use drawloom::text::path_text;
+use drawloom_jobs::text::path_text;
 
 /// Why a file cannot be written. Every message names the file.
 #[derive(Debug, thiserror::Error)]

@@ -25,7 +25,7 @@ mod picture;
 #[cfg(feature = "clap")]
 pub use arguments::{exit_with, parse_arguments};
 pub use console::{check_output, diagnostics, exit_code, print_diagnostic, print_line, text};
-pub use drawloom::text::path_text;
+pub use drawloom_jobs::text::path_text;
 pub use error::OutputError;
 pub use file::{OutputFile, create_folder};
 pub use picture::PictureFile;

@@ -9,8 +9,9 @@ use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
+use crate::task::{JobPanic, catch};
 use crate::timeline::{Labels, TuningChoice};
-use crate::unwind::{Contained, JobPanic, catch};
+use crate::unwind::Contained;
 
 /// A call of a backend's method panicked.
 #[derive(Debug)]
@@ -32,7 +33,7 @@ impl CallPanic {
 /// # Errors
 /// If it panics.
 pub(crate) fn guarded<R>(call: &'static str, method: impl FnOnce() -> R) -> Result<R, CallPanic> {
-    catch(method).map_err(|JobPanic { message }| CallPanic { call, message })
+    catch(method).map_err(|JobPanic { message, .. }| CallPanic { call, message })
 }
 
 /// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's

@@ -1,7 +1,8 @@
 //! A partition of a pass's commands into parts of a given number.
 
+use drawloom_jobs::internal::ChunkedArray;
+
 use super::{RenderCommand, SortKey};
-use crate::chunked_array::ChunkedArray;
 
 /// The commands of a pass, divided into parts of equal size. All commands of a part come before those of the next, so the
 /// parts can be sorted independently.

@@ -1,10 +1,11 @@
 //! Sort: commands by key, equal keys by object.
 
+use drawloom_jobs::internal::ChunkedArray;
+
 use super::key_packer::KeyPacker;
 use super::radix_sort::{DIGIT_VALUES, radix_sort};
 use super::splitters::KeyRange;
 use super::{RenderCommand, SortKey};
-use crate::chunked_array::ChunkedArray;
 
 /// Scratch memory for sorting. Each worker keeps one.
 #[derive(Debug, Default)]

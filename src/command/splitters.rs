@@ -1,7 +1,8 @@
 //! Splitters: keys that divide a pass's commands into buckets, which are sorted and merged in parallel.
 
+use drawloom_jobs::internal::ChunkedArray;
+
 use super::{RenderCommand, SortKey};
-use crate::chunked_array::ChunkedArray;
 
 /// The splitters of a sample sort: keys that divide a pass's commands into buckets of about equal size, one job each
 /// (Blelloch et al., "A Comparison of Sorting Algorithms for the Connection Machine CM-2", 1991).

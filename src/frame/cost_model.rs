@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use super::job_size::job_size;
+use drawloom_jobs::internal::{Estimate, Filter, job_size};
+
 use crate::timeline::{JobSize, Labels};
-use crate::tuning::{Estimate, Filter};
 
 /// What the items of a frame's stages cost. The nodes of one cost kind share an estimate; each node has its own width, and so a job
 /// size of its own. Nodes are counted in the order of the stage graph.
@@ -135,9 +135,10 @@ const FIRST_JOB_ITEMS: usize = 512;
 
 #[cfg(test)]
 mod tests {
-    use super::super::job_size::{MAX_JOB, MIN_JOB, PARALLEL_THRESHOLD};
+    use drawloom_jobs::internal::{MAX_JOB, MIN_JOB, PARALLEL_THRESHOLD};
+    use drawloom_signal::{ControllerBounds, check_controller};
+
     use super::*;
-    use crate::tuning::signal::{ControllerBounds, check_controller};
 
     const NODE: usize = 0;
 

@@ -195,6 +195,7 @@ impl From<RunError> for FrameError {
             RunError::Failed { node, source } => Self::Failed { stage: node, source },
             RunError::Panicked { node, message } => Self::Panicked { stage: node, message },
             RunError::Scheduler(panic) => Self::Scheduler(panic),
+            other => Self::Failed { stage: "the run of the graph".to_owned(), source: other.into() },
         }
     }
 }

@@ -231,7 +231,7 @@ fn submit_then<B: Backend>(
 /// Does a part of a frame's work on a thread of the loop, where a panic would leave all frames behind this one waiting
 /// for ever.
 fn caught<R>(work: impl FnOnce() -> Result<R, FrameLoopError>) -> Result<R, FrameLoopError> {
-    catch(work).unwrap_or_else(|JobPanic { message }| Err(FrameLoopError::Panicked { message }))
+    catch(work).unwrap_or_else(|JobPanic { message, .. }| Err(FrameLoopError::Panicked { message }))
 }
 
 /// The completion thread: waits until the device has drawn the frames, one after the other.

@@ -51,7 +51,7 @@ impl NodeDeclarations {
         self.generated.clear();
         for node in nodes {
             let first = self.accesses.accesses.len();
-            catch(|| node.declare(&mut self.accesses)).map_err(|JobPanic { message }| {
+            catch(|| node.declare(&mut self.accesses)).map_err(|JobPanic { message, .. }| {
                 let name = catch(|| node.name().to_owned()).unwrap_or_default();
                 FrameError::Panicked { stage: name, message }
             })?;
@@ -86,7 +86,7 @@ impl LentNodes<'_> {
     /// If a node panics when it is asked for its name.
     pub(super) fn keys(self) -> Result<NodeKeys, FrameError> {
         let key = |(index, node): (usize, &&dyn CpuNode)| {
-            let name = catch(|| Arc::from(node.name())).map_err(|JobPanic { message }| FrameError::Panicked {
+            let name = catch(|| Arc::from(node.name())).map_err(|JobPanic { message, .. }| FrameError::Panicked {
                 stage: format!("the name of node {index}"),
                 message,
             })?;

@@ -17,7 +17,6 @@ mod frame_outcome;
 mod frame_place;
 mod granularity;
 pub mod helper;
-mod job_size;
 mod latched_views;
 mod lent_nodes;
 mod light_maps;
@@ -72,8 +71,6 @@ pub use error::{BudgetError, BuildError, FrameError, LatchError, SubmitError};
 pub use frame_loop::{Buffering, FinishedFrame, FrameLoop, FrameLoopError, FrameSlot, FrameTimes};
 pub use frame_place::FramePlace;
 pub use granularity::Granularity;
-#[cfg(feature = "report")]
-pub(crate) use job_size::job_size;
 pub use node_accesses::{FrameData, NodeAccesses, NodeResource};
 pub use node_frame::{NodeAccessError, NodeFrame};
 pub use piece_statistics::PieceStatistics;

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use drawloom_jobs::internal::{CostSample, Tuner};
+
 use super::occluders::occluders;
 use super::tables::FrameTables;
 use crate::command::Selection;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
-use crate::tuning::{CostSample, Tuner};
 use crate::view::RenderView;
 
 /// Whether a view tests for occlusion, and what may occlude there. The view tries frames with the test and frames without it, and
@@ -124,8 +125,9 @@ pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &Frame
 
 #[cfg(test)]
 mod tests {
+    use drawloom_signal::{ControllerBounds, Signal, check_controller};
+
     use super::*;
-    use crate::tuning::signal::{ControllerBounds, Signal, check_controller};
 
     fn control() -> OcclusionControl {
         OcclusionControl::with_occluders(Some(Vec::new()))

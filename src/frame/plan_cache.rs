@@ -190,5 +190,5 @@ pub(super) fn with_quality(deferred: Deferred, quality: &Quality) -> Result<Defe
 
 /// Calls code of processes and steps of the engine, and turns its panic into an error.
 fn catch_panics<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
-    catch(call).unwrap_or_else(|JobPanic { message }| Err(PlanError::Panicked { message }))
+    catch(call).unwrap_or_else(|JobPanic { message, .. }| Err(PlanError::Panicked { message }))
 }

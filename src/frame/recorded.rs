@@ -251,7 +251,7 @@ impl<B: Backend> Submitter<B> {
         // Calls of the engine's code are caught one by one. Should one have been forgotten, the frame fails all the
         // same.
         let submitted = catch(|| self.submit_frame(recorded));
-        submitted.unwrap_or_else(|JobPanic { message }| Err(SubmitError::Panicked { message }))
+        submitted.unwrap_or_else(|JobPanic { message, .. }| Err(SubmitError::Panicked { message }))
     }
 
     fn submit_frame(&self, recorded: Recorded<B>) -> Result<Submitted<B>, SubmitError> {

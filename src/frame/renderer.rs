@@ -161,7 +161,7 @@ impl<B: Backend> Renderer<B> {
             self.backend_maintenance.start(&self.backend, &self.scheduler)?;
             Ok(recorded)
         });
-        let recorded = recorded.unwrap_or_else(|JobPanic { message }| {
+        let recorded = recorded.unwrap_or_else(|JobPanic { message, .. }| {
             Err(FrameError::Panicked { stage: String::from("the recording of the frame"), message })
         });
         match recorded {

@@ -3,8 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use drawloom_jobs::internal::Stopwatch;
+
 use super::statistics::StageTimes;
-use crate::timeline::{Stopwatch, Timeline};
+use crate::timeline::Timeline;
 
 /// A group of stages in [`StageTimes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

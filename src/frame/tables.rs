@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
@@ -16,7 +17,6 @@ use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
 use super::views::FrameViews;
 use crate::backend::SceneLimits;
-use crate::chunked_array::ChunkedArray;
 use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, Partition, RenderCommand, Selection, SortScratch, Splitters, Version,
 };

@@ -24,6 +24,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use drawloom_jobs::internal::{Estimate, Filter, Hysteresis};
+
 use super::budgeted_view::{BudgetedView, Rung};
 use super::view_cost::ViewCost;
 use super::{BudgetError, FrameStatistics};
@@ -31,7 +33,6 @@ use super::{BudgetError, FrameStatistics};
 use crate::backend::DevicePassTimes;
 use crate::scene::Camera;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
-use crate::tuning::{Estimate, Filter, Hysteresis};
 use crate::unwind::emit;
 
 /// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best again when there is

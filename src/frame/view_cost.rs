@@ -1,7 +1,8 @@
 //! What drawing a camera of a view costs: measured on the rung on which it is drawn, and predicted for the others.
 
+use drawloom_jobs::internal::{Estimate, Filter};
+
 use super::budgeted_view::Rung;
-use crate::tuning::{Estimate, Filter};
 
 /// What drawing a camera of a view costs, in nanoseconds, averaged over its cameras.
 ///

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use drawloom_jobs::internal::block_ranges;
+
 use super::frustum::Frustum;
 use super::group_bounds::{GroupBounds, Overlap};
-use crate::chunked_array::block_ranges;
 
 /// Bounds of blocks, and of groups of [`GroupBounds::GROUPS`] blocks. Each level tests four groups at once.
 #[derive(Debug, Default)]

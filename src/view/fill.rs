@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use drawloom_jobs::internal::ChunkedArray;
 use glam::DVec3;
 
 use super::block_reader::BlockReader;
@@ -9,7 +10,6 @@ use super::subdivision_level::subdivision_level;
 use super::{
     ObjectBlock, ObjectLevels, ObjectTable, RejectionReason, RenderView, SelectionFilter, VisibleSet, set_bits,
 };
-use crate::chunked_array::ChunkedArray;
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, ColumnValues, Projection, SceneRef};

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use drawloom_jobs::internal::{ChunkedArray, block_ranges};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::block_bounds::BlockBounds;
@@ -13,7 +14,6 @@ use super::object_description::{PacketDescription, rejection_reason};
 use super::packet_columns::GatheredColumns;
 use super::used_meshes::UsedMeshes;
 use super::{BoundingBoxes, GpuObject, RejectionReason, Rejections, TableLimits};
-use crate::chunked_array::block_ranges;
 use crate::command::{BinnedSegment, Bins};
 use crate::leaked_guards::unlock;
 use crate::quality::CullingVolume;
@@ -76,6 +76,9 @@ struct Summary {
     /// Whether an object may be rejected.
     has_rejected: bool,
 }
+
+// Sizes of jobs are whole blocks of both, so that jobs share none.
+const _: () = assert!(ObjectBlock::SIZE == ChunkedArray::<()>::BLOCK_SIZE);
 
 impl ObjectTable {
     /// Objects in a block.

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use drawloom_jobs::internal::block_ranges;
 use parking_lot::RwLock;
 
-use crate::chunked_array::block_ranges;
 use crate::command::Version;
 
 /// The objects that a view sees: a bit for each object, in words of 64, and a prefix sum over the words that are not empty. A view

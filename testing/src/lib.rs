@@ -3,14 +3,12 @@
 pub mod absent_features;
 #[cfg(feature = "wgpu")]
 pub mod adapter;
-pub mod adversarial_names;
 pub mod changing_world;
 pub mod culling;
 pub mod draw_lists;
 pub mod fault_injection;
 pub mod feedback;
 mod forwarded_calls;
-pub mod graph_oracle;
 pub mod hills;
 pub mod light_sums;
 pub mod limited;

@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use proc_macro2::TokenTree;
 
 use crate::paths::{Leaf, expand, from_root};
-use crate::sources::{Module, Source, modules_without_tests, read_crate};
+use crate::sources::{CRATES, Module, Source, modules_without_tests, read_all};
 use crate::tokens::{is, is_for_tests, item, trees_of};
 
 /// The maximum number of re-exports that are followed to the definition of one item.
@@ -20,7 +20,7 @@ const MAX_REEXPORTS: usize = 8;
 
 #[test]
 fn files_do_not_import_each_other_in_circles() {
-    let problems = circles(&read_crate());
+    let problems = CRATES.map(|folder| circles(&read_all(&[folder]))).concat();
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 

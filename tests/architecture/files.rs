@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use crate::sources::{Source, read_crate};
+use crate::sources::{CRATES, Source, read_all};
 
 const MAX_LINES: usize = 500;
 const VAGUE_NAMES: [&str; 5] = ["util", "utils", "helpers", "common", "misc"];
 
 #[test]
 fn files_are_short_and_well_named() {
-    let problems = wrong_files(&read_crate());
+    let problems = wrong_files(&read_all(&CRATES));
     assert!(problems.is_empty(), "{} files:\n{}", problems.len(), problems.join("\n"));
 }
 

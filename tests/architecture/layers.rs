@@ -1,29 +1,29 @@
-//! Each module that `src/lib.rs` lists is a layer, which uses only the layers above it.
+//! Each module that a crate's `lib.rs` lists is a layer, which uses only the layers above it.
 //!
 //! Unit tests in `src` follow the same rule: if a module's tests needed a lower layer, the module could not be
 //! understood, or moved, with only the layers above it. Comments do not: no code depends on a link downwards, and it
 //! helps a reader.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use proc_macro2::TokenTree;
 
 use crate::paths::{Leaf, expand, from_root};
-use crate::sources::{Source, read_crate};
+use crate::sources::{CRATES, Source, read_all};
 use crate::tokens::{is, trees_of};
 
 #[test]
 fn a_module_uses_only_those_above_it() {
-    let problems = wrong_uses(&read_crate());
+    let problems = CRATES.map(|folder| wrong_uses(&read_all(&[folder]))).concat();
     assert!(problems.is_empty(), "{} uses:\n{}", problems.len(), problems.join("\n"));
 }
 
 fn wrong_uses(sources: &[Source]) -> Vec<String> {
-    let lib = sources.iter().find(|source| source.path == Path::new("src/lib.rs")).expect("there is a lib.rs");
+    let lib = sources.iter().find(|source| source.path.ends_with("src/lib.rs")).expect("there is a lib.rs");
     let root = Root::new(&lib.parse().expect("lib.rs is Rust"));
     let again = root.layers.iter().enumerate().filter(|(index, layer)| root.layers[..*index].contains(layer));
-    let mut problems: Vec<_> = again.map(|(_, layer)| format!("src/lib.rs: {layer} is listed twice")).collect();
+    let mut problems: Vec<_> =
+        again.map(|(_, layer)| format!("{}: {layer} is listed twice", lib.path.display())).collect();
     for source in sources.iter().filter(|source| source.is_rust()) {
         // `files` reports a file that does not parse.
         if let Ok(trees) = source.parse() {

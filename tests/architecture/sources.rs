@@ -1,4 +1,4 @@
-//! The files of `src` and `tests`.
+//! The source files of crates and their tests.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -29,15 +29,13 @@ impl Source {
     /// `src/view/frustum.rs` is `["view", "frustum"]`; `src/view/mod.rs` is `["view"]`; `src/lib.rs` is the root.
     pub fn module(&self) -> Vec<String> {
         let parts = self.path.with_extension("");
-        let parts = parts.iter().skip(1).filter_map(|part| part.to_str());
+        let parts = parts.iter().skip_while(|part| *part != "src").skip(1).filter_map(|part| part.to_str());
         parts.filter(|part| !["mod", "lib"].contains(part)).map(str::to_owned).collect()
     }
 }
 
-/// The files of the crate under test.
-pub fn read_crate() -> Vec<Source> {
-    read_all(&["src"])
-}
+/// The folders of the crates that engines build.
+pub const CRATES: [&str; 2] = ["jobs/src", "src"];
 
 /// The files of these folders.
 pub fn read_all(folders: &[&str]) -> Vec<Source> {

@@ -3,7 +3,7 @@
 
 use proc_macro2::TokenTree;
 
-use crate::sources::{Source, read_crate};
+use crate::sources::{CRATES, Source, read_all};
 use crate::tokens::{is, trees_of};
 
 /// The macros of `tracing` that call a subscriber, and the ways to enter a span that exit it in a destructor of
@@ -26,7 +26,7 @@ const GUARDS: [&str; 2] = ["entered", "in_scope"];
 
 #[test]
 fn subscribers_are_called_where_their_panics_are_caught() {
-    let problems = unguarded_calls(&read_crate());
+    let problems = unguarded_calls(&read_all(&CRATES));
     assert!(problems.is_empty(), "{} calls of subscribers are not caught:\n{}", problems.len(), problems.join("\n"));
 }
 

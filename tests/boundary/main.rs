@@ -2,7 +2,7 @@
 //! unwinds out of the crate or hangs, the error names what panicked, nothing stays in memory, and the next frame is
 //! that of a renderer which knew no panic. The changes that the frame before was told of are in it.
 //!
-//! The table in `src/unwind/mod.rs` lists the calls. These hold with debug assertions and without.
+//! The tables in `src/unwind.rs` and `jobs/src/unwind/mod.rs` list the calls. These hold with debug assertions and without.
 
 mod builds;
 mod callers;

@@ -1,7 +1,6 @@
 //! Fences between the CPU and a device (S 9.4).
 
 mod frames;
-mod lone;
 mod table_9_1;
 
 use std::sync::Arc;

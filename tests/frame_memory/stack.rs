@@ -73,7 +73,8 @@ fn shorten(file: &str) -> &str {
 fn owner_of(file: &str) -> Owner {
     let is_own = file.starts_with(env!("CARGO_MANIFEST_DIR")) || file.starts_with("./");
     let is_wgpu = ["/wgpu-", "/naga-"].iter().any(|package| file.contains(package));
-    match (is_own && shorten(file).starts_with("src/"), is_wgpu) {
+    let is_library = ["src/", "jobs/src/"].iter().any(|folder| shorten(file).starts_with(folder));
+    match (is_own && is_library, is_wgpu) {
         (true, _) => Owner::Drawloom,
         (_, true) => Owner::Wgpu,
         _ => Owner::Other,
@@ -82,7 +83,7 @@ fn owner_of(file: &str) -> Owner {
 
 fn phase(own_frames: &[&Frame<'_>]) -> Phase {
     let visits = |folder: &str| own_frames.iter().any(|frame| frame.file.starts_with(folder));
-    if visits("src/graph/") {
+    if visits("jobs/src/graph/") {
         Phase::Jobs
     } else if visits("src/frame/renderer.rs") {
         Phase::Around

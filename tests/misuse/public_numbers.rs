@@ -260,5 +260,6 @@ fn path_of(name: &str) -> String {
         }
         before = character;
     }
-    path.strip_prefix("drawloom::").map_or(path.clone(), str::to_owned)
+    let crates = ["drawloom_jobs::", "drawloom::"];
+    crates.iter().find_map(|name| path.strip_prefix(name)).map_or(path.clone(), str::to_owned)
 }

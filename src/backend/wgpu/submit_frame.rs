@@ -4,6 +4,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use drawloom_jobs::internal::Tuner;
+
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, check_device, with_error_scope};
 use super::fences::set_when_done;
@@ -11,7 +13,6 @@ use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart
 use super::submission::WgpuSubmission;
 use crate::backend::{BackendError, FrameFence, ViewQueue};
 use crate::fence::FenceSetter;
-use crate::tuning::Tuner;
 
 impl WgpuBackend {
     /// Finishes open encoders, and submits the frame.

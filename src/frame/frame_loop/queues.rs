@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use drawloom_jobs::internal::{current_thread, list_wait};
 use parking_lot::{Condvar, Mutex};
 
 use super::Buffering;
-use crate::fence::{current_thread, list_wait};
 use crate::unwind::discard_all;
 
 /// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.

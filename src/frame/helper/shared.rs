@@ -100,7 +100,7 @@ impl Shared {
         let step: Box<dyn HelperStep> = Box::new(step);
         let (step, state, shown) = (Contained::new(step), Mutex::default(), SharedSelection::default());
         let shared = Self { name, step, source, target, scheduler, state, shown };
-        if let Some(JobPanic { message }) = panic {
+        if let Some(JobPanic { message, .. }) = panic {
             let message = shared.add_error_of_all(&mut shared.state.lock(), HelperErrorReason::Panicked { message });
             log(Some(message));
         }
@@ -305,7 +305,7 @@ impl Shared {
         let Some(source) = source else { return };
         let number = source.number;
         let computed = catch(|| self.compute(source, backend.as_ref()));
-        let result = computed.unwrap_or_else(|JobPanic { message }| Err(HelperErrorReason::Panicked { message }));
+        let result = computed.unwrap_or_else(|JobPanic { message, .. }| Err(HelperErrorReason::Panicked { message }));
         let (result, error) = match result {
             Ok(result) => (Some(Arc::new(result)), None),
             Err(error) => (None, Some(error)),

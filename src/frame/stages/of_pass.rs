@@ -202,7 +202,7 @@ fn finish_together<B: Backend>(
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
     let start = frame.clock.stopwatch();
     let result = catch(|| frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit));
-    let result = result.unwrap_or_else(|JobPanic { message }| {
+    let result = result.unwrap_or_else(|JobPanic { message, .. }| {
         fail(finished);
         // The run reports it.
         resume_unwind(Box::new(message))

@@ -39,7 +39,7 @@ impl PlannedProcess {
         is_present: impl Fn(ViewKind) -> bool,
     ) -> Result<Vec<Self>, PlanError> {
         let name =
-            catch(|| process.name().to_owned()).map_err(|JobPanic { message }| PlanError::Panicked { message })?;
+            catch(|| process.name().to_owned()).map_err(|JobPanic { message, .. }| PlanError::Panicked { message })?;
         let mut declare = Declare::default();
         catch(|| process.declare(&mut declare))
             .map_err(|panic| ProcessError::Panicked { process: name.clone(), message: panic.message })?;

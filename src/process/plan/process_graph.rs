@@ -23,7 +23,7 @@ pub(super) fn compile(
 ) -> Result<Schedule<usize>, PlanError> {
     let graph = process_graph(slot_names, added, imported, outputs)?;
     let schedule = graph.compile_with_outputs_of(|index| sampled_resources(added, &added[*index].1));
-    schedule.map_err(|CompileError { graph, problem }| {
+    schedule.map_err(|CompileError { graph, problem, .. }| {
         // What the outputs themselves lack is named before what the views lack that they sample.
         PlanError::Graph(graph.compile().map_or_else(|error| error.problem, |_| problem))
     })

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use drawloom_jobs::internal::CostSample;
 use parking_lot::RwLock;
 
 use super::bundle_cache::BundleCache;
@@ -15,7 +16,6 @@ use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::ViewKind;
-use crate::tuning::CostSample;
 use crate::view::RenderView;
 
 /// What a pass is known by from frame to frame, whatever its index.

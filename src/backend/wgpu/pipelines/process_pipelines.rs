@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
+use drawloom_jobs::internal::Tuner;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
@@ -20,7 +21,6 @@ use crate::command::{Cull, DrawState};
 use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
 use crate::scene::{Blend, Topology};
-use crate::tuning::Tuner;
 use crate::unwind::emit_unlocked;
 
 /// The pipelines of one render process: one for each draw state that a scene has needed so far.

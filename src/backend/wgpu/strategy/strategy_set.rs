@@ -1,7 +1,8 @@
 //! The strategies that a backend may use.
 
+use drawloom_jobs::internal::Tuner;
+
 use super::pass_strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
-use crate::tuning::Tuner;
 
 /// The strategies that passes may be recorded with: one, or several of which each pass uses the cheapest.
 pub(crate) struct StrategySet {

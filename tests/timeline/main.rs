@@ -1,9 +1,0 @@
-//! Reports, pages and Chrome traces of logs.
-
-mod chrome;
-mod chrome_edge_cases;
-mod chrome_golden;
-mod page;
-mod report;
-mod report_properties;
-mod trace;
