@@ -1,7 +1,10 @@
-//! The tables of memory orderings in `ARCHITECTURE.md` list every atomic of the crates, and name tests that exist.
+//! The file `ORDERINGS.md` in the source folder of a crate lists every atomic of the crate, and names tests that exist. A
+//! crate without atomics needs no such file.
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
 
 use proc_macro2::TokenTree;
 
@@ -10,32 +13,40 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 
 #[test]
 fn the_tables_of_memory_orderings_list_every_atomic() {
-    let architecture = fs::read_to_string("ARCHITECTURE.md").expect("ARCHITECTURE.md can be read");
-    let problems = wrong_atomics(&architecture, &read_all(&CRATES));
-    assert!(problems.is_empty(), "{} atomics:\n{}", problems.len(), problems.join("\n"));
+    let problems = CRATES.map(|folder| wrong_atomics(&memory_orderings(folder), &read_all(&[folder])));
+    let (problems, crates) = (problems.concat(), CRATES.join(", "));
+    assert!(problems.is_empty(), "{} atomics of {crates}:\n{}", problems.len(), problems.join("\n"));
 }
 
 #[test]
 fn the_tables_of_memory_orderings_name_tests_that_exist() {
-    let architecture = fs::read_to_string("ARCHITECTURE.md").expect("ARCHITECTURE.md can be read");
-    let unknown = unknown_tests(&architecture, &read_all(&["jobs", "src", "tests"]));
+    let sources = read_all(&["jobs", "src", "tests"]);
+    let unknown = CRATES.map(|folder| unknown_tests(&memory_orderings(folder), &sources)).concat();
     assert!(unknown.is_empty(), "no source has these functions: {unknown:?}");
 }
 
+/// The tables of the crate with this source folder; empty if the crate has none.
+fn memory_orderings(folder: &str) -> String {
+    match fs::read_to_string(Path::new(folder).join("ORDERINGS.md")) {
+        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+        text => text.expect("ORDERINGS.md can be read"),
+    }
+}
+
 /// The tests in the tables of memory orderings that are no function of the sources.
-fn unknown_tests(architecture: &str, sources: &[Source]) -> Vec<String> {
+fn unknown_tests(orderings: &str, sources: &[Source]) -> Vec<String> {
     let mut functions = BTreeSet::new();
     for trees in sources.iter().filter(|source| source.is_rust()).filter_map(|source| source.parse().ok()) {
         add_functions(&trees, &mut functions);
     }
-    let listed = covering_tests(architecture);
+    let listed = covering_tests(orderings);
     listed.into_iter().filter(|test| !functions.contains(test)).collect()
 }
 
-/// The backticked names in the columns "covered by", which are the last. A cell like "as `field`" refers to another row, and a name
-/// with a slash is a file.
-fn covering_tests(architecture: &str) -> Vec<String> {
-    let cells = memory_orderings(architecture).lines().filter_map(|line| line.strip_suffix('|')?.rsplit('|').next());
+/// The backticked names in the columns "covered by", which are the last. A cell like "as `field`" refers to another row,
+/// and a name with a slash is a file.
+fn covering_tests(orderings: &str) -> Vec<String> {
+    let cells = orderings.lines().filter_map(|line| line.strip_suffix('|')?.rsplit('|').next());
     let cells = cells.map(str::trim).filter(|cell| !cell.starts_with("as "));
     let names = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2));
     names.filter(|name| !name.contains('/')).map(str::to_owned).collect()
@@ -54,8 +65,8 @@ fn add_functions(trees: &[TokenTree], functions: &mut BTreeSet<String>) {
 }
 
 /// The atomics that are only in the sources, or only in the tables of memory orderings.
-fn wrong_atomics(architecture: &str, sources: &[Source]) -> Vec<String> {
-    let (listed, mut declared) = (listed_atomics(architecture), BTreeSet::new());
+fn wrong_atomics(orderings: &str, sources: &[Source]) -> Vec<String> {
+    let (listed, mut declared) = (listed_atomics(orderings), BTreeSet::new());
     for Module { source, trees, .. } in modules_without_tests(sources) {
         let file = source.path.iter().skip_while(|part| *part != "src").skip(1);
         let file: Vec<_> = file.filter_map(|part| part.to_str()).collect();
@@ -67,9 +78,9 @@ fn wrong_atomics(architecture: &str, sources: &[Source]) -> Vec<String> {
     missing.chain(removed).collect()
 }
 
-/// The names `file::field` in the first columns of the section. `::field` is in the file named before it.
-fn listed_atomics(architecture: &str) -> BTreeSet<String> {
-    let cells = memory_orderings(architecture).lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
+/// The names `file::field` in the first columns. `::field` is in the file named before it.
+fn listed_atomics(orderings: &str) -> BTreeSet<String> {
+    let cells = orderings.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
     // Code is between every other pair of backticks.
     let names = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter_map(|name| name.split_once("::"));
     let mut file = "";
@@ -78,12 +89,6 @@ fn listed_atomics(architecture: &str) -> BTreeSet<String> {
         format!("{file}::{field}")
     });
     whole.collect()
-}
-
-/// The section of that title.
-fn memory_orderings(architecture: &str) -> &str {
-    let mut sections = architecture.split("\n## ");
-    sections.find(|section| section.starts_with("Memory orderings\n")).unwrap_or_default()
 }
 
 /// The names of fields and statics with types that mention an atomic, and of tuple structs, enums and type aliases that mention
@@ -143,10 +148,10 @@ fn mentions_atomic(tree: &TokenTree) -> bool {
     }
 }
 
-/// The problems of a crate of one file, with these rows in the section on memory orderings.
+/// The problems of a crate of one file, with these rows in its table.
 fn atomics_with(path: &str, text: &str, rows: &str) -> Vec<String> {
-    let architecture = format!("# A\n\n## Memory orderings\n\n{rows}\n\n## B\n\n| `low.rs::other` |\n");
-    wrong_atomics(&architecture, &[Source::new(path, text)])
+    let orderings = format!("# A\n\n`low.rs::prose`\n\n| atomic | what it is |\n| --- | --- |\n{rows}\n");
+    wrong_atomics(&orderings, &[Source::new(path, text)])
 }
 
 #[test]
@@ -188,7 +193,7 @@ fn a_row_without_an_atomic_is_found() {
 #[test]
 fn a_row_whose_test_does_not_exist_is_found() {
     let row = "| `low.rs::a` | loom: `a_test`; shuttle: `another` |\n| `low.rs::b` | as `a` |\n| `low.rs::d` | all of `low/models.rs` |\n| `low.rs::c` | — |";
-    let architecture = format!("# A\n\n## Memory orderings\n\n{row}\n\n## B\n\n| `other` |\n");
+    let orderings = format!("# A\n\n`prose`\n\n{row}\n");
     let source = Source::new("low.rs", "mod tests { proptest! { #[test] fn a_test() {} } }");
-    assert_eq!(unknown_tests(&architecture, &[source]), ["another"]);
+    assert_eq!(unknown_tests(&orderings, &[source]), ["another"]);
 }

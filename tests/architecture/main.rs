@@ -5,7 +5,7 @@
 //! - `files`: files are short, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files and print lines through `drawloom-output`.
 //! - `subscribers`: the library calls subscribers of `tracing` where their panics are caught.
-//! - `atomics`: the tables of memory orderings in `ARCHITECTURE.md` list every atomic.
+//! - `atomics`: the file `ORDERINGS.md` of each crate lists every atomic of the crate.
 
 mod atomics;
 mod circles;
