@@ -21,9 +21,9 @@ use crate::unwind::{AbortOnUnwind, JobPanic, catch, discard};
 
 /// Proof that code runs as a job of a scheduler: a reference to a worker exists only there, and stays on its thread.
 ///
-/// No two threads are the same worker at the same time, so data that an engine keeps for each [`index`](Self::index) is never
-/// used by two threads at once. But while a job waits in a scope or a loop that it opened, other jobs of that scope may run on top
-/// of it, on the same worker. So such data should not stay borrowed over a wait.
+/// No two threads are the same worker at the same time, so no two threads use an engine's data of one
+/// [`index`](Self::index) at once. But while a job waits in a scope or a loop that it opened, other jobs of that scope
+/// may run on top of it, on the same worker: do not keep these data borrowed over a wait.
 ///
 /// ```compile_fail,E0277
 /// # let scheduler = drawloom_jobs::task::Scheduler::new(2)?;
@@ -62,9 +62,8 @@ impl JobContext for Worker {
 pub(super) enum ExitCondition {
     /// The scheduler is dropped.
     Shutdown,
-    /// All jobs of the region have run. The worker opened the region, and runs its pinned jobs. If the region is not an outermost
-    /// one, the worker is inside some job, and takes only jobs of the region: a foreign job might take long, or want what the job
-    /// has borrowed.
+    /// All jobs of the region have run. The worker opened the region, and runs its pinned jobs. Inside a job the worker
+    /// takes only jobs of the region: a foreign job might take long, or need values that the job has borrowed.
     Finished { region: &'static Region<Worker> },
 }
 
@@ -100,8 +99,8 @@ impl Worker {
         }
     }
 
-    /// The index of this worker, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that called the
-    /// scheduler.
+    /// The index of this worker, from 0 up to [`Scheduler::workers`](super::Scheduler::workers). 0 is the thread that
+    /// called the scheduler.
     #[inline]
     pub fn index(&self) -> usize {
         self.index
@@ -147,7 +146,7 @@ impl Worker {
         self.queues.len()
     }
 
-    /// Whether a loop may begin on this worker alone: others sleep, and work that is shorter than a wake-up should not wake them.
+    /// Whether a loop may begin on this worker alone: others sleep, and short work should not wake them.
     pub(super) fn may_begin_serially(&self) -> bool {
         !self.is_shuffled() && !self.wake_up_cost().is_zero() && self.shared.sleep().sleepers() > 0
     }
@@ -174,9 +173,9 @@ impl Worker {
 
     /// Queues a job, and wakes a worker for it. Call it only inside a counted job of the region, or inside its body.
     ///
-    /// The worker keeps the job in its own queues only if the owner of the region can take it from there. If the worker waits
-    /// inside a job, it keeps jobs of the innermost region that it waits for, whose owner it is. Otherwise it keeps jobs of an
-    /// outermost region, whose owner steals. All other jobs go to the owner's mailbox.
+    /// The worker keeps the job in its own queues only if the owner of the region can take it from there. If the worker
+    /// waits inside a job, it keeps jobs of the innermost region that it waits for, whose owner it is. Otherwise it
+    /// keeps jobs of an outermost region, whose owner steals. All other jobs go to the owner's mailbox.
     pub(super) fn push(&self, region: &'static Region<Self>, work: Work<Self>, priority: Priority) {
         self.acquire_count(region);
         let job = Job { work, region, is_stolen: false };
@@ -217,18 +216,19 @@ impl Worker {
         tokens: &dyn RunToken<Self>,
         body: impl FnOnce(&'static Region<Self>) -> R,
     ) -> Result<R, JobPanic> {
-        // SAFETY: The types differ only in lifetimes, so the referent must outlive every use of the result. Only jobs of the region
-        // use it. Each job is counted from before it is queued until it has run, `work_until_finished` returns only when the
-        // count is zero, and `guard`, which is made before the first use, aborts if this function unwinds before. The
-        // referent is borrowed for this whole call.
+        // SAFETY: The types differ only in lifetimes, so the referent must outlive every use of the result. Only jobs
+        // of the region use it. Each job is counted from before it is queued until it has run, `work_until_finished`
+        // returns only when the count is zero, and `guard`, which is made before the first use, aborts if this function
+        // unwinds before. The referent is borrowed for this whole call.
         let tokens = unsafe { mem::transmute::<&dyn RunToken<Self>, &'static dyn RunToken<Self>>(tokens) };
         let is_outermost = self.index == 0 && self.depth.get() == 0 && !self.is_in_background();
         let kind = RegionKind { is_outermost, is_background: self.is_in_background() };
         let storage = Region::new(self.index, self.depth.get(), kind, tokens, Arc::clone(&self.shared));
-        // SAFETY: The storage must not move, and must outlive every use of the reference. It is a local that is not moved. `body`
-        // uses the reference before it returns, jobs before they are counted off, and workers that hold a prepaid count before
-        // they flush it, which the latch counts too; a thread that releases the latch does not use the reference afterwards.
-        // `work_until_finished` returns only when the count is zero, and `guard` aborts if this function unwinds before.
+        // SAFETY: The storage must not move, and must outlive every use of the reference. It is a local that is not
+        // moved. `body` uses the reference before it returns, jobs before they are counted off, and workers that hold a
+        // prepaid count before they flush it, which the latch counts too; a thread that releases the latch does not use
+        // the reference afterwards. `work_until_finished` returns only when the count is zero, and `guard` aborts if
+        // this function unwinds before.
         let region: &'static Region<Self> = unsafe { &*ptr::from_ref(&storage) };
         // The last local, so that an unwind drops it before any other.
         let guard = AbortOnUnwind::new("an open region of jobs");
@@ -258,8 +258,8 @@ impl Worker {
         interrupted
     }
 
-    /// Works until all jobs of the region have run, whose body has returned, and leaves it. Returns the first panic of a job or of the
-    /// body. Does not unwind.
+    /// Works until all jobs of the region have run, and leaves it. Its body has returned. Returns the first panic of a
+    /// job or of the body. Does not unwind.
     fn work_until_finished(&self, region: &'static Region<Self>, interrupted: InterruptedWait) -> Option<JobPanic> {
         // The count that the latch began with is that of the body.
         self.release_count(region);
@@ -318,7 +318,7 @@ impl Worker {
         part.map(BackgroundTask::Part).or_else(whole)
     }
 
-    /// Frees the slot of this thread, if it has one, and wakes another worker if that may go on with the background jobs.
+    /// Frees the slot of this thread, if it has one, and wakes another worker if one may continue background jobs.
     fn free_background_slot(&self, has_slot: &mut bool) {
         if !mem::take(has_slot) {
             return;
@@ -357,7 +357,7 @@ impl Worker {
             }
     }
 
-    /// Whether this worker could take a job of these priorities, outside of its own queues: without a free slot none of the background.
+    /// Whether this worker could take a job of these priorities from elsewhere; a background job only with a slot.
     fn sees_jobs(&self, priorities: &[Priority]) -> bool {
         let shared = &self.shared;
         let takes =
@@ -397,8 +397,7 @@ impl Worker {
     fn run(&self, job: Job<Self>) {
         let region = job.region;
         let was_in_background = self.is_in_background.replace(region.is_background());
-        // The owner of another region may wait for the prepaid count that this worker holds of it, and this job may wait for that
-        // owner.
+        // The owner of another region may wait for this worker's prepaid count of it, and this job for that owner.
         self.prepaid.switch_to(region, |owner| self.wake_other(owner));
         self.has_stolen.set(job.is_stolen);
         job.run(self);
@@ -414,7 +413,7 @@ impl Worker {
         has_run
     }
 
-    /// The next job to run. Pinned jobs come first, because only this worker can run them, while others can steal from its queues.
+    /// The next job to run. Pinned jobs come first: only this worker can run them, while others steal from its queues.
     fn next_job(&self, until: ExitCondition) -> Option<Job<Self>> {
         match until {
             ExitCondition::Shutdown => self.frame_job(),
@@ -432,7 +431,7 @@ impl Worker {
         }
     }
 
-    /// A job of a frame. Mailboxes come before stealing, because the owner of a job in a mailbox waits for it inside another job.
+    /// A job of a frame. Mailboxes come before stealing: owners wait for jobs in mailboxes inside other jobs.
     fn frame_job(&self) -> Option<Job<Self>> {
         let own = Priority::FRAME.into_iter().find_map(|priority| self.queues.pop(priority));
         own.or_else(|| self.mailbox_job(Priority::Normal)).or_else(|| self.steal(&Priority::FRAME))
@@ -444,7 +443,7 @@ impl Worker {
         Some(Job { is_stolen: true, ..job })
     }
 
-    /// The newest job of this worker's queues, if it belongs to the region that the worker waits for inside another job.
+    /// The newest job of this worker's queues, if it belongs to the region that the worker waits for inside a job.
     fn awaited_job(&self, region: &Region<Self>) -> Option<Job<Self>> {
         Priority::ALL.into_iter().find_map(|priority| match self.queues.pop_awaited(priority, region) {
             Popped::Job(job) => Some(job),
@@ -466,8 +465,8 @@ impl Worker {
             victims.find_map(|victim| {
                 let job = self.queues.steal_from(&stealers[victim], priority)?;
                 if !stealers[self.index].is_empty(priority) {
-                    // Further jobs have moved to this worker's queues. The worker that pushed them may have relied on this one to
-                    // look for more jobs, and this one does not look into its own queues for that.
+                    // Further jobs have moved to this worker's queues, into which it does not look. The worker that
+                    // pushed them may have relied on this one to look for more jobs.
                     self.shared.sleep().wake_despite_searchers(priority);
                 }
                 self.victim.set(victim);
