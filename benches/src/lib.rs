@@ -12,6 +12,7 @@ pub mod chart;
 pub mod city;
 pub mod clouds;
 pub mod cpu_time;
+pub mod delta;
 pub mod harness;
 pub mod mirror;
 pub mod moving;

@@ -73,13 +73,13 @@ impl DrawState {
         }
     }
 
-    /// The bits as an index.
+    /// The bits as an index: [`DrawState::from_bits`] is the inverse.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 
-    /// The state with these bits; `None` if there is none.
-    pub(super) fn from_bits(bits: u16) -> Option<Self> {
+    /// The state with these bits, which are its [index](DrawState::index); `None` if there is none.
+    pub fn from_bits(bits: u16) -> Option<Self> {
         (usize::from(bits) < Self::COUNT).then_some(Self(bits))
     }
 

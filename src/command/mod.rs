@@ -4,7 +4,6 @@
 mod binned_segment;
 mod bins;
 mod bucket;
-mod delta;
 mod draw_list;
 mod draw_state;
 mod instance;
@@ -22,7 +21,6 @@ mod version;
 pub use binned_segment::BinnedSegment;
 pub use bins::{Bin, Bins};
 pub use bucket::{Batch, Bucket};
-pub use delta::{DeltaCommands, DeltaError};
 pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use instance::instance;

@@ -63,13 +63,6 @@ impl SortKey {
     pub fn from_bits(bits: u64) -> Self {
         Self(bits)
     }
-
-    /// The state and the mesh slot in the key of an opaque command; `None` for other keys.
-    pub(super) fn state_and_mesh(self) -> Option<(DrawState, u32)> {
-        let field = |shift: u32, bits: u32| (self.0 >> shift) as u16 & ((1 << bits) - 1);
-        let state = DrawState::from_bits(field(55, 3) | field(58, 4) << 5 | field(20, 3) << 9);
-        state.filter(|_| self.0 >> 62 == 0).map(|state| (state, (self.0 >> 23) as u32))
-    }
 }
 
 #[cfg(test)]
@@ -115,16 +108,6 @@ mod tests {
             if first.0 < second.0 {
                 prop_assert!(key(first) < key(second));
             }
-        }
-
-        #[test]
-        fn only_opaque_keys_contain_state_and_mesh(bits in 0..DrawState::COUNT as u16, mesh in any::<u32>(), depth in any::<u32>()) {
-            // An opaque state has no blending.
-            let state = DrawState::from_bits(bits & !0b1_1000).unwrap();
-            prop_assert_eq!(SortKey::opaque(state, mesh, depth).state_and_mesh(), Some((state, mesh)));
-            prop_assert_eq!(SortKey::blended(depth).state_and_mesh(), None);
-            prop_assert_eq!(SortKey::ordered(depth).state_and_mesh(), None);
-            prop_assert_eq!(SortKey::LAST.state_and_mesh(), None);
         }
     }
 

@@ -119,7 +119,7 @@ const RESULTS: &[&str] = &[
 const TOOLS: &[&str] = &["command::", "raster::", "view::", "handle::Slots::"];
 
 /// Bytes that shaders read as they are.
-const BYTES: &[&str] = &["parameters", "from_bytes", "DeltaCommands"];
+const BYTES: &[&str] = &["parameters"];
 
 /// Numbers of a scene that `tests/extremes` draws on every backend: in `numbers`, `cameras`, `positions`, `lights` and
 /// `qualities`.

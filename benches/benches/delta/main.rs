@@ -17,11 +17,12 @@ use std::mem;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
+use drawloom::command::{DrawState, RenderCommand, SortKey};
 use drawloom::demo;
 use drawloom::quality::Quality;
 use drawloom::scene::obj;
 use drawloom_benches::arguments::ExtentArguments;
+use drawloom_benches::delta::DeltaCommands;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::statistics::median_duration;
 use drawloom_output::print_diagnostic;

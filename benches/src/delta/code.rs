@@ -1,6 +1,6 @@
 //! The encoding of a command relative to the previous one.
 
-use crate::command::{DrawState, RenderCommand, SortKey};
+use drawloom::command::{DrawState, RenderCommand, SortKey};
 
 /// The maximum length of a coded command: its first byte, key, object, second byte, mesh, material and state.
 pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 2;
@@ -92,7 +92,7 @@ impl Coder {
             put(u64::from(length(mesh) | length(material) << 3 | state), 1);
             put(mesh, length(mesh));
             put(material, length(material));
-            put(u64::from(command.state.bits()), state >> 5);
+            put(command.state.index() as u64, state >> 5);
         }
         bytes[start] = first;
         *self = Self { last: *command, step };
@@ -139,9 +139,17 @@ impl Coder {
     /// Predicts mesh, material and state of a command with this key.
     fn predicted(&self, key: SortKey) -> Prediction {
         let RenderCommand { mesh, material, state, .. } = self.last;
-        let (state, mesh) = key.state_and_mesh().unwrap_or((state, mesh));
+        let (state, mesh) = state_and_mesh(key).unwrap_or((state, mesh));
         Prediction { mesh, material, state }
     }
+}
+
+/// The state and the mesh slot in the key of an opaque command (see [`SortKey`]); `None` for other keys.
+#[inline]
+pub(super) fn state_and_mesh(key: SortKey) -> Option<(DrawState, u32)> {
+    let field = |shift: u32, bits: u32| (key.bits() >> shift) as u16 & ((1 << bits) - 1);
+    let state = DrawState::from_bits(field(55, 3) | field(58, 4) << 5 | field(20, 3) << 9);
+    state.filter(|_| key.bits() >> 62 == 0).map(|state| (state, (key.bits() >> 23) as u32))
 }
 
 struct Prediction {

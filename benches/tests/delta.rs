@@ -5,9 +5,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use drawloom::command::DeltaCommands;
 use drawloom::demo;
 use drawloom::scene::{Scene, obj};
+use drawloom_benches::delta::DeltaCommands;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::obj_files::hall;
 use drawloom_testing::shared_scenes;

@@ -7,9 +7,9 @@ mod tests;
 use std::iter::FusedIterator;
 
 use crc32fast::Hasher;
+use drawloom::command::RenderCommand;
 
 use self::code::{Coder, Fault, MAX_LENGTH};
-use super::RenderCommand;
 
 /// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is lossless for
 /// any commands, and compact for sorted ones.
@@ -32,8 +32,9 @@ use super::RenderCommand;
 /// a virtual machine with two cores.)
 ///
 /// ```
-/// use drawloom::command::{DeltaCommands, DrawState, RenderCommand, SortKey};
+/// use drawloom::command::{DrawState, RenderCommand, SortKey};
 /// use drawloom::quality::DepthKey;
+/// use drawloom_benches::delta::DeltaCommands;
 ///
 /// let depth = DepthKey::EXACT.quantize(12.0, 0.1, 100.0);
 /// let command = |object| {
@@ -46,7 +47,7 @@ use super::RenderCommand;
 ///
 /// let received = DeltaCommands::from_bytes(sent)?;
 /// assert!(received.iter().eq(commands));
-/// # Ok::<(), drawloom::command::DeltaError>(())
+/// # Ok::<(), drawloom_benches::delta::DeltaError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct DeltaCommands {

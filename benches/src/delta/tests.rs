@@ -1,7 +1,8 @@
+use drawloom::command::{DrawState, SortKey};
 use proptest::prelude::*;
 
+use super::code::state_and_mesh;
 use super::*;
-use crate::command::{DrawState, SortKey};
 
 /// Arbitrary commands: keys that do not match mesh and state, extreme slots, and similar values.
 fn any_command() -> impl Strategy<Value = RenderCommand> {
@@ -142,6 +143,20 @@ proptest! {
         let commands: Vec<_> = coded.iter().collect();
         prop_assert_eq!(commands.len() as u64, count);
         prop_assert!(DeltaCommands::encode(&commands).iter().eq(commands));
+    }
+
+    #[test]
+    fn only_opaque_keys_contain_state_and_mesh(
+        bits in 0..DrawState::COUNT as u16,
+        mesh in any::<u32>(),
+        depth in any::<u32>(),
+    ) {
+        // An opaque state has no blending.
+        let state = DrawState::from_bits(bits & !0b1_1000).unwrap();
+        prop_assert_eq!(state_and_mesh(SortKey::opaque(state, mesh, depth)), Some((state, mesh)));
+        prop_assert_eq!(state_and_mesh(SortKey::blended(depth)), None);
+        prop_assert_eq!(state_and_mesh(SortKey::ordered(depth)), None);
+        prop_assert_eq!(state_and_mesh(SortKey::LAST), None);
     }
 
     #[test]
