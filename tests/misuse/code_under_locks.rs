@@ -3,18 +3,15 @@
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
-use std::fs;
 use std::sync::mpsc;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use drawloom::backend::{Picture, StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
 use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
-use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, Parameters, RenderProcess, ShaderFile,
-};
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, Parameters, RenderProcess};
 use drawloom::scene::{Mesh, Texture};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Timeline;
@@ -30,7 +27,6 @@ pub const CASES: &[Case] = &[
     ("a_clock_that_waits_while_a_log_is_taken", clocks),
     ("a_clock_that_asks_a_helper_for_its_picture", helpers),
     ("parameters_that_are_read_and_set_while_they_are_updated", parameters),
-    ("a_subscriber_that_reads_the_shader_that_it_hears_of", shader_files),
     ("a_subscriber_that_asks_a_backend_while_that_streams", streaming),
     ("a_subscriber_that_asks_a_backend_while_that_makes_pipelines", pipelines),
     ("a_fence_whose_callback_asks_a_backend_while_that_uploads", uploads),
@@ -196,25 +192,6 @@ fn hearing(
     });
     tracing::subscriber::with_default(tracing_subscriber::registry().with(layer), call)?;
     Ok(count.load(std::sync::atomic::Ordering::Relaxed))
-}
-
-fn shader_files() -> Result<(), Failed> {
-    let folder = tempfile::tempdir()?;
-    let path = folder.path().join("shader.wgsl");
-    fs::write(&path, "first")?;
-    let file = Arc::new(ShaderFile::open(&path)?);
-    fs::remove_file(&path)?;
-    let heard = Arc::clone(&file);
-    let look = || {
-        let start = Instant::now();
-        while start.elapsed() < Duration::from_millis(300) {
-            file.text();
-            thread::sleep(Duration::from_millis(50));
-        }
-        Ok(())
-    };
-    let count = hearing(look, move || assert_eq!(heard.text(), "first"))?;
-    ensure(count > 0, "the missing file is told")
 }
 
 thread_local! {

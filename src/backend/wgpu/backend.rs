@@ -174,8 +174,8 @@ impl WgpuBackend {
     }
 
     /// Draws a process whose new shader does not compile with the shader that it had, instead of failing the frame: for shaders that
-    /// change while the engine runs, such as those of a [`ShaderFile`](crate::process::ShaderFile). The error goes through `tracing`
-    /// once, and is among [`WgpuBackend::shader_errors`] until the shader compiles.
+    /// change while the engine runs, such as those that it reads again from a file. The error goes through `tracing` once, and is
+    /// among [`WgpuBackend::shader_errors`] until the shader compiles.
     pub fn keep_working_shaders(self) -> Self {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
     }
