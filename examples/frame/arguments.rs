@@ -184,8 +184,6 @@ pub enum StrategyName {
     Bundles,
     /// Into bundles that are cached from frame to frame.
     Cached,
-    /// With indirect draws, which not every adapter supports.
-    Indirect,
 }
 
 impl StrategyName {
@@ -195,7 +193,6 @@ impl StrategyName {
             Self::Direct => "direct",
             Self::Bundles => "bundles",
             Self::Cached => "cached",
-            Self::Indirect => "indirect",
         }
     }
 
@@ -205,7 +202,6 @@ impl StrategyName {
             Self::Direct => RecordingStrategy::Direct,
             Self::Bundles => RecordingStrategy::Bundles,
             Self::Cached => RecordingStrategy::CachedBundles,
-            Self::Indirect => RecordingStrategy::Indirect,
         }
     }
 }

@@ -52,7 +52,7 @@ pub fn wgpu_backend(
     let backend = WgpuBackend::new(device, queue)?;
     Ok(match arguments.record {
         None => backend,
-        Some(record) => backend.recording_strategy(record.strategy())?,
+        Some(record) => backend.recording_strategy(record.strategy()),
     })
 }
 

@@ -71,7 +71,7 @@ fn costs(feature: &AbsentFeature, setup: &Setup) -> [Cost; 4] {
     let (instance, device, queue) = adapter::noop_instance_and_device(wgpu::Features::empty()).unwrap();
     // Fixed strategies: which ones are tried depends on times.
     let backend = WgpuBackend::new(device, queue).unwrap();
-    let backend = backend.recording_strategy(RecordingStrategy::CachedBundles).unwrap();
+    let backend = backend.recording_strategy(RecordingStrategy::CachedBundles);
     let backend = backend.encoding_strategy(EncodingStrategy::PerPass);
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let (mut renderer, submitter) = setup.builder(backend).build(scheduler).unwrap();

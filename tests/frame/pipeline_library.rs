@@ -124,7 +124,7 @@ fn the_second_backend_of_a_library_compiles_nothing_and_another_quality_its_diff
     assert_eq!((pipelines, library.pipeline_count()), (all[1], all[1] + all[2]));
 
     // With strategies of its own.
-    let backend = library.backend().unwrap().recording_strategy(RecordingStrategy::Bundles).unwrap();
+    let backend = library.backend().unwrap().recording_strategy(RecordingStrategy::Bundles);
     let mut second = renderer(backend.encoding_strategy(EncodingStrategy::OnSubmit), shipped);
     draw(&mut second, &scene);
     assert_eq!((compiled(&instance), second.0.backend().resources().pipelines), (all, pipelines));

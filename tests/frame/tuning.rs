@@ -160,7 +160,6 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
             RecordingStrategy::Direct => "direct",
             RecordingStrategy::Bundles => "bundles",
             RecordingStrategy::CachedBundles => "cached bundles",
-            RecordingStrategy::Indirect => "indirect",
         };
         assert_eq!(choice.alternatives[choice.chosen].name.trim_start_matches("split "), name, "{choice} {pass:?}");
         let (has_batches, is_known) = (pass.batches > 0, choice.alternatives[choice.chosen].nanoseconds.is_some());
@@ -170,6 +169,6 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
     let trials =
         tuning.iter().flat_map(|tuning| choices_of(tuning, TuningSubject::Recording)).filter(|choice| choice.is_trial);
     assert!(trials.count() > passes.len());
-    let (fixed, _) = frames(|backend| backend.recording_strategy(RecordingStrategy::Direct).unwrap());
+    let (fixed, _) = frames(|backend| backend.recording_strategy(RecordingStrategy::Direct));
     assert!(choices_of(&fixed[0], TuningSubject::Recording).iter().all(|choice| choice.alternatives.len() == 2));
 }

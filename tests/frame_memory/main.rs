@@ -86,7 +86,6 @@ fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Repor
     let backend = WgpuBackend::new(device, queue)
         .unwrap()
         .recording_strategy(RecordingStrategy::CachedBundles)
-        .unwrap()
         .encoding_strategy(EncodingStrategy::PerPass);
     let backend = if workers > 1 { backend.transient_targets() } else { backend };
     let (mut renderer, submitter) =

@@ -230,8 +230,8 @@ fn same_everywhere() -> Result<(), Failed> {
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let by_software = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "coloured")?;
     let mut first = None;
-    for (recording, encoding) in strategies()? {
-        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
+    for (recording, encoding) in strategies() {
+        let backend = backend()?.recording_strategy(recording).encoding_strategy(encoding);
         let builder = Renderer::builder(backend).process(Colored).output("coloured");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };

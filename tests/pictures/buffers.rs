@@ -39,8 +39,8 @@ const RUNS: StorageBuffer<u32> = StorageBuffer::new("runs", 1);
 
 /// Adds a column in each frame, or in each view.
 #[derive(Clone, Copy)]
-struct Count {
-    once_a_frame: bool,
+pub struct Count {
+    pub once_a_frame: bool,
 }
 
 impl RenderProcess for Count {
@@ -69,7 +69,7 @@ impl RenderProcess for Count {
 }
 
 /// Draws a column of 8 pixels for each instance.
-struct DrawColumns;
+pub struct DrawColumns;
 
 impl RenderProcess for DrawColumns {
     fn name(&self) -> &str {

@@ -86,7 +86,7 @@ fn changing_shader() -> Result<(), Failed> {
             Ok(WgpuBackend::new(device, queue)?)
         };
         let backend = if is_counted { alone()? } else { backend()? };
-        let backend = backend.recording_strategy(recording)?.encoding_strategy(EncodingStrategy::PerPass);
+        let backend = backend.recording_strategy(recording).encoding_strategy(EncodingStrategy::PerPass);
         let builder = Renderer::builder(backend);
         let builder = builder.process(Painted { step: Arc::clone(&step) }).output("paint");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;

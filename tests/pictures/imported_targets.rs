@@ -131,7 +131,7 @@ fn srgb() -> Result<(), Failed> {
 /// As a window's surface does.
 fn alternating() -> Result<(), Failed> {
     let (device, queue) = adapter::device()?;
-    let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(RecordingStrategy::CachedBundles)?;
+    let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(RecordingStrategy::CachedBundles);
     let mut fixture = fixture_of(backend.encoding_strategy(EncodingStrategy::PerPass))?;
     let mut scene = field(60);
     scene.cameras.truncate(1);

@@ -4,7 +4,7 @@
 //! oracle computes in f64, from the positions of object and camera, which pixel that is; it shares no code with the crate.
 
 use drawloom::RendererBuilder;
-use drawloom::backend::{RecordingStrategy, WgpuBackend};
+use drawloom::backend::RecordingStrategy;
 use drawloom::command::{DrawOrder, Selection};
 use drawloom::glam::{DVec3, EulerRot, Quat, Vec3};
 use drawloom::process::{BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -14,7 +14,7 @@ use half::f16;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Fixture, backend, device};
+use crate::fixture::{Fixture, backend};
 use crate::strategies::expect;
 
 pub const CASES: &[Case] = &[
@@ -142,16 +142,11 @@ fn compare(
     })
 }
 
-/// How draws are recorded, and in which order objects are drawn: lists that are binned and lists that are sorted.
-const VARIANTS: [(RecordingStrategy, DrawOrder); 3] = [
-    (RecordingStrategy::Direct, DrawOrder::ByState),
-    (RecordingStrategy::Direct, DrawOrder::FrontToBack),
-    (RecordingStrategy::Indirect, DrawOrder::ByState),
-];
+/// In which order objects are drawn: lists that are binned and lists that are sorted.
+const ORDERS: [DrawOrder; 2] = [DrawOrder::ByState, DrawOrder::FrontToBack];
 
 /// Draws lists of these lengths: at first, after the first object and the last have changed places, and without the first.
 fn check_counts(counts: &[usize]) -> Result<(), Failed> {
-    let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
     for &count in counts {
         let whole = scene(count)?;
         let mut positions = whole.as_scene_ref().positions.to_vec();
@@ -167,18 +162,13 @@ fn check_counts(counts: &[usize]) -> Result<(), Failed> {
             ("of which two changed places", swapped, expected_numbers(&swapped)?),
             ("without the first", fewer, expected_numbers(&fewer)?),
         ];
-        for (index, (recording, order)) in VARIANTS.into_iter().enumerate() {
-            if recording == RecordingStrategy::Indirect && !has_indirect {
-                continue;
-            }
+        for (index, order) in ORDERS.into_iter().enumerate() {
             let build = |builder: RendererBuilder<_>| builder.process(Numbers(order)).output("number").output("draws");
-            let mut fixture = Fixture::on_backend(backend()?.recording_strategy(recording)?, 2, build)?;
+            let mut fixture = Fixture::on_backend(backend()?.recording_strategy(RecordingStrategy::Direct), 2, build)?;
             // A frame of a million takes seconds.
             let steps = if count > 100_000 && index > 0 { &steps[..1] } else { &steps[..] };
             for (step, scene, expected) in steps {
-                compare(&mut fixture, (*scene, expected), || {
-                    format!("{count} objects {step}, {recording:?}, {order:?}")
-                })?;
+                compare(&mut fixture, (*scene, expected), || format!("{count} objects {step}, {order:?}"))?;
             }
         }
     }

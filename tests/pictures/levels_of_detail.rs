@@ -80,7 +80,7 @@ fn coarsest_levels() -> Result<(), Failed> {
         let expected = draw(&with_meshes(leveled(), coarsest), PLAIN, quality(0.0))?;
         let full = draw(&with_meshes(leveled(), whole), PLAIN, quality(0.0))?;
         expect(expected != full, || "the levels look like the meshes".to_owned())?;
-        for strategies in few_strategies()? {
+        for strategies in few_strategies() {
             let found = draw(&leveled(), strategies, quality(1e9))?;
             expect(found == expected, || format!("the picture differs with {strategies:?}"))?;
         }
@@ -105,7 +105,7 @@ fn changing_levels() -> Result<(), Failed> {
     };
     let (expected, triangles) = frames(PLAIN, quality(0.7))?;
     expect(triangles.windows(2).all(|pair| pair[0] != pair[1]), || format!("no level changes: {triangles:?}"))?;
-    for strategies in strategies()? {
+    for strategies in strategies() {
         let found = frames(strategies, quality(0.7))?;
         expect(found == (expected.clone(), triangles.clone()), || format!("a picture differs with {strategies:?}"))?;
     }

@@ -45,7 +45,7 @@ fn many_materials() -> Result<Scene, Failed> {
 fn changing() -> Result<(), Failed> {
     // A device of its own: reading the picture waits for the frame, so every frame reuses the same buffers.
     let (device, queue) = adapter::device()?;
-    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles)?;
+    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles);
     let mut fixture = fixture_of(backend.encoding_strategy(EncodingStrategy::PerPass))?;
     let mut scene = many_materials()?;
     let texture = scene.add(Texture::new("red", 1, 1, vec![255, 0, 0, 255])?)?;
@@ -381,7 +381,7 @@ fn changing_types() -> Result<(), Failed> {
 
 fn changing_values() -> Result<(), Failed> {
     let (device, queue) = adapter::device()?;
-    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles)?;
+    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles);
     let backend = backend.encoding_strategy(EncodingStrategy::PerPass);
     let [own, _] = Colored::of_types();
     let builder = Renderer::builder(backend).deferred(small_maps()).process(own);

@@ -209,8 +209,8 @@ fn every_strategy() -> Result<(), Failed> {
     let mut scene = many_batches();
     scene.cameras.truncate(1);
     let [expected] = read(&mut fixture(true, Quality::balanced())?, &scene, ["numbers"])?;
-    for (recording, encoding) in strategies()? {
-        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
+    for (recording, encoding) in strategies() {
+        let backend = backend()?.recording_strategy(recording).encoding_strategy(encoding);
         let builder = Renderer::builder(backend).process(Numbered { multisampled: true }).output("numbers");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };

@@ -214,12 +214,12 @@ fn many_pieces() -> Scene {
 
 fn strategies() -> Result<(), Failed> {
     use EncodingStrategy::{OnSubmit, PerPass, Split};
-    use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+    use RecordingStrategy::{Bundles, CachedBundles, Direct};
     let mut scene = many_pieces();
     let camera = scene.cameras[0].clone();
-    for recording in [Direct, Bundles, CachedBundles, Indirect] {
+    for recording in [Direct, Bundles, CachedBundles] {
         for encoding in [PerPass, Split, OnSubmit] {
-            let mut with = on_the_device(|wgpu| Ok(wgpu.recording_strategy(recording)?.encoding_strategy(encoding)))?;
+            let mut with = on_the_device(|wgpu| Ok(wgpu.recording_strategy(recording).encoding_strategy(encoding)))?;
             let mut plain = on_the_device(Ok)?;
             let mut executed = 0;
             for frame in 0..5 {

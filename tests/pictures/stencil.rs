@@ -316,8 +316,8 @@ fn beside_depth() -> Result<(), Failed> {
 
 fn every_strategy() -> Result<(), Failed> {
     let expected = covered(Some("depth"))?;
-    for (recording, encoding) in strategies()? {
-        let backend = backend()?.recording_strategy(recording)?.encoding_strategy(encoding);
+    for (recording, encoding) in strategies() {
+        let backend = backend()?.recording_strategy(recording).encoding_strategy(encoding);
         let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
         let builder = Renderer::builder(backend).deferred(pipeline()).process(Mark::BESIDE_DEPTH);
         let (renderer, submitter) = builder.process(white).output("white").build(Arc::new(Scheduler::new(2)?))?;

@@ -31,31 +31,25 @@ pub const CASES: &[Case] = &[
     ("an_error_at_submission_names_the_pass", refused_at_submission),
 ];
 
-const RECORDING_STRATEGIES: [RecordingStrategy; 4] = [
-    RecordingStrategy::Direct,
-    RecordingStrategy::Bundles,
-    RecordingStrategy::CachedBundles,
-    RecordingStrategy::Indirect,
-];
+const RECORDING_STRATEGIES: [RecordingStrategy; 3] =
+    [RecordingStrategy::Direct, RecordingStrategy::Bundles, RecordingStrategy::CachedBundles];
 const ENCODING_STRATEGIES: [EncodingStrategy; 3] =
     [EncodingStrategy::PerPass, EncodingStrategy::Split, EncodingStrategy::OnSubmit];
 
-/// The strategies that the adapter supports.
-pub fn strategies() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
-    let has_indirect = device()?.0.features().contains(WgpuBackend::OPTIONAL_FEATURES);
-    let recordings =
-        RECORDING_STRATEGIES.into_iter().filter(|recording| has_indirect || *recording != RecordingStrategy::Indirect);
-    Ok(recordings.flat_map(|recording| ENCODING_STRATEGIES.map(|encoding| (recording, encoding))).collect())
+/// All strategies.
+pub fn strategies() -> Vec<(RecordingStrategy, EncodingStrategy)> {
+    let recordings = RECORDING_STRATEGIES.into_iter();
+    recordings.flat_map(|recording| ENCODING_STRATEGIES.map(|encoding| (recording, encoding))).collect()
 }
 
 /// A few of the strategies: each way to record once, and with these each way to encode at least once. For scenes whose passes have too few
 /// draws to be split.
-pub fn few_strategies() -> Result<Vec<(RecordingStrategy, EncodingStrategy)>, Failed> {
+pub fn few_strategies() -> Vec<(RecordingStrategy, EncodingStrategy)> {
     let mut next_encoding = ENCODING_STRATEGIES.into_iter().cycle();
-    let mut few = strategies()?;
+    let mut few = strategies();
     few.dedup_by_key(|(recording, _)| *recording);
     few.iter_mut().for_each(|(_, encoding)| *encoding = next_encoding.next().unwrap_or(*encoding));
-    Ok(few)
+    few
 }
 
 /// A fixture with this backend, whose jobs record two bundles at once.
@@ -77,14 +71,14 @@ pub fn small_maps() -> Deferred {
 
 /// A fixture with fixed strategies.
 pub fn fixture_with(recording: RecordingStrategy, encoding: EncodingStrategy) -> Result<Fixture, Failed> {
-    fixture_of(backend()?.recording_strategy(recording)?.encoding_strategy(encoding))
+    fixture_of(backend()?.recording_strategy(recording).encoding_strategy(encoding))
 }
 
 /// A fixture with cached bundles on a device that no other case uses. So the device is done with a frame when its picture is read,
 /// and the next frame has the same buffers and their bundles.
 fn fixture_alone(encoding: EncodingStrategy) -> Result<Fixture, Failed> {
     let (device, queue) = adapter::device()?;
-    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles)?;
+    let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles);
     fixture_of(backend.encoding_strategy(encoding))
 }
 
@@ -169,11 +163,10 @@ const CHANGES: [Change; 8] = [
 
 fn same_bytes() -> Result<(), Failed> {
     let mut fixtures = Vec::new();
-    for (recording, encoding) in strategies()? {
+    for (recording, encoding) in strategies() {
         fixtures.push((recording, encoding, fixture_with(recording, encoding)?));
     }
-    let scenes =
-        [(small_colonnade()?, few_strategies()?), (many_batches(), strategies()?), (everything(), strategies()?)];
+    let scenes = [(small_colonnade()?, few_strategies()), (many_batches(), strategies()), (everything(), strategies())];
     for (mut scene, chosen) in scenes {
         for (frame, change) in CHANGES.into_iter().enumerate() {
             change(&mut scene)?;
@@ -216,7 +209,7 @@ fn frames_in_flight() -> Result<(), Failed> {
         expected.push(drawn_by_a_new_renderer(&scene)?);
     }
     expect(expected.windows(2).all(|pair| pair[0] != pair[1]), || "nothing changes".to_owned())?;
-    for (recording, encoding) in strategies()? {
+    for (recording, encoding) in strategies() {
         let (mut scene, mut fixture) = (many_batches(), fixture_with(recording, encoding)?);
         for round in 0..3 {
             let differs =
@@ -256,7 +249,7 @@ fn tuned() -> Result<(), Failed> {
             fixture.renderer.backend().pass_statistics().iter().map(|pass| (pass.recording, pass.encoders > 1)),
         );
     }
-    for (recording, _) in strategies()? {
+    for (recording, _) in strategies() {
         if !used.contains(&(recording, false)) {
             return Err(format!("{recording:?} was not tried").into());
         }
@@ -462,7 +455,7 @@ impl RenderProcess for Head {
 
 fn refused_at_submission() -> Result<(), Failed> {
     let backend =
-        backend()?.recording_strategy(RecordingStrategy::CachedBundles)?.encoding_strategy(EncodingStrategy::OnSubmit);
+        backend()?.recording_strategy(RecordingStrategy::CachedBundles).encoding_strategy(EncodingStrategy::OnSubmit);
     let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros);
     let (mut renderer, submitter) = builder.output("tail").build(Arc::new(Scheduler::new(2)?))?;
     let scene = everything();

@@ -64,7 +64,7 @@ fn all_strategies() -> Result<(), Failed> {
             expected.push(drawn_by_a_new_renderer(&whole)?);
             change(&mut whole)?;
         }
-        let strategies = if can_be_split { strategies()? } else { few_strategies()? };
+        let strategies = if can_be_split { strategies() } else { few_strategies() };
         for (record, encode) in strategies {
             let (mut fixture, mut cullable) = (fixture_with(record, encode)?, cullable(scene()?, every));
             for (frame, expected) in expected.iter().enumerate() {

@@ -66,7 +66,7 @@ fn world(boxes: usize) -> Result<Moving, Box<dyn Error>> {
 
 fn renderer() -> Result<(Renderer<WgpuBackend>, Submitter<WgpuBackend>), Box<dyn Error>> {
     let backend = BackendName::Noop.open()?;
-    let backend = backend.recording_strategy(RecordingStrategy::Direct)?.encoding_strategy(EncodingStrategy::OnSubmit);
+    let backend = backend.recording_strategy(RecordingStrategy::Direct).encoding_strategy(EncodingStrategy::OnSubmit);
     let scheduler = Arc::new(Scheduler::new(1)?);
     // Without instancing each box is a draw, so that there is much to encode.
     Ok(Renderer::builder(backend).deferred(Deferred::to_picture()).instancing(false).build(scheduler)?)

@@ -85,11 +85,10 @@ pub fn measure(
     progress.set_message(format!("{objects} objects, {}", backend.name()));
     let mut scenarios = Vec::new();
     let mut add = |strategy: Option<RecordingStrategy>, scheduler: &Arc<Scheduler>, instancing| {
-        let opened = backend.open()?;
-        let opened = match strategy {
-            Some(strategy) => opened.recording_strategy(strategy)?,
-            None => opened,
-        };
+        let mut opened = backend.open()?;
+        if let Some(strategy) = strategy {
+            opened = opened.recording_strategy(strategy);
+        }
         let runner = Runner::new(opened, scheduler, Division { instancing, ..Division::OWN })?;
         scenarios.push(Scenario { runner, samples: Vec::new(), in_flight: Vec::new(), profiles: Vec::new() });
         Ok::<_, Box<dyn Error>>(scenarios.len() - 1)

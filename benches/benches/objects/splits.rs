@@ -62,7 +62,7 @@ impl Split {
             ),
             Self::Draws => (RecordingStrategy::Bundles, Division::OWN),
         };
-        Runner::new(backend.open()?.recording_strategy(strategy)?, scheduler, division)
+        Runner::new(backend.open()?.recording_strategy(strategy), scheduler, division)
     }
 }
 

@@ -8,7 +8,6 @@ use drawloom_benches::backends::BackendName;
 
 use drawloom_benches::clouds::around_one;
 use drawloom_benches::moving::{Motion, Moving};
-use drawloom_output::print_diagnostic;
 
 use crate::CAMERAS;
 use crate::bundles::Bundles;
@@ -95,22 +94,13 @@ impl Contender {
             ("drawloom-direct", Some(RecordingStrategy::Direct)),
             ("drawloom-bundles", Some(RecordingStrategy::Bundles)),
             ("drawloom-cached", Some(RecordingStrategy::CachedBundles)),
-            ("drawloom-indirect", Some(RecordingStrategy::Indirect)),
         ];
         for &workers in workers {
             for (name, strategy) in strategies {
-                let opened = backend.open()?;
-                let opened = match strategy {
-                    None => opened,
-                    // Some adapters lack a feature that it requires.
-                    Some(strategy) => match opened.recording_strategy(strategy) {
-                        Ok(opened) => opened,
-                        Err(error) => {
-                            print_diagnostic!("{name} is left out: {error}");
-                            continue;
-                        }
-                    },
-                };
+                let mut opened = backend.open()?;
+                if let Some(strategy) = strategy {
+                    opened = opened.recording_strategy(strategy);
+                }
                 all.push(drawloom(name, workers, Motion::Everything, Drawloom::new(opened, workers, true)?)?);
             }
             let single_draws = Drawloom::new(backend.open()?, workers, false)?;

@@ -10,7 +10,7 @@ use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::{PipelineCache, SharedPipelines};
 use super::resources::{
     BindGroupLayouts, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers, SubdividedMesh,
-    TargetCache, UploadQueue, new_buffer, shares_memory,
+    TargetCache, UploadQueue, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::streaming::{Streamer, StreamingBudget, StreamingStatistics};
@@ -70,9 +70,6 @@ impl WgpuBackend {
     /// The features that a device must have: none beyond WebGPU's own.
     pub const REQUIRED_FEATURES: wgpu::Features = wgpu::Features::empty();
 
-    /// Optional features, used by [`RecordingStrategy::Indirect`].
-    pub const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
-
     /// The feature that targets of [`Format::Depth32FloatStencil8`](crate::process::Format::Depth32FloatStencil8) need.
     pub const STENCIL_FEATURES: wgpu::Features = wgpu::Features::DEPTH32FLOAT_STENCIL8;
 
@@ -94,7 +91,7 @@ impl WgpuBackend {
     pub fn optional_features(adapter: &wgpu::Adapter) -> wgpu::Features {
         let mapping = if shares_memory(&adapter.get_info()) { Self::MAPPING_FEATURES } else { wgpu::Features::empty() };
         let of_drawing = Self::STENCIL_FEATURES | Self::BLENDING_FEATURES | Self::DEPTH_CLIP_FEATURES;
-        adapter.features() & (Self::OPTIONAL_FEATURES | of_drawing | Self::TIMING_FEATURES | mapping)
+        adapter.features() & (of_drawing | Self::TIMING_FEATURES | mapping)
     }
 
     /// The features that [`WgpuBackend::time_passes`] uses. It requires `TIMESTAMP_QUERY`; with the other one it times
@@ -123,11 +120,6 @@ impl WgpuBackend {
             return Err(error);
         }
         let layouts = with_error_scope(&device, "Drawloom's bind group layouts", || BindGroupLayouts::new(&device))?;
-        let supports_indirect =
-            device.features().contains(Self::OPTIONAL_FEATURES) && supports_indirect_buffers(&device);
-        // On the noop backend wgpu panics over the arguments' alignment, unless its check of indirect calls is switched
-        // off.
-        let tunes_indirect = supports_indirect && device.adapter_info().backend != wgpu::Backend::Noop;
         let maps_memory = device.features().contains(Self::MAPPING_FEATURES) && shares_memory(&device.adapter_info());
         Ok(Self {
             device,
@@ -143,7 +135,7 @@ impl WgpuBackend {
             imports: Mutex::default(),
             storage_buffers: Mutex::default(),
             buffers: Arc::new(BufferPool::new(maps_memory)),
-            strategies: StrategySet::new(supports_indirect, tunes_indirect),
+            strategies: StrategySet::new(),
             frames: AtomicU64::new(0),
             workers: AtomicUsize::new(1),
             latest: Mutex::default(),
@@ -155,17 +147,8 @@ impl WgpuBackend {
     }
 
     /// Fixes the recording strategy of all passes, instead of tuning it.
-    ///
-    /// # Errors
-    /// If the device lacks a feature for it, naming it.
-    pub fn recording_strategy(self, recording: RecordingStrategy) -> Result<Self, BackendError> {
-        if recording == RecordingStrategy::Indirect && !self.strategies.supports_indirect() {
-            let missing = (Self::OPTIONAL_FEATURES - self.device.features()).to_string();
-            // WebGPU requires it, so wgpu has no feature for it, but some OpenGL devices lack it.
-            let missing = if missing.is_empty() { "INDIRECT_EXECUTION".to_owned() } else { missing };
-            return Err(BackendError::MissingFeature { missing });
-        }
-        Ok(Self { strategies: self.strategies.with_recording(recording), ..self })
+    pub fn recording_strategy(self, recording: RecordingStrategy) -> Self {
+        Self { strategies: self.strategies.with_recording(recording), ..self }
     }
 
     /// Fixes the encoding strategy of all passes, instead of tuning it.
@@ -374,12 +357,6 @@ impl WgpuBackend {
             }
         }
     }
-}
-
-/// Whether the device can have buffers of indirect arguments.
-fn supports_indirect_buffers(device: &wgpu::Device) -> bool {
-    let create = || new_buffer(device, "indirect draws", 256, wgpu::BufferUsages::INDIRECT);
-    matches!(with_error_scope(device, "indirect draws", create), Ok(Ok(_)))
 }
 
 /// What a [`WgpuBackend`] keeps on the device from frame to frame.

@@ -166,13 +166,8 @@ impl Backend for WgpuBackend {
             frame.buffers.write_object_indices(&self.uploads, index, list);
             pass.upload_partial_indices(&self.device, &self.uploads, list.remaining_indices())?;
             self.subdivide(frame, request, list)?;
-            match pass.strategy.recording {
-                RecordingStrategy::CachedBundles => pass.bundle_cache.set_bundle_count(list.bundle_slot_count()),
-                RecordingStrategy::Indirect => {
-                    let upload = || pass.indirect_arguments.upload(&self.device, &self.uploads, &frame.meshes, list);
-                    pass.timing.time_serial(upload)?;
-                }
-                RecordingStrategy::Direct | RecordingStrategy::Bundles => {}
+            if pass.strategy.recording == RecordingStrategy::CachedBundles {
+                pass.bundle_cache.set_bundle_count(list.bundle_slot_count());
             }
             let runs = list.batches.chunk_by(|one, next| frame.meshes.share_pipeline(one, next));
             let variant = |run: &[Batch]| PipelineVariant::of_batch(&frame.meshes, &run[0]).clamping(pass.clamps_depth);

@@ -11,7 +11,7 @@
 //! the scene, so each pass tunes its own by measurement (`strategy`), unless the engine fixes it. All strategies draw
 //! the same picture.
 //!
-//! Each frame in flight has buffers of its own. Its bind groups, bundles and indirect arguments are cached with these
+//! Each frame in flight has buffers of its own. Its bind groups and bundles are cached with these
 //! buffers from frame to frame. A cached object is reused only if everything that it was made from compares equal. An
 //! error clears the caches that it may have left unusable.
 

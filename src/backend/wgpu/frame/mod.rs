@@ -5,7 +5,6 @@ mod bundle_cache;
 mod commands;
 mod frame_buffers;
 mod generated_uploads;
-mod indirect_arguments;
 mod material_buffer;
 mod object_buffers;
 mod object_lists;
@@ -20,7 +19,6 @@ pub(crate) use bundle_cache::BundleKey;
 pub(crate) use commands::{PassCommands, RecordedPart};
 pub(crate) use frame_buffers::{BufferPool, PassResources};
 pub(crate) use generated_uploads::GeneratedUploads;
-pub(crate) use indirect_arguments::IndirectArguments;
 pub(crate) use pass_state::WgpuPassState;
 pub(crate) use pending_uploads::PendingUploads;
 

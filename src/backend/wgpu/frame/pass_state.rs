@@ -7,7 +7,6 @@ use drawloom_jobs::internal::CostSample;
 use parking_lot::RwLock;
 
 use super::bundle_cache::BundleCache;
-use super::indirect_arguments::IndirectArguments;
 use super::pass_statistics::WgpuPassStatistics;
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{CachedBindGroup, GrowingBuffer, UploadQueue};
@@ -90,7 +89,6 @@ pub(crate) struct WgpuPassState {
     /// Whether it is in the encoder of the pass before it.
     pub(crate) is_in_previous_encoder: AtomicBool,
     pub(crate) bundle_cache: BundleCache,
-    pub(crate) indirect_arguments: IndirectArguments,
     /// The indices of partial batches' remaining triangles.
     pub(crate) partial_indices: RwLock<GrowingBuffer>,
     pub(crate) timing: PassTiming,
@@ -122,7 +120,6 @@ impl Default for WgpuPassState {
             continues_previous: false,
             is_in_previous_encoder: AtomicBool::new(false),
             bundle_cache: BundleCache::default(),
-            indirect_arguments: IndirectArguments::default(),
             partial_indices: RwLock::new(new_index_buffer()),
             timing: PassTiming::default(),
         }
@@ -153,14 +150,10 @@ impl WgpuPassState {
         (self.strategy, self.strategy_index, self.is_trial) = (strategy, strategy_index, is_trial);
         self.is_warm = match strategy.recording {
             RecordingStrategy::CachedBundles => self.bundle_cache.is_warm(),
-            RecordingStrategy::Indirect => self.indirect_arguments.is_warm(),
             RecordingStrategy::Direct | RecordingStrategy::Bundles => true,
         };
         if !is_trial && strategy.recording != RecordingStrategy::CachedBundles {
             self.bundle_cache.clear();
-        }
-        if !is_trial && strategy.recording != RecordingStrategy::Indirect {
-            self.indirect_arguments.clear();
         }
         self.timing = PassTiming::default();
         self.is_in_previous_encoder = AtomicBool::new(false);

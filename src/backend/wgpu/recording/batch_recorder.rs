@@ -26,18 +26,12 @@ pub(crate) struct BatchRecorder<'a> {
 }
 
 impl<'a> BatchRecorder<'a> {
-    /// Draws a range of the list's batches. State that does not change between batches is set once. `draw_run` is
-    /// called for consecutive unculled, unsubdivided batches of one state whose meshes are in the same pages, and draws them. Batches whose
-    /// meshes are not on the device draw nothing.
+    /// Draws a range of the list's batches. State that does not change between batches is set once. Batches whose meshes are not on the
+    /// device draw nothing.
     ///
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.
-    pub(crate) fn draw<E: RenderEncoder<'a>>(
-        &self,
-        encoder: &mut E,
-        batches: Range<usize>,
-        mut draw_run: impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
-    ) -> Result<(), BackendError> {
+    pub(crate) fn draw(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
         self.set_bind_groups(encoder);
         let mut bound = None;
         let mut start = batches.start;
@@ -60,12 +54,12 @@ impl<'a> BatchRecorder<'a> {
                 self.draw_subdivided(encoder, run)?;
                 bound = None;
             } else if meshes.has_one_page() {
-                self.draw_in_pages(encoder, start..end, &mut bound, &mut draw_run)?;
+                self.draw_in_pages(encoder, start..end, &mut bound)?;
             } else {
                 let mut first = start;
                 for in_same_pages in run.chunk_by(|one, next| meshes.pages(one) == meshes.pages(next)) {
                     let next = first + in_same_pages.len();
-                    self.draw_in_pages(encoder, first..next, &mut bound, &mut draw_run)?;
+                    self.draw_in_pages(encoder, first..next, &mut bound)?;
                     first = next;
                 }
             }
@@ -75,12 +69,11 @@ impl<'a> BatchRecorder<'a> {
     }
 
     /// Draws batches of one state whose meshes are in the same pages. `bound` are the pages whose buffers are set.
-    fn draw_in_pages<E: RenderEncoder<'a>>(
+    fn draw_in_pages(
         &self,
-        encoder: &mut E,
+        encoder: &mut impl RenderEncoder<'a>,
         batches: Range<usize>,
         bound: &mut Option<MeshPageIndices>,
-        draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
         let Some(pages) = self.frame.meshes.pages(&self.list.batches[batches.start]) else {
             // An error unless it is yet to arrive.
@@ -91,19 +84,18 @@ impl<'a> BatchRecorder<'a> {
             *bound = Some(pages);
         }
         if self.list.is_whole() {
-            draw_run(encoder, batches)
+            self.draw_each(encoder, batches)
         } else {
-            self.draw_with_partial(encoder, pages, batches, draw_run)
+            self.draw_with_partial(encoder, pages, batches)
         }
     }
 
-    /// Draws batches of one state, some of them partial, whose meshes are in these pages. `draw_run` draws each run of whole batches.
-    fn draw_with_partial<E: RenderEncoder<'a>>(
+    /// Draws batches of one state, some of them partial, whose meshes are in these pages.
+    fn draw_with_partial(
         &self,
-        encoder: &mut E,
+        encoder: &mut impl RenderEncoder<'a>,
         pages: MeshPageIndices,
         batches: Range<usize>,
-        draw_run: &mut impl FnMut(&mut E, Range<usize>) -> Result<(), BackendError>,
     ) -> Result<(), BackendError> {
         let mut whole = batches.start..batches.start;
         let mut binds_partial_indices = false;
@@ -116,7 +108,7 @@ impl<'a> BatchRecorder<'a> {
                 if mem::take(&mut binds_partial_indices) {
                     self.set_index_page(encoder, pages)?;
                 }
-                draw_run(encoder, whole)?;
+                self.draw_each(encoder, whole)?;
             }
             whole = index + 1..index + 1;
             if remaining.is_empty() {
@@ -135,15 +127,12 @@ impl<'a> BatchRecorder<'a> {
         if binds_partial_indices {
             self.set_index_page(encoder, pages)?;
         }
-        if whole.is_empty() { Ok(()) } else { draw_run(encoder, whole) }
+        if whole.is_empty() { Ok(()) } else { self.draw_each(encoder, whole) }
     }
 
-    /// Draws each batch of a run with a draw call of its own.
-    ///
-    /// # Errors
-    /// If a mesh is missing. This is a bug in Drawloom.
-    pub(crate) fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
-        for batch in run {
+    /// Draws each of these whole batches with a draw call of its own.
+    fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
+        for batch in &self.list.batches[batches] {
             if let Some(mesh) = self.frame.meshes.mesh_range(batch)? {
                 let indices = mesh.first_index..mesh.first_index + mesh.index_count;
                 encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);

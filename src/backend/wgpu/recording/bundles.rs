@@ -68,6 +68,6 @@ fn new_bundle(
     let partial_indices = indices.buffer();
     let recorder = BatchRecorder { frame, pass, list, pipelines: &variants, subdivided, partial_indices };
     let batches = list.bundle_range(bundle);
-    recorder.draw(&mut encoder, batches, |encoder, run| recorder.draw_each(encoder, &list.batches[run]))?;
+    recorder.draw(&mut encoder, batches)?;
     Ok(encoder.finish(&wgpu::RenderBundleDescriptor { label: Some(&pass.label) }))
 }

@@ -45,7 +45,7 @@ fn record_pass(
     &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
     parts: &[WgpuPart],
 ) -> Result<(), BackendError> {
-    use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+    use RecordingStrategy::{Bundles, CachedBundles, Direct};
     let WgpuPassState { pass, strategy, timed_pass_index, .. } = *frame.pass(index);
     let accesses = &request.plan.processes()[pass.process_index].declaration.accesses;
     let clears = accesses.iter().any(|(_, access)| access.writes() && !access.reads());
@@ -54,7 +54,7 @@ fn record_pass(
         // A pass that would only load and store its targets.
         (Draws::Commands(_), _) if list.batches.is_empty() && timed_pass_index.is_none() && !clears => {}
         (Draws::Compute(dispatch), _) => encode_compute(encoder, frame, index, dispatch)?,
-        (Draws::Commands(_), Direct | Indirect) => {
+        (Draws::Commands(_), Direct) => {
             record_batches(encoder, frame, request, index, PassSegment::WHOLE, list, 0..list.bundle_count())?;
         }
         (Draws::Commands(_), Bundles | CachedBundles) => {
@@ -99,12 +99,12 @@ pub(crate) fn encode_segment(
     list: &DrawList,
     segment: usize,
 ) -> Result<RecordedPart, BackendError> {
-    use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+    use RecordingStrategy::{Bundles, CachedBundles, Direct};
     let strategy = frame.pass(index).strategy;
     let bundles = strategy.bundles_of_encoder(list, segment);
     let segment = strategy.segment_of_encoder(list, segment);
     let encoder = match strategy.recording {
-        Direct | Indirect => encode(device, frame, index, |encoder| {
+        Direct => encode(device, frame, index, |encoder| {
             record_batches(encoder, frame, request, index, segment, list, bundles)
         }),
         Bundles | CachedBundles => {

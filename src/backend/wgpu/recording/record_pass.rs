@@ -6,9 +6,9 @@ use super::batch_recorder::BatchRecorder;
 use super::begin_pass::{begin_pass, set_stencil_reference};
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::SubdividedMeshes;
-use crate::backend::wgpu::frame::{IndirectArguments, WgpuFrame, WgpuPassState};
+use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
 use crate::backend::wgpu::pipelines::{PipelineVariant, fixed_state};
-use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
+use crate::backend::wgpu::strategy::PassSegment;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
 use crate::process::{DrawCount, Draws, Pass, PlannedProcess, ProceduralDraws, RawAccess, RawPass, RawPassResources};
@@ -29,7 +29,6 @@ pub(crate) fn record_batches(
     let pass = frame.pass(index);
     let pipelines = frame.pipelines(pass.pass).variants();
     let subdivided = frame.buffers.subdivided().read();
-    let arguments = pass.indirect_arguments.read();
     let indices = pass.partial_indices.read();
     let partial_indices = indices.buffer();
     let recorder = BatchRecorder { frame, pass, list, pipelines: &pipelines, subdivided: &subdivided, partial_indices };
@@ -39,26 +38,8 @@ pub(crate) fn record_batches(
     };
     let mut render_pass = begin_pass(encoder, frame, request, index, segment);
     set_stencil_reference(&mut render_pass, frame, request, index);
-    if batches.is_empty() {
-        return Ok(());
-    }
-    if pass.strategy.recording != RecordingStrategy::Indirect {
-        return recorder
-            .draw(&mut render_pass, batches, |encoder, run| recorder.draw_each(encoder, &list.batches[run]));
-    }
-    let buffer = arguments.as_ref().and_then(|arguments| arguments.on_device.buffer());
-    let buffer = buffer.ok_or_else(|| broken_rule("indirect arguments are uploaded before they are used"))?;
-    recorder.draw(&mut render_pass, batches, |render_pass, run| {
-        for start in run.clone().step_by(MAX_INDIRECT_DRAWS) {
-            let offset = start as u64 * IndirectArguments::STRIDE;
-            render_pass.multi_draw_indexed_indirect(buffer, offset, (run.end - start).min(MAX_INDIRECT_DRAWS) as u32);
-        }
-        Ok(())
-    })
+    if batches.is_empty() { Ok(()) } else { recorder.draw(&mut render_pass, batches) }
 }
-
-/// Draws per indirect call: the limit that every Vulkan device with such calls supports.
-const MAX_INDIRECT_DRAWS: usize = 65_535;
 
 /// Records a segment of a pass that replays bundles.
 pub(crate) fn replay_bundles<'a>(

@@ -40,7 +40,6 @@ pub(crate) use attribute_set::vertex_format;
 pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };
-pub(crate) use buffers::new_buffer;
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
 pub(crate) use growing_buffer::{ALIGNMENT, GrowingBuffer, check_storage_binding_size, size_with_headroom};
 pub(crate) use imported_meshes::{ImportedMeshes, VertexSlot, VertexStreamLayouts};

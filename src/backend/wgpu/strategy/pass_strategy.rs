@@ -15,10 +15,6 @@ pub enum RecordingStrategy {
     /// Into bundles that are cached: a bundle whose batches, meshes, pipelines and bindings equal those of an earlier frame is
     /// replayed instead of recorded. Objects may move in between, as long as the view draws the same ones.
     CachedBundles,
-    /// Straight into the pass, by one `multi_draw_indexed_indirect` for each run of batches of one state. The indirect arguments
-    /// are uploaded when they change. Needs [`wgpu::Features::INDIRECT_FIRST_INSTANCE`]; on wgpu's `noop` backend also an
-    /// instance without [`wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL`].
-    Indirect,
 }
 
 /// Where and when a recorded pass is encoded for the device. Every strategy draws the same picture.
@@ -50,7 +46,7 @@ impl PassStrategy {
     /// Its name in reports.
     pub(crate) fn name(self) -> &'static str {
         use EncodingStrategy::{OnSubmit, PerPass, Split};
-        use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+        use RecordingStrategy::{Bundles, CachedBundles, Direct};
         match (self.recording, self.encoding) {
             (Direct, PerPass) => "direct",
             (Direct, Split) => "split direct",
@@ -61,9 +57,6 @@ impl PassStrategy {
             (CachedBundles, PerPass) => "cached bundles",
             (CachedBundles, Split) => "split cached bundles",
             (CachedBundles, OnSubmit) => "cached bundles on submit",
-            (Indirect, PerPass) => "indirect",
-            (Indirect, Split) => "split indirect",
-            (Indirect, OnSubmit) => "indirect on submit",
         }
     }
 
@@ -92,7 +85,7 @@ impl PassStrategy {
     pub(crate) fn part_count(self, list: &DrawList) -> usize {
         let bundles = list.bundle_count();
         match (self.encoder_count(bundles), self.recording) {
-            (1, RecordingStrategy::Direct | RecordingStrategy::Indirect) => 0,
+            (1, RecordingStrategy::Direct) => 0,
             (1, RecordingStrategy::Bundles | RecordingStrategy::CachedBundles) => bundles,
             (encoders, _) => encoders,
         }
@@ -125,10 +118,10 @@ mod tests {
 
     #[test]
     fn encoders_divide_all_bundles_in_order() {
-        use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
+        use RecordingStrategy::{Bundles, CachedBundles, Direct};
         for batches in [0, 1, 256, 257, 512, 513, 1000, 3000, 10_000] {
             let list = list(batches);
-            for recording in [Direct, Bundles, CachedBundles, Indirect] {
+            for recording in [Direct, Bundles, CachedBundles] {
                 let strategy = PassStrategy { recording, encoding: EncodingStrategy::Split };
                 let encoders = strategy.encoder_count(list.bundle_count());
                 let divided = (0..encoders).flat_map(|encoder| strategy.bundles_of_encoder(&list, encoder));

@@ -9,9 +9,6 @@ pub(crate) struct StrategySet {
     /// Fixed by the engine.
     recording: Option<RecordingStrategy>,
     encoding: Option<EncodingStrategy>,
-    /// Whether the device can draw indirectly, and whether the tuner may try that.
-    supports_indirect: bool,
-    tunes_indirect: bool,
     strategies: Vec<PassStrategy>,
 }
 
@@ -20,14 +17,9 @@ pub(crate) struct StrategySet {
 const MAX_PAUSE: u64 = 2048;
 
 impl StrategySet {
-    /// All strategies that a device supports.
-    pub(crate) fn new(supports_indirect: bool, tunes_indirect: bool) -> Self {
-        let strategies = Vec::new();
-        Self { recording: None, encoding: None, supports_indirect, tunes_indirect, strategies }.enumerated()
-    }
-
-    pub(crate) fn supports_indirect(&self) -> bool {
-        self.supports_indirect
+    /// All strategies that the tuner may choose.
+    pub(crate) fn new() -> Self {
+        Self { recording: None, encoding: None, strategies: Vec::new() }.enumerated()
     }
 
     pub(crate) fn with_recording(self, recording: RecordingStrategy) -> Self {
@@ -49,17 +41,13 @@ impl StrategySet {
     }
 
     fn enumerated(self) -> Self {
-        use RecordingStrategy::{Bundles, CachedBundles, Direct, Indirect};
-        let recordings = match self.recording {
-            Some(recording) => vec![recording],
-            None if self.tunes_indirect => vec![CachedBundles, Direct, Bundles, Indirect],
-            None => vec![CachedBundles, Direct, Bundles],
-        };
+        use RecordingStrategy::{Bundles, CachedBundles, Direct};
+        let default_recordings = || vec![CachedBundles, Direct, Bundles];
+        let recordings = self.recording.map_or_else(default_recordings, |recording| vec![recording]);
         // `OnSubmit` moves work to the device thread, which every frame waits for. So only the engine chooses it.
         let default_encodings = || vec![EncodingStrategy::PerPass, EncodingStrategy::Split];
         let encodings = self.encoding.map_or_else(default_encodings, |encoding| vec![encoding]);
-        // Fewer strategies are tuned sooner. Several encoders gain nothing for bundles that are replayed once, nor for
-        // indirect draws, which are few.
+        // Fewer strategies are tuned sooner. Several encoders gain nothing for bundles that are replayed once.
         let is_tuned = self.recording.is_none() && self.encoding.is_none();
         let is_candidate = |strategy: &PassStrategy| {
             !is_tuned
@@ -79,15 +67,13 @@ mod tests {
     #[test]
     fn a_fixed_strategy_excludes_all_others() {
         use EncodingStrategy::{OnSubmit, PerPass};
-        use RecordingStrategy::{Bundles, CachedBundles, Indirect};
-        let all = StrategySet::new(true, true).strategies().to_vec();
+        use RecordingStrategy::{Bundles, CachedBundles};
+        let all = StrategySet::new().strategies().to_vec();
         assert_eq!(all[0], PassStrategy { recording: CachedBundles, encoding: PerPass });
         assert!(all.iter().all(|strategy| strategy.encoding != OnSubmit));
-        let untuned = StrategySet::new(true, false);
-        assert!(untuned.strategies().iter().all(|strategy| strategy.recording != Indirect));
-        let fixed = StrategySet::new(true, false).with_recording(Indirect).with_encoding(OnSubmit);
-        assert_eq!(fixed.strategies(), [PassStrategy { recording: Indirect, encoding: OnSubmit }]);
-        let recorded = StrategySet::new(true, true).with_recording(Bundles);
+        let fixed = StrategySet::new().with_recording(Bundles).with_encoding(OnSubmit);
+        assert_eq!(fixed.strategies(), [PassStrategy { recording: Bundles, encoding: OnSubmit }]);
+        let recorded = StrategySet::new().with_recording(Bundles);
         assert!(recorded.strategies().iter().all(|strategy| strategy.recording == Bundles));
     }
 }
