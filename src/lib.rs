@@ -47,6 +47,11 @@
 //!
 //! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is
 //!   there, and [`NullBackend`](backend::NullBackend), which counts and checks.
+//! - `vulkan`, `metal`, `dx12` (default): what wgpu draws with. An engine for one system names its own:
+//!   `default-features = false, features = ["vulkan", "affinity"]`.
+//! - `noop`: wgpu's device without a graphics card, which draws nothing, for tests and for measuring the CPU's work.
+//! - `affinity` (default): [`SchedulerBuilder::affinity`](task::SchedulerBuilder::affinity), and workers that stay off the
+//!   processor of their caller. Linux and Android alone have it.
 //! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
 //!   A process supplies one with `RenderProcess::cpu_shader`.
 //! - `obj`: OBJ files and their textures.

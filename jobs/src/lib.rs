@@ -14,7 +14,9 @@
 //! | [`timeline::Timeline`] | what ran when on which worker |
 //!
 //! With the feature `report` the module `report` explains a timeline: why a frame took as long as it did, how long it
-//! would take on other numbers of workers, and all frames as an HTML page or as a trace for Perfetto.
+//! would take on other numbers of workers, and all frames as an HTML page or as a trace for Perfetto. The feature
+//! `affinity`, which is on by default, restricts threads to processors, on Linux and Android: see
+//! [`SchedulerBuilder::affinity`](task::SchedulerBuilder::affinity).
 //!
 //! # Spans
 //!

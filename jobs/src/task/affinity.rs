@@ -26,8 +26,8 @@ impl AffinityMask {
     /// Restricts the calling thread to these processors.
     ///
     /// # Errors
-    /// Returns the system's error, or that the system does not support affinities.
-    #[cfg(any(target_os = "linux", target_os = "android"))]
+    /// Returns the system's error, or what is missing.
+    #[cfg(all(feature = "affinity", any(target_os = "linux", target_os = "android")))]
     pub(super) fn apply(&self) -> io::Result<()> {
         use rustix::thread::{CpuSet, sched_setaffinity};
 
@@ -42,9 +42,14 @@ impl AffinityMask {
     /// Restricts the calling thread to these processors.
     ///
     /// # Errors
-    /// Returns the system's error, or that the system does not support affinities.
-    #[cfg(not(any(target_os = "linux", target_os = "android")))]
+    /// Returns the system's error, or what is missing.
+    #[cfg(not(all(feature = "affinity", any(target_os = "linux", target_os = "android"))))]
     pub(super) fn apply(&self) -> io::Result<()> {
-        Err(io::Error::new(io::ErrorKind::Unsupported, "thread affinity is not supported on this system"))
+        let missing = if cfg!(feature = "affinity") {
+            "thread affinity is not supported on this system"
+        } else {
+            "thread affinity needs the feature `affinity`"
+        };
+        Err(io::Error::new(io::ErrorKind::Unsupported, missing))
     }
 }

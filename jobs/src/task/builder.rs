@@ -107,11 +107,12 @@ impl SchedulerBuilder {
     }
 
     /// Sets the processors that each thread may run on, by the index of the worker, 1 or more. Threads that call the scheduler are
-    /// not affected. Only Linux and Android support this; on other systems use [`on_start`](Self::on_start).
+    /// not affected. This needs the feature `affinity`, which is on by default, and Linux or Android. Elsewhere
+    /// [`build`](Self::build) returns [`SchedulerError::Affinity`], and [`on_start`](Self::on_start) can restrict threads.
     ///
     /// Without this the system chooses the processors. If it puts them on the processor of the thread that wakes them, as on some
-    /// virtual machines, they are kept off there (on Linux and Android), except threads that [`on_start`](Self::on_start) has
-    /// placed.
+    /// virtual machines, they are kept off there (with that feature, on Linux and Android), except threads that
+    /// [`on_start`](Self::on_start) has placed.
     pub fn affinity(mut self, affinity: impl Fn(usize) -> AffinityMask + 'static) -> Self {
         self.affinity = Some(Contained::new(Box::new(affinity)));
         self

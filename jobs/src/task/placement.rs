@@ -7,12 +7,12 @@
 //! processor that the caller runs on, until a later call comes from another processor.
 
 // Miri has no processors to choose from.
-#[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
+#[cfg(all(feature = "affinity", any(target_os = "linux", target_os = "android"), not(miri)))]
 pub(super) use self::linux::Placement;
-#[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
+#[cfg(not(all(feature = "affinity", any(target_os = "linux", target_os = "android"), not(miri))))]
 pub(super) use self::other::Placement;
 
-#[cfg(all(any(target_os = "linux", target_os = "android"), not(miri)))]
+#[cfg(all(feature = "affinity", any(target_os = "linux", target_os = "android"), not(miri)))]
 mod linux {
     use std::io;
 
@@ -156,7 +156,7 @@ mod linux {
     }
 }
 
-#[cfg(not(all(any(target_os = "linux", target_os = "android"), not(miri))))]
+#[cfg(not(all(feature = "affinity", any(target_os = "linux", target_os = "android"), not(miri))))]
 mod other {
     /// Leaves it to the system where the threads of a scheduler run.
     pub(in crate::task) struct Placement;

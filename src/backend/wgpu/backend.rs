@@ -21,8 +21,8 @@ use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
 ///
-/// Drawloom builds wgpu with Vulkan, Metal, DX12 and `noop`, and WGSL. An engine that depends on wgpu 30 itself can
-/// enable more of it.
+/// Drawloom builds wgpu with WGSL, and with what the features `vulkan`, `metal`, `dx12` and `noop` name; all but the last are on by
+/// default. An engine that depends on wgpu 30 itself can enable more of it.
 ///
 /// Errors in what Drawloom records and submits are returned. Other device errors are not: for those an engine sets its own
 /// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`.
