@@ -55,6 +55,9 @@
 //! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
 //!   A process supplies one with `RenderProcess::cpu_shader`.
 //! - `obj`: OBJ files and their textures.
+//! - `occlusion`: culling of hidden objects, with `Quality::occlusion`, and of triangles, with
+//!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off, because in no scene that was measured
+//!   does either save the CPU's time.
 //! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
 //!   or a Chrome trace.
 //! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.

@@ -1,20 +1,26 @@
 //! What each view draws, and what that costs.
 
+use drawloom::ViewStatistics;
 use drawloom::backend::TargetMemory;
 use egui::{Grid, Ui};
 
 use crate::frame_history::FrameHistory;
 
-const COLUMNS: [(&str, &str); 9] = [
+const COLUMNS: [(&str, &str); 3] = [
     ("view", "The camera's name."),
     ("kind", "What the view is for."),
     ("thread time", "The time of all workers in its stages, and in those of other views of its name."),
-    ("visible", "Objects that it sees."),
-    ("occluded", "Objects in its frustum that others hide."),
-    ("lights", "Lights that reach it."),
-    ("commands", "Draws of single objects, over all its processes."),
-    ("batches", "Instanced draws that they are merged into."),
-    ("bundles", "Bundles that the batches fill."),
+];
+
+/// The columns after these: name, explanation, and number.
+const COUNTS: &[(&str, &str, fn(&ViewStatistics) -> usize)] = &[
+    ("visible", "Objects that it sees.", |view| view.visible),
+    #[cfg(feature = "occlusion")]
+    ("occluded", "Objects in its frustum that others hide.", |view| view.occluded),
+    ("lights", "Lights that reach it.", |view| view.lights),
+    ("commands", "Draws of single objects, over all its processes.", |view| view.commands),
+    ("batches", "Instanced draws that they are merged into.", |view| view.batches),
+    ("bundles", "Bundles that the batches fill.", |view| view.bundles),
 ];
 
 /// Shows the views of the shown frame.
@@ -24,8 +30,9 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
         ui.weak("No statistics of this frame.");
         return;
     };
-    Grid::new("views").striped(true).num_columns(COLUMNS.len()).show(ui, |ui| {
-        for (name, explanation) in COLUMNS {
+    Grid::new("views").striped(true).num_columns(COLUMNS.len() + COUNTS.len()).show(ui, |ui| {
+        let counts = COUNTS.iter().map(|&(name, explanation, _)| (name, explanation));
+        for (name, explanation) in COLUMNS.into_iter().chain(counts) {
             ui.weak(name).on_hover_text(explanation);
         }
         ui.end_row();
@@ -33,8 +40,8 @@ pub fn show(ui: &mut Ui, history: &FrameHistory) {
             ui.label(&view.name);
             ui.label(view.kind.name());
             ui.label(format!("{:.0} µs", record.view_time(&view.name).as_secs_f64() * 1e6));
-            for count in [view.visible, view.occluded, view.lights, view.commands, view.batches, view.bundles] {
-                ui.label(count.to_string());
+            for (_, _, count) in COUNTS {
+                ui.label(count(view).to_string());
             }
             ui.end_row();
         }

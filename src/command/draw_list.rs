@@ -167,6 +167,7 @@ impl DrawList {
 
     /// Makes a batch of one object partial: it draws only the triangles whose corners `append_indices` appends, three per
     /// triangle. Calls come in ascending order of `batch`.
+    #[cfg(feature = "occlusion")]
     pub(crate) fn make_partial(&mut self, batch: u32, append_indices: impl FnOnce(&mut Vec<u32>)) {
         let first = self.remaining_indices.len() as u32;
         append_indices(&mut self.remaining_indices);

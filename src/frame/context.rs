@@ -3,17 +3,16 @@
 use std::time::Duration;
 
 use super::cost_model::CostModel;
+use super::culling::{OcclusionControls, allows_triangle_culling};
 use super::granularity::Granularity;
 use super::lent_nodes::LentNodes;
 use super::list_inputs::{ListInputs, OrderInputs};
-use super::occlusion_control::OcclusionControl;
 use super::pass_recording::PassRecording;
 use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
 use super::tables::{FrameTables, MAX_SEGMENTS};
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::{DrawList, Splitters};
-use crate::process::AttachmentExtent;
 use crate::scene::Projection;
 use crate::view::{ObjectLevels, SelectionFilter, VisibleRange};
 
@@ -36,8 +35,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) nodes: LentNodes<'a>,
     pub(super) clock: &'a StageClock<'a>,
     pub(super) costs: &'a CostModel,
-    /// One for each view.
-    pub(super) occlusion: &'a [OcclusionControl],
+    pub(super) occlusion: &'a OcclusionControls,
     /// Whether the triangles of meshes with triangle culling are culled.
     pub(super) culls_triangles: bool,
     pub(super) workers: usize,
@@ -164,16 +162,12 @@ impl<B: Backend> FrameContext<'_, B> {
 
     /// Whether a pass culls triangles of meshes with triangle culling.
     pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
-        let process = self.request.passes[pass].process_index;
-        // Triangle culling tests undeformed triangles against the centres of the picture's pixels.
-        let is_exact = self.request.draws[process].allows_triangle_culling()
-            && self.request.plan.attachment_extent(process) == AttachmentExtent::PICTURE;
-        self.culls_triangles && is_exact && self.request.views[self.view_index_of(pass)].can_cull_triangles()
+        self.culls_triangles && allows_triangle_culling(self.request, pass)
     }
 
     /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.
     pub(super) fn can_merge(&self, pass: usize, mesh: u32) -> bool {
-        self.instancing && !(self.pass_culls_triangles(pass) && self.tables.cullable_meshes.contains(mesh))
+        self.instancing && !(self.pass_culls_triangles(pass) && self.tables.culling.is_cullable(mesh))
     }
 
     /// The number of a node's `width` items that are worth a job.
@@ -186,7 +180,7 @@ impl<B: Backend> FrameContext<'_, B> {
         let view = self.view_index_of(pass);
         self.tables.view_times.add(view, took);
         if self.depends_on_occlusion(pass) {
-            self.tables.occlusion[view].add_time(took);
+            self.tables.culling.add_time(view, took);
         }
     }
 
@@ -195,13 +189,13 @@ impl<B: Backend> FrameContext<'_, B> {
         let view = self.view_index_of(pass);
         self.tables.view_times.subtract(view, took);
         if self.depends_on_occlusion(pass) {
-            self.tables.occlusion[view].subtract_time(took);
+            self.tables.culling.subtract_time(view, took);
         }
     }
 
     /// Whether what a pass costs depends on the occlusion tests of its view.
     fn depends_on_occlusion(&self, pass: usize) -> bool {
-        self.tables.passes[pass].selection.is_some() && self.occlusion[self.view_index_of(pass)].is_possible()
+        self.tables.passes[pass].selection.is_some() && self.occlusion.is_possible(self.view_index_of(pass))
     }
 
     /// Overrides the job size that is reported for a node.

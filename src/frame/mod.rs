@@ -10,6 +10,8 @@ mod change_check;
 mod context;
 mod cost_model;
 mod cpu_node;
+#[cfg(feature = "occlusion")]
+mod culling;
 mod error;
 mod frame_loop;
 mod frame_node;
@@ -21,10 +23,10 @@ mod latched_views;
 mod lent_nodes;
 mod light_maps;
 mod list_inputs;
+#[cfg(not(feature = "occlusion"))]
+mod no_culling;
 mod node_accesses;
 mod node_frame;
-mod occluders;
-mod occlusion_control;
 mod pass_recording;
 mod pass_runs;
 mod piece_statistics;
@@ -48,14 +50,12 @@ mod stages;
 mod statistics;
 mod table_keys;
 mod tables;
-mod triangle_culling;
 mod valid_lights;
 mod view_budget;
 mod view_cache;
 mod view_cost;
 mod view_filter;
 mod view_levels;
-mod view_occlusion;
 mod view_pieces;
 mod view_queues;
 mod view_times;
@@ -63,6 +63,9 @@ mod view_visibility;
 mod views;
 mod warm_up;
 mod warnings;
+
+#[cfg(not(feature = "occlusion"))]
+use no_culling as culling;
 
 pub use budgeted_view::{BudgetedView, Rung, ViewForm};
 pub use builder::RendererBuilder;

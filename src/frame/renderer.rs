@@ -7,6 +7,7 @@ use parking_lot::RwLockReadGuard;
 use super::backend_maintenance::BackendMaintenance;
 use super::change_check::ChangeCheck;
 use super::context::FrameContext;
+use super::culling::CullingOptions;
 use super::latched_views::LatchedViews;
 use super::lent_nodes::NodeDeclarations;
 use super::pass_recording::{PassRecording, reset_recordings};
@@ -31,7 +32,7 @@ use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
 use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
-use crate::quality::{Quality, TransformPrecision};
+use crate::quality::Quality;
 use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
@@ -307,14 +308,11 @@ impl<B: Backend> Renderer<B> {
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
-        self.tables.cullable_meshes.update(scene.assets, self.tables.objects.used_meshes());
+        self.tables.culling.update(scene.assets, self.tables.objects.used_meshes());
         self.tables.mesh_levels.update(scene.assets, self.tables.objects.used_meshes());
-        // The bounds of triangle culling hold only for camera-relative transforms.
-        let culls_triangles =
-            !self.tables.cullable_meshes.is_empty() && self.quality.transforms == TransformPrecision::CameraRelative;
+        let culling = CullingOptions::new(&self.quality, &self.tables.culling);
         let options = StageOptions {
-            occlusion_tile: self.quality.occlusion,
-            culls_triangles,
+            culling,
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
             has_pieces: !scene.pieces.is_empty(),
@@ -363,7 +361,7 @@ impl<B: Backend> Renderer<B> {
             clock: &clock,
             costs: &graph.tuning.costs,
             occlusion: &graph.tuning.occlusion,
-            culls_triangles,
+            culls_triangles: culling.culls_triangles(),
             workers: self.scheduler.workers(),
             binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
             sorted_before: self.tables.sorted_before(),

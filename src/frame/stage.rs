@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::context::FrameContext;
+use super::culling::CullingNeeds;
 use super::granularity::Granularity;
 use super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
@@ -78,10 +79,8 @@ pub(super) struct StageNeeds {
     pub(super) draws_commands: bool,
     /// Whether the pass orders its objects by bin, and so sorts no commands.
     pub(super) orders_by_bin: bool,
-    /// Whether the view may test for occlusion.
-    pub(super) tests_occlusion: bool,
-    /// Whether the scene has meshes whose triangles are culled.
-    pub(super) culls_triangles: bool,
+    #[cfg_attr(not(feature = "occlusion"), expect(dead_code, reason = "only stages of culling ask"))]
+    pub(super) culling: CullingNeeds,
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
     /// Whether the scene has pieces.
@@ -148,7 +147,7 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
             frame.tables.view_times.add(view, took);
         }
         if let Some(view) = self.tuned_view {
-            frame.tables.occlusion[view].add_time(took);
+            frame.tables.culling.add_time(view, took);
         }
         if (frame.granularity == Granularity::Adaptive || self.chunked_by_cost(frame))
             && let Some(measured) = self.stage.measured_items(frame, items)

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::FrameError;
+use super::culling::{CullingNeeds, CullingOptions, OcclusionControls};
 use super::frame_node::{CpuNodeIndex, FrameNode};
 use super::granularity::Granularity;
 use super::lent_nodes::{LentNodes, NodeKeys};
 use super::list_inputs::orders_by_bin;
-use super::occlusion_control::OcclusionControl;
 use super::pieces::ListConditions;
 use super::stage::{Stage, StageNeeds, StageNode};
 use super::stage_tuning::{StageTuning, TuningLabels};
@@ -66,10 +66,7 @@ struct DrawsKey {
 /// The optional parts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StageOptions {
-    /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
-    pub(super) occlusion_tile: Option<u32>,
-    /// Whether triangles of meshes with triangle culling are culled.
-    pub(super) culls_triangles: bool,
+    pub(super) culling: CullingOptions,
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
     /// The order of opaque objects.
@@ -196,19 +193,12 @@ impl<B: Backend> StageGraph<B> {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
-        let tests_occlusion = key.options.occlusion_tile.is_some();
-        let control_of = |view: (usize, &RenderView)| {
-            // What is behind a clip plane hides nothing, and a camera that is replaced may look past what hides others.
-            let is_enabled = tests_occlusion && !view.1.has_oblique_near_plane() && !view.1.may_be_replaced();
-            OcclusionControl::new(is_enabled, plan, draws, &passes, view)
-        };
-        let occlusion: Vec<_> = views.iter().enumerate().map(control_of).collect();
+        let occlusion = OcclusionControls::new(key.options.culling, plan, draws, &passes, views);
         let mut builder = GraphBuilder::default();
         let every_frame = StageNeeds {
             draws_commands: true,
             orders_by_bin: false,
-            tests_occlusion: false,
-            culls_triangles: false,
+            culling: CullingNeeds::default(),
             chooses_levels: false,
             has_pieces: key.options.has_pieces,
         };
@@ -221,8 +211,7 @@ impl<B: Backend> StageGraph<B> {
                 draws_commands: selection.is_some(),
                 orders_by_bin: selection
                     .is_some_and(|selection| orders_by_bin(selection, view, key.options.opaque_order)),
-                tests_occlusion: occlusion[pass.view_index].is_possible(),
-                culls_triangles: key.options.culls_triangles,
+                culling: occlusion.needs(pass.view_index),
                 chooses_levels: key.options.chooses_levels,
                 has_pieces: key.options.has_pieces,
             };
@@ -231,7 +220,7 @@ impl<B: Backend> StageGraph<B> {
             let pass_scope = if needs.draws_commands {
                 let view_scope = view_scopes[pass.view_index].get_or_insert_with(|| {
                     builder.add(
-                        frame.of_view(pass.view_index, view, needs.tests_occlusion),
+                        frame.of_view(pass.view_index, view, occlusion.is_possible(pass.view_index)),
                         stages_of_view(pass.view_index),
                         needs,
                     )
@@ -268,11 +257,7 @@ impl<B: Backend> StageGraph<B> {
         let pairs: Vec<_> = pairs.collect();
         self.tuning.costs.inherit_estimates(&before.tuning.costs, pairs);
         let views_before = before.key.views.iter().map(|view| (view.kind, view.name.as_str()));
-        for (control, kept) in self.tuning.occlusion.iter_mut().zip(kept_views(views_before, views)) {
-            if let Some(kept) = kept.filter(|kept| kept.is_same) {
-                control.inherit_measurements(&before.tuning.occlusion[kept.index]);
-            }
-        }
+        self.tuning.occlusion.inherit_measurements(&before.tuning.occlusion, &kept_views(views_before, views));
     }
 
     /// The cost kinds by their names.
@@ -303,7 +288,8 @@ impl<B: Backend> StageGraph<B> {
         workers: usize,
         granularity: Granularity,
     ) -> Result<(), FrameError> {
-        let StageOptions { occlusion_tile: tile, culls_triangles, chooses_levels, opaque_order, .. } = self.key.options;
+        let StageOptions { culling, chooses_levels, opaque_order, .. } = self.key.options;
+        let culls_triangles = culling.culls_triangles();
         tables.set_keys(&self.table_keys, views);
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
@@ -316,18 +302,15 @@ impl<B: Backend> StageGraph<B> {
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_pieces(scene, conditions, &self.passes)?;
-        if self.tuning.occlusion.iter().any(OcclusionControl::is_possible) {
-            tables.occluder_meshes.sync(scene.assets, tables.objects.used_meshes());
-        }
+        self.tuning.occlusion.begin_frame(tables, scene.assets, views);
         if chooses_levels {
             ViewLevels::keep(&mut tables.levels, views);
         } else {
             tables.levels.clear();
         }
         for (index, view) in views.iter().enumerate() {
-            tables.occlusion[index].reset(view, tile.filter(|_| self.tuning.occlusion[index].is_on()));
             if self.view_draws_commands[index] {
-                let tests_occlusion = tables.occlusion[index].is_on();
+                let tests_occlusion = tables.culling.tests_occlusion(index);
                 let version = tables.version(index);
                 let (visibility, objects) = (&mut tables.visibility[index], (&tables.objects, &tables.pieces));
                 let begun =

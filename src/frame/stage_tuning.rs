@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::cost_model::CostModel;
-use super::occlusion_control::{OcclusionControl, occlusion_choices, update_occlusion};
+use super::culling::OcclusionControls;
 use super::tables::FrameTables;
 use crate::backend::{Backend, CallPanic, GuardedBackend};
 use crate::graph::ModeChoice;
@@ -14,8 +14,7 @@ use crate::view::RenderView;
 /// What is tuned by measurement in the frames of one stage graph, beside the run mode, which its schedule tunes.
 pub(super) struct StageTuning {
     pub(super) costs: CostModel,
-    /// One for each view.
-    pub(super) occlusion: Vec<OcclusionControl>,
+    pub(super) occlusion: OcclusionControls,
     labels: TuningLabels,
 }
 
@@ -44,8 +43,8 @@ impl TuningLabels {
 }
 
 impl StageTuning {
-    /// The tuning of nodes whose cost kinds have these indices, and of views with these controls.
-    pub(super) fn new(kind_of_node: Vec<usize>, occlusion: Vec<OcclusionControl>, labels: TuningLabels) -> Self {
+    /// The tuning of nodes whose cost kinds have these indices, and of views with these occlusion tests.
+    pub(super) fn new(kind_of_node: Vec<usize>, occlusion: OcclusionControls, labels: TuningLabels) -> Self {
         Self { costs: CostModel::new(kind_of_node), occlusion, labels }
     }
 
@@ -60,14 +59,14 @@ impl StageTuning {
         backend: &GuardedBackend<B>,
         frame: &B::Frame,
     ) -> Result<FrameTuning, CallPanic> {
-        let occlusion = occlusion_choices(&self.occlusion, tables, &self.labels.views);
+        let occlusion = self.occlusion.choices(tables, &self.labels.views);
         let mut recording = Vec::new();
         for (pass, labels) in self.labels.passes.iter().enumerate() {
             recording.extend(backend.recording_choice(frame, pass, labels)?);
         }
         let choices = run_mode.map(run_mode_choice).into_iter().chain(occlusion).chain(recording).collect();
         let job_sizes = self.costs.take_sizes(&self.labels.nodes).collect();
-        update_occlusion(&mut self.occlusion, tables);
+        self.occlusion.update(tables);
         self.costs.update();
         Ok(FrameTuning { choices, job_sizes })
     }

@@ -3,17 +3,21 @@
 //! A stage is a type that holds all about itself: its [`StageInfo`](super::stage::StageInfo), when a frame needs it, its width and
 //! its work. To add one, implement [`Stage`] and add a line to one of these lists.
 
+#[cfg(feature = "occlusion")]
+mod of_culling;
 mod of_draw_list;
 mod of_frame;
 mod of_pass;
 mod of_pieces;
 mod of_view;
 
+#[cfg(feature = "occlusion")]
+use of_culling::{CoarseDepth, CullList, Occluders, Occlusion, Triangles};
 use of_draw_list::{Bin, Fill, Instance, Join, Sort, Split};
 use of_frame::{Bins, Objects, Upload};
-use of_pass::{CullList, Finish, Prepare, Record, Triangles};
+use of_pass::{Finish, Prepare, Record};
 use of_pieces::{ExecutePieces, RecordPieces};
-use of_view::{CoarseDepth, Compact, Levels, Occluders, Occlusion, Visibility};
+use of_view::{Compact, Levels, Visibility};
 
 use super::stage::Stage;
 use crate::backend::Backend;
@@ -28,8 +32,11 @@ pub(super) fn stages_of_view<B: Backend>(view: usize) -> Vec<Box<dyn Stage<B>>> 
     vec![
         Box::new(Visibility { view }),
         Box::new(Levels { view }),
+        #[cfg(feature = "occlusion")]
         Box::new(Occluders { view }),
+        #[cfg(feature = "occlusion")]
         Box::new(CoarseDepth { view }),
+        #[cfg(feature = "occlusion")]
         Box::new(Occlusion { view }),
         Box::new(Compact { view }),
     ]
@@ -45,7 +52,9 @@ pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> 
         Box::new(Bin { pass }),
         Box::new(ExecutePieces { pass }),
         Box::new(Join { pass }),
+        #[cfg(feature = "occlusion")]
         Box::new(Triangles { pass }),
+        #[cfg(feature = "occlusion")]
         Box::new(CullList { pass }),
         Box::new(Prepare { pass }),
         Box::new(Record { pass }),

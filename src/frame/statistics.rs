@@ -7,6 +7,7 @@ use super::piece_statistics::PieceStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
+#[cfg(feature = "occlusion")]
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
 use crate::timeline::{FrameTuning, Timeline, TuningSubject};
@@ -58,6 +59,7 @@ pub struct ViewStatistics {
     /// The objects of these pieces.
     pub objects_of_pieces: usize,
     /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
+    #[cfg(feature = "occlusion")]
     pub occluded: usize,
     /// Lights that reach it.
     pub lights: usize,
@@ -69,6 +71,7 @@ pub struct ViewStatistics {
     pub bundles: usize,
     /// Triangles that were tested and culled on the CPU, over all its processes: see
     /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
+    #[cfg(feature = "occlusion")]
     pub culled_triangles: CulledTriangles,
     /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) is 0 or no mesh
     /// has levels.
@@ -172,11 +175,13 @@ impl ViewStatistics {
             visible: visibility.set.count() + visibility.pieces.object_count(),
             pieces: visibility.pieces.executed().len(),
             objects_of_pieces: visibility.pieces.object_count(),
-            occluded: tables.occlusion[index].hidden(),
+            #[cfg(feature = "occlusion")]
+            occluded: tables.culling.occlusion[index].hidden(),
             lights: tables.lights[index].light_count(),
             commands: 0,
             batches: 0,
             bundles: 0,
+            #[cfg(feature = "occlusion")]
             culled_triangles: CulledTriangles::default(),
             levels_of_detail: tables.levels.get(index).map(|_| LevelStatistics::default()),
         }
@@ -187,7 +192,10 @@ impl ViewStatistics {
         self.commands += list.drawn_count();
         self.batches += list.batches.len();
         self.bundles += list.bundle_count();
-        self.culled_triangles += table.triangles.read().culled();
+        #[cfg(feature = "occlusion")]
+        {
+            self.culled_triangles += table.triangles.read().culled();
+        }
         if let Some(levels) = &mut self.levels_of_detail {
             levels.add(&list.batches, assets);
         }

@@ -6,13 +6,12 @@ use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
 
 use super::blended_object_witness::BlendedObjectWitness;
+use super::culling::{CullingTables, PassTriangles};
 use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
 use super::pieces::{ListConditions, PieceTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
-use super::triangle_culling::{CullableMeshes, PassTriangles};
 use super::view_levels::ViewLevels;
-use super::view_occlusion::ViewOcclusion;
 use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
 use super::views::FrameViews;
@@ -23,7 +22,7 @@ use crate::command::{
 use crate::leaked_guards::unlock;
 use crate::process::Pass;
 use crate::scene::{SceneError, SceneRef};
-use crate::view::{LightTable, MeshLevels, ObjectTable, OccluderMeshes, RejectionReason, RenderView};
+use crate::view::{LightTable, MeshLevels, ObjectTable, RejectionReason, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
@@ -36,12 +35,7 @@ pub(super) struct FrameTables {
     pub(super) view_times: ViewTimes,
     /// One for each view.
     pub(super) visibility: Vec<ViewVisibility>,
-    /// One for each view.
-    pub(super) occlusion: Vec<ViewOcclusion>,
-    /// The convex parts of meshes, for views that test for occlusion.
-    pub(super) occluder_meshes: OccluderMeshes,
-    /// The meshes whose triangles are culled.
-    pub(super) cullable_meshes: CullableMeshes,
+    pub(super) culling: CullingTables,
     /// The meshes that have levels of detail.
     pub(super) mesh_levels: MeshLevels,
     /// One for each view of a frame that chooses levels of detail.
@@ -69,7 +63,7 @@ impl FrameTables {
         };
         let TakenTables { of_views, of_passes } = keys.taken_from(&before, views);
         rearrange(&mut self.visibility, &of_views);
-        rearrange(&mut self.occlusion, &of_views);
+        self.culling.rearrange(&of_views);
         rearrange(&mut self.lights, &of_views);
         rearrange(&mut self.passes, &of_passes);
     }
@@ -80,7 +74,7 @@ impl FrameTables {
         self.is_in_frame = true;
         self.view_times.reset(views);
         self.visibility.resize_with(views, ViewVisibility::default);
-        self.occlusion.resize_with(views, ViewOcclusion::default);
+        self.culling.begin_frame(views);
         self.lights.resize_with(views, LightTable::default);
         self.sort_scratch.resize_with(workers, Mutex::default);
     }
@@ -210,11 +204,7 @@ impl PassTable {
         if selection.is_none() || culls_triangles {
             self.clear_list();
         }
-        if culls_triangles {
-            self.triangles.get_mut().clear();
-        } else {
-            *self.triangles.get_mut() = PassTriangles::default();
-        }
+        self.triangles.get_mut().begin_frame(culls_triangles);
         if orders_by_bin {
             self.segments.resize_with(parts.max(MAX_SEGMENTS), RwLock::default);
         } else if selection.is_some() {

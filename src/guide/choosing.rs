@@ -37,7 +37,7 @@
 //! | --- | --- |
 //! | the CPU, in `objects` and `visibility` | [`Changes`](crate::scene::Changes) that name what changed; `culling: Sphere` |
 //! | the CPU, in `record` | fewer meshes and materials that differ, so that more objects are one batch |
-//! | the device, in vertices | `vertices: Packed`, `occlusion: Some(8)`, meshes with [triangle culling] or [levels of detail] |
+//! | the device, in vertices | `vertices: Packed`, meshes with [levels of detail]; with the feature `occlusion`, `occlusion: Some(8)` and meshes with triangle culling |
 //! | the device, in pixels | `opaque_order` with 10 bits or `depth_pre_pass`, a `light_cut_off`, smaller shadow maps |
 //! | memory bandwidth | `normals: Octahedral8`, `diffuse: Srgb8` |
 //!
@@ -53,4 +53,3 @@
 //! [`PipelineLibrary`]: crate::backend::PipelineLibrary
 //! [`WgpuBackend::transient_targets`]: crate::backend::WgpuBackend::transient_targets
 //! [levels of detail]: crate::scene::Mesh::with_levels
-//! [triangle culling]: crate::scene::Mesh::with_triangle_culling

@@ -218,6 +218,7 @@ impl Draws<'_> {
     }
 
     /// Whether triangle culling is exact for it: it does not deform objects, and culls faces as materials say.
+    #[cfg(feature = "occlusion")]
     pub fn allows_triangle_culling(&self) -> bool {
         matches!(self, Self::Commands(CommandDraws { deformation: None, face_culling: FaceCulling::ByMaterial, .. }))
     }

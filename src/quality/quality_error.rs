@@ -15,9 +15,11 @@ pub enum QualityError {
         range: &'static str,
     },
     /// Occlusion culling is enabled without a culling volume.
+    #[cfg(feature = "occlusion")]
     #[error("occlusion needs a culling volume: objects without one are never hidden")]
     OcclusionWithoutVolume,
     /// Occlusion culling is enabled with absolute transforms.
+    #[cfg(feature = "occlusion")]
     #[error("occlusion needs camera-relative transforms: absolute ones draw objects at inaccurate positions")]
     OcclusionWithAbsoluteTransforms,
 }

@@ -14,13 +14,13 @@ use super::{
 /// ```
 /// use drawloom::quality::{CullingVolume, Quality};
 ///
-/// let quality = Quality { culling: CullingVolume::OrientedBox, occlusion: Some(8), ..Quality::balanced() };
+/// let quality = Quality { culling: CullingVolume::OrientedBox, depth_pre_pass: true, ..Quality::balanced() };
 /// quality.check()?;
 ///
-/// let wrong = Quality { culling: CullingVolume::None, ..quality };
+/// let wrong = Quality { level_of_detail: -1.0, ..quality };
 /// assert_eq!(
 ///     wrong.check().unwrap_err().to_string(),
-///     "occlusion needs a culling volume: objects without one are never hidden",
+///     "quality setting level_of_detail is -1; valid: 0 pixels or more, and finite",
 /// );
 /// # Ok::<(), drawloom::quality::QualityError>(())
 /// ```
@@ -48,7 +48,7 @@ pub struct Quality {
     /// view; boxes take as long again for objects that the bounding sphere does not decide.
     pub culling: CullingVolume,
     /// The tile size of occlusion culling, which removes objects that larger ones hide: 1, 2, 4, 8 or 16 pixels of the
-    /// view's picture; `None` disables it. See S 9.6.
+    /// view's picture; `None` disables it, as all presets do. See S 9.6. With the feature `occlusion` alone.
     ///
     /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
     /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
@@ -56,6 +56,7 @@ pub struct Quality {
     /// they [discard](crate::process::CommandDraws::discards) parts of them or
     /// [deform](crate::process::CommandDraws::deformation) them; objects that they move in another way must have bounds
     /// other than their mesh's.
+    #[cfg(feature = "occlusion")]
     pub occlusion: Option<u32>,
     /// The format of normals in the geometry buffer.
     ///
@@ -118,6 +119,7 @@ pub struct Quality {
 
 impl Quality {
     /// The valid tile sizes of [`Quality::occlusion`], in pixels.
+    #[cfg(feature = "occlusion")]
     pub const OCCLUSION_TILE_SIZES: [u32; 5] = [1, 2, 4, 8, 16];
 
     /// The fastest preset: errors are visible on inspection.
@@ -126,7 +128,8 @@ impl Quality {
             opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey { bits: 18, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::Sphere,
-            occlusion: Some(16),
+            #[cfg(feature = "occlusion")]
+            occlusion: None,
             normals: NormalFormat::Octahedral8,
             diffuse: DiffuseFormat::Srgb8,
             vertices: VertexFormat::Packed,
@@ -146,6 +149,7 @@ impl Quality {
             opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey::EXACT,
             culling: CullingVolume::Sphere,
+            #[cfg(feature = "occlusion")]
             occlusion: None,
             normals: NormalFormat::HalfFloat,
             diffuse: DiffuseFormat::Srgb8,
@@ -181,18 +185,8 @@ impl Quality {
     pub fn check(&self) -> Result<(), QualityError> {
         self.opaque_order.check("opaque_order", 0..=DepthKey::MAX_OPAQUE_BITS)?;
         self.blended_order.check("blended_order", 1..=DepthKey::MAX_BLENDED_BITS)?;
-        if let Some(tile_size) = self.occlusion {
-            if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
-                return Err(QualityError::OutOfRange {
-                    setting: "occlusion",
-                    value: tile_size.to_string(),
-                    range: "1, 2, 4, 8 or 16 pixels",
-                });
-            }
-            if self.culling == CullingVolume::None {
-                return Err(QualityError::OcclusionWithoutVolume);
-            }
-        }
+        #[cfg(feature = "occlusion")]
+        self.check_occlusion()?;
         if !(self.light_cut_off >= 0.0 && self.light_cut_off.is_finite()) {
             let value = self.light_cut_off.to_string();
             return Err(QualityError::OutOfRange { setting: "light_cut_off", value, range: "0 or more, and finite" });
@@ -205,10 +199,26 @@ impl Quality {
                 range: "0 pixels or more, and finite",
             });
         }
-        if self.occlusion.is_some() && self.transforms == TransformPrecision::Absolute {
+        self.shadows.check()
+    }
+
+    #[cfg(feature = "occlusion")]
+    fn check_occlusion(&self) -> Result<(), QualityError> {
+        let Some(tile_size) = self.occlusion else { return Ok(()) };
+        if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
+            return Err(QualityError::OutOfRange {
+                setting: "occlusion",
+                value: tile_size.to_string(),
+                range: "1, 2, 4, 8 or 16 pixels",
+            });
+        }
+        if self.culling == CullingVolume::None {
+            return Err(QualityError::OcclusionWithoutVolume);
+        }
+        if self.transforms == TransformPrecision::Absolute {
             return Err(QualityError::OcclusionWithAbsoluteTransforms);
         }
-        self.shadows.check()
+        Ok(())
     }
 }
 

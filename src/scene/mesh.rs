@@ -23,6 +23,7 @@ pub struct Mesh {
     pub(super) bounds: Bounds,
     pub(super) corners: [Vec3; 2],
     longest_edge: f32,
+    #[cfg(feature = "occlusion")]
     culls_triangles: bool,
     /// The coarser levels, the finest first.
     pub(super) levels: Arc<Vec<LevelOfDetail>>,
@@ -127,6 +128,7 @@ impl Mesh {
             bounds,
             corners,
             longest_edge: 0.0,
+            #[cfg(feature = "occlusion")]
             culls_triangles: false,
             levels: Arc::default(),
             generated: None,
@@ -204,6 +206,7 @@ impl Mesh {
     ///
     /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
     /// triangles at most; further objects are drawn whole. So are meshes [in the engine's own buffers](Self::from_buffers).
+    #[cfg(feature = "occlusion")]
     pub fn with_triangle_culling(self, enabled: bool) -> Self {
         let enabled = enabled && self.has_triangles();
         let mesh = if enabled { self.into_list() } else { self };
@@ -211,6 +214,7 @@ impl Mesh {
     }
 
     /// The mesh and its levels as triangle lists.
+    #[cfg(any(feature = "meshopt", feature = "occlusion"))]
     pub(super) fn into_list(mut self) -> Self {
         if self.topology == Topology::TriangleStrip {
             let (levels, indices) = (Arc::make_mut(&mut self.levels), Arc::make_mut(&mut self.indices));
@@ -225,6 +229,7 @@ impl Mesh {
     }
 
     /// Whether triangle culling is enabled: see [`Mesh::with_triangle_culling`].
+    #[cfg(feature = "occlusion")]
     pub fn culls_triangles(&self) -> bool {
         self.culls_triangles
     }

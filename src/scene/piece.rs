@@ -13,13 +13,13 @@ use super::ObjectSet;
 /// be executed is drawn as if it were in no piece:
 ///
 /// - blended objects, which need an order; objects whose mesh has levels of detail that views choose from; objects whose
-///   [triangles are culled](super::Mesh::with_triangle_culling);
+///   triangles are culled (`Mesh::with_triangle_culling`);
 /// - a piece with an object that [changed](super::SceneRef::changes), until the first frame in which none of them does. That frame
 ///   records the piece anew; the next one executes it. In frames that report [`Changes::Unknown`](super::Changes::Unknown) any object may have
 ///   changed, so an engine that wants pieces executed reports its changes;
 /// - all pieces in a view with a process that draws opaque objects in an order, by [depth](crate::quality::Quality::opaque_order), by
 ///   [the engine's](crate::command::DrawOrder) or [before blended ones](crate::command::Selection::ALL); in maps of paraboloids; and while a view
-///   tests for [occlusion](crate::quality::Quality::occlusion), which finds hidden objects one by one;
+///   tests for occlusion (`Quality::occlusion`), which finds hidden objects one by one;
 /// - a piece of which a view's [filter](super::Camera::filter) shows only some objects, and one that reaches beyond the
 ///   [far plane](super::Camera::far) of a perspective view.
 ///

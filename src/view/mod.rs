@@ -28,6 +28,7 @@ mod object_block;
 mod object_description;
 mod object_levels;
 mod object_table;
+#[cfg(feature = "occlusion")]
 mod occlusion;
 mod packet_columns;
 mod piece_objects;
@@ -37,6 +38,7 @@ mod selection_filter;
 mod shadow_maps;
 mod subdivision_level;
 mod table_limits;
+#[cfg(feature = "occlusion")]
 mod triangle_culling;
 mod used_meshes;
 mod visible_set;
@@ -63,6 +65,7 @@ pub use object_block::ObjectBlock;
 pub use object_description::ObjectDraw;
 pub(crate) use object_levels::ObjectLevels;
 pub use object_table::ObjectTable;
+#[cfg(feature = "occlusion")]
 #[doc(hidden)] // For this repository's tests and benchmarks.
 pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub(crate) use piece_objects::{ObjectWord, bin_objects, recordable_objects};

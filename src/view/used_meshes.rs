@@ -31,6 +31,7 @@ impl UsedMeshes {
     }
 
     /// Whether the mesh in a slot is used.
+    #[cfg(any(feature = "occlusion", feature = "wgpu"))]
     pub(crate) fn contains_slot(&self, slot: u32) -> bool {
         let slot = slot as usize;
         self.meshes.get(slot).is_some_and(Option::is_some) && !self.is_unused[slot]

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+#[cfg(feature = "occlusion")]
 use drawloom_jobs::internal::block_ranges;
 use parking_lot::RwLock;
 
@@ -90,6 +91,7 @@ impl VisibleSet {
     /// range, `is_hidden` is called with the word's first object and a mask of the visible ones, and returns a mask of
     /// the hidden ones; excess bits are ignored. Ranges processed at the same time must not share objects, but may
     /// share words.
+    #[cfg(feature = "occlusion")]
     pub fn remove_hidden(&self, objects: Range<usize>, is_hidden: impl Fn(usize, u64) -> u64) -> usize {
         let mut count = 0;
         for (word, part) in block_ranges(objects, Self::OBJECTS_PER_WORD) {

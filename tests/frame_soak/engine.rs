@@ -124,7 +124,8 @@ impl Engine {
         self.totals.resizes += u64::from(self.world.change(random));
         match random.below(400) {
             0 => {
-                let quality = [Quality::fast(), Quality::balanced(), Quality::exact()][random.below(3)];
+                let fast = Quality { occlusion: Some(16), ..Quality::fast() };
+                let quality = [fast, Quality::balanced(), Quality::exact()][random.below(3)];
                 self.frames.renderer().set_quality(quality).unwrap();
                 self.totals.qualities += 1;
             }

@@ -275,7 +275,7 @@ fn other_renderers() -> Result<(), Failed> {
     let shadows = ShadowQuality { side: 64, ..balanced.shadows };
     for (name, quality) in [
         ("exact, ordered by depth", Quality { shadows, occlusion: None, ..Quality::exact() }),
-        ("fast", Quality { shadows, ..Quality::fast() }),
+        ("fast", Quality { shadows, occlusion: Some(16), ..Quality::fast() }),
         ("packed vertices", Quality { shadows, vertices: VertexFormat::Packed, ..balanced }),
         ("occlusion tests", Quality { shadows, occlusion: Some(8), ..balanced }),
         ("boxes", Quality { shadows, culling: CullingVolume::OrientedBox, occlusion: None, ..balanced }),

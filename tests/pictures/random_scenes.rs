@@ -34,11 +34,11 @@ fn random_scenes() -> Result<(), Failed> {
     let end = Instant::now() + Duration::from_secs(seconds);
     let scheduler = Arc::new(Scheduler::new(2)?);
     let mut fixtures = Vec::new();
-    for quality in [Quality::balanced(), Quality::exact(), Quality::fast()] {
-        let shadows = ShadowQuality { side: 128, interval: 1, ..quality.shadows };
-        let quality = Quality { shadows, ..quality };
+    for (preset, occlusion) in [(Quality::balanced(), None), (Quality::exact(), None), (Quality::fast(), Some(16))] {
+        let shadows = ShadowQuality { side: 128, interval: 1, ..preset.shadows };
+        let quality = Quality { shadows, occlusion, ..preset };
         // One of the presets ignores colours.
-        let deferred = Deferred::to_picture().vertex_colors(quality != Quality::fast());
+        let deferred = Deferred::to_picture().vertex_colors(preset != Quality::fast());
         let by_wgpu = Fixture::with(2, |builder| builder.deferred(deferred.clone()).quality(quality))?;
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
         let builder = Renderer::builder(backend).deferred(deferred).quality(quality);

@@ -63,6 +63,7 @@ pub const KNOBS: &[Knob] = &[
             ("oriented box", |quality| quality.culling = CullingVolume::OrientedBox),
         ],
     },
+    #[cfg(feature = "occlusion")]
     Knob {
         name: "occlusion culling",
         explanation: "Error: hidden objects that are drawn. Cost: a coarse depth buffer for each view, of tiles of this size.",

@@ -279,7 +279,7 @@ impl<B: Backend> Stage<B> for Join {
             }
         }
         if frame.pass_culls_triangles(self.pass) {
-            table.triangles.write().find(&list, &frame.tables.cullable_meshes, frame.request.scene.assets);
+            table.triangles.write().find(&list, &frame.tables.culling, frame.request.scene.assets);
         }
         if frame.can_keep_list(self.pass) {
             list.set_version(frame.tables.version(self.pass));

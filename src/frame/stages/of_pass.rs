@@ -15,67 +15,6 @@ use crate::backend::{Backend, BackendError, PassRequest};
 use crate::command::DrawList;
 use crate::task::{JobPanic, Worker, catch};
 
-/// Culls the triangles of meshes with triangle culling (S 9.6).
-pub(super) struct Triangles {
-    pub(super) pass: usize,
-}
-
-impl<B: Backend> Stage<B> for Triangles {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "triangles",
-            after: &["join"],
-            group: StageGroup::Instance,
-            chunking: Chunking::ByDraws { draws_per_item: 1 },
-            cost_kind: "triangles",
-            depends_on_occlusion: true,
-        }
-    }
-
-    fn is_needed(&self, needs: &StageNeeds) -> bool {
-        needs.draws_commands && needs.culls_triangles
-    }
-
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.passes[self.pass].triangles.read().len()
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let table = &frame.tables.passes[self.pass];
-        let view = &frame.request.views[frame.view_index_of(self.pass)];
-        table.triangles.read().cull(job.items, view, frame.request.scene, &table.list.read());
-        Ok(())
-    }
-}
-
-/// Leaves culled triangles out of the draw list.
-pub(super) struct CullList {
-    pub(super) pass: usize,
-}
-
-impl<B: Backend> Stage<B> for CullList {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "cull list",
-            after: &["triangles"],
-            group: StageGroup::Instance,
-            chunking: Chunking::PerItem,
-            cost_kind: "cull list",
-            depends_on_occlusion: true,
-        }
-    }
-
-    fn is_needed(&self, needs: &StageNeeds) -> bool {
-        needs.draws_commands && needs.culls_triangles
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        let table = &frame.tables.passes[self.pass];
-        table.triangles.read().apply(&mut table.list.write());
-        Ok(())
-    }
-}
-
 /// Uploads which objects the pass draws, and makes its pipelines.
 pub(super) struct Prepare {
     pub(super) pass: usize,

@@ -31,7 +31,7 @@ impl<B: Backend> Stage<B> for RecordPieces {
     fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
         let tables = frame.tables;
         let changes_by_view =
-            |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.cullable_meshes.contains(mesh);
+            |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.culling.is_cullable(mesh);
         let timeline = job.worker.timeline();
         for index in job.items {
             // A slice of its own, by name.

@@ -1,53 +1,18 @@
-//! Triangle culling on the CPU, for meshes with triangle culling enabled (S 9.6).
+//! The triangles that a pass tests: culling on the CPU, of meshes with triangle culling enabled (S 9.6).
 
 use std::ops::Range;
 
 use parking_lot::Mutex;
 
+use super::culling_tables::CullingTables;
 use crate::command::DrawList;
 use crate::raster::CulledTriangles;
-use crate::scene::{Assets, Mesh, SceneRef};
-use crate::view::{RenderView, UsedMeshes};
-
-/// The meshes that ask for triangle culling, and that objects use.
-#[derive(Debug, Default)]
-pub(super) struct CullableMeshes {
-    /// The identity and revision of the mesh collection that this was built from, and the revision of the used meshes.
-    version: Option<(u64, u64, u64)>,
-    /// For each slot, up to the last cullable one.
-    is_cullable: Vec<bool>,
-}
-
-impl CullableMeshes {
-    /// Rebuilds the set if the meshes have changed, or others are used.
-    pub(super) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
-        let version = (assets.meshes.identity(), assets.meshes.revision(), used.revision());
-        if self.version == Some(version) {
-            return;
-        }
-        self.version = Some(version);
-        self.is_cullable.clear();
-        let is_cullable = |(handle, mesh): &(_, &Mesh)| mesh.culls_triangles() && used.contains(*handle);
-        for (handle, _) in assets.iter::<Mesh>().filter(is_cullable) {
-            self.is_cullable.resize(handle.index() as usize, false);
-            self.is_cullable.push(true);
-        }
-    }
-
-    /// Whether there are none.
-    pub(super) fn is_empty(&self) -> bool {
-        self.is_cullable.is_empty()
-    }
-
-    /// Whether the mesh in a slot is one of them.
-    pub(super) fn contains(&self, slot: u32) -> bool {
-        self.is_cullable.get(slot as usize).is_some_and(|is_cullable| *is_cullable)
-    }
-}
+use crate::scene::{Assets, SceneRef};
+use crate::view::RenderView;
 
 /// The triangles of a pass that are tested.
 #[derive(Debug, Default)]
-pub(super) struct PassTriangles {
+pub(in crate::frame) struct PassTriangles {
     items: Vec<Item>,
     /// The indices of the triangles that remain of each item; longer than `items`, to keep memory.
     remaining: Vec<Mutex<Vec<u32>>>,
@@ -69,11 +34,20 @@ const MAX_ITEM_TRIANGLES: usize = 256;
 const MAX_PASS_TRIANGLES: usize = (1 << 25) / 3;
 
 impl PassTriangles {
+    /// Begins a frame. One that culls no triangles gives the memory back.
+    pub(in crate::frame) fn begin_frame(&mut self, culls_triangles: bool) {
+        if culls_triangles {
+            self.clear();
+        } else {
+            *self = Self::default();
+        }
+    }
+
     /// Lists the triangles of cullable meshes in a draw list, in its order, up to [`MAX_PASS_TRIANGLES`].
-    pub(super) fn find(&mut self, list: &DrawList, cullable: &CullableMeshes, assets: &Assets) {
+    pub(in crate::frame) fn find(&mut self, list: &DrawList, tables: &CullingTables, assets: &Assets) {
         self.clear();
         let mut room = MAX_PASS_TRIANGLES;
-        let cullable_batches = (0..).zip(&list.batches).filter(|(_, batch)| cullable.contains(batch.mesh));
+        let cullable_batches = (0..).zip(&list.batches).filter(|(_, batch)| tables.is_cullable(batch.mesh));
         for (batch, drawn) in cullable_batches {
             let level = drawn.state.level_of_detail();
             let mesh = assets.meshes.get_with_revision(drawn.mesh);
@@ -92,18 +66,18 @@ impl PassTriangles {
     }
 
     /// Removes all items. The memory stays until the next [`PassTriangles::find`].
-    pub(super) fn clear(&mut self) {
+    fn clear(&mut self) {
         self.items.clear();
         *self.culled.get_mut() = CulledTriangles::default();
     }
 
     /// The number of items.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::frame) fn len(&self) -> usize {
         self.items.len()
     }
 
     /// Culls the triangles of some items.
-    pub(super) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
+    pub(in crate::frame) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
         let mut culled = CulledTriangles::default();
         for (item, remaining) in self.items[items.clone()].iter().zip(&self.remaining[items]) {
             let batch = &list.batches[item.batch as usize];
@@ -116,7 +90,7 @@ impl PassTriangles {
     }
 
     /// Makes the draw list draw what remains. A batch that lost no triangle stays whole.
-    pub(super) fn apply(&self, list: &mut DrawList) {
+    pub(in crate::frame) fn apply(&self, list: &mut DrawList) {
         let mut first = 0;
         for items in self.items.chunk_by(|one, next| one.batch == next.batch) {
             let remaining = &self.remaining[first..first + items.len()];
@@ -132,7 +106,7 @@ impl PassTriangles {
     }
 
     /// How many triangles were tested and culled.
-    pub(super) fn culled(&self) -> CulledTriangles {
+    pub(in crate::frame) fn culled(&self) -> CulledTriangles {
         *self.culled.lock()
     }
 }

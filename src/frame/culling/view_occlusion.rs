@@ -7,8 +7,8 @@ use crate::view::{OcclusionCuller, RenderView};
 
 /// The occlusion test of a view in one frame. It keeps its memory from frame to frame.
 #[derive(Debug, Default)]
-pub(super) struct ViewOcclusion {
-    pub(super) occlusion: OcclusionCuller,
+pub(in crate::frame) struct ViewOcclusion {
+    pub(in crate::frame) occlusion: OcclusionCuller,
     is_on: bool,
     hidden: AtomicUsize,
     /// The thread time of the test, and of drawing what is left.
@@ -17,7 +17,7 @@ pub(super) struct ViewOcclusion {
 
 impl ViewOcclusion {
     /// Starts a frame. `tile` is the side of a tile of the coarse depth buffer in pixels; `None` turns the test off.
-    pub(super) fn reset(&mut self, view: &RenderView, tile: Option<u32>) {
+    pub(in crate::frame) fn reset(&mut self, view: &RenderView, tile: Option<u32>) {
         let tile = tile.filter(|side| has_room(view, *side));
         self.is_on = tile.is_some();
         *self.hidden.get_mut() = 0;
@@ -28,33 +28,33 @@ impl ViewOcclusion {
     }
 
     /// Whether the view tests for occlusion in this frame.
-    pub(super) fn is_on(&self) -> bool {
+    pub(in crate::frame) fn is_on(&self) -> bool {
         self.is_on
     }
 
     /// Counts hidden objects.
-    pub(super) fn add_hidden(&self, objects: usize) {
+    pub(in crate::frame) fn add_hidden(&self, objects: usize) {
         // Relaxed, here and below: sums, read after the run.
         self.hidden.fetch_add(objects, Ordering::Relaxed);
     }
 
     /// The number of hidden objects.
-    pub(super) fn hidden(&self) -> usize {
+    pub(in crate::frame) fn hidden(&self) -> usize {
         self.hidden.load(Ordering::Relaxed)
     }
 
     /// Adds the thread time of a job.
-    pub(super) fn add_time(&self, took: Duration) {
+    pub(in crate::frame) fn add_time(&self, took: Duration) {
         self.nanoseconds.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// Takes away a time that a job spends on other views. It wraps below 0 until the job's own time is added.
-    pub(super) fn subtract_time(&self, took: Duration) {
+    pub(in crate::frame) fn subtract_time(&self, took: Duration) {
         self.nanoseconds.fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// The thread time in nanoseconds.
-    pub(super) fn nanoseconds(&self) -> u64 {
+    pub(in crate::frame) fn nanoseconds(&self) -> u64 {
         self.nanoseconds.load(Ordering::Relaxed)
     }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use drawloom_jobs::internal::{CostSample, Tuner};
 
 use super::occluders::occluders;
-use super::tables::FrameTables;
 use crate::command::Selection;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
@@ -19,7 +18,6 @@ pub(super) struct OcclusionControl {
     /// The objects that may occlude others; `None` where the view cannot test for occlusion.
     pub(super) occluders: Option<Vec<Selection>>,
     tuner: Tuner,
-    /// The number of frames in which the view had objects.
     frames: u64,
     /// The alternative of the next frame, and whether it is a trial.
     chosen: usize,
@@ -61,6 +59,11 @@ impl OcclusionControl {
         }
     }
 
+    /// The number of frames in which the view had objects.
+    pub(super) fn frames(&self) -> u64 {
+        self.frames
+    }
+
     /// Whether the view can test for occlusion.
     pub(super) fn is_possible(&self) -> bool {
         self.occluders.is_some()
@@ -73,7 +76,7 @@ impl OcclusionControl {
 
     /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None` where the view
     /// cannot test for occlusion, or did not though it was chosen, because its picture is too large.
-    fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
+    pub(super) fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let alternative = |(name, nanoseconds): (&'static str, _)| TuningAlternative { name: name.into(), nanoseconds };
         (self.is_possible() && has_tested == self.is_on()).then(|| TuningChoice {
             subject: TuningSubject::OcclusionTest,
@@ -86,7 +89,7 @@ impl OcclusionControl {
 
     /// Reports the thread time of the frame, which had `objects` in the view's frustum and tested them or not, and chooses for the
     /// next frame.
-    fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
+    pub(super) fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
         if objects == 0 {
             return;
         }
@@ -96,30 +99,6 @@ impl OcclusionControl {
         self.previous = Some(used);
         self.frames += 1;
         (self.chosen, self.is_trial) = self.tuner.choose(self.frames, may_try, |_, _| true);
-    }
-}
-
-/// The choices for a frame that was recorded, of views that have these labels.
-pub(super) fn occlusion_choices<'a>(
-    controls: &'a [OcclusionControl],
-    tables: &'a FrameTables,
-    labels: &'a [Arc<Labels>],
-) -> impl Iterator<Item = TuningChoice> + 'a {
-    let views = controls.iter().zip(labels).zip(&tables.occlusion);
-    views.filter_map(|((control, labels), occlusion)| control.choice(occlusion.is_on(), labels))
-}
-
-/// Updates the control of each view with the times of a frame that was recorded.
-pub(super) fn update_occlusion(controls: &mut [OcclusionControl], tables: &FrameTables) {
-    // Of all views at most one begins a trial in a frame. Another one is first in each frame, so that none waits forever.
-    let (count, mut may_try) = (controls.len().max(1), true);
-    let first = controls.iter().map(|control| control.frames as usize).max().unwrap_or(0) % count;
-    let (before, after) = controls.split_at_mut(first);
-    for (view, control) in (first..).zip(after).chain((0..).zip(before)).filter(|(_, control)| control.is_possible()) {
-        let occlusion = &tables.occlusion[view];
-        let visibility = &tables.visibility[view];
-        let objects = visibility.set.count() + visibility.pieces.object_count() + occlusion.hidden();
-        control.update(occlusion.nanoseconds(), objects, occlusion.is_on(), &mut may_try);
     }
 }
 

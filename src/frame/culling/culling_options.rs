@@ -1,0 +1,46 @@
+//! What decides which stages of culling a frame has.
+
+use super::culling_tables::CullingTables;
+use crate::backend::FrameRequest;
+use crate::process::AttachmentExtent;
+use crate::quality::{Quality, TransformPrecision};
+
+/// What culling a frame does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::frame) struct CullingOptions {
+    /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
+    pub(super) occlusion_tile: Option<u32>,
+    culls_triangles: bool,
+}
+
+/// Which stages of culling a pass has, or its view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::frame) struct CullingNeeds {
+    /// Whether the view may test for occlusion.
+    pub(in crate::frame) tests_occlusion: bool,
+    /// Whether the scene has meshes whose triangles are culled.
+    pub(in crate::frame) culls_triangles: bool,
+}
+
+impl CullingOptions {
+    /// The options of a frame whose meshes the tables have.
+    pub(in crate::frame) fn new(quality: &Quality, tables: &CullingTables) -> Self {
+        // The bounds of triangle culling hold only for camera-relative transforms.
+        let is_exact = quality.transforms == TransformPrecision::CameraRelative;
+        Self { occlusion_tile: quality.occlusion, culls_triangles: tables.has_cullable_meshes() && is_exact }
+    }
+
+    /// Whether triangles of meshes with triangle culling are culled.
+    pub(in crate::frame) fn culls_triangles(self) -> bool {
+        self.culls_triangles
+    }
+}
+
+/// Whether the triangles of meshes with triangle culling may be culled in a pass.
+pub(in crate::frame) fn allows_triangle_culling(request: &FrameRequest<'_>, pass: usize) -> bool {
+    let pass = request.passes[pass];
+    // Triangle culling tests undeformed triangles against the centres of the picture's pixels.
+    request.draws[pass.process_index].allows_triangle_culling()
+        && request.plan.attachment_extent(pass.process_index) == AttachmentExtent::PICTURE
+        && request.views[pass.view_index].can_cull_triangles()
+}

@@ -1,0 +1,92 @@
+//! What is in the place of `culling` without the feature `occlusion`: frames cull objects by their view frustum alone.
+
+use std::iter;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::tables::FrameTables;
+use crate::backend::{FrameRequest, KeptView};
+use crate::command::DrawList;
+use crate::process::{Draws, FramePlan, Pass};
+use crate::quality::Quality;
+use crate::scene::Assets;
+use crate::timeline::{Labels, TuningChoice};
+use crate::view::{RenderView, UsedMeshes};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct CullingOptions;
+
+impl CullingOptions {
+    pub(super) fn new(_: &Quality, _: &CullingTables) -> Self {
+        Self
+    }
+
+    pub(super) fn culls_triangles(self) -> bool {
+        false
+    }
+}
+
+pub(super) fn allows_triangle_culling(_: &FrameRequest<'_>, _pass: usize) -> bool {
+    false
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CullingNeeds;
+
+#[derive(Default)]
+pub(super) struct CullingTables;
+
+impl CullingTables {
+    pub(super) fn update(&mut self, _: &Assets, _: &UsedMeshes) {}
+
+    pub(super) fn rearrange(&mut self, _: &[Option<usize>]) {}
+
+    pub(super) fn begin_frame(&mut self, _views: usize) {}
+
+    pub(super) fn tests_occlusion(&self, _view: usize) -> bool {
+        false
+    }
+
+    pub(super) fn add_time(&self, _view: usize, _: Duration) {}
+
+    pub(super) fn subtract_time(&self, _view: usize, _: Duration) {}
+
+    pub(super) fn is_cullable(&self, _mesh: u32) -> bool {
+        false
+    }
+}
+
+pub(super) struct OcclusionControls;
+
+impl OcclusionControls {
+    pub(super) fn new(_: CullingOptions, _: &FramePlan, _: &[Draws<'_>], _: &[Pass], _: &[RenderView]) -> Self {
+        Self
+    }
+
+    pub(super) fn is_possible(&self, _view: usize) -> bool {
+        false
+    }
+
+    pub(super) fn needs(&self, _view: usize) -> CullingNeeds {
+        CullingNeeds
+    }
+
+    pub(super) fn inherit_measurements(&mut self, _: &Self, _: &[Option<KeptView>]) {}
+
+    pub(super) fn begin_frame(&self, _: &mut FrameTables, _: &Assets, _: &[RenderView]) {}
+
+    pub(super) fn choices(&self, _: &FrameTables, _: &[Arc<Labels>]) -> impl Iterator<Item = TuningChoice> {
+        iter::empty()
+    }
+
+    pub(super) fn update(&mut self, _: &FrameTables) {}
+}
+
+#[derive(Debug, Default)]
+pub(super) struct PassTriangles;
+
+impl PassTriangles {
+    pub(super) fn begin_frame(&mut self, _culls_triangles: bool) {}
+
+    pub(super) fn find(&mut self, _: &DrawList, _: &CullingTables, _: &Assets) {}
+}
