@@ -111,9 +111,9 @@ pub use drawloom_jobs::report;
 pub use drawloom_jobs::{fence, graph, task, text, timeline};
 pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
-    FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LatchError, LevelStatistics,
-    NodeAccessError, NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung,
-    StageTimes, SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp, helper,
+    FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, NodeAccessError,
+    NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung, StageTimes,
+    SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp, helper,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

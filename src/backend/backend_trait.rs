@@ -7,7 +7,7 @@ use super::error::BackendError;
 use super::frame_fence::FrameFence;
 use super::picture::Picture;
 use super::read_back::ReadBack;
-use super::requests::{FrameRequest, PassRequest, ViewRequest};
+use super::requests::{FrameRequest, PassRequest};
 use super::scene_limits::SceneLimits;
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
@@ -18,7 +18,7 @@ use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
-/// The interface between frames and a device. All methods but [`Backend::replace_view`], [`Backend::read_back`] and [`Backend::submit`] are called while a frame is recorded,
+/// The interface between frames and a device. All methods but [`Backend::read_back`] and [`Backend::submit`] are called while a frame is recorded,
 /// most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also beside a frame. Those that record take the worker as proof that they run in a job (M 10.3
 /// asserts it).
 ///
@@ -29,7 +29,7 @@ use crate::timeline::{Labels, TuningChoice};
 ///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
 ///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
-/// 4. `replace_view`, as often as the engine replaces a camera, and `read_back`.
+/// 4. `read_back`.
 /// 5. Later, on the device thread, `submit`.
 ///
 /// A panic of a method fails the frame with an error that names the method or the stage of the pass, and the next frame
@@ -231,17 +231,6 @@ pub trait Backend: Send + Sync + 'static {
     fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let _ = (frame, pass, labels);
         None
-    }
-
-    /// Replaces what shaders read of a view that [may be replaced](crate::view::RenderView::may_be_replaced), in a frame that is recorded and
-    /// not submitted: the view, and the same lights relative to the new camera. Only position and orientation of the camera differ from those
-    /// that the frame was recorded with, and what its passes draw stays as it is.
-    ///
-    /// # Errors
-    /// If the device refuses; [`BackendError::CannotReplaceViews`] from a backend that does not implement it.
-    fn replace_view(&self, frame: &mut Self::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        let _ = (frame, request);
-        Err(BackendError::CannotReplaceViews)
     }
 
     /// Has a view's target read back as a recorded frame leaves it, when the frame is submitted. It does not wait.

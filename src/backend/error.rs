@@ -204,9 +204,6 @@ pub enum BackendError {
     /// What is read back belongs to a frame that is not submitted, or was dropped.
     #[error("the frame whose pixels are read back was not submitted")]
     NotSubmitted,
-    /// [`Recorded::replace_camera`](crate::Recorded::replace_camera) of a backend that cannot change a view once it is recorded.
-    #[error("the backend cannot replace the camera of a recorded frame")]
-    CannotReplaceViews,
     /// A target is to be read back from a backend that cannot.
     #[error("the backend cannot read targets back")]
     CannotReadBack,

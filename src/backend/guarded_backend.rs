@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{
-    Backend, BackendError, FrameFence, FrameRequest, ReadBack, SceneLimits, TargetMemory, ViewQueue, ViewRequest,
-};
+use super::{Backend, BackendError, FrameFence, FrameRequest, ReadBack, SceneLimits, TargetMemory, ViewQueue};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
@@ -151,11 +149,6 @@ impl<B: Backend> GuardedBackend<B> {
         labels: &Arc<Labels>,
     ) -> Result<Option<TuningChoice>, CallPanic> {
         self.call("recording_choice", |backend| backend.recording_choice(frame, pass, labels))
-    }
-
-    pub(crate) fn replace_view(&self, frame: &mut B::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        let replaced = self.call("replace_view", |backend| backend.replace_view(frame, request));
-        replaced.map_err(CallPanic::into_backend_error)?
     }
 
     pub(crate) fn read_back(

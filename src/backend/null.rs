@@ -8,7 +8,7 @@ use parking_lot::Mutex;
 use super::backend_trait::Backend;
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
-use super::requests::{FrameRequest, PassRequest, ViewRequest};
+use super::requests::{FrameRequest, PassRequest};
 use super::view_queue::ViewQueue;
 use crate::command::DrawList;
 use crate::process::{Draws, Pass};
@@ -199,13 +199,6 @@ impl Backend for NullBackend {
                 _ => 0,
             },
         })
-    }
-
-    fn replace_view(&self, _frame: &mut NullFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        ensure(request.view.may_be_replaced(), || {
-            format!("the camera of a view is replaced only if it may be, but that of {:?} may not", request.view.name())
-        })?;
-        request.gpu_view().map(|_| ())
     }
 
     fn submit(

@@ -54,8 +54,6 @@ impl ViewForm {
             // An empty picture stays empty, so that its error names it.
             size: camera.size.map(|pixels| ((pixels as f32 * self.size).round() as u32).max(pixels.min(1))),
             redraw: self.redraw(camera),
-            // A camera that is not redrawn in every frame cannot be replaced.
-            late_latch: camera.late_latch.filter(|_| self.redraw(camera).is_every_frame()),
             level_of_detail_scale: camera.level_of_detail_scale * self.level_of_detail_scale,
             ..camera.clone()
         })

@@ -5,7 +5,7 @@ use crate::fence::FenceError;
 use crate::graph::{GraphProblem, NodeError, RunError};
 use crate::process::{PlanError, ProcessError};
 use crate::quality::QualityError;
-use crate::scene::{CameraMotion, SceneError, ViewKind};
+use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
 
 /// Why a renderer cannot be built.
@@ -253,56 +253,6 @@ impl BudgetError {
     pub const MIN_MILLISECONDS: f64 = 1e-6;
     /// The largest budget of a frame.
     pub const MAX_MILLISECONDS: f64 = 1e12;
-}
-
-/// Why the camera of a recorded frame was not [replaced](super::Recorded::replace_camera). The frame keeps the camera that it had.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LatchError {
-    /// The frame has no such view.
-    #[error("the frame has no view {view}, only {count}")]
-    UnknownView {
-        /// The index.
-        view: usize,
-        /// How many views it has.
-        count: usize,
-    },
-    /// The view was recorded with a camera that has no [`late_latch`](crate::scene::Camera::late_latch).
-    #[error("view {view:?} was recorded with a camera that has no `late_latch`, so it cannot be replaced")]
-    NotAllowed {
-        /// The view.
-        view: String,
-    },
-    /// Cameras that differ in more than position and orientation.
-    #[error("view {view:?} was recorded with a camera of another `{property}`")]
-    DifferentCamera {
-        /// The view.
-        view: String,
-        /// The first field of [`Camera`](crate::scene::Camera) that differs.
-        property: &'static str,
-    },
-    /// The position or the orientation is invalid.
-    #[error(transparent)]
-    InvalidCamera(#[from] SceneError),
-    /// The camera has moved or turned further than it may.
-    #[error(
-        "the camera of view {view:?} has moved by {distance} m of {} m that are allowed, and turned by {angle} of {} radians",
-        allowed.distance,
-        allowed.angle
-    )]
-    BeyondMotion {
-        /// The view.
-        view: String,
-        /// How far it is from the recorded position, in metres.
-        distance: f64,
-        /// By how much it is turned from the recorded orientation, in radians.
-        angle: f64,
-        /// How far it may be.
-        allowed: CameraMotion,
-    },
-    /// The backend cannot replace the view, or the device refused.
-    #[error("the camera could not be replaced: {0}")]
-    Backend(#[from] BackendError),
 }
 
 /// Why a recorded frame was not submitted.

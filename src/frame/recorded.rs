@@ -4,10 +4,10 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::latched_views::LatchedViews;
 use super::view_cache::InFlight;
 use super::view_queues::ViewQueues;
-use super::{FrameError, FramePlace, FrameStatistics, LatchError, SubmitError};
+use super::views::FrameViews;
+use super::{FrameError, FramePlace, FrameStatistics, SubmitError};
 use crate::backend::{Backend, BackendError, FrameFence, GuardedBackend, ReadBack, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
@@ -35,7 +35,7 @@ pub struct Recorded<B: Backend> {
     /// The number of its frame in the timeline, if that was on.
     pub(super) frame_number: Option<u64>,
     pub(super) in_flight: InFlight,
-    pub(super) views: LatchedViews,
+    pub(super) views: Arc<FrameViews>,
     pub(super) fences: FrameFences,
 }
 
@@ -102,73 +102,10 @@ impl<B: Backend> Recorded<B> {
         self.frame_number.map_or_else(|| "a frame".to_owned(), |number| format!("frame {number}"))
     }
 
-    /// The camera that a view, by index, is drawn with: the one that was recorded, or the latest that
-    /// [replaced](Recorded::replace_camera) it. The views are those of the scene's cameras, in their order, then those of shadow maps. `None`
-    /// if there is no such view.
+    /// The camera that a view, by index, is drawn with. The views are those of the scene's cameras, in their order, then those of shadow
+    /// maps. `None` if there is no such view.
     pub fn camera(&self, view: usize) -> Option<&Camera> {
-        self.views.camera(view)
-    }
-
-    /// Replaces the camera of a view, by index: late latching. The engine reads its input once more right before it submits, and the picture
-    /// is as old as that input, not as old as the recording. The camera that was recorded says
-    /// [how far](Camera::late_latch) another one may be from it; only position and orientation may differ. It may be replaced again, always
-    /// within these bounds of the recorded one. It takes about as long as two small uploads.
-    ///
-    /// ```
-    /// use std::time::Duration;
-    ///
-    /// use drawloom::glam::{DVec3, Quat};
-    /// use drawloom::scene::{Camera, CameraMotion, SceneRef};
-    /// use drawloom::{Renderer, Submitter, backend::Backend};
-    ///
-    /// fn frame<B: Backend>(
-    ///     renderer: &mut Renderer<B>,
-    ///     submitter: &Submitter<B>,
-    ///     world: SceneRef<'_>,
-    ///     mut camera: Camera,
-    ///     read_input: impl FnOnce() -> (DVec3, Quat),
-    /// ) -> Result<(), Box<dyn std::error::Error>> {
-    ///     camera.late_latch = Some(CameraMotion::from_speeds(5.0, 3.0, Duration::from_millis(16)));
-    ///     let cameras = [camera.clone()];
-    ///     let mut recorded = renderer.record(SceneRef { cameras: &cameras, ..world })?;
-    ///     (camera.position, camera.orientation) = read_input();
-    ///     if let Err(error) = recorded.replace_camera(0, &camera) {
-    ///         // The player was faster than that: the frame is drawn as it was recorded.
-    ///         eprintln!("{error}");
-    ///     }
-    ///     submitter.submit(recorded)?;
-    ///     Ok(())
-    /// }
-    /// ```
-    ///
-    /// # What follows the new camera, and what keeps the recorded one
-    ///
-    /// | follows the new camera | |
-    /// | --- | --- |
-    /// | all that shaders read of the view | position, matrix, the picture's axes, also where a [clip plane](Camera::clip_plane) is the near plane |
-    /// | the lights that reach the view, and how their shadow maps are looked up | relative to the camera, computed anew from their positions |
-    /// | histories, and what is read back | they hold the picture that is drawn |
-    ///
-    /// | keeps the recorded camera | |
-    /// | --- | --- |
-    /// | which objects and lights the view draws | all that any allowed camera may see |
-    /// | levels of detail | their errors are larger by as much as the camera comes closer |
-    /// | the order of blended and opaque objects by depth | |
-    /// | what is drawn beyond the [far plane](Camera::far) of a perspective, which does not clip | objects up to the farthest allowed plane |
-    /// | a directional light's shadow maps | they cover what any allowed camera sees, around the recorded one |
-    /// | other views: mirrors, portals, other eyes | each is replaced by a call of its own, with the camera that is [derived](Camera::reflected) from the new one |
-    /// | parameters and resources of the engine's processes | they are those of the recording |
-    ///
-    /// So a process that reprojects the frame before with a camera among its parameters needs the camera that *was drawn*:
-    /// [`Recorded::camera`], before that frame is submitted. Where the next frame is recorded before this one is replaced, let a shader
-    /// write what it needs of `view` into a [buffer](crate::process::Declare::changes_buffer) that the next frame reads.
-    ///
-    /// # Errors
-    /// [`LatchError`] if there is no such view, it allows no replacement, the camera differs in more than position and orientation or is
-    /// farther from the recorded one than allowed; if it is out of reach, or the device refuses. Then the frame keeps the camera that it had.
-    pub fn replace_camera(&mut self, view: usize, camera: &Camera) -> Result<(), LatchError> {
-        let Self { views, backend, frame, .. } = self;
-        views.replace(view, camera, |request| backend.replace_view(frame, request))
+        self.views.views.get(view).map(|view| &view.camera)
     }
 
     /// Has a view's target read back as a whole, as this frame leaves it, on any backend. It does not wait: ask the result when the frame is
@@ -259,7 +196,7 @@ impl<B: Backend> Submitter<B> {
         if !self.backend.is(&recorded.backend) {
             return Err(SubmitError::ForeignFrame);
         }
-        let missing_view = || recorded.in_flight.missing_view().and_then(|view| recorded.views.recorded().get(view));
+        let missing_view = || recorded.in_flight.missing_view().and_then(|view| recorded.views.views.get(view));
         let lost_view = |view: &RenderView| SubmitError::LostView { view: view.name().to_owned() };
         missing_view().map_or(Ok(()), |view| Err(lost_view(view)))?;
         for (fence, limit) in &recorded.fences.awaited {

@@ -8,7 +8,6 @@ use super::backend_maintenance::BackendMaintenance;
 use super::change_check::ChangeCheck;
 use super::context::FrameContext;
 use super::culling::CullingOptions;
-use super::latched_views::LatchedViews;
 use super::lent_nodes::NodeDeclarations;
 use super::pass_recording::{PassRecording, reset_recordings};
 use super::pass_runs::PassRuns;
@@ -401,7 +400,7 @@ impl<B: Backend> Renderer<B> {
             backend: self.backend.clone(),
             frame_number,
             in_flight,
-            views: LatchedViews::new(frame_views, &self.tables.lights, scene.ambient),
+            views: frame_views,
             fences: FrameFences::default(),
         })
     }

@@ -84,7 +84,6 @@ struct ViewKey {
     is_cached: bool,
     is_paraboloid: bool,
     has_oblique_near_plane: bool,
-    may_be_replaced: bool,
     layers: LayerMask,
     samples_views: bool,
 }
@@ -97,7 +96,6 @@ impl ViewKey {
             is_cached: view.is_cached(),
             is_paraboloid: is_paraboloid(view),
             has_oblique_near_plane: view.has_oblique_near_plane(),
-            may_be_replaced: view.may_be_replaced(),
             layers: view.camera.layers,
             samples_views: view.camera.samples_views,
         }
@@ -106,7 +104,6 @@ impl ViewKey {
     fn fits(&self, view: &RenderView) -> bool {
         (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached())
             && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
-            && self.may_be_replaced == view.may_be_replaced()
             && (self.layers, self.samples_views) == (view.camera.layers, view.camera.samples_views)
     }
 }

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
 use super::projection::MAX_SHIFT;
 use super::transform::is_unit;
-use super::{CameraMotion, ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, WholePicture};
+use super::{ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, WholePicture};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,10 +49,6 @@ pub struct Camera {
     pub kind: ViewKind,
     /// How often the picture is drawn. Between redraws, what it shows is as old as the latest one.
     pub redraw: Redraw,
-    /// How far the camera may move between recording and submission. `None`, for most cameras, costs nothing: then
-    /// [`Recorded::replace_camera`](crate::Recorded::replace_camera) refuses to replace it. Only for a view that is drawn in every frame and
-    /// is no shadow map. What is [derived](Camera::reflected) from a camera has the same bounds.
-    pub late_latch: Option<CameraMotion>,
 }
 
 /// The purpose of a view (M listing 10.4). If two views do not depend on each other, the earlier kind comes first.
@@ -116,7 +112,6 @@ impl Camera {
             samples_views: true,
             kind: ViewKind::Main,
             redraw: Redraw::EveryFrame,
-            late_latch: None,
         }
     }
 
@@ -180,8 +175,6 @@ impl Camera {
             reason
         } else if self.redraw == Redraw::Interval(0) {
             "it is redrawn every 0 frames"
-        } else if let Some(reason) = self.late_latch_problem() {
-            reason
         } else if let Some(reason) = self.projection_problem() {
             reason
         } else {
@@ -191,24 +184,13 @@ impl Camera {
     }
 
     /// What is wrong with its position or orientation; `None` if nothing is.
-    pub(crate) fn pose_problem(&self) -> Option<&'static str> {
+    fn pose_problem(&self) -> Option<&'static str> {
         if !self.position.is_finite() {
             Some("its position is not finite")
         } else if !is_unit(self.orientation.length_squared()) {
             Some("its orientation is not of unit length")
         } else {
             None
-        }
-    }
-
-    fn late_latch_problem(&self) -> Option<&'static str> {
-        let motion = self.late_latch?;
-        if self.kind == ViewKind::Shadow {
-            Some("a shadow map's camera cannot have a late_latch")
-        } else if !self.redraw.is_every_frame() {
-            Some("it has a late_latch and is not redrawn in every frame")
-        } else {
-            motion.problem()
         }
     }
 

@@ -64,7 +64,6 @@ impl Camera {
     /// Moves the camera to the right and up, in metres.
     fn move_aside(&mut self, metres: Vec2) {
         self.position += self.orientation.as_dquat().normalize() * metres.as_dvec2().extend(0.0);
-        self.late_latch = self.late_latch.map(|motion| motion.at_distance(metres.length()));
     }
 
     /// The camera whose picture a plane mirror shows this camera, for a view that the process of the mirror's surface samples as `mirror`:

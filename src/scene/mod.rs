@@ -6,7 +6,6 @@
 mod asset_loader;
 mod assets;
 mod camera;
-mod camera_motion;
 mod changes;
 mod chunk_users;
 mod clip_plane;
@@ -51,8 +50,6 @@ pub use asset_loader::{Arrivals, AssetLoader, LoadError};
 pub use assets::{Asset, Assets};
 pub(crate) use camera::child_name;
 pub use camera::{Camera, ViewKind};
-pub use camera_motion::CameraMotion;
-pub(crate) use camera_motion::PreciseMotion;
 pub use changes::Changes;
 pub(crate) use chunk_users::run_node_job;
 pub use clip_plane::ClipPlane;

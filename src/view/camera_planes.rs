@@ -2,10 +2,7 @@
 
 use std::array::from_fn;
 
-use glam::DVec3;
-
-use super::inflated_volume::InflatedVolume;
-use crate::scene::{Camera, CameraMotion, Projection, ViewKind};
+use crate::scene::{Camera, Projection, ViewKind};
 
 /// The planes of a camera's frustum, without tolerance, in metres.
 pub(super) struct CameraPlanes {
@@ -67,30 +64,7 @@ impl CameraPlanes {
             _ if camera.clip_plane.is_some() => 0.0,
             _ => -camera.near,
         };
-        let exact = Self { pairs, offsets, near, far: camera.far };
-        match camera.late_latch {
-            Some(motion) if camera.kind != ViewKind::Shadow => exact.inflated(camera, motion, halves),
-            _ => exact,
-        }
-    }
-
-    /// Planes around all that the camera sees, wherever the motion leads it.
-    fn inflated(self, camera: &Camera, motion: CameraMotion, half_extents: [f64; 2]) -> Self {
-        let volume = InflatedVolume::new(camera, motion, half_extents, -f64::from(self.near));
-        let pairs = match camera.projection {
-            Projection::Perspective { .. } => from_fn(|pair| {
-                let [half, middle] = volume.half_and_middle(pair);
-                PairSlopes::of_tangents(half, middle)
-            }),
-            _ => self.pairs,
-        };
-        let offset_of_side = |pair: usize, sign: f64| {
-            let [aside, forward] = pairs[pair].normal(sign);
-            volume.offset([DVec3::X, DVec3::Y][pair] * aside + DVec3::Z * forward)
-        };
-        let offsets = [0, 1].map(|pair| offset_of_side(pair, 1.0).max(offset_of_side(pair, -1.0)));
-        let [near, far] = [DVec3::Z, DVec3::NEG_Z].map(|normal| (volume.offset(normal) as f32).next_up());
-        Self { pairs, offsets, near, far }
+        Self { pairs, offsets, near, far: camera.far }
     }
 }
 

@@ -33,19 +33,8 @@ pub(super) fn visible_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> Option<
     sphere.filter(|(center, radius)| center.is_finite() && radius.is_finite() && *radius > 0.0)
 }
 
-/// A sphere around what a camera sees between two distances, wherever it may be when the frame is submitted: a turn moves the sphere's centre
-/// along a chord around the camera.
-fn slice_sphere(camera: &Camera, slice: [f64; 2]) -> (DVec3, f64) {
-    let (center, radius) = recorded_slice_sphere(camera, slice);
-    let moves = camera.late_latch.map_or(0.0, |motion| {
-        let bounds = motion.with_rounding();
-        bounds.distance + bounds.moves_at(center.distance(camera.position))
-    });
-    (center, radius + moves)
-}
-
-/// A sphere around what the camera sees from where it is.
-fn recorded_slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64) {
+/// A sphere around what a camera sees between two distances.
+fn slice_sphere(camera: &Camera, [begin, end]: [f64; 2]) -> (DVec3, f64) {
     let forward = camera.orientation.normalize().as_dquat() * DVec3::NEG_Z;
     let aspect = f64::from(camera.aspect());
     let whole = camera.whole_picture();
@@ -116,7 +105,7 @@ mod tests {
             depth in prop_oneof![0.01..1.0_f64, 1.0..100.0_f64],
         ) {
             let end = begin + depth;
-            let (center, radius) = recorded_slice_sphere(&camera, [begin, end]);
+            let (center, radius) = slice_sphere(&camera, [begin, end]);
             let aside = center - camera.position;
             // The aspect ratio and the orientation are in f32.
             let rounding = 1e-6 * (radius + end) + 1e-15 * camera.position.length();

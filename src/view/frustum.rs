@@ -58,8 +58,7 @@ pub(super) struct CameraPoint {
 }
 
 impl Frustum {
-    /// The frustum of `camera`. If the camera has a [`late_latch`](Camera::late_latch), it is a volume around the frusta of all cameras that may
-    /// replace it; `inflated_volume.rs` derives it.
+    /// The frustum of `camera`.
     pub fn new(camera: &Camera) -> Self {
         let orientation = camera.orientation.as_dquat().normalize();
         let forward = orientation * DVec3::NEG_Z;

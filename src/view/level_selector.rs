@@ -54,7 +54,7 @@ impl LevelSelector {
         Self {
             eye: camera.position,
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
-            near: if may_have_oblique_near_plane(view) { 0.0 } else { f64::from(camera.near) },
+            near: if view.has_oblique_near_plane() { 0.0 } else { f64::from(camera.near) },
             magnification,
             largest_error: f64::from(quality.level_of_detail) * f64::from(camera.level_of_detail_scale) * of_kind,
         }
@@ -87,11 +87,6 @@ impl LevelSelector {
             Magnification::Paraboloid(pixels) => pixels / (offset.length() - radius).max(self.near),
         }
     }
-}
-
-/// Whether a clip plane replaces the near plane, or may when the camera is replaced.
-fn may_have_oblique_near_plane(view: &RenderView) -> bool {
-    view.has_oblique_near_plane() || (view.camera.clip_plane.is_some() && view.may_be_replaced())
 }
 
 #[cfg(test)]

@@ -121,12 +121,8 @@ impl LightTable {
         self.set_origin(view.camera.position, lights, views);
     }
 
-    /// Makes the lights relative to a camera at `origin`. Which lights are in the table, and in which order, stays as it is. `lights` and
-    /// `views` are those that it was filled with.
-    ///
-    /// # Panics
-    /// If there are fewer of them.
-    pub(crate) fn set_origin(&mut self, origin: DVec3, lights: &[Light], views: &[RenderView]) {
+    /// Makes the lights relative to a camera at `origin`. `lights` and `views` are those that the table is filled with.
+    fn set_origin(&mut self, origin: DVec3, lights: &[Light], views: &[RenderView]) {
         let Self { gpu_lights, reaching, shadow_views, layers, .. } = self;
         gpu_lights.clear();
         gpu_lights.extend(reaching.iter().map(|&(_, light)| {

@@ -19,7 +19,6 @@ mod gpu_light;
 mod gpu_object;
 mod gpu_view;
 mod group_bounds;
-mod inflated_volume;
 mod level_errors;
 mod level_selector;
 mod light_table;

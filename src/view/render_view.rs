@@ -55,12 +55,6 @@ impl RenderView {
         self.age > 0
     }
 
-    /// Whether the camera may be [replaced](crate::Recorded::replace_camera) until the frame is submitted. Then what is culled must be
-    /// invisible from wherever the camera may be.
-    pub fn may_be_replaced(&self) -> bool {
-        self.camera.late_latch.is_some()
-    }
-
     /// Whether what is in front of the near plane is drawn as if it were on it: in the map of a directional light,
     /// where it casts a shadow.
     pub fn clamps_depth(&self) -> bool {

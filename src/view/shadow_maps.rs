@@ -165,7 +165,6 @@ impl ShadowMaps {
             samples_views: true,
             kind: ViewKind::Shadow,
             redraw: Redraw::EveryFrame,
-            late_latch: None,
         }
     }
 

@@ -37,7 +37,6 @@ impl RenderView {
     /// map whose depth is clamped at the near plane, nor for a camera that may still be replaced.
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
-            _ if self.may_be_replaced() => false,
             Projection::Perspective { .. } => true,
             Projection::Orthographic { .. } => self.kind() != ViewKind::Shadow,
             Projection::Paraboloid => false,

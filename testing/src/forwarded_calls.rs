@@ -39,14 +39,6 @@ macro_rules! forward_unchanged_calls {
             self.inner.counters(count);
         }
 
-        fn replace_view(
-            &self,
-            frame: &mut B::Frame,
-            request: &::drawloom::backend::ViewRequest<'_>,
-        ) -> Result<(), ::drawloom::backend::BackendError> {
-            self.inner.replace_view(frame, request)
-        }
-
         fn read_back(
             &self,
             frame: &mut B::Frame,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use drawloom::backend::{
     Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, Picture, ReadBack, SceneLimits,
-    SoftwareBackend, TargetMemory, ViewQueue, ViewRequest,
+    SoftwareBackend, TargetMemory, ViewQueue,
 };
 use drawloom::command::DrawState;
 use drawloom::fence::DeviceProgress;
@@ -229,11 +229,6 @@ impl<B: Backend> Backend for OwnBackend<B> {
     fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         backend("recording_choice");
         self.inner.recording_choice(frame.get(), pass, labels)
-    }
-
-    fn replace_view(&self, frame: &mut Self::Frame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        backend("replace_view");
-        self.inner.replace_view(frame.get_mut(), request)
     }
 
     fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {

@@ -10,8 +10,7 @@ use drawloom::fence::Fence;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{
-    Camera, CameraMotion, Changes, Material, MaterialPredicate, Mesh, ObjectFilter, Redraw, RenderObject, Scene,
-    SceneRef, ViewKind,
+    Camera, Changes, Material, MaterialPredicate, Mesh, ObjectFilter, Redraw, RenderObject, Scene, SceneRef, ViewKind,
 };
 use drawloom::task::Scheduler;
 use drawloom::{CpuNode, Renderer, Submitter};
@@ -28,12 +27,10 @@ pub fn worlds() -> [Scene; 2] {
         let material = scene.add(Material { emission: Vec3::ONE, ..Material::default() }).unwrap();
         scene.add_object(RenderObject::new(mesh, material, position)).unwrap();
         scene.add_object(RenderObject::new(mesh, material, DVec3::new(0.6, 0.4, 0.0))).unwrap();
-        let late_latch = Some(CameraMotion { distance: 0.1, angle: 0.1 });
         let main = Camera::looking_at("main", DVec3::Z * 3.0, DVec3::ZERO);
         let seldom = Camera::looking_at("seldom", DVec3::Z * 5.0, DVec3::ZERO);
         let (kind, redraw) = (ViewKind::Main, Redraw::Interval(2));
-        scene.cameras =
-            vec![Camera { size: [16, 16], late_latch, ..main }, Camera { size: [8, 8], kind, redraw, ..seldom }];
+        scene.cameras = vec![Camera { size: [16, 16], ..main }, Camera { size: [8, 8], kind, redraw, ..seldom }];
         scene
     })
 }
@@ -69,8 +66,6 @@ impl<S: Subject> Fixture<S> {
         let nodes: [&dyn CpuNode; 1] = [&OwnNode];
         let recorded = self.renderer.record_with_nodes(scene, &nodes);
         let mut recorded = recorded.map_err(|error| error.to_string())?;
-        let camera = scene.cameras[0].clone();
-        recorded.replace_camera(0, &camera).map_err(|error| error.to_string())?;
         match recorded.read_back_whole(0, "picture") {
             Err(error) if error.to_string().contains("panicked") => return Err(error.to_string()),
             // Backends may be unable to.

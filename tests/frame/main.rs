@@ -12,7 +12,6 @@ mod deferred;
 mod determinism;
 mod failing_process;
 mod granularity;
-mod late_latch;
 mod left_out;
 mod layers;
 mod levels_of_detail;

@@ -7,7 +7,7 @@ use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend};
 use drawloom::glam::Quat;
 use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
 use drawloom::process::{Deferred, Format};
-use drawloom::scene::{Camera, CameraMotion, Scene};
+use drawloom::scene::{Camera, Scene, SceneRef};
 use drawloom::{Buffering, FrameLoop, RendererBuilder};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -17,12 +17,12 @@ use crate::fixture::{DrawingBackend, Engine};
 
 pub const ON_ADAPTER: &[Case] = &[
     ("frames_in_flight_show_the_results_that_they_say", in_flight::<WgpuBackend>),
-    ("a_result_is_of_the_camera_that_was_drawn", replaced_camera::<WgpuBackend>),
+    ("a_result_is_of_the_camera_that_was_drawn", drawn_camera::<WgpuBackend>),
 ];
 
 pub const IN_SOFTWARE: &[Case] = &[
     ("software_frames_in_flight_show_the_results_that_they_say", in_flight::<SoftwareBackend>),
-    ("software_a_result_is_of_the_camera_that_was_drawn", replaced_camera::<SoftwareBackend>),
+    ("software_a_result_is_of_the_camera_that_was_drawn", drawn_camera::<SoftwareBackend>),
 ];
 
 /// A picture of the number of the frame and of that of the view's camera, which its width tells. Cameras are noted.
@@ -110,17 +110,16 @@ where
     Ok(())
 }
 
-fn replaced_camera<B: DrawingBackend>() -> Result<(), Failed> {
+fn drawn_camera<B: DrawingBackend>() -> Result<(), Failed> {
     let step = Noting::default();
     let mut engine = engine::<B>(&step)?;
     let mut scene = scene();
     scene.cameras.truncate(1);
-    scene.cameras[0].late_latch = Some(CameraMotion { distance: 1.0, angle: 0.5 });
     let turn = Quat::from_rotation_y(0.3);
-    let newer = Camera { orientation: (turn * scene.cameras[0].orientation).normalize(), ..scene.cameras[0].clone() };
-    engine.helper.begin_frame(&engine.renderer, &scene.cameras);
-    let mut recorded = engine.renderer.record(scene.as_scene_ref())?;
-    recorded.replace_camera(0, &newer)?;
+    let turned = Camera { orientation: (turn * scene.cameras[0].orientation).normalize(), ..scene.cameras[0].clone() };
+    let cameras = [turned.clone()];
+    engine.helper.begin_frame(&engine.renderer, &cameras);
+    let mut recorded = engine.renderer.record(SceneRef { cameras: &cameras, ..scene.as_scene_ref() })?;
     engine.helper.read_back(&mut recorded);
     let number = recorded.statistics().helpers[0].frame;
     let submitted = engine.submitter.submit(recorded)?;
@@ -128,7 +127,7 @@ fn replaced_camera<B: DrawingBackend>() -> Result<(), Failed> {
     engine.wait_for(&submitted.submission, number, &["map"])?;
     engine.draw_and_wait(&scene, &["map"])?;
     let noted: Vec<_> = step.0.lock().unwrap().iter().map(|camera| camera.orientation).collect();
-    if noted != [newer.orientation, scene.cameras[0].orientation] {
+    if noted != [turned.orientation, scene.cameras[0].orientation] {
         return Err(format!("the cameras are {noted:?}").into());
     }
     engine.check_no_errors()

@@ -30,7 +30,6 @@ mod image_distance;
 mod imported_targets;
 mod kept_processes;
 mod large_lists;
-mod late_latch;
 mod levels_of_detail;
 mod light_cut_off;
 mod light_sums;
@@ -108,7 +107,6 @@ fn main() {
         (imported_targets::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
         (large_lists::CASES, Needs::Adapter),
-        (late_latch::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),
         (light_cut_off::CASES, Needs::Adapter),
         (light_sums::CASES, Needs::Adapter),

@@ -23,8 +23,6 @@ pub const NAMES: &[&str] = &[
     "a_mirror_shows_the_scene_of_its_latest_redraw_and_the_rest_is_up_to_date",
     "a_moved_light_lags_together_with_its_shadow",
     "a_process_that_is_kept_changes_no_byte",
-    "a_replaced_camera_draws_what_it_draws_in_software",
-    "a_replaced_camera_draws_what_it_draws_when_it_is_recorded",
     "a_shadow_begins_at_the_foot_of_its_caster",
     "a_slow_camera_sees_levels_of_detail_change_at_edges_only",
     "a_small_pass_that_grows_gets_encoders_of_its_own",

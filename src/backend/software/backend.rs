@@ -10,7 +10,7 @@ use super::executor::Executor;
 use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
-use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, ViewQueue, ViewRequest};
+use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, ViewQueue};
 use crate::quality::VertexFormat;
 use crate::scene::Mesh;
 use crate::task::{Scheduler, Worker};
@@ -142,10 +142,6 @@ impl Backend for SoftwareBackend {
         _parts: &mut Vec<Infallible>,
     ) -> Result<SoftwareCommands, BackendError> {
         Ok(SoftwareCommands::new(pass.list))
-    }
-
-    fn replace_view(&self, frame: &mut SoftwareFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        frame.recording.replace_view(request)
     }
 
     fn read_back(

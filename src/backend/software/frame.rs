@@ -22,10 +22,10 @@ use super::targets::SoftwareTargets;
 use super::triangle_setup::setup_chunks;
 use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
-use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
+use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use crate::command::Batch;
 use crate::process::ShaderColumns;
-use crate::quality::{TransformPrecision, VertexFormat};
+use crate::quality::VertexFormat;
 use crate::scene::{ColumnLayout, GeneratedContents, Mesh};
 use crate::unwind::hold_events;
 
@@ -33,7 +33,6 @@ use crate::unwind::hold_events;
 pub(super) struct TypedFrame<R: Precision> {
     pub(super) context: Arc<DrawContext>,
     pub(super) views: Vec<ViewState<R>>,
-    pub(super) transforms: TransformPrecision,
     /// In the order they are submitted.
     pub(super) passes: Vec<SoftwarePass<R>>,
     pub(super) objects: R::Objects,
@@ -61,11 +60,6 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
         self.context.subdivisions.collect(request, list, self.vertices, make, |key, mesh| {
             self.subdivided.lock().insert(key, mesh);
         })
-    }
-
-    fn replace_view(&mut self, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        self.views[request.index] = ViewState::new(request, self.transforms)?;
-        Ok(())
     }
 
     fn read_back(&mut self, view: usize, target: &str) -> Result<SoftwareReadBack, BackendError> {

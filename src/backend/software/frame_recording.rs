@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::SoftwareSubmission;
 use super::commands::SoftwareCommands;
 use super::read_back::SoftwareReadBack;
-use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue, ViewRequest};
+use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use crate::process::CpuShader;
 
 /// A rasterizer in either precision.
@@ -33,12 +33,6 @@ pub(super) trait FrameRecording: Send + Sync {
     /// # Errors
     /// If a batch's mesh does not exist. This is a bug in Drawloom.
     fn prepare(&self, pass: &PassRequest<'_>) -> Result<(), BackendError>;
-
-    /// Replaces a view.
-    ///
-    /// # Errors
-    /// If the camera is out of reach.
-    fn replace_view(&mut self, request: &ViewRequest<'_>) -> Result<(), BackendError>;
 
     /// Has a view's target read back when all passes are drawn.
     ///

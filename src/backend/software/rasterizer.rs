@@ -84,7 +84,6 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         Ok(Box::new(TypedFrame {
             context: Arc::clone(&self.context),
             views: view_states,
-            transforms,
             passes,
             objects: R::objects(scene),
             columns,

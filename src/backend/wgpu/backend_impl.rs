@@ -20,7 +20,7 @@ use super::submission::WgpuSubmission;
 use super::uploaded_picture::upload_picture;
 use crate::backend::{
     Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, SceneLimits, TargetMemory,
-    ViewQueue, ViewRequest,
+    ViewQueue,
 };
 use crate::command::{Batch, DrawList, DrawState};
 use crate::process::{Draws, FramePlan, ShaderResource};
@@ -335,16 +335,6 @@ impl Backend for WgpuBackend {
             chosen: state.strategy_index,
             is_trial: state.is_trial,
         })
-    }
-
-    fn replace_view(&self, frame: &mut WgpuFrame, request: &ViewRequest<'_>) -> Result<(), BackendError> {
-        let gpu_view = request.gpu_view()?;
-        let label = "a view whose camera is replaced";
-        let replace = || frame.buffers.replace_view(&self.uploads, &gpu_view, request);
-        // Not all may have been written.
-        with_error_scope(&self.device, label, || catch_wgpu_panic(label, replace))
-            .flatten()
-            .inspect_err(|error| self.fail_frame(error))
     }
 
     fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {

@@ -29,9 +29,9 @@ impl OcclusionControls {
         views: &[RenderView],
     ) -> Self {
         let control_of = |view: (usize, &RenderView)| {
-            // What is behind a clip plane hides nothing, and a camera that is replaced may look past what hides others.
-            let can_hide = !view.1.has_oblique_near_plane() && !view.1.may_be_replaced();
-            OcclusionControl::new(options.occlusion_tile.is_some() && can_hide, plan, draws, passes, view)
+            // What is behind a clip plane hides nothing.
+            let is_enabled = options.occlusion_tile.is_some() && !view.1.has_oblique_near_plane();
+            OcclusionControl::new(is_enabled, plan, draws, passes, view)
         };
         Self { options, of_views: views.iter().enumerate().map(control_of).collect() }
     }

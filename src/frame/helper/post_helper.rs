@@ -126,8 +126,8 @@ impl PostHelper {
         self.0.begin_frame(&backend, cameras);
     }
 
-    /// Has the source of a recorded frame read back when the frame is drawn, and the step computed from it. Call it when all cameras are
-    /// [replaced](Recorded::replace_camera) that will be, before the frame is submitted and the next one begins. It does not wait.
+    /// Has the source of a recorded frame read back when the frame is drawn, and the step computed from it. Call it before the
+    /// frame is submitted and the next one begins. It does not wait.
     ///
     /// It also adds to the frame's [statistics](crate::FrameStatistics::helpers).
     pub fn read_back<B: Backend>(&self, recorded: &mut Recorded<B>) {

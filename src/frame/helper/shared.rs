@@ -166,7 +166,7 @@ impl Shared {
             state.frame
         };
         let mut drawn: Vec<(usize, String)> = Vec::new();
-        for (index, view) in recorded.views.recorded().iter().enumerate() {
+        for (index, view) in recorded.views.views.iter().enumerate() {
             let is_source = view.kind() == ViewKind::Main && !view.is_cached();
             if is_source && drawn.iter().all(|(_, name)| name != view.name()) {
                 drawn.push((index, view.name().to_owned()));
@@ -343,7 +343,7 @@ impl Shared {
     fn add_statistics<B: Backend>(&self, recorded: &mut Recorded<B>) {
         let (shown, mut all) = (self.shown.get(), Vec::new());
         let state = self.state.lock();
-        for view in recorded.views.recorded().iter().filter(|view| view.kind() == ViewKind::Main) {
+        for view in recorded.views.views.iter().filter(|view| view.kind() == ViewKind::Main) {
             let work = state.views.iter().find(|work| work.view == view.name());
             let statistics = HelperStatistics {
                 step: self.name.to_string(),

@@ -1,8 +1,8 @@
 //! Indices of views, rectangles and places of recorded and submitted frames.
 
+use drawloom::FramePlace;
 use drawloom::glam::Vec2;
 use drawloom::process::Deferred;
-use drawloom::{FramePlace, LatchError};
 use libtest_mimic::Failed;
 
 use super::NumberCase;
@@ -17,7 +17,6 @@ pub const CASES: &[NumberCase] = &[
             "Recorded::camera",
             "Recorded::read_back",
             "Recorded::read_back_whole",
-            "Recorded::replace_camera",
             "backend::WgpuSubmission::read",
             "backend::WgpuSubmission::texture",
         ],
@@ -58,8 +57,6 @@ fn recorded() -> Result<(), Failed> {
     let mut recorded = fixture.record(&scene)?;
     for view in NO_VIEWS {
         ensure(recorded.camera(view).is_none(), "there is no such view")?;
-        let replaced = recorded.replace_camera(view, &scene.cameras[0]);
-        ensure(matches!(replaced, Err(LatchError::UnknownView { .. })), format_args!("{replaced:?}"))?;
         refused(recorded.read_back(view, "picture", [0; 2], [1; 2]), "picture")?;
         refused(recorded.read_back_whole(view, "picture"), "picture")?;
         refused(recorded.fence_at(FramePlace::View(view)), "place")?;

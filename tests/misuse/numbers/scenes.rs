@@ -1,18 +1,16 @@
 //! Numbers of scenes that are no positions, colours or angles: those are in `tests/extremes`.
 
-use std::time::Duration;
-
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
-    Bounds, Camera, CameraMotion, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Mesh, MeshBuffers, ObjectSet,
-    Piece, StreamAttribute, StreamLayout, Texture, Topology, Vertex, VertexStream,
+    Bounds, Camera, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Mesh, MeshBuffers, ObjectSet, Piece,
+    StreamAttribute, StreamLayout, Texture, Topology, Vertex, VertexStream,
 };
 use drawloom::wgpu;
 use drawloom_testing::adapter::noop_device;
 use libtest_mimic::Failed;
 
 use super::NumberCase;
-use crate::fixture::{COUNTS, DURATIONS, FLOATS, Fixture, ensure, refused, same, scene};
+use crate::fixture::{COUNTS, FLOATS, Fixture, ensure, refused, same, scene};
 
 pub const CASES: &[NumberCase] = &[
     NumberCase {
@@ -55,14 +53,7 @@ pub const CASES: &[NumberCase] = &[
     },
     NumberCase {
         name: "cameras_derived_by_any_number",
-        numbers: &[
-            "scene::Camera::impostor",
-            "scene::Camera::impostor_half_width",
-            "scene::Camera::through_portal",
-            "scene::CameraMotion::angle",
-            "scene::CameraMotion::distance",
-            "scene::CameraMotion::from_speeds",
-        ],
+        numbers: &["scene::Camera::impostor", "scene::Camera::impostor_half_width", "scene::Camera::through_portal"],
         check: cameras,
     },
     NumberCase {
@@ -208,18 +199,6 @@ fn cameras() -> Result<(), Failed> {
     let camera = scene().cameras.remove(0);
     for number in FLOATS {
         let wide = f64::from(number);
-        for motion in [CameraMotion { distance: number, angle: 0.1 }, CameraMotion { distance: 0.1, angle: number }] {
-            let is_valid = (0.0..=CameraMotion::MAX_DISTANCE).contains(&motion.distance)
-                && motion.angle >= 0.0
-                && motion.angle.is_finite();
-            let drawn = draw(Camera { late_latch: Some(motion), ..camera.clone() });
-            ensure(drawn.is_ok() == is_valid, format_args!("{motion:?}: {drawn:?}"))?;
-        }
-        for time in DURATIONS {
-            let motion = CameraMotion::from_speeds(number, number, time);
-            let drawn = draw(Camera { late_latch: Some(motion), ..camera.clone() });
-            ensure(drawn.is_ok() || !(0.0..1e6).contains(&motion.distance), format_args!("{motion:?}: {drawn:?}"))?;
-        }
         for (center, radius, side, angle) in [
             (DVec3::splat(wide), 1.0, 16, 0.1),
             (DVec3::ZERO, wide, 16, 0.1),
@@ -240,8 +219,7 @@ fn cameras() -> Result<(), Failed> {
             }
         }
     }
-    let motion = CameraMotion::from_speeds(5.0, 3.0, Duration::from_millis(16));
-    draw(Camera { late_latch: Some(motion), ..camera })
+    draw(camera)
 }
 
 fn ranges() -> Result<(), Failed> {

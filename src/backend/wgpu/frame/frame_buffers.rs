@@ -21,7 +21,7 @@ use crate::backend::wgpu::resources::{
     check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
-use crate::backend::{BackendError, FrameRequest, ViewRequest};
+use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
 use crate::view::GpuView;
@@ -194,14 +194,6 @@ impl FrameBuffers {
             }
         }
         Ok(())
-    }
-
-    /// Replaces a view by this one, and its lights by those of the request.
-    pub(crate) fn replace_view(&mut self, uploads: &UploadQueue, gpu_view: &GpuView, request: &ViewRequest<'_>) {
-        let Buffers { views, lights, view_ranges, .. } = &mut *self.buffers;
-        let ranges = &view_ranges[request.index];
-        views.overwrite(uploads, ranges.view.start, bytemuck::bytes_of(gpu_view));
-        lights.overwrite(uploads, ranges.lights.start, bytemuck::cast_slice(request.light_table.gpu_lights()));
     }
 
     /// Makes room for timestamps of the frame's passes. After an error the buffers are unusable.

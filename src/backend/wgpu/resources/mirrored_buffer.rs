@@ -52,18 +52,6 @@ impl MirroredBuffer {
         Ok(())
     }
 
-    /// Replaces bytes that the buffer holds.
-    ///
-    /// # Panics
-    /// If it does not hold as many.
-    pub(crate) fn overwrite(&mut self, uploads: &UploadQueue, offset: usize, bytes: &[u8]) {
-        let held = &mut self.written[offset..][..bytes.len()];
-        if held != bytes {
-            held.copy_from_slice(bytes);
-            self.on_device.write(uploads, offset, bytes);
-        }
-    }
-
     /// Uploads the rewritten bytes if they changed. Returns whether the buffer was reallocated.
     ///
     /// # Errors
