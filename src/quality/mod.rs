@@ -7,6 +7,7 @@
 mod culling_volume;
 mod depth_key;
 mod formats;
+mod knobs;
 mod quality_error;
 mod radiance_sum;
 mod settings;
@@ -18,6 +19,7 @@ pub use culling_volume::CullingVolume;
 pub(crate) use depth_key::DepthQuantizer;
 pub use depth_key::{DepthCurve, DepthKey};
 pub use formats::{DiffuseFormat, NormalFormat, VertexFormat};
+pub use knobs::Knob;
 pub use quality_error::QualityError;
 pub use radiance_sum::RadianceSum;
 pub use settings::Quality;

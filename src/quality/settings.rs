@@ -8,7 +8,7 @@ use super::{
 /// The settings that trade a frame's accuracy for speed.
 ///
 /// There are three presets: [`Quality::fast`], [`Quality::balanced`], which is the default, and [`Quality::exact`].
-/// `benches/examples/tradeoff` measures error and cost of each setting for a scene of your own. Settings of shadow cascades, views and
+/// [`Knob::ALL`](super::Knob::ALL) lists all settings with values to choose from, and `benches/examples/tradeoff` measures error and cost of each for a scene of your own. Settings of shadow cascades, views and
 /// impostors are [elsewhere](crate::quality).
 ///
 /// ```

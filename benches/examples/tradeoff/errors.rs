@@ -57,22 +57,7 @@ pub fn of(
             bound: (setting.name == "exact").then_some(2.0),
             oracle: "f64 reference",
         }),
-        Knob::OpaqueOrder => Ok(case.order(quality.opaque_order, &measured.contents.opaque, Blend::None)),
-        Knob::BlendedOrder => Ok(case.order(quality.blended_order, &measured.contents.blended, Blend::Alpha)),
-        // Culling must not remove visible objects.
-        Knob::Culling => Ok(KnobError { bound: Some(0.0), ..case.pixels_that_differ() }),
-        // It has an effect only if an object is occluded.
-        Knob::Occlusion => {
-            let error = (measured.occluded > 0).then_some(measured.differing[0]);
-            Ok(KnobError { error, bound: Some(0.0), ..case.pixels_that_differ() })
-        }
-        Knob::DepthPrePass => Ok(case.pixels_that_differ()),
-        Knob::Normals | Knob::Vertices => case.normals(setting.knob),
-        Knob::Diffuse => case.diffuse(),
-        Knob::LevelOfDetail => {
-            let error = levels::greatest_error(scene, camera, &measured.contents.opaque);
-            Ok(of_levels(error, f64::from(quality.level_of_detail)))
-        }
+        Knob::Quality(index) => case.of_quality(Knob::Quality(index).name()),
         Knob::ViewLevelOfDetail => {
             let mirrors = subject.mirror_cameras(camera);
             let commands = &measured.contents.mirrored;
@@ -102,25 +87,6 @@ pub fn of(
                 oracle: "f64 rays through the impostor",
             })
         }
-        Knob::ShadowSide | Knob::ShadowFilter | Knob::ShadowBias | Knob::ShadowInterval => {
-            Ok(case.pixels_that_visibly_differ())
-        }
-        Knob::ShadowEdge => Ok(case.shadow_edges()),
-        Knob::LightCutOff => case.light_cut_off(),
-        Knob::RadianceSum => case.radiance_sum(),
-        Knob::ToneCurve => Ok(KnobError {
-            error: Some(measured.from_exact.rmse * 255.0),
-            metric: "RMSE of 255",
-            bound: None,
-            oracle: "exact",
-        }),
-        Knob::Transforms => Ok(KnobError {
-            error: vertices::greatest_error(scene, camera, quality.transforms),
-            metric: "pixels",
-            // The bound holds for camera-relative transforms, at any distance from the world's origin.
-            bound: (quality.transforms == TransformPrecision::CameraRelative).then_some(1e-3),
-            oracle: "f64 from the camera's definition",
-        }),
     }
 }
 
@@ -130,6 +96,50 @@ fn of_levels(error: Option<f64>, pixels: f64) -> KnobError {
 }
 
 impl Case<'_> {
+    /// The error of a setting of [`Quality`], by its field.
+    fn of_quality(&self, field: &str) -> Result<KnobError, Failure> {
+        match field {
+            "opaque_order" => Ok(self.order(self.quality.opaque_order, &self.measured.contents.opaque, Blend::None)),
+            "blended_order" => {
+                Ok(self.order(self.quality.blended_order, &self.measured.contents.blended, Blend::Alpha))
+            }
+            // Culling must not remove visible objects.
+            "culling" => Ok(KnobError { bound: Some(0.0), ..self.pixels_that_differ() }),
+            // It has an effect only if an object is occluded.
+            "occlusion" => {
+                let error = (self.measured.occluded > 0).then_some(self.measured.differing[0]);
+                Ok(KnobError { error, bound: Some(0.0), ..self.pixels_that_differ() })
+            }
+            "depth_pre_pass" => Ok(self.pixels_that_differ()),
+            "normals" | "vertices" => self.normals(field),
+            "diffuse" => self.diffuse(),
+            "level_of_detail" => {
+                let error = levels::greatest_error(self.scene, self.camera, &self.measured.contents.opaque);
+                Ok(of_levels(error, f64::from(self.quality.level_of_detail)))
+            }
+            "shadows.side" | "shadows.filter" | "shadows.bias" | "shadows.interval" => {
+                Ok(self.pixels_that_visibly_differ())
+            }
+            "shadows.widest_edge" => Ok(self.shadow_edges()),
+            "light_cut_off" => self.light_cut_off(),
+            "radiance_sum" => self.radiance_sum(),
+            "tone_curve" => Ok(KnobError {
+                error: Some(self.measured.from_exact.rmse * 255.0),
+                metric: "RMSE of 255",
+                bound: None,
+                oracle: "exact",
+            }),
+            "transforms" => Ok(KnobError {
+                error: vertices::greatest_error(self.scene, self.camera, self.quality.transforms),
+                metric: "pixels",
+                // The bound holds for camera-relative transforms, at any distance from the world's origin.
+                bound: (self.quality.transforms == TransformPrecision::CameraRelative).then_some(1e-3),
+                oracle: "f64 from the camera's definition",
+            }),
+            _ => Err(format!("the error of {field} is not known").into()),
+        }
+    }
+
     fn pixels_that_differ(&self) -> KnobError {
         let metric = "share of pixels that differ";
         KnobError { error: Some(self.measured.differing[0]), metric, bound: None, oracle: "exact" }
@@ -188,7 +198,7 @@ impl Case<'_> {
     /// normals at right angles at most is at least 1/√3 as long as they are, so its direction has the error √3·δ at
     /// most. No bound is known if a triangle has larger angles, or if an object is scaled non-uniformly, which rotates
     /// normals farther.
-    fn normals(&self, knob: Knob) -> Result<KnobError, Failure> {
+    fn normals(&self, field: &str) -> Result<KnobError, Failure> {
         let own = directions(&self.measured.contents.normal, self.quality.normals)?;
         let exact = directions(&self.exact.contents.normal, Quality::exact().normals)?;
         let angles = own.iter().zip(&exact).filter_map(|(one, other)| {
@@ -196,8 +206,8 @@ impl Case<'_> {
             // The cross product resolves small angles, which a cosine does not.
             Some(one.cross(other).length().atan2(one.dot(other).abs()).to_degrees())
         });
-        let bound = match knob {
-            Knob::Vertices => {
+        let bound = match field {
+            "vertices" => {
                 let of_mixtures = 3.0_f64.sqrt() * self.quality.vertices.max_normal_error_degrees();
                 vertices::normals_are_bounded(self.scene)
                     .then_some(of_mixtures + 2.0 * Quality::exact().normals.max_error_degrees())

@@ -117,14 +117,14 @@ impl Results {
 
     /// The knobs that were measured, in the order of reports.
     pub fn knobs(&self) -> impl Iterator<Item = Knob> {
-        Knob::ALL.into_iter().filter(|knob| self.entries.iter().any(|entry| entry.knob == knob.name()))
+        Knob::all().filter(|knob| self.entries.iter().any(|entry| entry.knob == knob.name()))
     }
 
     /// The knobs that change nothing in the scene, whatever their setting, and those that were not measured.
     pub fn without_effect(&self) -> impl Iterator<Item = Knob> {
         let has_error =
             |knob: &Knob| self.entries.iter().any(|entry| entry.knob == knob.name() && entry.error.is_some());
-        Knob::ALL.into_iter().filter(move |knob| !has_error(knob))
+        Knob::all().filter(move |knob| !has_error(knob))
     }
 
     /// The Pareto front, from the fastest to the most accurate.

@@ -1,10 +1,7 @@
 //! The settings that are measured: each knob alone at each of its settings, and the presets.
 
 use drawloom::ViewForm;
-use drawloom::quality::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, RadianceSum, ShadowQuality, ToneCurve,
-    TransformPrecision, VertexFormat,
-};
+use drawloom::quality::{self, Quality};
 use drawloom::view::ShadowMaps;
 
 use crate::configuration::Configuration;
@@ -31,24 +28,8 @@ impl Setting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Knob {
     Preset,
-    OpaqueOrder,
-    BlendedOrder,
-    Culling,
-    Occlusion,
-    Normals,
-    Diffuse,
-    Vertices,
-    LevelOfDetail,
-    DepthPrePass,
-    ShadowSide,
-    ShadowFilter,
-    ShadowBias,
-    ShadowInterval,
-    ShadowEdge,
-    LightCutOff,
-    RadianceSum,
-    ToneCurve,
-    Transforms,
+    /// A setting of [`Quality`], by its index in [`quality::Knob::ALL`].
+    Quality(usize),
     Cascades,
     MaxDistance,
     Redraw,
@@ -61,26 +42,12 @@ pub enum Knob {
 
 impl Knob {
     /// All knobs, in the order of reports.
-    pub const ALL: [Self; 27] = [
-        Self::Preset,
-        Self::OpaqueOrder,
-        Self::BlendedOrder,
-        Self::Culling,
-        Self::Occlusion,
-        Self::Normals,
-        Self::Diffuse,
-        Self::Vertices,
-        Self::LevelOfDetail,
-        Self::DepthPrePass,
-        Self::ShadowSide,
-        Self::ShadowFilter,
-        Self::ShadowBias,
-        Self::ShadowInterval,
-        Self::ShadowEdge,
-        Self::LightCutOff,
-        Self::RadianceSum,
-        Self::ToneCurve,
-        Self::Transforms,
+    pub fn all() -> impl Iterator<Item = Self> {
+        [Self::Preset].into_iter().chain((0..quality::Knob::ALL.len()).map(Self::Quality)).chain(Self::ELSEWHERE)
+    }
+
+    /// Those that are no settings of [`Quality`].
+    const ELSEWHERE: [Self; 8] = [
         Self::Cascades,
         Self::MaxDistance,
         Self::Redraw,
@@ -95,24 +62,7 @@ impl Knob {
     pub fn name(self) -> &'static str {
         match self {
             Self::Preset => "preset",
-            Self::OpaqueOrder => "opaque_order",
-            Self::BlendedOrder => "blended_order",
-            Self::Culling => "culling",
-            Self::Occlusion => "occlusion",
-            Self::Normals => "normals",
-            Self::Diffuse => "diffuse",
-            Self::Vertices => "vertices",
-            Self::LevelOfDetail => "level_of_detail",
-            Self::DepthPrePass => "depth_pre_pass",
-            Self::ShadowSide => "shadows.side",
-            Self::ShadowFilter => "shadows.filter",
-            Self::ShadowBias => "shadows.bias",
-            Self::ShadowInterval => "shadows.interval",
-            Self::ShadowEdge => "shadows.widest_edge",
-            Self::LightCutOff => "light_cut_off",
-            Self::RadianceSum => "radiance_sum",
-            Self::ToneCurve => "tone_curve",
-            Self::Transforms => "transforms",
+            Self::Quality(index) => quality::Knob::ALL[index].field,
             Self::Cascades => "ShadowMaps.cascades",
             Self::MaxDistance => "ShadowMaps.max_distance",
             Self::Redraw => "Camera.redraw",
@@ -127,28 +77,10 @@ impl Knob {
     /// `configuration` with this knob set as in `other`.
     pub fn changed(self, configuration: &Configuration, other: &Configuration) -> Configuration {
         let mut changed = *configuration;
-        let (quality, others) = (&mut changed.quality, &other.quality);
         let (form, forms) = (&mut changed.mirrors, &other.mirrors);
         match self {
             Self::Preset => changed = *other,
-            Self::OpaqueOrder => quality.opaque_order = others.opaque_order,
-            Self::BlendedOrder => quality.blended_order = others.blended_order,
-            Self::Culling => quality.culling = others.culling,
-            Self::Occlusion => quality.occlusion = others.occlusion,
-            Self::Normals => quality.normals = others.normals,
-            Self::Diffuse => quality.diffuse = others.diffuse,
-            Self::Vertices => quality.vertices = others.vertices,
-            Self::LevelOfDetail => quality.level_of_detail = others.level_of_detail,
-            Self::DepthPrePass => quality.depth_pre_pass = others.depth_pre_pass,
-            Self::ShadowSide => quality.shadows.side = others.shadows.side,
-            Self::ShadowFilter => quality.shadows.filter = others.shadows.filter,
-            Self::ShadowBias => quality.shadows.bias = others.shadows.bias,
-            Self::ShadowInterval => quality.shadows.interval = others.shadows.interval,
-            Self::ShadowEdge => quality.shadows.widest_edge = others.shadows.widest_edge,
-            Self::LightCutOff => quality.light_cut_off = others.light_cut_off,
-            Self::RadianceSum => quality.radiance_sum = others.radiance_sum,
-            Self::ToneCurve => quality.tone_curve = others.tone_curve,
-            Self::Transforms => quality.transforms = others.transforms,
+            Self::Quality(index) => quality::Knob::ALL[index].copy(&mut changed.quality, &other.quality),
             Self::Cascades => changed.maps.cascades = other.maps.cascades,
             Self::MaxDistance => changed.maps.max_distance = other.maps.max_distance,
             Self::Redraw => form.interval = forms.interval,
@@ -215,80 +147,23 @@ fn add_of_mirrors(mut add: impl FnMut(Knob, &str, Configuration)) {
     add(Knob::ViewLeftOut, "left out", Configuration { draws_mirrors: false, ..exact });
 }
 
-/// The settings of the fields of [`Quality`].
+/// The settings of the fields of [`Quality`]: those that `exact` has itself only where the error is not that against `exact`.
 fn add_of_quality(mut add: impl FnMut(Knob, &str, Quality)) {
-    let exact = Quality::exact();
-
-    let far = 1000.0;
-    let key = |bits, curve| DepthKey { bits, curve };
-    add(Knob::OpaqueOrder, "unordered", Quality { opaque_order: DepthKey::UNORDERED, ..exact });
-    for bits in [1, 8, 16] {
-        let name = format!("{bits} {}, logarithmic", if bits == 1 { "bit" } else { "bits" });
-        add(Knob::OpaqueOrder, &name, Quality { opaque_order: key(bits, DepthCurve::Logarithmic), ..exact });
+    for (index, knob) in quality::Knob::ALL.iter().enumerate() {
+        for (name, set) in knob.values.iter().filter(|(name, _)| !LEFT_OUT.contains(&(knob.field, name))) {
+            let mut quality = Quality::exact();
+            set(&mut quality);
+            if quality != Quality::exact() || ["radiance_sum", "transforms"].contains(&knob.field) {
+                add(Knob::Quality(index), name, quality);
+            }
+        }
     }
-    add(
-        Knob::OpaqueOrder,
-        "16 bits, linear to 1 km",
-        Quality { opaque_order: key(16, DepthCurve::Linear { far }), ..exact },
-    );
-    for bits in [8, 16, 24] {
-        let name = format!("{bits} bits, logarithmic");
-        add(Knob::BlendedOrder, &name, Quality { blended_order: key(bits, DepthCurve::Logarithmic), ..exact });
-    }
-    add(
-        Knob::BlendedOrder,
-        "16 bits, linear to 1 km",
-        Quality { blended_order: key(16, DepthCurve::Linear { far }), ..exact },
-    );
-    for (name, culling) in
-        [("none", CullingVolume::None), ("sphere", CullingVolume::Sphere), ("box", CullingVolume::Box)]
-    {
-        add(Knob::Culling, name, Quality { culling, ..exact });
-    }
-    for tile_size in Quality::OCCLUSION_TILE_SIZES {
-        add(Knob::Occlusion, &format!("1/{tile_size}"), Quality { occlusion: Some(tile_size), ..exact });
-    }
-    for (name, normals) in [
-        ("octahedral, 8 bits", NormalFormat::Octahedral8),
-        ("octahedral, 10 bits", NormalFormat::Octahedral10),
-        ("octahedral, half floats", NormalFormat::HalfFloat),
-    ] {
-        add(Knob::Normals, name, Quality { normals, ..exact });
-    }
-    add(Knob::Diffuse, "sRGB, 8 bits", Quality { diffuse: DiffuseFormat::Srgb8, ..exact });
-    add(Knob::Vertices, "packed", Quality { vertices: VertexFormat::Packed, ..exact });
-    for level_of_detail in [0.5, 1.0, 2.0, 4.0] {
-        let name = format!("{level_of_detail} pixels");
-        add(Knob::LevelOfDetail, &name, Quality { level_of_detail, ..exact });
-    }
-    add(Knob::DepthPrePass, "on", Quality { depth_pre_pass: true, ..exact });
-
-    let shadows = exact.shadows;
-    let shadowed = |shadows| Quality { shadows, ..exact };
-    for side in [256, 512, 1024] {
-        add(Knob::ShadowSide, &format!("{side} pixels"), shadowed(ShadowQuality { side, ..shadows }));
-    }
-    for filter in [0, 1] {
-        add(Knob::ShadowFilter, &filter.to_string(), shadowed(ShadowQuality { filter, ..shadows }));
-    }
-    for bias in [0.5, 2.0] {
-        add(Knob::ShadowBias, &bias.to_string(), shadowed(ShadowQuality { bias, ..shadows }));
-    }
-    for interval in [2, 4] {
-        add(Knob::ShadowInterval, &format!("{interval} frames"), shadowed(ShadowQuality { interval, ..shadows }));
-    }
-    for widest_edge in [5.0, 10.0, 20.0, 45.0] {
-        add(Knob::ShadowEdge, &format!("{widest_edge}°"), shadowed(ShadowQuality { widest_edge, ..shadows }));
-    }
-    for (name, light_cut_off) in [("1/1020", 1.0 / 1020.0), ("1/255", 1.0 / 255.0), ("4/255", 4.0 / 255.0)] {
-        add(Knob::LightCutOff, name, Quality { light_cut_off, ..exact });
-    }
-    for (name, radiance_sum) in
-        [("half floats", RadianceSum::HalfFloat), ("floats", RadianceSum::Float), ("shader", RadianceSum::Shader)]
-    {
-        add(Knob::RadianceSum, name, Quality { radiance_sum, ..exact });
-    }
-    add(Knob::ToneCurve, "clipped", Quality { tone_curve: ToneCurve::Clipped, ..exact });
-    add(Knob::Transforms, "camera-relative", exact);
-    add(Knob::Transforms, "absolute", Quality { transforms: TransformPrecision::Absolute, ..exact });
 }
+
+/// Values that are not measured: more than `exact` has, or more than a short path shows.
+const LEFT_OUT: [(&str, &str); 4] = [
+    ("shadows.side", "4096 pixels"),
+    ("shadows.filter", "4 texels"),
+    ("shadows.bias", "4"),
+    ("shadows.interval", "8 frames"),
+];

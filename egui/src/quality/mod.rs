@@ -1,15 +1,13 @@
 //! The settings of the quality, and what each costs in the engine's scene.
 
-mod knobs;
 mod price;
 
 use drawloom::backend::Backend;
-use drawloom::quality::Quality;
+use drawloom::quality::{Knob, Quality};
 use drawloom::{FrameStatistics, Renderer};
 use egui::{Button, ComboBox, Grid, ProgressBar, RichText, Ui};
 
 use crate::colors::ACCENT;
-use knobs::{KNOBS, Knob};
 use price::{KnobValue, Measurement, PriceList};
 
 /// Shows and changes the quality, and measures what its settings cost.
@@ -95,7 +93,7 @@ impl QualityPanel {
                 .into_iter()
                 .for_each(|name| _ = ui.weak(name));
             ui.end_row();
-            for (index, knob) in KNOBS.iter().enumerate() {
+            for (index, knob) in Knob::ALL.iter().enumerate() {
                 let can_measure = self.measurement.is_none() && renderer.pipeline_has_quality();
                 self.show_knob(ui, index, knob, can_measure, &mut chosen);
                 ui.end_row();
@@ -114,7 +112,7 @@ impl QualityPanel {
             }
         } else if ui.button("Measure all prices").clicked() {
             self.measurement =
-                Some(Measurement::new(current, (0..KNOBS.len()).flat_map(|knob| alternatives(knob, current))));
+                Some(Measurement::new(current, (0..Knob::ALL.len()).flat_map(|knob| alternatives(knob, current))));
         }
     }
 
@@ -154,8 +152,8 @@ impl QualityPanel {
 
 /// The values of a knob that are not chosen.
 fn alternatives(knob: usize, current: Quality) -> impl Iterator<Item = KnobValue> {
-    let chosen = KNOBS[knob].chosen(&current);
-    (0..KNOBS[knob].values.len())
+    let chosen = Knob::ALL[knob].chosen(&current);
+    (0..Knob::ALL[knob].values.len())
         .filter(move |value| Some(*value) != chosen)
         .map(move |value| KnobValue { knob, value })
 }

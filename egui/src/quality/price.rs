@@ -6,9 +6,7 @@ use std::mem;
 use std::time::Instant;
 
 use drawloom::FrameStatistics;
-use drawloom::quality::Quality;
-
-use super::knobs::KNOBS;
+use drawloom::quality::{Knob, Quality};
 
 /// A value of a knob, both by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -147,7 +145,7 @@ impl Measurement {
     /// What is measured at present.
     pub fn progress_text(&self) -> String {
         self.pending.front().map_or_else(String::new, |&KnobValue { knob, value }| {
-            let knob = &KNOBS[knob];
+            let knob = &Knob::ALL[knob];
             format!("{}: {}", knob.name, knob.values[value].0)
         })
     }
@@ -166,7 +164,7 @@ impl Measurement {
         if self.turn % 2 == 1
             && let Some(&KnobValue { knob, value }) = self.pending.front()
         {
-            (KNOBS[knob].values[value].1)(&mut quality);
+            (Knob::ALL[knob].values[value].1)(&mut quality);
         }
         quality
     }
@@ -230,13 +228,13 @@ mod tests {
     }
 
     fn value_of(knob: &str, value: &str) -> KnobValue {
-        let knob = KNOBS.iter().position(|candidate| candidate.name == knob).unwrap();
-        KnobValue { knob, value: KNOBS[knob].values.iter().position(|(name, _)| *name == value).unwrap() }
+        let knob = Knob::ALL.iter().position(|candidate| candidate.name == knob).unwrap();
+        KnobValue { knob, value: Knob::ALL[knob].values.iter().position(|(name, _)| *name == value).unwrap() }
     }
 
     #[test]
     fn a_price_is_the_difference_to_the_chosen_settings() {
-        let (on, large) = (value_of("depth pre-pass", "on"), value_of("size of shadow maps", "4096"));
+        let (on, large) = (value_of("depth pre-pass", "on"), value_of("size of shadow maps", "4096 pixels"));
         let costs = |quality: &Quality, _| {
             let interval = if quality.shadows.side == 4096 { 9.0 } else { 5.0 };
             [if quality.depth_pre_pass { 1.5 } else { 1.25 }, interval]
@@ -259,7 +257,7 @@ mod tests {
 
     #[test]
     fn what_is_done_in_every_fourth_frame_costs_a_fourth() {
-        let fourth = value_of("frames between shadow maps", "every 4th");
+        let fourth = value_of("frames between shadow maps", "4 frames");
         let costs = |quality: &Quality, frame: usize| {
             let draws_maps = frame.is_multiple_of(quality.shadows.interval as usize);
             [if draws_maps { 3.0 } else { 1.0 }, 10.0]
