@@ -54,14 +54,14 @@
 //!   processor of their caller. Linux and Android alone have it.
 //! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
 //!   A process supplies one with `RenderProcess::cpu_shader`.
-//! - `obj`: OBJ files and their textures.
 //! - `occlusion`: culling of hidden objects, with `Quality::occlusion`, and of triangles, with
 //!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off, because in no scene that was measured
 //!   does either save the CPU's time.
 //! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
 //!   or a Chrome trace.
-//! - `demo`: the scene that examples, tests and benchmarks draw, and a camera and lights for scenes without them.
 //! - `meshopt`: `scene::Mesh::with_simplified_levels`, which makes levels of detail with meshoptimizer, a library in C++.
+//!
+//! The crate `drawloom-obj` reads OBJ files into a [`Scene`](scene::Scene).
 //!
 //! # Spans
 //!
@@ -93,8 +93,6 @@ mod leaked_guards;
 pub mod quality;
 pub mod handle;
 pub mod scene;
-#[cfg(feature = "demo")]
-pub mod demo;
 pub mod raster;
 pub mod command;
 pub mod view;
@@ -113,7 +111,7 @@ pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
     FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, NodeAccessError,
     NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung, StageTimes,
-    SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp, helper,
+    SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

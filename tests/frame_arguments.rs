@@ -8,10 +8,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use arguments::{Arguments, Frames};
-use drawloom::demo::UpAxis;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::Camera;
-use drawloom::scene::obj::ObjLimits;
+use drawloom_obj::ObjLimits;
+use drawloom_testing::demo::UpAxis;
 
 /// An empty folder of this process, which is removed on drop.
 struct Folder(PathBuf);

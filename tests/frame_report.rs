@@ -18,11 +18,11 @@ use arguments::{Arguments, BackendName};
 use content::Content;
 use drawloom::Renderer;
 use drawloom::backend::NullBackend;
-use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::{RenderObject, obj};
+use drawloom::scene::RenderObject;
 use drawloom::task::Scheduler;
+use drawloom_testing::demo;
 use report::Report;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -34,7 +34,7 @@ fn a_report_counts_what_is_drawn_and_by_kind_what_is_left_out() -> Result<(), Bo
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
     // A triangle without area, two unknown statements of one file, and two malformed lines.
     fs::write(&file, format!("{square}f 1 1 2\nF 1 2 3\nfo 1 2 3\nf 1 2 9\nv 0 0 x\n"))?;
-    let mut imported = obj::load(&file)?;
+    let mut imported = drawloom_obj::load(&file)?;
     let mut content = Content::of_file(&imported);
     demo::add_camera_and_lights(&mut imported.scene);
     let scene = &mut imported.scene;

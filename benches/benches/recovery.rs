@@ -20,7 +20,7 @@ use drawloom::backend::{BackendError, Picture, WgpuBackend};
 use drawloom::process::{Deferred, ToneMapping};
 use drawloom::scene::{Changes, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, Submitter, demo};
+use drawloom::{Renderer, Submitter};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
@@ -29,6 +29,7 @@ use drawloom_benches::table::Table;
 use drawloom_benches::targets::Targets;
 use drawloom_output::print_line;
 use drawloom_testing::adapter;
+use drawloom_testing::demo;
 use serde::Serialize;
 
 /// Medians in milliseconds.

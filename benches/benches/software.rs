@@ -13,7 +13,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::{Picture, SoftwareBackend};
-use drawloom::demo;
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
@@ -25,6 +24,7 @@ use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::stopwatch::timed_frame;
 use drawloom_benches::table::Table;
+use drawloom_testing::demo;
 use indicatif::ProgressBar;
 use serde::Serialize;
 

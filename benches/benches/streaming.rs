@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use drawloom::backend::{StreamingBudget, WgpuBackend};
+use drawloom::backend::{Backend, StreamingBudget, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::handle::Handle;
 use drawloom::process::Deferred;
@@ -297,7 +297,7 @@ impl World {
     }
 
     fn uploaded(&self) -> u64 {
-        drawloom::backend::Backend::uploaded_bytes(self.renderer.backend())
+        self.renderer.backend().uploaded_bytes()
     }
 
     fn resident(&self) -> u64 {

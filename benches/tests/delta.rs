@@ -5,9 +5,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use drawloom::demo;
-use drawloom::scene::{Scene, obj};
+use drawloom::scene::Scene;
 use drawloom_benches::delta::DeltaCommands;
+use drawloom_testing::demo;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::obj_files::hall;
 use drawloom_testing::shared_scenes;
@@ -30,7 +30,7 @@ fn main() -> ExitCode {
 }
 
 fn check_twenty_times(file: &Path) -> Result<(), Failed> {
-    let mut scene = obj::load(file)?.scene;
+    let mut scene = drawloom_obj::load(file)?.scene;
     demo::add_camera_and_lights(&mut scene);
     scene.duplicate_objects(20);
     check(&scene)

@@ -11,11 +11,11 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, ValueEnum};
 use drawloom::Granularity;
 use drawloom::backend::RecordingStrategy;
-use drawloom::demo::UpAxis;
 use drawloom::glam::DVec3;
 use drawloom::scene::Camera;
-use drawloom::scene::obj::ObjLimits;
+use drawloom_obj::ObjLimits;
 use drawloom_output::{OutputFile, PictureFile};
+use drawloom_testing::demo::UpAxis;
 
 /// Renders a scene through the whole frame: graph, jobs, views, commands, sorting and instancing, bundles, queues and
 /// submission.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use drawloom::scene::obj::{Imported, ObjWarning};
 use drawloom::scene::{Mesh, Scene};
+use drawloom_obj::{Imported, ObjWarning};
 use drawloom_output::print_diagnostic;
 use serde::Serialize;
 

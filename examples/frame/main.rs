@@ -24,13 +24,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, NullBackend, Picture, WgpuBackend};
-use drawloom::demo;
-use drawloom::scene::{Mesh, Scene, obj};
+use drawloom::scene::{Mesh, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
 use drawloom::{FrameStatistics, Submitted, wgpu};
 use drawloom_output::{path_text, print_diagnostic, print_line};
 use drawloom_testing::adapter;
+use drawloom_testing::demo;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use arguments::{Arguments, BackendName, Frames};
@@ -150,7 +150,7 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Option<String>, Content),
     let mut scene = match &arguments.scene {
         None => demo::colonnade()?,
         Some(path) => {
-            let mut imported = obj::load_within(path, &arguments.obj_limits())
+            let mut imported = drawloom_obj::load_within(path, &arguments.obj_limits())
                 .inspect_err(|error| print_warnings(error.warnings()))?;
             content = Content::of_file(&imported);
             found = Some(format!(

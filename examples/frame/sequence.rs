@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use drawloom::backend::{Backend, BackendError, Picture, SoftwareSubmission, WgpuBackend, WgpuSubmission};
-use drawloom::demo::UpAxis;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom_output::{PictureFile, path_text, print_line};
+use drawloom_testing::demo::UpAxis;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::{Arguments, BackendName, CameraPosition};

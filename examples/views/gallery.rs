@@ -1,11 +1,11 @@
 //! The scene, its mirror, portals and screen, and the cameras of all views.
 
-use drawloom::demo;
 use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
     Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Topology, Vertex, ViewKind,
 };
+use drawloom_testing::demo;
 
 use crate::surface::Surface;
 use crate::{contact_sheet, impostor, mirror_ball, smoke};

@@ -4,9 +4,9 @@
 
 use std::io;
 
-use drawloom::demo;
-use drawloom::scene::obj::Imported;
 use drawloom_fuzz::imports::{check_frame, import};
+use drawloom_obj::Imported;
+use drawloom_testing::demo;
 use libfuzzer_sys::fuzz_target;
 
 const LIBRARY: &[u8] = b"newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd a.png\nnewmtl glow\nKe 1 1 1\n";

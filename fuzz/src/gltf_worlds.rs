@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use drawloom::task::Scheduler;
-use gltf_scene::{LoadOptions, load_bytes};
-use indicatif::ProgressBar;
+use drawloom_gltf::{LoadOptions, load_bytes};
 
-#[path = "../../examples/gltf/tests/gltf/invariants.rs"]
+#[path = "../../gltf/tests/gltf/invariants.rs"]
 pub(crate) mod invariants;
 
 use invariants::{SMALL_LIMITS, check_error, check_world};
@@ -24,8 +23,7 @@ thread_local! {
 /// If one is wrong.
 pub fn check(file: &[u8], time: Option<f64>) {
     let options = LoadOptions { time, limits: SMALL_LIMITS, ..LoadOptions::default() };
-    let load =
-        |scheduler: &Scheduler| load_bytes(Path::new(NAME), file.to_vec(), &options, scheduler, &ProgressBar::hidden());
+    let load = |scheduler: &Scheduler| load_bytes(Path::new(NAME), file.to_vec(), &options, scheduler, &mut |_| ());
     let checked = match SCHEDULER.with(load) {
         Ok(world) => check_world(&world, &SMALL_LIMITS),
         Err(error) => check_error(&error, NAME),

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::scene::obj::{self, Imported, ObjError, ObjLimits};
 use drawloom::scene::{Camera, Light, Material, Mesh, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
+use drawloom_obj::{Imported, ObjError, ObjLimits};
 
 use crate::gltf_worlds::invariants::is_forbidden;
 
@@ -31,7 +31,7 @@ pub const LIMITS: ObjLimits = ObjLimits {
 
 /// Imports a file, and checks the scene, or the error. `check` gets the import.
 pub fn import(file: &[u8], fetch: impl Fn(&str) -> io::Result<Vec<u8>>, check: impl FnOnce(&Imported)) {
-    match obj::read_within(NAME, file, fetch, &LIMITS) {
+    match drawloom_obj::read_within(NAME, file, fetch, &LIMITS) {
         Ok(imported) => {
             check_meshes(&imported);
             check_materials(imported.scene.as_scene_ref());

@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
-use super::picture::Picture;
 use super::read_back::ReadBack;
 use super::requests::{FrameRequest, PassRequest};
 use super::scene_limits::SceneLimits;
 use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
 use crate::command::DrawState;
-use crate::process::{Draws, FramePlan, ShaderResource};
+use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
 use crate::task::Worker;
@@ -240,16 +239,6 @@ pub trait Backend: Send + Sync + 'static {
     fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
         let _ = (frame, view, target);
         Err(BackendError::CannotReadBack)
-    }
-
-    /// A texture with the pixels of a picture, for shaders to sample. Called on any thread, at any time. `None` from a backend whose shaders
-    /// read no resources.
-    ///
-    /// # Errors
-    /// If the device refuses it.
-    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
-        let _ = picture;
-        Ok(None)
     }
 
     /// Submits a frame's queues one after the other. Called only on the device thread.

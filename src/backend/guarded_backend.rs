@@ -26,14 +26,6 @@ impl CallPanic {
     }
 }
 
-/// Calls a method of a backend.
-///
-/// # Errors
-/// If it panics.
-pub(crate) fn guarded<R>(call: &'static str, method: impl FnOnce() -> R) -> Result<R, CallPanic> {
-    catch(method).map_err(|JobPanic { message, .. }| CallPanic { call, message })
-}
-
 /// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's
 /// code. Outside of jobs the rest of the crate calls it in no other way.
 ///
@@ -66,8 +58,12 @@ impl<B> GuardedBackend<B> {
         Arc::ptr_eq(&self.backend, &other.backend)
     }
 
+    /// Calls a method of the backend.
+    ///
+    /// # Errors
+    /// If it panics.
     fn call<R>(&self, call: &'static str, method: impl FnOnce(&B) -> R) -> Result<R, CallPanic> {
-        guarded(call, || method(&self.backend))
+        catch(|| method(&self.backend)).map_err(|JobPanic { message, .. }| CallPanic { call, message })
     }
 }
 

@@ -32,7 +32,7 @@ pub use self::wgpu::{
 pub use backend_trait::Backend;
 pub use error::BackendError;
 pub use frame_fence::FrameFence;
-pub(crate) use guarded_backend::{CallPanic, GuardedBackend, guarded};
+pub(crate) use guarded_backend::{CallPanic, GuardedBackend};
 pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::{NullBackend, NullPass, NullSubmission};
 pub use picture::Picture;

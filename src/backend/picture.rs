@@ -22,7 +22,7 @@ pub struct Picture {
 
 impl Picture {
     /// Whether it has the bytes that its size and format say, and any.
-    pub(crate) fn is_whole(&self) -> bool {
+    pub fn is_whole(&self) -> bool {
         let bytes = (self.width as usize).checked_mul(self.height as usize);
         let bytes = bytes.and_then(|pixels| pixels.checked_mul(self.format.bytes()));
         bytes == Some(self.bytes.len()) && !self.bytes.is_empty()

@@ -18,7 +18,6 @@ mod frame_node;
 mod frame_outcome;
 mod frame_place;
 mod granularity;
-pub mod helper;
 mod lent_nodes;
 mod light_maps;
 mod list_inputs;

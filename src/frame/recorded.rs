@@ -102,8 +102,17 @@ impl<B: Backend> Recorded<B> {
         self.frame_number.map_or_else(|| "a frame".to_owned(), |number| format!("frame {number}"))
     }
 
-    /// The camera that a view, by index, is drawn with. The views are those of the scene's cameras, in their order, then those of shadow
-    /// maps. `None` if there is no such view.
+    /// The backend that it was recorded for.
+    pub fn backend(&self) -> &B {
+        self.backend.unguarded()
+    }
+
+    /// The views as they were recorded: those of the scene's cameras, in their order, then those of shadow maps.
+    pub fn views(&self) -> &[RenderView] {
+        &self.views.views
+    }
+
+    /// The camera that a view, by index, is drawn with. `None` if there is no [such view](Self::views).
     pub fn camera(&self, view: usize) -> Option<&Camera> {
         self.views.views.get(view).map(|view| &view.camera)
     }

@@ -485,8 +485,8 @@ impl<B: Backend> Renderer<B> {
         &self.scheduler
     }
 
-    /// The backend.
-    pub fn backend(&self) -> &B {
+    /// The backend, which its submitters and frames share.
+    pub fn backend(&self) -> &Arc<B> {
         self.backend.unguarded()
     }
 }

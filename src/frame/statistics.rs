@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use super::helper::HelperStatistics;
 use super::piece_statistics::PieceStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
@@ -38,8 +37,6 @@ pub struct FrameStatistics {
     pub rejections: Vec<Rejection>,
     /// What was chosen by measurement, and by which costs.
     pub tuning: FrameTuning,
-    /// What each [helper](super::helper) computes for each view, once it [reads the frame back](super::helper::PostHelper::read_back).
-    pub helpers: Vec<HelperStatistics>,
 }
 
 /// Statistics of a view.
@@ -159,7 +156,6 @@ impl FrameStatistics {
             stages,
             rejections: request.rejections.list_of(request.scene),
             tuning,
-            helpers: Vec::new(),
         }
     }
 }

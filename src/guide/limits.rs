@@ -10,7 +10,7 @@
 //! - **The web.** Threads are needed, and wgpu's native backends: Vulkan, Metal and DX12.
 //! - **A game engine.** There is no window, input, sound, physics, asset pipeline or scene file of its own. `examples/` shows how such
 //!   parts are joined to it.
-//! - **Physically based materials out of the box.** The shipped materials are diffuse, emissive and textured. `examples/gltf` has
+//! - **Physically based materials out of the box.** The shipped materials are diffuse, emissive and textured. `drawloom-gltf` has
 //!   metallic and rough ones as an engine's own material type.
 //! - **Ray tracing and global illumination.** An engine can add passes for both.
 //! - **Streaming by itself.** Meshes and textures are uploaded within the frame that first draws them, which takes long for many at once,

@@ -27,8 +27,6 @@ mod material_type;
 mod mesh;
 mod mesh_levels;
 mod node_column;
-#[cfg(feature = "obj")]
-pub mod obj;
 mod object_column;
 mod object_filter;
 mod object_set;

@@ -166,8 +166,8 @@ impl SceneRef<'_> {
         transform_is_valid(position, orientation, self.scale_column().get(object))
     }
 
-    /// The objects whose transforms can be drawn; none if the scene's slices differ in length.
-    pub(crate) fn drawable_objects(self) -> impl Iterator<Item = usize> {
+    /// The indices of the objects whose transforms can be drawn; none if the scene's slices differ in length.
+    pub fn drawable_objects(self) -> impl Iterator<Item = usize> {
         let count = if self.check_lengths().is_ok() { self.object_count() } else { 0 };
         (0..count).filter(move |&object| self.transform_is_valid(object))
     }

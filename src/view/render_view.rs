@@ -76,7 +76,7 @@ impl RenderView {
     }
 
     /// [`RenderView::clip_from_relative`] before rounding.
-    pub(crate) fn precise_clip_from_relative(&self) -> DMat4 {
+    pub fn precise_clip_from_relative(&self) -> DMat4 {
         let camera = &self.camera;
         let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
         let projection = match camera.projection {

@@ -11,7 +11,7 @@ use drawloom::process::{Draws, FramePlan};
 use drawloom::quality::Quality;
 use drawloom::task::Worker;
 
-use crate::forwarded_calls::{forward_limits, forward_unchanged_calls};
+use crate::forwarded_calls::{forward_limits, forward_picture_uploads, forward_unchanged_calls};
 
 /// Passes calls on to another backend, counts them, and fails one of them.
 ///
@@ -302,3 +302,5 @@ impl<B: Backend> Backend for FaultyBackend<B> {
         self.inner.submit(frame, queues, fences)
     }
 }
+
+forward_picture_uploads!(FaultyBackend);

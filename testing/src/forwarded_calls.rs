@@ -48,13 +48,6 @@ macro_rules! forward_unchanged_calls {
             self.inner.read_back(frame, view, target)
         }
 
-        fn upload_picture(
-            &self,
-            picture: &::drawloom::backend::Picture,
-        ) -> Result<Option<::drawloom::process::ShaderResource<'static>>, ::drawloom::backend::BackendError> {
-            self.inner.upload_picture(picture)
-        }
-
         fn part_count(&self, frame: &B::Frame, pass: &::drawloom::backend::PassRequest<'_>) -> usize {
             self.inner.part_count(frame, pass)
         }
@@ -168,4 +161,18 @@ macro_rules! forward_recording_calls {
     };
 }
 
-pub(crate) use {forward_limits, forward_recording_calls, forward_unchanged_calls};
+/// The implementation of [`UploadPicture`](drawloom_async_post::UploadPicture) for a wrapper of the backend `inner`.
+macro_rules! forward_picture_uploads {
+    ($wrapper:ident) => {
+        impl<B: ::drawloom_async_post::UploadPicture> ::drawloom_async_post::UploadPicture for $wrapper<B> {
+            fn upload_picture(
+                &self,
+                picture: &::drawloom::backend::Picture,
+            ) -> Result<Option<::drawloom::process::ShaderResource<'static>>, ::drawloom::backend::BackendError> {
+                ::drawloom_async_post::UploadPicture::upload_picture(&self.inner, picture)
+            }
+        }
+    };
+}
+
+pub(crate) use {forward_limits, forward_picture_uploads, forward_recording_calls, forward_unchanged_calls};

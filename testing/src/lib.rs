@@ -5,6 +5,7 @@ pub mod absent_features;
 pub mod adapter;
 pub mod changing_world;
 pub mod culling;
+pub mod demo;
 pub mod draw_lists;
 pub mod fault_injection;
 pub mod feedback;

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, BackendError, FrameFence, ViewQueue};
 
-use crate::forwarded_calls::{forward_limits, forward_recording_calls, forward_unchanged_calls};
+use crate::forwarded_calls::{
+    forward_limits, forward_picture_uploads, forward_recording_calls, forward_unchanged_calls,
+};
 
 /// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
 /// Its passes take equal shares of that time.
@@ -130,3 +132,5 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
         format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
     }
 }
+
+forward_picture_uploads!(SimulatedDevice);

@@ -35,7 +35,7 @@ impl Source {
 }
 
 /// The folders of the crates that engines build.
-pub const CRATES: [&str; 2] = ["jobs/src", "src"];
+pub const CRATES: [&str; 5] = ["async-post/src", "gltf/src", "jobs/src", "obj/src", "src"];
 
 /// The files of these folders.
 pub fn read_all(folders: &[&str]) -> Vec<Source> {

@@ -5,8 +5,6 @@ use std::thread;
 
 use drawloom::process::{Deferred, Parameters};
 use drawloom::quality::Quality;
-#[cfg(feature = "obj")]
-use drawloom::scene::obj;
 use drawloom::scene::{Material, MaterialPredicate};
 
 use crate::builds::deferred;
@@ -90,7 +88,6 @@ fn a_panic_of_a_predicate_that_an_engine_asks_unwinds() {
     });
 }
 
-#[cfg(feature = "obj")]
 #[test]
 fn a_panic_of_what_fetches_files_unwinds_to_who_reads_them() {
     within_time(|| {
@@ -99,7 +96,8 @@ fn a_panic_of_what_fetches_files_unwinds_to_who_reads_them() {
                 call(Kind::Hook, "fetch");
                 Ok(b"newmtl stone\n".to_vec())
             };
-            obj::read("a.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl stone\nf 1 2 3\n", fetch).unwrap();
+            drawloom_obj::read("a.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl stone\nf 1 2 3\n", fetch)
+                .unwrap();
         };
         assert_eq!(each_call_unwinds(Kind::Hook, read), ["fetch"]);
     });

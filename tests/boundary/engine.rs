@@ -22,6 +22,7 @@ use drawloom::scene::Mesh;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::timeline::{Labels, TuningChoice};
 use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom_async_post::UploadPicture;
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
@@ -237,11 +238,6 @@ impl<B: Backend> Backend for OwnBackend<B> {
         Ok(Box::new(OwnReadBack { inner, _dropped: Owned::new("read_back", ()) }))
     }
 
-    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
-        backend("upload_picture");
-        self.inner.upload_picture(picture)
-    }
-
     fn submit(
         &self,
         frame: Self::Frame,
@@ -256,6 +252,13 @@ impl<B: Backend> Backend for OwnBackend<B> {
         let queues = queues.into_iter().map(passes_of).collect();
         let submission = self.inner.submit(frame.take(), queues, fences)?;
         Ok(Owned::new("submission", submission))
+    }
+}
+
+impl<B: UploadPicture> UploadPicture for OwnBackend<B> {
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        backend("upload_picture");
+        self.inner.upload_picture(picture)
     }
 }
 

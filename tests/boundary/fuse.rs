@@ -14,7 +14,7 @@ pub enum Kind {
     Process,
     /// Predicates of materials.
     Predicate,
-    /// Steps of post-processing, of helpers, and what reads a target back.
+    /// Steps of asynchronous post-processing, and what reads a target back.
     Step,
     /// What follows a submission, callbacks of fences, devices that set fences, hooks of threads, jobs, and
     /// loads.

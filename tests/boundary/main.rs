@@ -2,14 +2,15 @@
 //! unwinds out of the crate or hangs, the error names what panicked, nothing stays in memory, and the next frame is
 //! that of a renderer which knew no panic. The changes that the frame before was told of are in it.
 //!
-//! The tables in `src/unwind.rs` and `jobs/src/unwind/mod.rs` list the calls. These hold with debug assertions and without.
+//! The tables in `src/unwind.rs`, `jobs/src/unwind/mod.rs` and `async-post/src/unwind.rs` list the calls;
+//! `drawloom_obj::read` has one more. These hold with debug assertions and without.
 
+mod async_post;
 mod builds;
 mod callers;
 mod engine;
 mod frames;
 mod fuse;
-mod helpers;
 mod loops;
 mod preparations;
 #[cfg(feature = "wgpu")]

@@ -1,14 +1,14 @@
-//! What the engine has done beside frames: pipelines, jobs, loads, pictures of helpers.
+//! What the engine has done beside frames: pipelines, jobs, loads, pictures of post-processing.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use drawloom::backend::{NullBackend, Picture, SoftwareBackend};
-use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
 use drawloom::process::Deferred;
 use drawloom::scene::{AssetLoader, Material, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
+use drawloom_async_post::{AsyncPost, AsyncStep, StepFrame, StepSource};
 
 use crate::engine::{OwnBackend, OwnProcess};
 use crate::frames::worlds;
@@ -227,29 +227,29 @@ fn a_panic_in_the_destructor_of_a_load_loses_no_other_load() {
 
 struct Step;
 
-impl HelperStep for Step {
+impl AsyncStep for Step {
     fn name(&self) -> &str {
         "step"
     }
 
-    fn compute(&self, frame: &HelperFrame<'_>) -> Picture {
+    fn compute(&self, frame: &StepFrame<'_>) -> Picture {
         frame.picture.clone()
     }
 }
 
 #[test]
-fn a_panic_of_an_upload_is_an_error_of_the_helper() {
+fn a_panic_of_an_upload_is_an_error() {
     within_time(|| {
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
-        let helper = PostHelper::new(Arc::clone(&scheduler), Step, HelperSource::whole("picture"));
+        let post = AsyncPost::new(Arc::clone(&scheduler), Step, StepSource::whole("picture"));
         let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).deferred(Deferred::to_picture());
         let (renderer, _submitter) = builder.build(scheduler).unwrap();
         let [scene, _] = worlds();
         fuse::arm(Kind::Backend, 0, true);
-        let begun = catch_unwind(AssertUnwindSafe(|| helper.begin_frame(&renderer, &scene.cameras)));
+        let begun = catch_unwind(AssertUnwindSafe(|| post.begin_frame(&renderer, &scene.cameras)));
         assert_eq!(fuse::disarm(), Some("upload_picture"));
         assert!(begun.is_ok(), "it unwinds");
-        let errors: Vec<_> = helper.take_errors().iter().map(ToString::to_string).collect();
+        let errors: Vec<_> = post.take_errors().iter().map(ToString::to_string).collect();
         assert!(errors.iter().any(|error| error.contains("upload_picture panicked")), "{errors:?}");
     });
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use drawloom::backend::{NullBackend, NullPass};
 use drawloom::command::{DrawList, Splitters};
-use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Blend, Projection, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer};
+use drawloom_testing::demo;
 use drawloom_testing::scenes::field;
 
 use crate::renderer;

@@ -18,12 +18,12 @@ use std::process::Command;
 use std::sync::Arc;
 
 use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuSubmission};
-use drawloom::demo;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::{CpuNode, Renderer};
+use drawloom_testing::demo;
 use drawloom_testing::hills::{self, GeneratedHills};
 use drawloom_testing::{adapter, scenes};
 

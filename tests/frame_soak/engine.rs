@@ -6,12 +6,12 @@ use std::thread;
 use std::time::Duration;
 
 use drawloom::backend::{BackendError, StreamingBudget, WgpuBackend};
-use drawloom::helper::{Bloom, HelperLayer, PostHelper};
 use drawloom::process::{Declare, Deferred, Draws, FullScreen, RenderProcess, ToneMapping};
 use drawloom::quality::Quality;
 use drawloom::scene::SceneRef;
 use drawloom::task::Scheduler;
 use drawloom::{Buffering, FinishedFrame, FrameError, FrameLoop, FrameLoopError, Renderer};
+use drawloom_async_post::{AsyncPost, Bloom, LayerSettings};
 use drawloom_testing::adapter;
 use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
 use drawloom_testing::random::Random;
@@ -89,7 +89,7 @@ pub struct Engine {
     frames: SoakLoop,
     world: World,
     /// Computes a bloom on the workers, while the device draws.
-    bloom: PostHelper,
+    bloom: AsyncPost,
     sparks: Sparks,
     panics: Arc<AtomicBool>,
     in_flight: usize,
@@ -109,8 +109,8 @@ impl Engine {
         let process = MayPanic { panics: Arc::clone(&panics) };
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
         let glow = Bloom::default();
-        let bloom = PostHelper::new(Arc::clone(&scheduler), glow.on_cpu(), glow.source());
-        let deferred = Deferred::new().post(bloom.layer(HelperLayer::default())).post(ToneMapping::default());
+        let bloom = AsyncPost::new(Arc::clone(&scheduler), glow.on_cpu(), glow.source());
+        let deferred = Deferred::new().post(bloom.layer(LayerSettings::default())).post(ToneMapping::default());
         let builder = Renderer::builder(open()).deferred(deferred).process(process);
         let builder = builder.process(bloom.downsample().unwrap()).output(bloom.source_target());
         let (renderer, submitter) = builder.build(scheduler).unwrap();
@@ -166,7 +166,7 @@ impl Engine {
         let mut recorded = recorded?;
         self.bloom.read_back(&mut recorded);
         self.totals.static_groups += u64::from(recorded.statistics().views.iter().any(|view| view.pieces > 0));
-        self.totals.results += u64::from(recorded.statistics().helpers.iter().any(|view| view.result.is_some()));
+        self.totals.results += u64::from(self.bloom.statistics().iter().any(|view| view.result.is_some()));
         slot.submit(recorded);
         self.in_flight += 1;
         self.totals.frames += 1;

@@ -10,12 +10,12 @@ use std::time::Duration;
 
 use drawloom::backend::{Picture, StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
-use drawloom::helper::{HelperFrame, HelperSource, HelperStep, PostHelper};
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, Parameters, RenderProcess};
 use drawloom::scene::{Mesh, Texture};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Timeline;
 use drawloom::{FramePlace, Renderer, Submitter};
+use drawloom_async_post::{AsyncPost, AsyncStep, StepFrame, StepSource};
 use libtest_mimic::Failed;
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 
@@ -25,7 +25,7 @@ use crate::fixture::{LONG, ensure, noop_backend, same, scene};
 pub const CASES: &[Case] = &[
     ("a_name_that_calls_the_timeline_while_it_is_converted", names),
     ("a_clock_that_waits_while_a_log_is_taken", clocks),
-    ("a_clock_that_asks_a_helper_for_its_picture", helpers),
+    ("a_clock_that_asks_for_the_picture_of_a_step", async_post),
     ("parameters_that_are_read_and_set_while_they_are_updated", parameters),
     ("a_subscriber_that_asks_a_backend_while_that_streams", streaming),
     ("a_subscriber_that_asks_a_backend_while_that_makes_pipelines", pipelines),
@@ -101,21 +101,21 @@ fn clocks() -> Result<(), Failed> {
 /// A step that makes a picture of one pixel.
 struct Pixel;
 
-impl HelperStep for Pixel {
+impl AsyncStep for Pixel {
     fn name(&self) -> &str {
         "pixel"
     }
 
-    fn compute(&self, _: &HelperFrame<'_>) -> Picture {
+    fn compute(&self, _: &StepFrame<'_>) -> Picture {
         Picture { width: 1, height: 1, format: Format::Rgba8Unorm, bytes: vec![0; 4] }
     }
 }
 
-fn helpers() -> Result<(), Failed> {
-    static HELPER: OnceLock<PostHelper> = OnceLock::new();
+fn async_post() -> Result<(), Failed> {
+    static ASYNC_POST: OnceLock<AsyncPost> = OnceLock::new();
     let clock = || {
-        if let Some(helper) = HELPER.get() {
-            helper.latest("main");
+        if let Some(post) = ASYNC_POST.get() {
+            post.latest("main");
         }
         Duration::from_secs(1)
     };
@@ -124,13 +124,13 @@ fn helpers() -> Result<(), Failed> {
     let backend = drawloom::backend::SoftwareBackend::new(Arc::clone(&scheduler));
     let (mut renderer, submitter) =
         Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
-    HELPER.set(PostHelper::new(scheduler, Pixel, HelperSource::whole("picture"))).map_err(|_| "it is set once")?;
-    let helper = HELPER.get().ok_or("it is set")?;
+    ASYNC_POST.set(AsyncPost::new(scheduler, Pixel, StepSource::whole("picture"))).map_err(|_| "it is set once")?;
+    let post = ASYNC_POST.get().ok_or("it is set")?;
     let scene = scene();
     for _ in 0..5 {
-        helper.begin_frame(&renderer, &scene.cameras);
+        post.begin_frame(&renderer, &scene.cameras);
         let mut recorded = renderer.record(scene.as_scene_ref())?;
-        helper.read_back(&mut recorded);
+        post.read_back(&mut recorded);
         submitter.submit(recorded)?;
     }
     let counters = renderer.scheduler().timeline().take().counters;

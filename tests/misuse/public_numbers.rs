@@ -37,17 +37,17 @@ const RESULTS: &[&str] = &[
     "backend::ViewQueue::",
     "backend::WgpuPassStatistics::",
     "backend::WgpuResources::",
+    "drawloom_async_post::AsyncPostStatistics::",
+    "drawloom_async_post::StepFrame::",
     "fence::FenceWait::",
     "graph::ModeChoice::",
     "handle::StaleHandle::",
-    "helper::HelperFrame::",
-    "helper::HelperStatistics::",
     "raster::CulledTriangles::",
     "scene::Arrivals::",
     "scene::ChunkInUse::",
-    "scene::obj::IgnoredKeyword::",
-    "scene::obj::Imported::",
-    "scene::obj::ObjWarning::",
+    "drawloom_obj::IgnoredKeyword::",
+    "drawloom_obj::Imported::",
+    "drawloom_obj::ObjWarning::",
     "timeline::Chunk::",
     "timeline::Counter::",
     "timeline::DeviceLog::",
@@ -114,9 +114,9 @@ const RESULTS: &[&str] = &[
     "NodeResource::Buffer::",
 ];
 
-/// Paths that begin with one of these are tools below the renderer for engines that build their own. They document what
-/// an index that is not there does, and their own tests have their extremes.
-const TOOLS: &[&str] = &["command::", "raster::", "view::", "handle::Slots::"];
+/// Paths that begin with one of these are tools below the renderer for engines that build their own, or loaders of
+/// files. They document what an index that is not there does, and their own tests have their extremes.
+const TOOLS: &[&str] = &["command::", "drawloom_gltf::", "raster::", "view::", "handle::Slots::"];
 
 /// Bytes that shaders read as they are.
 const BYTES: &[&str] = &["parameters"];
@@ -142,7 +142,6 @@ const EXTREMES: &[&str] = &[
     "scene::SceneRef::",
     "scene::Vertex::",
     "scene::WrittenColumn",
-    "demo::UpAxis::looking_at",
     "quality::DepthCurve::",
     "quality::DepthKey::bits",
     "quality::Quality::",
@@ -248,7 +247,8 @@ fn has_number(text: &str) -> bool {
     text.split(|character: char| !character.is_alphanumeric() && character != '_').any(|word| NUMBERS.contains(&word))
 }
 
-/// A path without the crate's name and without generic arguments.
+/// A path without generic arguments, and without the name of `drawloom` or of `drawloom-jobs`, whose modules `drawloom`
+/// re-exports.
 fn path_of(name: &str) -> String {
     let (mut depth, mut before, mut path) = (0, ' ', String::new());
     for character in name.chars() {

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use drawloom::backend::Picture;
-use drawloom::demo;
 use drawloom::glam::Vec3;
-use drawloom::scene::{Light, Mesh, Scene, Vertex, obj};
+use drawloom::scene::{Light, Mesh, Scene, Vertex};
+use drawloom_testing::demo;
 use drawloom_testing::obj_files::{ObjFile, UNUSUAL, hall, interior};
 use drawloom_testing::scenes::field;
 use drawloom_testing::shared_scenes;
@@ -69,7 +69,7 @@ pub fn shared(path: &str) -> Result<Scene, Failed> {
 }
 
 fn load(path: &Path) -> Result<Scene, Failed> {
-    let mut scene = obj::load(path)?.scene;
+    let mut scene = drawloom_obj::load(path)?.scene;
     demo::add_camera_and_lights(&mut scene);
     Ok(scene)
 }
@@ -184,7 +184,7 @@ fn malformed_files() -> Result<(), Failed> {
 
 /// Whether a file loads. If it does, something of it is seen.
 fn draws_if_it_loads(path: &Path) -> Result<bool, Failed> {
-    let Ok(mut imported) = obj::load(path) else { return Ok(false) };
+    let Ok(mut imported) = drawloom_obj::load(path) else { return Ok(false) };
     demo::add_camera_and_lights(&mut imported.scene);
     let picture = draw(&small(imported.scene))?;
     let first = &picture.bytes[..4];

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use drawloom::backend::{Picture, SoftwareBackend};
-use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, ClipPlane, LayerMask, Projection, RenderObject, Scene};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
+use drawloom_testing::demo;
 use drawloom_testing::obj_files::{hall, interior};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;

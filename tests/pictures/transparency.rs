@@ -6,7 +6,7 @@ use std::io::{self, Cursor};
 use drawloom::backend::Picture;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology, obj};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, Topology};
 use drawloom::view::ShadowMaps;
 use drawloom_testing::scenes::{cube, sized, square};
 use half::f16;
@@ -318,7 +318,7 @@ fn masked() -> Result<(), Failed> {
             "mask.png" => Ok(png.clone()),
             _ => Err(io::ErrorKind::NotFound.into()),
         };
-        let imported = obj::read("a.obj", file.as_bytes(), fetch)?;
+        let imported = drawloom_obj::read("a.obj", file.as_bytes(), fetch)?;
         if !imported.warnings.is_empty() {
             return Err(format!("{:?}", imported.warnings).into());
         }

@@ -7,9 +7,7 @@ use std::sync::Arc;
 use drawloom::backend::{Picture, SoftwareBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::scene::{
-    Blend, Camera, Material, Mesh, Projection, RenderObject, Scene, Topology, VERTEX_COLOR, Vertex, obj,
-};
+use drawloom::scene::{Blend, Camera, Material, Mesh, Projection, RenderObject, Scene, Topology, VERTEX_COLOR, Vertex};
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{sized, square};
@@ -141,7 +139,7 @@ fn without_colors() -> Result<(), Failed> {
 /// Of a triangle that is red, green and blue at its corners, each corner is the brightest in its channel.
 fn of_an_obj_file() -> Result<(), Failed> {
     let text = "v -1 -1 0 1 0 0\nv 1 -1 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
-    let mut scene = obj::read("triangle.obj", text.as_bytes(), |_| Err(io::ErrorKind::NotFound.into()))?.scene;
+    let mut scene = drawloom_obj::read("triangle.obj", text.as_bytes(), |_| Err(io::ErrorKind::NotFound.into()))?.scene;
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z * 2.0, DVec3::ZERO), SIZE)];
     scene.ambient = Vec3::ONE;
     let found = half_floats(&draw(Deferred::new().vertex_colors(true), &scene, "radiance")?);

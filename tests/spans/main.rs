@@ -10,10 +10,10 @@ use std::io;
 use std::sync::{Arc, Mutex};
 
 use drawloom::backend::NullBackend;
-use drawloom::demo;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Granularity, Renderer};
+use drawloom_testing::demo;
 use serde_json::Value;
 use tracing::level_filters::LevelFilter;
 use tracing::{Dispatch, Level, dispatcher};

@@ -14,9 +14,10 @@ use clap::Parser;
 use drawloom::backend::{Backend, WgpuBackend};
 use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::task::Scheduler;
-use drawloom::{Renderer, demo, wgpu};
+use drawloom::{Renderer, wgpu};
 use drawloom_output::{print_diagnostic, print_line};
 use drawloom_testing::adapter;
+use drawloom_testing::demo;
 use drawloom_tracy::Zones;
 use indicatif::{ProgressBar, ProgressStyle};
 

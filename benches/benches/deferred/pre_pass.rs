@@ -3,13 +3,13 @@
 use std::error::Error;
 use std::rc::Rc;
 
-use drawloom::demo;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneError};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::table::Table;
 use drawloom_output::print_line;
+use drawloom_testing::demo;
 use indicatif::ProgressBar;
 use serde::Serialize;
 

@@ -18,14 +18,13 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use drawloom::command::{DrawState, RenderCommand, SortKey};
-use drawloom::demo;
 use drawloom::quality::Quality;
-use drawloom::scene::obj;
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::delta::DeltaCommands;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::statistics::median_duration;
 use drawloom_output::print_diagnostic;
+use drawloom_testing::demo;
 use drawloom_testing::draw_lists::draw_lists;
 use drawloom_testing::random::Random;
 use drawloom_testing::shared_scenes;
@@ -69,7 +68,7 @@ fn cases() -> Result<Vec<Case>, Box<dyn Error>> {
     ];
     let sponza = shared_scenes::folder().join("sponza/sponza_part.obj");
     if sponza.is_file() {
-        let mut scene = obj::load(sponza)?.scene;
+        let mut scene = drawloom_obj::load(sponza)?.scene;
         demo::add_camera_and_lights(&mut scene);
         scene.duplicate_objects(20);
         cases.push(Case { scene: "sponza x 20", lists: draw_lists(&scene)? });

@@ -4,13 +4,13 @@ use std::error::Error;
 use std::sync::Arc;
 use std::thread::available_parallelism;
 
-use drawloom::demo;
 use drawloom::quality::DepthKey;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom_benches::city;
 use drawloom_benches::clouds::around_one;
 use drawloom_benches::table::Table;
+use drawloom_testing::demo;
 use indicatif::ProgressBar;
 use serde::Serialize;
 

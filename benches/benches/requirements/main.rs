@@ -22,7 +22,6 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use drawloom::backend::WgpuBackend;
-use drawloom::demo;
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, WarmUp};
@@ -34,6 +33,7 @@ use drawloom_benches::results;
 use drawloom_benches::statistics::median_duration;
 use drawloom_benches::table::Table;
 use drawloom_benches::targets::Targets;
+use drawloom_testing::demo;
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::everything::everything;
 use indicatif::ProgressBar;

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
-use drawloom::demo;
-use drawloom::scene::obj;
 use drawloom_output::print_diagnostic;
+use drawloom_testing::demo;
 
 use crate::Failure;
 use crate::every_knob::every_knob;
@@ -105,7 +104,7 @@ impl Arguments {
         let Some(path) = self.scene.as_ref().filter(|path| path.as_os_str() != COLONNADE) else {
             return Ok(Subject::of_scene(demo::colonnade()?));
         };
-        let mut imported = obj::load(path)?;
+        let mut imported = drawloom_obj::load(path)?;
         for warning in &imported.warnings {
             print_diagnostic!("warning: {warning}");
         }

@@ -14,9 +14,12 @@ use std::sync::Arc;
 
 use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use drawloom::Renderer;
+use drawloom::backend::WgpuBackend;
+use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::task::Scheduler;
+use drawloom_gltf::{GltfLimits, LoadOptions, World, draw, load};
 use drawloom_output::{PictureFile, path_text, print_diagnostic, print_line};
-use gltf_scene::{GltfLimits, LoadOptions, World, draw, load, open_device};
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::filter::LevelFilter;
 
@@ -84,9 +87,12 @@ fn read(arguments: &Arguments, scheduler: &Scheduler) -> Result<World, Box<dyn E
         size: [arguments.size[0], arguments.size[1]],
         limits,
     };
-    let progress = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} images")?);
-    let loaded = load(&arguments.file, &options, scheduler, &progress);
-    progress.finish_and_clear();
+    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} images")?);
+    let loaded = load(&arguments.file, &options, scheduler, &mut |progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+    });
+    bar.finish_and_clear();
     let (warnings, unlisted) = match &loaded {
         Ok(world) => (&world.warnings, world.unlisted_warnings),
         Err(error) => (&error.warnings, error.unlisted_warnings),
@@ -100,8 +106,16 @@ fn read(arguments: &Arguments, scheduler: &Scheduler) -> Result<World, Box<dyn E
     Ok(loaded?)
 }
 
+/// Draws the world, and writes the picture.
 fn run(arguments: &Arguments, world: &World, scheduler: Arc<Scheduler>) -> Result<(), Box<dyn Error>> {
-    let picture = draw(open_device()?, scheduler, world, arguments.exposure)?;
+    let (device, queue) = draw::open_device()?;
+    let deferred = Deferred::new().shadow_maps(Some(draw::shadow_maps(world)));
+    let deferred = deferred.post(ToneMapping::new(arguments.exposure)).post(Fxaa::default());
+    let builder = Renderer::builder(WgpuBackend::new(device.clone(), queue.clone())?);
+    let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
+    let (mut renderer, submitter) = builder.build(scheduler)?;
+    let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
+    let picture = submitter.submit(recorded)?.submission.read(0, "picture")?;
     arguments.picture.write([picture.width, picture.height], &picture.bytes)?;
     print_line!("{}", describe(world, arguments));
     Ok(())
@@ -154,7 +168,7 @@ impl FromStr for FileLimit {
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, as in geometry_bytes=4000000000")?;
         let value = value.parse().map_err(|error| format!("{value:?}: {error}"))?;
-        GltfLimits::default().set(name, value)?;
+        GltfLimits::default().set(name, value).map_err(|error| error.to_string())?;
         Ok(Self { name: name.to_owned(), value })
     }
 }

@@ -15,8 +15,10 @@ use super::resources::{
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::streaming::{Streamer, StreamingBudget, StreamingStatistics};
 use super::timing::{DeviceClock, DeviceTiming};
+use super::uploaded_picture::upload_picture;
 use crate::backend::subdivision_cache::SubdivisionCache;
-use crate::backend::{Backend, BackendError, FrameRequest, TargetMemory};
+use crate::backend::{Backend, BackendError, FrameRequest, Picture, TargetMemory};
+use crate::process::ShaderResource;
 use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
@@ -287,6 +289,15 @@ impl WgpuBackend {
     /// The device's queue.
     pub fn queue(&self) -> &wgpu::Queue {
         self.uploads.queue()
+    }
+
+    /// A new texture with the pixels of a picture, for shaders to sample. It may be called on any thread, at any time,
+    /// and the next submission has the pixels.
+    ///
+    /// # Errors
+    /// If the device refuses it, the picture has other bytes than its size and format say, or it is one of depth.
+    pub fn upload_picture(&self, picture: &Picture) -> Result<ShaderResource<'static>, BackendError> {
+        upload_picture(&self.device, self.queue(), picture)
     }
 
     /// What the backend keeps on the device from frame to frame.

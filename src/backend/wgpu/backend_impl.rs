@@ -17,13 +17,11 @@ use super::resources::check_mesh;
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::streaming::Streamer;
 use super::submission::WgpuSubmission;
-use super::uploaded_picture::upload_picture;
 use crate::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, Picture, ReadBack, SceneLimits, TargetMemory,
-    ViewQueue,
+    Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, SceneLimits, TargetMemory, ViewQueue,
 };
 use crate::command::{Batch, DrawList, DrawState};
-use crate::process::{Draws, FramePlan, ShaderResource};
+use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
 use crate::task::Worker;
@@ -339,10 +337,6 @@ impl Backend for WgpuBackend {
 
     fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
         Ok(Box::new(frame.read_back_whole(&self.device, view, target)?))
-    }
-
-    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
-        upload_picture(&self.device, self.queue(), picture).map(Some)
     }
 
     fn submit(

@@ -3,9 +3,9 @@
 use std::io;
 
 use drawloom::scene::Assets;
-use drawloom::scene::obj::{self, ObjLimits};
 use drawloom::task::Scheduler;
 use drawloom::text::excerpt;
+use drawloom_obj::{Imported, ObjError, ObjLimits, ObjWarning, read_within};
 use libtest_mimic::Failed;
 use std::sync::Arc;
 
@@ -16,16 +16,16 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "imports_within_any_limits",
         numbers: &[
-            "scene::obj::ObjLimits::all_textures_bytes",
-            "scene::obj::ObjLimits::decoded_bytes",
-            "scene::obj::ObjLimits::library_bytes",
-            "scene::obj::ObjLimits::line_bytes",
-            "scene::obj::ObjLimits::scene_bytes",
-            "scene::obj::ObjLimits::texture_bytes",
-            "scene::obj::ObjLimits::texture_file_bytes",
-            "scene::obj::ObjLimits::warnings",
-            "scene::obj::read",
-            "scene::obj::read_within",
+            "drawloom_obj::ObjLimits::all_textures_bytes",
+            "drawloom_obj::ObjLimits::decoded_bytes",
+            "drawloom_obj::ObjLimits::library_bytes",
+            "drawloom_obj::ObjLimits::line_bytes",
+            "drawloom_obj::ObjLimits::scene_bytes",
+            "drawloom_obj::ObjLimits::texture_bytes",
+            "drawloom_obj::ObjLimits::texture_file_bytes",
+            "drawloom_obj::ObjLimits::warnings",
+            "drawloom_obj::read",
+            "drawloom_obj::read_within",
         ],
         check: limits,
     },
@@ -43,13 +43,13 @@ fn excerpts() -> Result<(), Failed> {
 const SCENE: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl one\nf 1/1 2/1 3/1\nnonsense\nnonsense\n";
 const LIBRARY: &str = "newmtl one\nmap_Kd a.png\n";
 
-fn read(limits: &ObjLimits) -> Result<obj::Imported, obj::ObjError> {
+fn read(limits: &ObjLimits) -> Result<Imported, ObjError> {
     let file = |name: &str| match name {
         "a.mtl" => Ok(LIBRARY.as_bytes().to_vec()),
         "a.png" => Ok(png()),
         _ => Err(io::ErrorKind::NotFound.into()),
     };
-    obj::read_within("a.obj", SCENE.as_bytes(), file, limits)
+    read_within("a.obj", SCENE.as_bytes(), file, limits)
 }
 
 /// Four grey pixels.
@@ -91,7 +91,7 @@ fn limits() -> Result<(), Failed> {
                 ("line_bytes", imported) => ensure(imported.is_err(), "there is nothing left")?,
                 (_, Ok(imported)) => {
                     // What a material names is left out, with a warning.
-                    let names = |warning: &obj::ObjWarning| warning.to_string().contains(name);
+                    let names = |warning: &ObjWarning| warning.to_string().contains(name);
                     ensure(imported.warnings.iter().any(names), format_args!("{name}: {:?}", imported.warnings))?;
                 }
                 (_, refused_import) => refused(refused_import, name)?,

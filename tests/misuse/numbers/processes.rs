@@ -6,7 +6,6 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::{NullBackend, Picture, PipelineLibrary, SoftwareBackend};
 use drawloom::command::Cull;
-use drawloom::helper::{Bloom, HelperFrame, HelperLayer, HelperSource, HelperStep, PostHelper};
 use drawloom::process::{
     ClearColor, Comparison, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Exposure, Format, FullScreen, Fxaa,
     PostStep, ProceduralDraws, RenderProcess, Stencil, StorageBuffer, TargetSize, ToneMapping, Workgroups,
@@ -14,6 +13,7 @@ use drawloom::process::{
 use drawloom::scene::ViewKind;
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
+use drawloom_async_post::{AsyncPost, AsyncStep, Bloom, LayerSettings, StepFrame, StepSource};
 use drawloom_testing::adapter::noop_device;
 use libtest_mimic::Failed;
 
@@ -48,12 +48,12 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "bloom_and_sources_of_any_numbers",
         numbers: &[
-            "helper::Bloom::divisor",
-            "helper::Bloom::radius",
-            "helper::Bloom::threshold",
-            "helper::Bloom::on_device",
-            "helper::HelperLayer::strength",
-            "helper::HelperSource::downsampled",
+            "drawloom_async_post::Bloom::divisor",
+            "drawloom_async_post::Bloom::radius",
+            "drawloom_async_post::Bloom::threshold",
+            "drawloom_async_post::Bloom::on_device",
+            "drawloom_async_post::LayerSettings::strength",
+            "drawloom_async_post::StepSource::downsampled",
         ],
         check: bloom,
     },
@@ -191,12 +191,12 @@ fn draws() -> Result<(), Failed> {
 /// A step that makes a picture of one pixel.
 struct Pixel;
 
-impl HelperStep for Pixel {
+impl AsyncStep for Pixel {
     fn name(&self) -> &str {
         "pixel"
     }
 
-    fn compute(&self, _: &HelperFrame<'_>) -> Picture {
+    fn compute(&self, _: &StepFrame<'_>) -> Picture {
         Picture { width: 1, height: 1, format: Format::Rgba8Unorm, bytes: vec![0; 4] }
     }
 }
@@ -212,11 +212,11 @@ fn bloom() -> Result<(), Failed> {
     }
     let layers = COUNTS.map(|divisor| (divisor, 1.0)).into_iter().chain(FLOATS.map(|strength| (4, strength)));
     for (divisor, strength) in layers {
-        let source = HelperSource::downsampled("radiance", divisor);
-        let helper = PostHelper::new(Arc::new(Scheduler::new(1)?), Pixel, source);
-        let processes: Vec<_> = helper.downsample().map(|process| Arc::new(process) as _).into_iter().collect();
-        let layer = helper.layer(HelperLayer { strength, ..HelperLayer::default() });
-        let drawn = expect_drawn((&processes, Some(helper.source_target())), layer, divisor);
+        let source = StepSource::downsampled("radiance", divisor);
+        let async_post = AsyncPost::new(Arc::new(Scheduler::new(1)?), Pixel, source);
+        let processes: Vec<_> = async_post.downsample().map(|process| Arc::new(process) as _).into_iter().collect();
+        let layer = async_post.layer(LayerSettings { strength, ..LayerSettings::default() });
+        let drawn = expect_drawn((&processes, Some(async_post.source_target())), layer, divisor);
         ensure(drawn.is_ok() == (divisor > 0), format_args!("divided by {divisor}, {strength}: {drawn:?}"))?;
     }
     Ok(())

@@ -13,7 +13,7 @@ use drawloom::quality::Quality;
 use drawloom::raster::Real;
 use drawloom::scene::{
     Blend, Camera, LayerMask, LevelOfDetail, Material, Mesh, Piece, Projection, RenderObject, Scene, Topology,
-    VERTEX_COLOR, Vertex, obj,
+    VERTEX_COLOR, Vertex,
 };
 use drawloom_testing::scenes::{cube, culled, sized, with_meshes};
 use fastrand::Rng;
@@ -331,7 +331,8 @@ fn two_leaves([hole, leaf]: [u8; 2], is_red_first: bool) -> Result<Scene, Failed
         "mask.png" => Ok(mask.clone()),
         _ => Err(io::ErrorKind::NotFound.into()),
     };
-    let imported = obj::read("a.obj", format!("mtllib a.mtl\no tree\nusemtl leaf\n{faces}").as_bytes(), fetch)?;
+    let imported =
+        drawloom_obj::read("a.obj", format!("mtllib a.mtl\no tree\nusemtl leaf\n{faces}").as_bytes(), fetch)?;
     if !imported.warnings.is_empty() || imported.scene.object_count() != 1 {
         return Err(format!("{:?}", imported.warnings).into());
     }
