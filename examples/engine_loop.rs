@@ -2,9 +2,9 @@
 //!
 //!     cargo run --release --example engine_loop
 //!
-//! Each iteration of the loop lends the world to the renderer, which returns it when the frame is recorded. It then submits
-//! the frame on this thread, the device thread, while the next update runs on another thread. The example opens no window:
-//! it copies the picture into a texture in place of a surface's, and finally saves it as `engine_loop.png`.
+//! Each iteration of the loop lends the world to the renderer, which returns it when the frame is recorded. It then
+//! submits the frame on this thread, the device thread, while the next update runs on another thread. The example opens
+//! no window: it copies the picture into a texture in place of a surface's, and finally saves it as `engine_loop.png`.
 
 use std::error::Error;
 use std::process::ExitCode;

@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::Mutex;
 
-/// A reference to a `T` in [`Slots`]. When that `T` is removed, the handle is stale: using it is an error, and never returns
-/// another `T`.
+/// A reference to a `T` in [`Slots`]. When that `T` is removed, the handle is stale: using it is an error, and never
+/// returns another `T`.
 pub struct Handle<T> {
     index: u32,
     generation: u32,
@@ -44,8 +44,8 @@ pub struct StaleHandle {
     pub generation: u32,
 }
 
-/// A slot map: a collection whose entries are accessed by [`Handle`]. An entry keeps its slot until it is removed; the slot is
-/// then reused with the next generation.
+/// A slot map: a collection whose entries are accessed by [`Handle`]. An entry keeps its slot until it is removed; the
+/// slot is then reused with the next generation.
 #[derive(Debug)]
 pub struct Slots<T> {
     identity: u64,
@@ -190,8 +190,8 @@ impl<T> Slots<T> {
         entry.value = Some(value);
     }
 
-    /// Begins the next generation of an empty slot. A slot without generations left is retired: reusing it would make a stale handle valid
-    /// again.
+    /// Begins the next generation of an empty slot. A slot without generations left is retired: reusing it would make a
+    /// stale handle valid again.
     fn retire(&mut self, index: u32) {
         let entry = &mut self.entries[index as usize];
         entry.revision = self.revision;

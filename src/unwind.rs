@@ -4,8 +4,8 @@
 //! stand others around the recording of a frame and its submission, for a call that was forgotten.
 //!
 //! These are all places where this crate calls such code. `tests/boundary` makes each of these calls panic in turn,
-//! except the iterators and writers that the engine passes to a call, and `SurfaceFrame::present`, which needs a window.
-//! The module `unwind` of `drawloom-jobs` has those of jobs, nodes, clocks, hooks and subscribers, and that of
+//! except the iterators and writers that the engine passes to a call, and `SurfaceFrame::present`, which needs a
+//! window. The module `unwind` of `drawloom-jobs` has those of jobs, nodes, clocks, hooks and subscribers, and that of
 //! `drawloom-async-post` those of steps of asynchronous post-processing.
 //!
 //! | code | called in | its panic |

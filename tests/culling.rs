@@ -93,9 +93,10 @@ fn a_light_is_kept_if_and_only_if_it_reaches_the_picture() {
     );
 }
 
-/// Whether a sphere is so far outside of a plane that a test in f32 must cull it. [`Frustum::intersects_sphere`] widens spheres and planes by
-/// 16 · 2⁻²⁴ of the centre's ‖·‖₁, the radius and the plane's distance from the camera. Its rounding errors are smaller than that, so twice as much
-/// suffices here. That holds for cameras without a shift, as here. Others have shorter normals.
+/// Whether a sphere is so far outside of a plane that a test in f32 must cull it. [`Frustum::intersects_sphere`] widens
+/// spheres and planes by 16 · 2⁻²⁴ of the centre's ‖·‖₁, the radius and the plane's distance from the camera. Its
+/// rounding errors are smaller than that, so twice as much suffices here. That holds for cameras without a shift, as
+/// here. Others have shorter normals.
 fn is_outside_beyond_tolerance(oracle: &Oracle, center: DVec3, radius: f64) -> bool {
     let tolerance = |offset: f64| 32.0 / f64::from(1 << 24) * (center.abs().element_sum() + radius + offset.abs());
     let planes = oracle.depths(center).into_iter().zip(oracle.depths(DVec3::ZERO));

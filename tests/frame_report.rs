@@ -1,4 +1,5 @@
-//! The report of the example `frame`: it counts what a scene has, and what of its file and of its frames was left out.
+//! The report of the example `frame`: it counts what a scene has, and the elements of its file and of its frames that
+//! were left out.
 
 #[path = "../examples/frame/arguments.rs"]
 #[expect(dead_code, reason = "a report needs few of them")]

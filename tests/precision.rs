@@ -1,5 +1,5 @@
-//! The position of vertices in pictures is precise, anywhere in the world: as computed in Rust in the order of the shader. `tests/pictures` has
-//! the same of the shader itself.
+//! The position of vertices in pictures is precise, anywhere in the world: as computed in Rust in the order of the
+//! shader. `tests/pictures` has the same of the shader itself.
 
 use drawloom_testing::precision::measure::{BOUND, BOUNDED, MAGNIFYING, Origin, WORST_ANGLE, measure};
 use drawloom_testing::precision::vertex::ShaderInRust;

@@ -1,9 +1,9 @@
-//! Frames that are submitted leave no memory behind in the driver: lavapipe of Mesa 22.3 keeps shaders that it compiles anew for each
-//! pass (`src/view/gpu_view.rs`). Frames that are dropped leave none behind in wgpu. These cases have a binary of their own, and run one after
-//! the other, so that they can measure the process.
+//! Frames that are submitted leave no memory behind in the driver: lavapipe of Mesa 22.3 keeps shaders that it compiles
+//! anew for each pass (`src/view/gpu_view.rs`). Frames that are dropped leave none behind in wgpu. These cases have a
+//! binary of their own, and run one after the other, so that they can measure the process.
 //!
-//! They take long, and are ignored without `DRAWLOOM_SLOW_CASES=1`, without an adapter, or on a system that does not tell how much memory a
-//! process has. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
+//! They take long, and are ignored without `DRAWLOOM_SLOW_CASES=1`, without an adapter, or on a system that does not
+//! tell how much memory a process has. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
 
 use std::env;
 use std::error::Error;
@@ -22,13 +22,14 @@ use drawloom_testing::{adapter, slow_cases};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 const WARM_UP_FRAMES: usize = 12;
-/// The growth is the median of this many periods: what each frame leaves behind adds up in every period, while the allocator takes
-/// some MiB from the system in one period and in another none.
+/// The growth is the median of this many periods: what each frame leaves behind adds up in every period, while the
+/// allocator takes some MiB from the system in one period and in another none.
 const PERIODS: usize = 7;
 const FRAMES_IN_A_PERIOD: usize = 4;
-/// So many that they exceed the bound if each leaves a sixth of what it uploads.
+/// Enough to exceed the bound if each leaves a sixth of its uploads.
 const DROPPED_FRAMES_IN_A_PERIOD: usize = 25;
-/// A shader that the driver compiles and keeps is some 100 KiB or more. Where it keeps those of each pass, four frames leave 52 MiB behind.
+/// A shader that the driver compiles and keeps is some 100 KiB or more. Where it keeps those of each pass, four frames
+/// leave 52 MiB behind.
 const MAX_GROWTH_KIB: usize = 2 * 1024;
 
 fn main() -> ExitCode {
@@ -79,7 +80,7 @@ fn draw_and_measure() -> Result<(), Box<dyn Error>> {
     })
 }
 
-/// Calls `draw` with the number of each frame, and measures how the process grows in periods of so many of them.
+/// Calls `draw` with the number of each frame, and measures how the process grows in periods of this number of frames.
 fn expect_steady_memory(
     frames_in_a_period: usize,
     mut draw: impl FnMut(usize) -> Result<(), Box<dyn Error>>,

@@ -3,10 +3,10 @@
 //!     cargo bench -p drawloom-benches --bench budget
 //!     cargo bench -p drawloom-benches --bench budget -- --quick
 //!
-//! A main view and six others look at boxes, on wgpu's `noop` device and two workers. All cameras move in every frame. The budget is what
-//! frames with few boxes cost, and half as much again. Then there are four times as many boxes, and few again. The table has the mean thread
-//! time of a frame from the 30th frame after each step on, and the rungs after it. `target/drawloom/budget.json` has the same. The last line names
-//! the targets that were missed.
+//! A main view and six others look at boxes, on wgpu's `noop` device and two workers. All cameras move in every frame.
+//! The budget is what frames with few boxes cost, and half as much again. Then there are four times as many boxes, and
+//! few again. The table has the mean thread time of a frame from the 30th frame after each step on, and the rungs after
+//! it. `target/drawloom/budget.json` has the same. The last line names the targets that were missed.
 
 use std::error::Error;
 use std::process::ExitCode;

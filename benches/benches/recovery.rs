@@ -3,11 +3,12 @@
 //!     cargo bench -p drawloom-benches --bench recovery
 //!     cargo bench -p drawloom-benches --bench recovery -- --quick
 //!
-//! The colonnade is drawn on the machine's adapter, with two workers, until the device is destroyed and a frame says that it is lost. Then
-//! another device takes its place. Times are medians: of opening the device, instance and adapter included; of making the backend and
-//! replacing the old one; of preparing pipelines, if the engine does; of recording the next frame, with everything that is uploaded and
-//! compiled for it; until it is submitted, in sum; and until it is drawn, with the longest. For comparison there is the frame that was drawn
-//! last on the device before, from record until it is drawn. Each picture is compared with that of the device before, byte by byte.
+//! The colonnade is drawn on the machine's adapter, with two workers, until the device is destroyed and a frame says
+//! that it is lost. Then another device takes its place. Times are medians: of opening the device, instance and adapter
+//! included; of making the backend and replacing the old one; of preparing pipelines, if the engine does; of recording
+//! the next frame, with everything that is uploaded and compiled for it; until it is submitted, in sum; and until it is
+//! drawn, with the longest. For comparison there is the frame that was drawn last on the device before, from record
+//! until it is drawn. Each picture is compared with that of the device before, byte by byte.
 //! `target/drawloom/recovery.json` has the same. The last line names the targets that were missed.
 
 use std::error::Error;

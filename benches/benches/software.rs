@@ -3,9 +3,9 @@
 //!     cargo bench -p drawloom-benches --bench software
 //!     cargo bench -p drawloom-benches --bench software -- --quick
 //!
-//! The software backend draws the project's own scene in f32, on one worker and on two, interleaved. Measured is one frame, from
-//! the hand-over of the scene to the return of submit, by which time it is drawn. The table compares medians; both pictures must
-//! have the same bytes. `target/drawloom/software.json` has the same.
+//! The software backend draws the project's own scene in f32, on one worker and on two, interleaved. Measured is one
+//! frame, from the hand-over of the scene to the return of submit, by which time it is drawn. The table compares
+//! medians; both pictures must have the same bytes. `target/drawloom/software.json` has the same.
 
 use std::error::Error;
 use std::process::ExitCode;

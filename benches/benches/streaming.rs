@@ -1,13 +1,15 @@
-//! What meshes and textures cost the frame in which they come: all at once, one by one, and streamed by background jobs.
+//! What meshes and textures cost the frame in which they come: all at once, one by one, and streamed by background
+//! jobs.
 //!
 //!     cargo bench -p drawloom-benches --bench streaming
 //!     cargo bench -p drawloom-benches --bench streaming -- --quick
 //!
-//! *At once* is the first frame of a renderer whose pipelines are made. *More* is the longest of 30 frames that each bring a twentieth
-//! more. *Streamed* is the longest frame until everything is on the device, and how many it takes. *Through* so many MB is a world of which each
-//! frame brings a mesh and a texture and drops as many: its longest frame, and that divided by the median. Times are of
-//! `Renderer::record`, but in the last rows, which are of whole frames; two workers, on wgpu's `noop` device and on the machine's adapter, if
-//! there is one. `target/drawloom/streaming.json` has the same. The last line names the targets that were missed.
+//! *At once* is the first frame of a renderer whose pipelines are made. *More* is the longest of 30 frames that each
+//! bring a twentieth more. *Streamed* is the longest frame until everything is on the device, and how many it takes.
+//! *Through* a number of MB is a world of which each frame brings a mesh and a texture and drops as many: its longest
+//! frame, and that divided by the median. Times are of `Renderer::record`, but in the last rows, which are of whole
+//! frames; two workers, on wgpu's `noop` device and on the machine's adapter, if there is one.
+//! `target/drawloom/streaming.json` has the same. The last line names the targets that were missed.
 
 use std::collections::VecDeque;
 use std::error::Error;
@@ -140,8 +142,8 @@ fn run() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The targets of a world that is streamed: it keeps to its budget, and no frame takes longer than two, where frames are long enough
-/// that the system's other programs do not make one of them twice as long.
+/// The targets of a world that is streamed: it keeps to its budget, and no frame takes longer than two, where frames
+/// are long enough that the system's other programs do not make one of them twice as long.
 fn targets(rows: &[Row], extent: &Extent) -> Targets {
     let mut targets = Targets::new();
     let budget: u64 = extent.budget_bytes.iter().sum();
@@ -315,7 +317,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// Since so many bytes were uploaded.
+    /// Since this number of bytes was uploaded.
     fn row(self, world: &World, uploaded_before: u64, resident_bytes_max: u64) -> Row {
         let Self { adapter, scene, case, times } = self;
         Row {

@@ -4,11 +4,12 @@
 //!     cargo bench -p drawloom-benches --bench views -- --quick
 //!     cargo bench -p drawloom-benches --bench views -- --workers 1,4
 //!
-//! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is compared in a row is
-//! drawn in turn, and the table has the medians. All cameras move in every frame. `target/drawloom/views.json` has the same.
+//! Measured is one frame on wgpu's `noop` device, from the hand-over of the scene to the return of submit. What is
+//! compared in a row is drawn in turn, and the table has the medians. All cameras move in every frame.
+//! `target/drawloom/views.json` has the same.
 //!
-//! The second table has the memory of many small views with transient targets, each number of views in a process of its own. The last
-//! line names the targets that were missed.
+//! The second table has the memory of many small views with transient targets, each number of views in a process of its
+//! own. The last line names the targets that were missed.
 
 use std::env;
 use std::error::Error;
@@ -47,7 +48,7 @@ struct ViewsArguments {
     extent: ExtentArguments,
     #[command(flatten)]
     workers: WorkersArguments,
-    /// Draw so many views, and print the memory that they need in KiB.
+    /// Draw this number of views, and print the memory that they need in KiB.
     #[arg(long)]
     views: Option<usize>,
 }
@@ -136,7 +137,7 @@ struct Memory {
     mebibytes: f64,
 }
 
-/// Measures the memory of so many views in another process.
+/// Measures the memory of this number of views in another process.
 fn memory_of(views: usize) -> Result<f64, Box<dyn Error>> {
     let output = Command::new(env::current_exe()?).arg("--views").arg(views.to_string()).output()?;
     if !output.status.success() {
@@ -146,7 +147,7 @@ fn memory_of(views: usize) -> Result<f64, Box<dyn Error>> {
     Ok(kibibytes / 1024.0)
 }
 
-/// Draws so many views of 8 × 8 pixels of 500 objects, and prints by how many KiB the process has grown.
+/// Draws this number of views of 8 × 8 pixels of 500 objects, and prints by how many KiB the process has grown.
 fn print_memory(views: usize) -> Result<(), Box<dyn Error>> {
     let (device, queue) = adapter::noop_device()?;
     let builder = Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets());

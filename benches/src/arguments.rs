@@ -71,7 +71,8 @@ impl BackendArguments {
 /// The numbers of workers to measure. Peers run on as many threads.
 #[derive(Args)]
 pub struct WorkersArguments {
-    /// Measures with these numbers of workers, at most as many as there are cores; by default, the powers of two up to that.
+    /// Measures with these numbers of workers, at most as many as there are cores; by default, the powers of two up to
+    /// that.
     #[arg(long, value_name = "NUMBER,…", value_delimiter = ',', value_parser = |text: &str| worker_count(text, cores()))]
     workers: Vec<usize>,
 }
@@ -82,7 +83,8 @@ impl WorkersArguments {
         self.counts_on(cores())
     }
 
-    /// The same for what compares several workers with one thread: by default from two workers on, if there are two cores.
+    /// The same for what compares several workers with one thread: by default from two workers on, if there are two
+    /// cores.
     pub fn parallel_counts(&self) -> Vec<usize> {
         let mut counts = self.counts();
         if self.workers.is_empty() && counts.len() > 1 {
@@ -121,7 +123,8 @@ pub(crate) fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(Scheduler::MAX_WORKERS)
 }
 
-/// With more workers than cores the system decides which of them run, so the figures would say nothing about the number of workers.
+/// With more workers than cores the system decides which of them run, so the figures would say nothing about the number
+/// of workers.
 fn worker_count(text: &str, cores: usize) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if (1..=cores).contains(&count) => Ok(count),

@@ -10,8 +10,8 @@ pub const MESHES: u32 = 64;
 /// A view of a large cloud has 64 × 16 = 1,024 batches, which are four bundles to record.
 pub const MATERIALS: u32 = 16;
 
-/// In metres. A cloud covers 20° to each side of its camera's axis. A camera sees 30° in each direction, as its picture is square: all
-/// of its own cloud, and nothing of the clouds at right angles to it.
+/// In metres. A cloud covers 20° to each side of its camera's axis. A camera sees 30° in each direction, as its picture
+/// is square: all of its own cloud, and nothing of the clouds at right angles to it.
 const DISTANCE: f64 = 150.0;
 const CLOUD_RADIUS: f64 = 50.0;
 
@@ -40,8 +40,8 @@ pub fn back_to_back(objects: [usize; 4], blend: Blend) -> Result<Scene, SceneErr
     Ok(scene)
 }
 
-/// A row of clouds far from each other, `objects` boxes in each, one after the other in the scene. Each of the cameras sees one of the
-/// first clouds.
+/// A row of clouds far from each other, `objects` boxes in each, one after the other in the scene. Each of the cameras
+/// sees one of the first clouds.
 ///
 /// # Errors
 /// Returns an error if the scene rejects a mesh, a material or an object.

@@ -28,7 +28,8 @@ impl CpuUse {
         Self { begun: Instant::now(), before: cpu_time() }
     }
 
-    /// The share of all cores' time that this process has used since the beginning; NaN where the platform does not tell.
+    /// The share of all cores' time that this process has used since the beginning; NaN where the platform does not
+    /// tell.
     pub fn share(&self) -> f64 {
         let available = self.begun.elapsed().as_secs_f64() * cores() as f64;
         match (self.before, cpu_time()) {

@@ -11,8 +11,8 @@ use drawloom::command::RenderCommand;
 
 use self::code::{Coder, Fault, MAX_LENGTH};
 
-/// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is lossless for
-/// any commands, and compact for sorted ones.
+/// Delta-coded commands: of each, only how it differs from the one before (M 10.3, its "bonus points"). The coding is
+/// lossless for any commands, and compact for sorted ones.
 ///
 /// ```text
 /// byte 0 … 3 | 4 … 7    | 8 … 15            | 16 …
@@ -20,16 +20,16 @@ use self::code::{Coder, Fault, MAX_LENGTH};
 /// ```
 ///
 /// All numbers are little-endian. The checksum is the CRC-32 of the coded commands followed by their count. It detects
-/// accidental damage, not tampering. A coded command is a byte with the lengths of its parts, and the parts: the difference
-/// between its key and the previous one, the difference between the objects if it is not the same as last time, and mesh,
-/// material and state where they differ from the prediction, which is the mesh and the state in the key of an opaque command,
-/// and the previous command's values for everything else.
+/// accidental damage, not tampering. A coded command is a byte with the lengths of its parts, and the parts: the
+/// difference between its key and the previous one, the difference between the objects if it is not the same as last
+/// time, and mesh, material and state where they differ from the prediction, which is the mesh and the state in the key
+/// of an opaque command, and the previous command's values for everything else.
 ///
-/// Delta coding is for commands that leave the frame: stored, sent, or kept for many frames. Sorted commands take 1 to 6 bytes
-/// instead of 24. Encoding, checking and decoding take 3 to 8 ns each per command, so delta coding is faster where bytes are
-/// transferred at less than 0.8 GB/s. Frames do not use them: they sort and read commands several times, and copying a
-/// [`RenderCommand`] takes 0.5 ns, comparing it with the last frame's 1.3. (`cargo bench -p drawloom-benches --bench delta`, on
-/// a virtual machine with two cores.)
+/// Delta coding is for commands that leave the frame: stored, sent, or kept for many frames. Sorted commands take 1 to
+/// 6 bytes instead of 24. Encoding, checking and decoding take 3 to 8 ns each per command, so delta coding is faster
+/// where bytes are transferred at less than 0.8 GB/s. Frames do not use them: they sort and read commands several
+/// times, and copying a [`RenderCommand`] takes 0.5 ns, comparing it with the last frame's 1.3. (`cargo bench -p
+/// drawloom-benches --bench delta`, on a virtual machine with two cores.)
 ///
 /// ```
 /// use drawloom::command::{DrawState, RenderCommand, SortKey};
@@ -118,8 +118,8 @@ impl DeltaCommands {
         new
     }
 
-    /// The commands in bytes that [`DeltaCommands::bytes`] returned. It checks all of them, and allocates nothing, so that invalid
-    /// bytes cannot exhaust memory.
+    /// The commands in bytes that [`DeltaCommands::bytes`] returned. It checks all of them, and allocates nothing, so
+    /// that invalid bytes cannot exhaust memory.
     ///
     /// # Errors
     /// If the bytes are not delta-coded commands of this version, or are damaged.

@@ -27,7 +27,8 @@ pub enum Motion {
     Nothing,
     /// The cameras alone, and the engine says that no object does.
     Cameras,
-    /// All objects, and all cameras turn a little in each frame, so that other objects are seen. The engine says nothing about it.
+    /// All objects, and all cameras turn a little in each frame, so that other objects are seen. The engine says
+    /// nothing about it.
     EverythingInTurningViews,
 }
 
@@ -35,8 +36,8 @@ pub enum Motion {
 const STEP: f64 = 1e-3;
 const FRAMES: u32 = 64;
 
-/// How far cameras are turned at least, and how much farther they turn per frame, in radians. At the least, the border of the picture
-/// cuts a cloud of [`clouds`](crate::clouds).
+/// How far cameras are turned at least, and how much farther they turn per frame, in radians. At the least, the border
+/// of the picture cuts a cloud of [`clouds`](crate::clouds).
 const MIN_TURN: f32 = 0.2;
 const TURN: f32 = 0.003;
 

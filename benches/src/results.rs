@@ -28,8 +28,8 @@ pub fn file(name: &str) -> io::Result<PathBuf> {
     Ok(folder.join(name))
 }
 
-/// The folder `drawloom` in Cargo's target folder. Creates it. Cargo's programs are two folders below the target folder:
-/// `target/release/deps/bench`, `target/release/examples/example`.
+/// The folder `drawloom` in Cargo's target folder. Creates it. Cargo's programs are two folders below the target
+/// folder: `target/release/deps/bench`, `target/release/examples/example`.
 ///
 /// # Errors
 /// Returns an error if the folder cannot be created.

@@ -7,7 +7,8 @@ use std::thread;
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder, Yield};
 
-/// Threads that wait for the next frame without sleeping. They are those of a rayon pool, which lends them what a frame borrows.
+/// Threads that wait for the next frame without sleeping. They are those of a rayon pool, which lends them what a frame
+/// borrows.
 pub struct SpinningTeam {
     pool: ThreadPool,
 }

@@ -52,7 +52,8 @@ impl Targets {
         table.print();
     }
 
-    /// Prints the last line of a benchmark, which names the targets that were missed. It comes after the names of written files.
+    /// Prints the last line of a benchmark, which names the targets that were missed. It comes after the names of
+    /// written files.
     pub fn print_missed(&self) {
         print_line!("{}", self.missed());
     }

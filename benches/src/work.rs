@@ -40,7 +40,8 @@ impl Work {
         self.record.as_ref()
     }
 
-    /// Runs one job. Timed and checked frames run the same code: recording costs a well-predicted branch, for all executors alike.
+    /// Runs one job. Timed and checked frames run the same code: recording costs a well-predicted branch, for all
+    /// executors alike.
     #[inline]
     pub fn job(&self, index: usize) {
         let index = black_box(index);

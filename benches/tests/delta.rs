@@ -1,6 +1,7 @@
 //! Delta coding of the commands of whole frames is lossless and compact.
 //!
-//! The case that needs a shared scene is ignored if that is missing, or fails with `DRAWLOOM_REQUIRE_SCENES=1`. A generated hall stands in for it.
+//! The case that needs a shared scene is ignored if that is missing, or fails with `DRAWLOOM_REQUIRE_SCENES=1`. A
+//! generated hall stands in for it.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -2,7 +2,8 @@
 //!
 //!     cargo run --release -p drawloom-egui --example small_engine
 //!
-//! `examples/window` adds what a larger one has: several windows, hidden ones that draw nothing, a camera that flies, frame pacing.
+//! `examples/window` adds what a larger one has: several windows, hidden ones that draw nothing, a camera that flies,
+//! frame pacing.
 
 use std::error::Error;
 use std::sync::Arc;

@@ -29,7 +29,8 @@ impl FrameHistory {
     /// The number of frames that are kept.
     pub const LENGTH: usize = 240;
 
-    /// Adds what was recorded since the log before. What a log reports of an earlier frame, as its submission, is added to that.
+    /// Adds what was recorded since the log before. What a log reports of an earlier frame, as its submission, is added
+    /// to that.
     pub fn add_log(&mut self, log: Log) {
         let skipped = log.frames.len().saturating_sub(Self::LENGTH);
         let frames = &log.frames[skipped..];
@@ -92,7 +93,8 @@ impl FrameHistory {
         selected.or_else(|| self.ended().next()).or(self.frames.back())
     }
 
-    /// Makes a record of a frame that is later than all others. Beyond the length the oldest one goes, unless it is selected.
+    /// Makes a record of a frame that is later than all others. Beyond the length the oldest one goes, unless it is
+    /// selected.
     fn begin(&mut self, number: u64) {
         let latest = self.frames.back().map(|latest| latest.number);
         // A scheduler that is new counts from 0 again.

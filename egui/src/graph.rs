@@ -68,8 +68,8 @@ impl GraphView {
     }
 }
 
-/// The column and the row of each shown node. A node's column is behind those of all that it depends on; in a column, nodes
-/// stand in the order of the rows of their dependencies, so that few edges cross.
+/// The column and the row of each shown node. A node's column is behind those of all that it depends on; in a column,
+/// nodes stand in the order of the rows of their dependencies, so that few edges cross.
 fn layout(graph: &Graph, is_shown: impl Fn(usize) -> bool) -> HashMap<usize, [usize; 2]> {
     let mut columns: Vec<Vec<usize>> = Vec::new();
     let mut column_of = vec![0; graph.nodes.len()];

@@ -18,8 +18,9 @@ use crate::warnings::WarningList;
 /// [`RendererBuilder::quality`](drawloom::RendererBuilder::quality) or chosen in the inspector.
 ///
 /// While it is open, it records the scheduler's [timeline](drawloom::timeline), and takes out the
-/// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took. An inspector belongs to
-/// one renderer. [Close](Self::close) it before it is dropped: a measurement that is not ended leaves its quality behind.
+/// [logs](drawloom::timeline::Timeline::take): an engine that takes them itself lacks what the inspector took. An
+/// inspector belongs to one renderer. [Close](Self::close) it before it is dropped: a measurement that is not ended
+/// leaves its quality behind.
 pub struct Inspector {
     is_open: bool,
     /// Whether the inspector switched the timeline on, and so switches it off.
@@ -91,7 +92,8 @@ impl Inspector {
         self.is_open = true;
     }
 
-    /// Hides it, as its close button does. A measurement ends, and so does the recording of the timeline, if the inspector began it.
+    /// Hides it, as its close button does. A measurement ends, and so does the recording of the timeline, if the
+    /// inspector began it.
     pub fn close<B: Backend>(&mut self, renderer: &mut Renderer<B>) {
         self.is_open = false;
         self.quality.cancel_measurement(renderer);
@@ -119,7 +121,8 @@ impl Inspector {
         self.quality.add_frame(recorded.statistics());
     }
 
-    /// Shows the window, if it is open. Call it once a frame. A quality that is chosen in it holds from the next frame on.
+    /// Shows the window, if it is open. Call it once a frame. A quality that is chosen in it holds from the next frame
+    /// on.
     pub fn show<B: Backend>(&mut self, context: &Context, renderer: &mut Renderer<B>) {
         if !self.is_open {
             return;

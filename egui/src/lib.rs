@@ -1,5 +1,6 @@
-//! Drawloom's frames, live, in an engine's own egui: where the time of a frame went, what was chosen by measurement and why, what
-//! each setting of [`Quality`](drawloom::quality::Quality) costs in this scene, what each view draws, and what was left out.
+//! Drawloom's frames, live, in an engine's own egui: where the time of a frame went, what was chosen by measurement and
+//! why, what each setting of [`Quality`](drawloom::quality::Quality) costs in this scene, what each view draws, and
+//! what was left out.
 //!
 //! An engine that has egui adds three lines:
 //!

@@ -19,8 +19,8 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// An overlay for a window, drawn into views of this format. egui's colours are meant for a format without sRGB: with sRGB, its
-    /// shades look slightly different.
+    /// An overlay for a window, drawn into views of this format. egui's colours are meant for a format without sRGB:
+    /// with sRGB, its shades look slightly different.
     pub fn new(window: &Window, device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let side = device.limits().max_texture_dimension_2d as usize;
         let scale_factor = window.scale_factor() as f32;
@@ -49,7 +49,8 @@ impl Overlay {
         }
     }
 
-    /// Runs the user interface `run`, and draws it over a picture in the window's texture, which the queue draws before.
+    /// Runs the user interface `run`, and draws it over a picture in the window's texture, which the queue draws
+    /// before.
     ///
     /// `texture` has the size of the window in pixels, and allows views of the overlay's format.
     pub fn draw(

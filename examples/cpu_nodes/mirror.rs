@@ -1,5 +1,5 @@
-//! A mirror, of which jobs trace the few pixels that a camera sees (L 5), at an eighth of the picture's width and height; a process puts
-//! them into the picture.
+//! A mirror, of which jobs trace the few pixels that a camera sees (L 5), at an eighth of the picture's width and
+//! height; a process puts them into the picture.
 
 use std::ops::Range;
 

@@ -1,4 +1,5 @@
-//! Catmull-Clark subdivision of a cage, as weights: each vertex of the surface is a sum of the cage's points, whatever these are in a frame.
+//! Catmull-Clark subdivision of a cage, as weights: each vertex of the surface is a sum of the cage's points, whatever
+//! these are in a frame.
 
 use std::collections::HashMap;
 
@@ -18,7 +19,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The surface of a cage with these faces after so many steps.
+    /// The surface of a cage with these faces after this number of steps.
     pub fn new(cage: &[[u32; 4]], steps: usize) -> Self {
         let point = |index: usize| std::array::from_fn(|other| if other == index { 1.0 } else { 0.0 });
         let mut positions: Vec<Weights> = (0..POINTS).map(point).collect();
@@ -44,7 +45,8 @@ fn sum<'a>(weights: impl IntoIterator<Item = (f32, &'a Weights)>) -> Weights {
     sum
 }
 
-/// One step: a point for each face, one for each edge, and each vertex moved. The vertices come first, then faces, then edges.
+/// One step: a point for each face, one for each edge, and each vertex moved. The vertices come first, then faces, then
+/// edges.
 fn refine(vertices: &[Weights], quads: &[[u32; 4]]) -> (Vec<Weights>, Vec<[u32; 4]>) {
     let faces: Vec<_> = quads.iter().map(|quad| sum(quad.map(|corner| (0.25, &vertices[corner as usize])))).collect();
     // Of each edge its number, its ends, and the faces beside it.
@@ -79,7 +81,8 @@ fn refine(vertices: &[Weights], quads: &[[u32; 4]]) -> (Vec<Weights>, Vec<[u32; 
         }
     }
     let moved = around.iter().zip(vertices).map(|((parts, faces), vertex)| {
-        // (F + 2R + (n − 3) P) / n, with the means F of the n faces and R of the n edges' middles: R is half of the ends' mean.
+        // (F + 2R + (n − 3) P) / n, with the means F of the n faces and R of the n edges' middles: R is half of the
+        // ends' mean.
         let scaled = parts.iter().map(|(factor, part)| (factor / (faces * faces), *part));
         sum(scaled.chain([((faces - 3.0) / faces, vertex)]))
     });
@@ -91,7 +94,8 @@ fn refine(vertices: &[Weights], quads: &[[u32; 4]]) -> (Vec<Weights>, Vec<[u32; 
     (refined_vertices, refined)
 }
 
-/// Two directions at each vertex: the neighbours in their order around it, weighted by the cosine and the sine of their angle.
+/// Two directions at each vertex: the neighbours in their order around it, weighted by the cosine and the sine of their
+/// angle.
 fn tangents(positions: &[Weights], quads: &[[u32; 4]]) -> Vec<[Weights; 2]> {
     // For each vertex, from one neighbour to the next one, counter-clockwise.
     let mut next: Vec<HashMap<u32, u32>> = vec![HashMap::new(); positions.len()];

@@ -44,7 +44,8 @@ impl Terrain {
         Mesh::generated("terrain", Topology::TriangleList, corners, &self.vertices, indices)
     }
 
-    /// Puts the middle below the camera, by whole squares so that the land does not crawl. Returns the position of the object.
+    /// Puts the middle below the camera, by whole squares so that the land does not crawl. Returns the position of the
+    /// object.
     pub fn follow(&mut self, camera: DVec3) -> DVec3 {
         self.middle = [camera.x, camera.z].map(|coordinate| (coordinate as f32 / STEP).round() * STEP);
         DVec3::new(self.middle[0].into(), 0.0, self.middle[1].into())

@@ -33,12 +33,14 @@ pub struct Arguments {
     #[arg(long, value_enum, value_name = "AXIS", default_value = "y")]
     pub up: UpName,
 
-    /// Sets a limit in bytes of the OBJ file or of the files that it names, by its name in messages. May be given several times.
+    /// Sets a limit in bytes of the OBJ file or of the files that it names, by its name in messages. May be given
+    /// several times.
     #[arg(long = "limit", value_name = "FIELD=BYTES")]
     pub limits: Vec<FileLimit>,
 
-    /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread; `noop` is wgpu without
-    /// an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if there is no adapter and no camera path.
+    /// The backend: `wgpu` draws on an adapter, `software` on the CPU, `reference` on the CPU in f64 on one thread;
+    /// `noop` is wgpu without an adapter, and `null` draws nothing but checks every rule. Default: wgpu, or software if
+    /// there is no adapter and no camera path.
     #[arg(long, value_enum)]
     pub backend: Option<BackendName>,
 
@@ -58,12 +60,13 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub copies: u32,
 
-    /// The number of frames; or the frames of a camera path, A to B - 1, each in a file of its own. Those that are there already are not drawn.
+    /// The number of frames; or the frames of a camera path, A to B - 1, each in a file of its own. Those that are
+    /// there already are not drawn.
     #[arg(long, value_name = "N|A..B", default_value = "1")]
     pub frames: Frames,
 
-    /// The camera path, in a regular file: lines of a frame's number, and the camera's position and target then, `12 x y z tx ty tz`. It moves
-    /// smoothly between them.
+    /// The camera path, in a regular file: lines of a frame's number, and the camera's position and target then, `12 x
+    /// y z tx ty tz`. It moves smoothly between them.
     #[arg(long, value_name = "FILE")]
     pub path: Option<PathBuf>,
 
@@ -71,8 +74,8 @@ pub struct Arguments {
     #[arg(long, value_name = "WxH", default_value = "960x540")]
     pub size: PictureSize,
 
-    /// The file of the last picture, a .png, .jpg, .tga or .bmp. Default: frame.png. The files of a camera path have their frame's number instead
-    /// of `#`s, as in shot-####.png.
+    /// The file of the last picture, a .png, .jpg, .tga or .bmp. Default: frame.png. The files of a camera path have
+    /// their frame's number instead of `#`s, as in shot-####.png.
     #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(PictureFile::new))]
     pub out: Option<PictureFile>,
 
@@ -289,7 +292,7 @@ impl FromStr for FileLimit {
 /// `N` or `A..B`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Frames {
-    /// So many frames, of which the last one is written.
+    /// The number of frames, of which the last one is written.
     Count(u32),
     /// Frames of a camera path.
     Range(Range<u32>),

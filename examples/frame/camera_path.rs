@@ -29,7 +29,8 @@ impl CameraPath {
     /// Reads keyframes from a file: see [`CameraPath::parse`].
     ///
     /// # Errors
-    /// If it is no regular file, as others may have no end; if it is too large, cannot be read, or has a line that is wrong.
+    /// If it is no regular file, as others may have no end; if it is too large, cannot be read, or has a line that is
+    /// wrong.
     pub fn load(path: &Path) -> Result<Self, String> {
         let read = || -> io::Result<String> {
             // To open a pipe is to wait for its writer.
@@ -46,7 +47,8 @@ impl CameraPath {
         Self::parse(&read().map_err(|error| error.to_string())?)
     }
 
-    /// Parses keyframes, one a line: the frame's number, and position and target, `12 x y z tx ty tz`. Frames ascend. What follows a `#` is a comment.
+    /// Parses keyframes, one a line: the frame's number, and position and target, `12 x y z tx ty tz`. Frames ascend.
+    /// What follows a `#` is a comment.
     ///
     /// # Errors
     /// Names the line that is wrong.
@@ -66,7 +68,8 @@ impl CameraPath {
         if keyframes.is_empty() { Err("it has no keyframe".to_owned()) } else { Ok(Self { keyframes }) }
     }
 
-    /// The camera of a frame: on a cubic curve through the keyframes (Catmull–Rom), and at rest before the first and after the last.
+    /// The camera of a frame: on a cubic curve through the keyframes (Catmull–Rom), and at rest before the first and
+    /// after the last.
     ///
     /// # Errors
     /// If its position is its target.
@@ -92,7 +95,8 @@ impl CameraPath {
             + self.velocity(before + 1, point) * (length * (cube - square))
     }
 
-    /// The change of a point per frame at a keyframe: the difference of its neighbours, divided by the frames between them.
+    /// The change of a point per frame at a keyframe: the difference of its neighbours, divided by the frames between
+    /// them.
     fn velocity(&self, index: usize, point: usize) -> DVec3 {
         let before = self.keyframes[index.saturating_sub(1)];
         let behind = self.keyframes[(index + 1).min(self.keyframes.len() - 1)];

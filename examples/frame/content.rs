@@ -1,4 +1,4 @@
-//! What a scene consists of, and what of its file was left out.
+//! The content of a scene, and the elements of its file that were left out.
 
 use std::collections::BTreeMap;
 

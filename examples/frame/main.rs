@@ -1,13 +1,14 @@
-//! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend draws it, but not the frames of
-//! a camera path: other processes may draw theirs on an adapter.
+//! Renders a scene through the whole frame, and reports its times. Without a graphics adapter the software backend
+//! draws it, but not the frames of a camera path: other processes may draw theirs on an adapter.
 //!
 //!     cargo run --release --example frame
 //!     cargo run --release --example frame -- scene.obj --workers 4 --granularity chunk:64 --record cached --frames 100
 //!     cargo run --release --example frame -- scene.obj --frames 100 --explain --html timeline.html --timeline trace.json
 //!     cargo run --release --example frame -- scene.obj --frames 40..80 --path flight.txt --out shot-####.png
 //!
-//! Its exit status is 0 if all is drawn and written; 1 if drawing or writing failed or there is no adapter, which may go well another time or on
-//! another machine; and 2 if the arguments or the files that they name are wrong, which fails again.
+//! Its exit status is 0 if all is drawn and written; 1 if drawing or writing failed or there is no adapter, which may
+//! go well another time or on another machine; and 2 if the arguments or the files that they name are wrong, which
+//! fails again.
 
 mod arguments;
 mod camera_path;

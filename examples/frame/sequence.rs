@@ -1,5 +1,5 @@
-//! Frames of a camera path, each in a file of its own. Any of them may be drawn by any process, on any machine: a frame needs nothing from the
-//! others, and one that is there already is not drawn again.
+//! Frames of a camera path, each in a file of its own. Any of them may be drawn by any process, on any machine: a frame
+//! needs nothing from the others, and one that is there already is not drawn again.
 
 use std::error::Error;
 use std::ffi::OsStr;
@@ -54,8 +54,8 @@ impl Sequence {
         Ok(Self { missing, frame_count, up: arguments.up.axis() })
     }
 
-    /// Draws the frames that are not there, and writes each as soon as it is drawn. Unless the command line names a software backend, that of
-    /// `open_adapter` draws all of them.
+    /// Draws the frames that are not there, and writes each as soon as it is drawn. Unless the command line names a
+    /// software backend, that of `open_adapter` draws all of them.
     ///
     /// # Errors
     /// If there is no such backend, or a frame cannot be drawn or written. Those before it are there.
@@ -103,8 +103,8 @@ impl Sequence {
     }
 }
 
-/// The file of a frame: its number instead of the last `#`s of the name, with a zero for each of them that it does not need. A name without a
-/// `#`, or that is not Unicode, stays.
+/// The file of a frame: its number instead of the last `#`s of the name, with a zero for each of them that it does not
+/// need. A name without a `#`, or that is not Unicode, stays.
 pub fn file_of(pattern: &Path, frame: u32) -> PathBuf {
     let name = pattern.file_name().and_then(OsStr::to_str).unwrap_or_default();
     let Some(end) = name.rfind('#') else { return pattern.to_owned() };

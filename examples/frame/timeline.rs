@@ -10,7 +10,8 @@ use drawloom_output::{OutputFile, path_text};
 
 use crate::arguments::Arguments;
 
-/// The number of recorded frames, from the last one backwards. The first frames create pipelines and try recording strategies.
+/// The number of recorded frames, from the last one backwards. The first frames create pipelines and try recording
+/// strategies.
 const RECORDED_FRAMES: u32 = 60;
 
 /// The first frame to record, if any output of the timeline is requested.

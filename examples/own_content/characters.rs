@@ -1,4 +1,5 @@
-//! Characters whose vertices the engine moves: a morph target of each, then joints. They cast the shadows of their poses.
+//! Characters whose vertices the engine moves: a morph target of each, then joints. They cast the shadows of their
+//! poses.
 
 use std::f32::consts::TAU;
 use std::sync::Arc;

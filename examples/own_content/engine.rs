@@ -56,7 +56,8 @@ impl Engine {
         Ok(picture)
     }
 
-    /// The glowing world with temporal anti-aliasing, after some frames in which camera and objects move. Calls `progress` after each.
+    /// The glowing world with temporal anti-aliasing, after some frames in which camera and objects move. Calls
+    /// `progress` after each.
     pub fn smooth(&self, world: &mut World, frames: usize, progress: impl Fn()) -> Result<Picture, Box<dyn Error>> {
         let motion = Arc::new(Motion::default());
         let filter = |source: &str, target: &str| TemporalFilter::new(source, target);

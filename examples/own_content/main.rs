@@ -1,18 +1,22 @@
-//! What an engine brings of its own: data of objects and vertices, a material, vertex code, buffers and compute shaders,
-//! post-processing with histories and smaller targets, and picking.
+//! What an engine brings of its own: data of objects and vertices, a material, vertex code, buffers and compute
+//! shaders, post-processing with histories and smaller targets, and picking.
 //!
 //!     cargo run --release --example own_content -- --out pictures
 //!
 //! It draws 20,000 objects and three rings, and writes pictures:
 //!
-//! - `tints.png`: a colour of the engine's own for each object (`tints.rs`), beside a material of its own on vertices of its own
-//!   (`metal.rs`);
-//! - `bloom.png`: the same with a glow around bright objects, at a half and a quarter of the picture's size (`bloom.rs`);
-//! - `particles.png`: a fountain that a compute shader moves, drawn by an indirect draw (`particles.rs`), with the glow;
+//! - `tints.png`: a colour of the engine's own for each object (`tints.rs`), beside a material of its own on vertices
+//!   of its own (`metal.rs`);
+//! - `bloom.png`: the same with a glow around bright objects, at a half and a quarter of the picture's size
+//!   (`bloom.rs`);
+//! - `particles.png`: a fountain that a compute shader moves, drawn by an indirect draw (`particles.rs`), with the
+//!   glow;
 //! - `smooth.png`: the objects after frames of temporal anti-aliasing, while camera and objects move (`temporal.rs`);
-//! - `characters.png`: characters with a morph target and joints (`characters.rs`), one of them outlined (`outline.rs`).
+//! - `characters.png`: characters with a morph target and joints (`characters.rs`), one of them outlined
+//!   (`outline.rs`).
 //!
-//! And it prints which object is in the middle of the picture (`picking.rs`). All of it uses the public interfaces only.
+//! And it prints which object is in the middle of the picture (`picking.rs`). All of it uses the public interfaces
+//! only.
 
 mod bloom;
 mod characters;

@@ -1,5 +1,5 @@
-//! A material type of the engine's own: base colour, normals, and metalness with roughness from three textures, on vertices with
-//! tangents and colours.
+//! A material type of the engine's own: base colour, normals, and metalness with roughness from three textures, on
+//! vertices with tangents and colours.
 
 use std::f32::consts::TAU;
 
@@ -32,7 +32,8 @@ pub const METAL: MaterialType<Metal> = MaterialType::new("metal");
 /// The name of the process.
 pub const NAME: &str = "metal";
 
-/// Draws the objects whose material is of the type [`METAL`], lit by all lights that reach the view, without their shadows.
+/// Draws the objects whose material is of the type [`METAL`], lit by all lights that reach the view, without their
+/// shadows.
 pub struct MetalSurfaces {
     shader: String,
     resources: Vec<ShaderResource<'static>>,

@@ -1,4 +1,5 @@
-//! A line around selected objects: a stencil holds their pixels, and the same objects are drawn a little larger elsewhere.
+//! A line around selected objects: a stencil holds their pixels, and the same objects are drawn a little larger
+//! elsewhere.
 
 use drawloom::command::Selection;
 use drawloom::process::{

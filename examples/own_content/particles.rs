@@ -1,5 +1,5 @@
-//! Particles that live on the device: a compute shader moves them and lists those that are alive, and an indirect draw has as many
-//! instances as there are in the list.
+//! Particles that live on the device: a compute shader moves them and lists those that are alive, and an indirect draw
+//! has as many instances as there are in the list.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,4 +1,5 @@
-//! Temporal anti-aliasing: motion vectors from the displacement of each object, and the filtered picture of the frame before.
+//! Temporal anti-aliasing: motion vectors from the displacement of each object, and the filtered picture of the frame
+//! before.
 
 use drawloom::command::Selection;
 use drawloom::glam::Mat4;

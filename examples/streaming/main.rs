@@ -3,9 +3,10 @@
 //!     cargo run --release --example streaming -- --seconds 60 --report report.json --out flight
 //!     cargo run --release --example streaming -- --frames 300 --backend noop
 //!
-//! The engine asks for tiles of land ahead of the camera and drops those behind. An [`AssetLoader`](drawloom::scene::AssetLoader) has
-//! background jobs make their meshes and textures, and the backend streams these to the device within a budget. It writes a chart of
-//! frame times and bytes, a report, and three pictures.
+//! The engine asks for tiles of land ahead of the camera and drops those behind. An
+//! [`AssetLoader`](drawloom::scene::AssetLoader) has background jobs make their meshes and textures, and the backend
+//! streams these to the device within a budget. It writes a chart of frame times and bytes, a report, and three
+//! pictures.
 
 mod arguments;
 mod chart;
@@ -72,7 +73,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let flight = Flight::new(arguments.size.0);
     let mut world = World::new(&scheduler, SKY)?;
     world.scene.cameras = vec![flight.camera(0.0)];
-    // The driver compiles what the first frames draw, and allocates for the first picture that is read; the land is not requested yet.
+    // The driver compiles what the first frames draw, and allocates for the first picture that is read; the land is not
+    // requested yet.
     for _frame in 0..WARM_UP_FRAMES {
         let mut recorded = renderer.record(world.scene.as_scene_ref())?;
         let is_drawn = arguments.backend == BackendName::Wgpu;
@@ -122,7 +124,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
 const WARM_UP_FRAMES: usize = 12;
 
-/// Two fifths of the memory for meshes, the rest for textures. Uploads keep up with the flight at eight frames a second.
+/// Two fifths of the memory for meshes, the rest for textures. Uploads keep up with the flight at eight frames a
+/// second.
 fn budget(arguments: &Arguments) -> StreamingBudget {
     let bytes = u64::from(arguments.budget) << 20;
     StreamingBudget {

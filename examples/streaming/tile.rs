@@ -17,7 +17,8 @@ const SIDE_CORNERS: usize = QUADS + 1;
 /// Pixels along a side of the texture.
 const PIXELS: usize = 256;
 
-/// So many pixels around the tile show what is beyond it. Coarse mip levels blend an edge of the texture with the opposite one.
+/// The pixels around the tile that show its surroundings. Coarse mip levels blend an edge of the texture with the
+/// opposite one.
 const MARGIN: f32 = 8.0;
 
 /// A tile's column and row.

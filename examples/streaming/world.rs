@@ -43,7 +43,7 @@ impl World {
     const NEARBY: f64 = 250.0;
     /// Tiles behind the camera stay for so long, so that it may turn a little.
     const BEHIND: f64 = 90.0;
-    /// The engine begins at most so many tiles in a frame.
+    /// The most tiles that the engine begins in a frame.
     const TILES_PER_FRAME: usize = 3;
 
     /// # Errors
@@ -70,7 +70,8 @@ impl World {
         Ok(Self { scene, loader, tiles: HashMap::new(), tile_of_mesh: HashMap::new(), plants, water, made: 0 })
     }
 
-    /// Takes what has arrived, begins tiles ahead of the camera, and drops those behind it. Returns what could not be made.
+    /// Takes what has arrived, begins tiles ahead of the camera, and drops those behind it. Returns what could not be
+    /// made.
     ///
     /// # Errors
     /// If the scene refuses something.
@@ -177,7 +178,8 @@ struct Nearness {
 }
 
 impl Nearness {
-    /// Whether a tile is near, and not far behind. With a `margin` in metres, so that a tile at the limit does not come and go.
+    /// Whether a tile is near, and not far behind. With a `margin` in metres, so that a tile at the limit does not come
+    /// and go.
     fn needs(&self, tile: TileIndex, margin: f64) -> bool {
         let offset = self.offset(tile);
         let ahead = offset.dot(self.forward);

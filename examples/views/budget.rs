@@ -25,8 +25,9 @@ pub struct Chosen {
 /// How often a budget that gives nothing up is halved, to show what would be.
 const MAX_HALVINGS: u32 = 8;
 
-/// Draws frames within a budget of so many milliseconds of thread time. Prints a line whenever the rung of a view changes. If the budget gives
-/// nothing up, goes on with half of it, and so on, to show what would be given up first; what is left is still that of the budget.
+/// Draws frames within a budget, in milliseconds of thread time. Prints a line whenever the rung of a view changes. If
+/// the budget gives nothing up, goes on with half of it, and so on, to show what would be given up first; what is left
+/// is still that of the budget.
 ///
 /// # Errors
 /// If the budget is no time, or a frame fails.

@@ -211,7 +211,8 @@ impl<R: Real> FullScreenCpuShader<R> for ContactSheetRow {
             let [width, height] = shown.size();
             shown.load([x.min(width - 1), y.min(height - 1)], layer)
         };
-        // The number of the square in which a pixel is, three to a row, and where in the square, as pixels of a texture of this size.
+        // The number of the square in which a pixel is, three to a row, and where in the square, as pixels of a texture
+        // of this size.
         let square = |side: usize, count: usize, pixels: usize| {
             let columns = count.min(3);
             let x = x.checked_sub((width - columns * side) / 2).filter(|x| *x < columns * side)?;

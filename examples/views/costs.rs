@@ -14,8 +14,8 @@ use serde::Serialize;
 
 use crate::gallery::Gallery;
 
-/// Frames that are drawn before others are measured: targets and pipelines are made in them, and the impostor is drawn, which is cached
-/// afterwards.
+/// Frames that are drawn before others are measured: targets and pipelines are made in them, and the impostor is drawn,
+/// which is cached afterwards.
 const WARM_UP_FRAMES: u32 = 3;
 
 /// A view, and what it costs.
@@ -29,8 +29,8 @@ pub struct ViewCost {
     commands: usize,
     /// The thread time of its stages a frame, in milliseconds.
     ms: f64,
-    /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted sooner. Only of
-    /// views that may be left out.
+    /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted
+    /// sooner. Only of views that may be left out.
     saves_ms: Option<f64>,
     /// Its rung at the end of the frames with a budget: 0 at its best, and without a budget.
     rung: usize,

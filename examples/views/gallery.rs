@@ -149,7 +149,8 @@ fn pool() -> ClipPlane {
     ClipPlane { point: DVec3::new(-0.2, 0.06, 6.2), normal: Vec3::Y }
 }
 
-/// Two portals on both sides of the pool. The second is turned so that the main camera, through the first, sees the first again.
+/// Two portals on both sides of the pool. The second is turned so that the main camera, through the first, sees the
+/// first again.
 fn portals() -> [(DVec3, Quat); 2] {
     let [entry, exit] = [DVec3::new(-3.6, 1.6, 6.6), DVec3::new(4.4, 1.6, 4.8)];
     let facing = |from: DVec3, to: DVec3| Quat::from_rotation_arc(Vec3::Z, (to - from).normalize().as_vec3());

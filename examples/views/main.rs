@@ -1,6 +1,6 @@
-//! Everything is a camera (M 10.1): draws a scene with mirrors, portals, a screen, an impostor, two players and tiles, each as views that other views
-//! sample, and puts all of them on one contact sheet. Prints what each view costs the processor, and what leaving it out would save. Without
-//! a graphics adapter the software backend draws it.
+//! Everything is a camera (M 10.1): draws a scene with mirrors, portals, a screen, an impostor, two players and tiles,
+//! each as views that other views sample, and puts all of them on one contact sheet. Prints what each view costs the
+//! processor, and what leaving it out would save. Without a graphics adapter the software backend draws it.
 //!
 //!     cargo run --release --example views
 //!     cargo run --release --example views -- --frames 100 --report views.json --out sheet.png
@@ -47,8 +47,8 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
 
-    /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are left. The table still has
-    /// what they cost at their best, and the rung that each ends on.
+    /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are
+    /// left. The table still has what they cost at their best, and the rung that each ends on.
     #[arg(long, value_name = "MS")]
     budget_ms: Option<f64>,
 

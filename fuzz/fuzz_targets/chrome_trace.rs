@@ -1,5 +1,5 @@
-//! Timelines as a Chrome trace, a page and reports: both files are JSON with the names of the log, and a log that refers to nothing
-//! is refused.
+//! Timelines as a Chrome trace, a page and reports: both files are JSON with the names of the log, and a log that
+//! refers to nothing is refused.
 
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! Frames of any scene: a picture without NaN that is the same on any number of workers, or an error that names what is wrong and is the
-//! same on all backends.
+//! Frames of any scene: a picture without NaN that is the same on any number of workers, or an error that names what is
+//! wrong and is the same on all backends.
 
 #![no_main]
 

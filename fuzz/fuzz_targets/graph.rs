@@ -1,5 +1,5 @@
-//! Graphs: what compiles, in which order, is what naive rules say; a run processes each item once after all that it waits for; and a
-//! failure is that of the first node that fails.
+//! Graphs: what compiles, in which order, is what naive rules say; a run processes each item once after all that it
+//! waits for; and a failure is that of the first node that fails.
 
 #![no_main]
 
@@ -44,7 +44,7 @@ struct Work {
 #[derive(Arbitrary, Clone, Copy, Debug)]
 enum Outcome {
     Done,
-    /// All is well, as it is with most nodes.
+    /// All is well, which most nodes are.
     AlsoDone,
     FailsAt(u8),
     PanicsAt(u8),
@@ -55,7 +55,8 @@ impl<'a> Arbitrary<'a> for Input {
     fn arbitrary(input: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
         let nodes = input.int_in_range(1..=MAX_NODES)?;
         let resources = input.int_in_range(0..=MAX_RESOURCES)?;
-        // The writers, modifiers and readers of a resource are made in this order where a byte says so, as else few graphs compile.
+        // The writers, modifiers and readers of a resource are made in this order where a byte says so, as else few
+        // graphs compile.
         let mut roles = vec![vec![None; resources]; nodes];
         for role in roles.iter_mut().flatten() {
             *role =

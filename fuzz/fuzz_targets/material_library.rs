@@ -1,4 +1,5 @@
-//! Material libraries: an import has valid materials, those that the OBJ file uses and no others, and all warnings are counted.
+//! Material libraries: an import has valid materials, those that the OBJ file uses and no others, and all warnings are
+//! counted.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! OBJ files: an import is a valid scene with as many triangles as a naive count of the faces allows, or an error that names the file.
+//! OBJ files: an import is a valid scene with as many triangles as a naive count of the faces allows, or an error that
+//! names the file.
 
 #![no_main]
 

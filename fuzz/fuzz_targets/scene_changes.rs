@@ -48,7 +48,7 @@ enum Report {
 #[derive(Arbitrary, Debug, PartialEq)]
 enum Outcome {
     Drawn,
-    /// All is well, as it is with most frames.
+    /// All is well, which most frames are.
     AlsoDrawn,
     /// Recorded, and never submitted.
     Dropped,

@@ -613,8 +613,8 @@ fn pick<T>(items: &[T], index: u8) -> &T {
     &items[usize::from(index) % items.len()]
 }
 
-/// One of the presets, or another combination of settings, with small shadow maps that are drawn in each frame, and edges in maps of
-/// paraboloids that are divided into few.
+/// One of the presets, or another combination of settings, with small shadow maps that are drawn in each frame, and
+/// edges in maps of paraboloids that are divided into few.
 pub fn quality(choice: u8) -> Quality {
     let preset = [Quality::balanced, Quality::exact, Quality::fast][usize::from(choice) % 3]();
     let shadows = ShadowQuality { side: 16, interval: 1, widest_edge: 30.0, ..preset.shadows };
@@ -644,7 +644,7 @@ impl Drawer {
         Self::new(scheduler, |builder| builder.quality(quality).granularity(Granularity::Adaptive))
     }
 
-    /// Draws a frame, or returns why it cannot be drawn as it is.
+    /// Draws a frame, or returns why it cannot be drawn unchanged.
     ///
     /// # Panics
     /// If the error is no property of the scene.

@@ -28,7 +28,7 @@ use crate::warnings::Warnings;
 use crate::world::World;
 use crate::world_builder::WorldBuilder;
 
-/// What of a file is drawn.
+/// The parts of a file that are drawn.
 #[derive(Clone, Debug)]
 pub struct LoadOptions {
     /// The time in seconds at which the animation is; `None` for nodes where the file has them.

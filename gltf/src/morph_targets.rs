@@ -26,8 +26,8 @@ pub(crate) struct MorphTargets {
 }
 
 impl MorphTargets {
-    /// Reads the targets of a primitive of so many vertices. What a target has not one finite value of for each vertex,
-    /// it does not change, which is a warning.
+    /// Reads the targets of a primitive with this number of vertices. A target changes no attribute without a finite
+    /// value for each vertex; that is a warning.
     ///
     /// # Errors
     /// If a limit is exceeded.

@@ -17,7 +17,7 @@ pub(crate) struct Warnings {
 }
 
 impl Warnings {
-    /// Lists so many at most.
+    /// The most that it lists.
     pub(crate) fn new(greatest: u64) -> Self {
         Self { greatest: usize::try_from(greatest).unwrap_or(usize::MAX), ..Self::default() }
     }

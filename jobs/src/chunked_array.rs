@@ -6,9 +6,9 @@ use parking_lot::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// An array in blocks of [`ChunkedArray::BLOCK_SIZE`] entries, each behind its own lock.
 ///
-/// Jobs that write different blocks never wait for each other, and the graph's order keeps jobs that use the same block apart.
-/// So a lock is never contended, and one uncontended lock a block costs a fraction of a nanosecond an entry: cheap enough to
-/// need no unsafe code.
+/// Jobs that write different blocks never wait for each other, and the graph's order keeps jobs that use the same block
+/// apart. So a lock is never contended, and one uncontended lock a block costs a fraction of a nanosecond an entry:
+/// cheap enough to need no unsafe code.
 #[derive(Debug)]
 pub struct ChunkedArray<T> {
     blocks: Vec<RwLock<Box<[T]>>>,
@@ -54,8 +54,8 @@ impl<T: Clone> ChunkedArray<T> {
     }
 }
 
-/// Cuts `range` at multiples of `size`: the index of each block of `size`, and the indices of `range` in it. An empty range has
-/// no blocks.
+/// Cuts `range` at multiples of `size`: the index of each block of `size`, and the indices of `range` in it. An empty
+/// range has no blocks.
 #[inline]
 pub fn block_ranges(range: Range<usize>, size: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
     let blocks = if range.is_empty() { 0..0 } else { range.start / size..range.end.div_ceil(size) };

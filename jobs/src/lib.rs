@@ -32,7 +32,8 @@
 //! each by [`SchedulerBuilder::on_start`](task::SchedulerBuilder::on_start). If it panics, the span or event is lost,
 //! and nothing else.
 //!
-//! [`graph`] and [`task`] have examples to copy. The crate `drawloom`, a renderer on top of this one, re-exports all modules.
+//! [`graph`] and [`task`] have examples to copy. The crate `drawloom`, a renderer on top of this one, re-exports all
+//! modules.
 
 // Each module uses only modules above it; `tests/architecture` of the workspace fails otherwise.
 #[forbid(unsafe_code)]

@@ -1,13 +1,14 @@
 //! The synchronisation primitives, in whose place a model checker puts its own.
 //!
-//! The modules `task`, `graph` and `timeline` take their atomics, locks, threads and deques from here. By default these are the
-//! standard library's, parking_lot's and crossbeam-deque's. With `--cfg drawloom_loom` they are those of loom, a model checker that
-//! explores all interleavings of a few threads, and all values that each memory ordering allows. With `--cfg drawloom_shuttle`
-//! they are those of shuttle, which tries random interleavings in one total order, and so can check whole runs. With either comes
-//! `--cfg drawloom_model_check`. The tests for both are beside the code that they check.
+//! The modules `task`, `graph` and `timeline` take their atomics, locks, threads and deques from here. By default these
+//! are the standard library's, parking_lot's and crossbeam-deque's. With `--cfg drawloom_loom` they are those of loom,
+//! a model checker that explores all interleavings of a few threads, and all values that each memory ordering allows.
+//! With `--cfg drawloom_shuttle` they are those of shuttle, which tries random interleavings in one total order, and so
+//! can check whole runs. With either comes `--cfg drawloom_model_check`. The tests for both are beside the code that
+//! they check.
 //!
-//! All variants have the same interface: a lock returns its guard and cannot be poisoned, and a wait takes the guard and returns
-//! it.
+//! All variants have the same interface: a lock returns its guard and cannot be poisoned, and a wait takes the guard
+//! and returns it.
 
 #[cfg(all(any(drawloom_loom, drawloom_shuttle), not(drawloom_model_check)))]
 compile_error!("a model checker also needs --cfg drawloom_model_check");
@@ -162,12 +163,13 @@ mod randomised {
 
     use shuttle::rand::{Rng, thread_rng};
 
-    /// A random point in time, so that decisions that depend on the clock go either way, and the same way when an interleaving
-    /// is repeated. A later reading may be smaller, which counts as no time between the two.
+    /// A random point in time, so that decisions that depend on the clock go either way, and the same way when an
+    /// interleaving is repeated. A later reading may be smaller, which counts as no time between the two.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Instant(Duration);
 
-    /// The upper bounds of a reading in nanoseconds. Most readings use the first, so that most work seems short and some long.
+    /// The upper bounds of a reading in nanoseconds. Most readings use the first, so that most work seems short and
+    /// some long.
     const MAX_USUAL: u64 = 1_000;
     const MAX_RARE: u64 = 20_000;
 
@@ -195,9 +197,9 @@ mod randomised {
         }
     }
 
-    /// Runs a test in some thousand interleavings: half of them switch threads at random, and half switch a few times only, but
-    /// delay a thread for long each time (Burckhardt et al., "A Randomized Scheduler with Probabilistic Guarantees of Finding
-    /// Bugs", 2010).
+    /// Runs a test in some thousand interleavings: half of them switch threads at random, and half switch a few times
+    /// only, but delay a thread for long each time (Burckhardt et al., "A Randomized Scheduler with Probabilistic
+    /// Guarantees of Finding Bugs", 2010).
     #[cfg(test)]
     pub(crate) fn check(run: impl Fn() + Send + Sync + 'static) {
         use shuttle::scheduler::{PctScheduler, RandomScheduler};

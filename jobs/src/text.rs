@@ -6,7 +6,7 @@ use std::path::Path;
 /// A text on one line, in which characters are escaped that do more than show: control characters, which terminals
 /// obey, and those that break lines or turn the direction in which text is read.
 ///
-/// Backslashes stay as they are, so that paths of Windows are legible. A name that spells `\u{a}` out therefore looks
+/// Backslashes are kept, so that paths of Windows are legible. A name that spells `\u{a}` out therefore looks
 /// like one with a line feed: the result is to be read, and not to be decoded.
 ///
 /// ```

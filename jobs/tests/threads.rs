@@ -1,4 +1,5 @@
-//! A dropped scheduler leaves no thread. This is the only test of its binary, so that it can count the threads of the process.
+//! A dropped scheduler leaves no thread. This is the only test of its binary, so that it can count the threads of the
+//! process.
 
 use std::sync::{
     Arc,

@@ -107,7 +107,7 @@ impl Limit {
         Ok(())
     }
 
-    /// Checks a size in bytes, of which at least so many are known.
+    /// Checks a size in bytes, of which at least this number is known.
     ///
     /// # Errors
     /// If it is above what is left of the limit, with the kind [`io::ErrorKind::FileTooLarge`].

@@ -263,7 +263,7 @@ pub(crate) fn without_comment(values: &str) -> &str {
     values.split_once('#').map_or(values, |(values, _)| values)
 }
 
-/// Appends a character of a statement. Messages escape more of what they quote: a file may have such a name.
+/// Appends a character of a statement. Messages escape more of what they quote: a file may have that name.
 fn push_escaped(text: &mut String, character: char) {
     match character {
         '\t' => text.push('\t'),

@@ -164,7 +164,7 @@ fn decode_bytes(decoder: impl ImageDecoder, rgba_bytes: u64) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Converts pixels of so many channels, which lie at the start, to RGBA, from the last one to the first.
+/// Converts pixels of `channels` channels, which lie at the start, to RGBA, from the last one to the first.
 fn to_rgba(bytes: &mut [u8], channels: usize) {
     for pixel in (0..bytes.len() / 4).rev() {
         let from = &bytes[pixel * channels..][..channels];

@@ -38,7 +38,8 @@ impl Destination {
             if let Some(stream) = StandardStream::of(&resolved) {
                 return Ok(Self::Stream(stream));
             }
-            // Names in these folders lead to open files, which need not have a name of their own, and which others write to as well.
+            // Names in these folders lead to open files, which need not have a name of their own, and which others
+            // write to as well.
             let is_open = |folder: PathBuf| folder.starts_with("/proc") || folder == Path::new("/dev/fd");
             if fs::canonicalize(folder_of(&resolved)).is_ok_and(is_open) {
                 return Ok(Self::Direct(path.to_owned()));
@@ -99,8 +100,8 @@ impl StandardStream {
         ["/proc/self/fd", "/dev/fd"].into_iter().any(is_folder).then_some(stream)
     }
 
-    /// The stream as a file with the same offset: one that is opened by its name begins elsewhere, and what the process prints then
-    /// overwrites it.
+    /// The stream as a file with the same offset: one that is opened by its name begins elsewhere, and what the process
+    /// prints then overwrites it.
     #[cfg(unix)]
     fn open(self) -> io::Result<File> {
         use std::os::fd::AsFd;

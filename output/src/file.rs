@@ -27,8 +27,8 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Checks that the file can be written: its folder is there and takes new files, and an old file of that name may be written. Creates
-    /// nothing that stays.
+    /// Checks that the file can be written: its folder is there and takes new files, and an old file of that name may
+    /// be written. Creates nothing that stays.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -57,13 +57,13 @@ impl OutputFile {
 
     /// Replaces the file by what `write` writes.
     ///
-    /// What is no regular file is written directly, and so is a regular file that is named as an open one, such as `/dev/stdout` or `/dev/fd/3`
-    /// where a shell redirects it. That file is not replaced, because the shell and other processes hold it open: the content goes behind what
-    /// it has.
+    /// What is no regular file is written directly, and so is a regular file that is named as an open one, such as
+    /// `/dev/stdout` or `/dev/fd/3` where a shell redirects it. That file is not replaced, because the shell and other
+    /// processes hold it open: the content goes behind what it has.
     ///
     /// # Errors
-    /// If `write` or the operating system fails. A file that would have been replaced is then as it was; one that is written directly may
-    /// have a part of the content.
+    /// If `write` or the operating system fails. A file that would have been replaced is then as it was; one that is
+    /// written directly may have a part of the content.
     pub fn write(&self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), OutputError> {
         let written = Destination::of(&self.path).and_then(|destination| destination.write(write));
         written.map_err(|source| OutputError::Failed { path: self.path.clone(), source })

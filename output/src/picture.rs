@@ -35,8 +35,8 @@ impl PictureFile {
         self.file.path()
     }
 
-    /// Replaces the file by a picture of `size` pixels, with `rgba` from its upper left row by row, a byte for each of red, green, blue and
-    /// alpha. JPEG has no alpha; it is left out.
+    /// Replaces the file by a picture of `size` pixels, with `rgba` from its upper left row by row, a byte for each of
+    /// red, green, blue and alpha. JPEG has no alpha; it is left out.
     ///
     /// # Errors
     /// If `rgba` is no such picture, the format has none of this size, or the file cannot be written.

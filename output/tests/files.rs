@@ -123,8 +123,9 @@ fn a_picture_has_the_format_of_its_extension() -> Outcome {
         assert!(!image::open(picture.path())?.color().has_alpha(), "{name}");
         let read = image::open(picture.path()).map_err(|error| format!("{name}: {error}"))?.to_rgb8();
         assert_eq!(read.dimensions(), (width, height), "{name}");
-        // JPEG converts colours to brightness and two differences of colour, in whole numbers, and stores the mean of a block in steps of 1 (at
-        // a quality of 75): half a step each time, so 1.06 of 255 in each of the three, and times 1 + 1.77 at most in a colour.
+        // JPEG converts colours to brightness and two differences of colour, in whole numbers, and stores the mean of a
+        // block in steps of 1 (at a quality of 75): half a step each time, so 1.06 of 255 in each of the three, and
+        // times 1 + 1.77 at most in a colour.
         let tolerance = if name.contains(".jp") { 3 } else { 0 };
         for (x, y, pixel) in read.enumerate_pixels() {
             let expected = &colors[(y / BLOCK) as usize][..3];

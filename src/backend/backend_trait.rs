@@ -17,16 +17,17 @@ use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
-/// The interface between frames and a device. All methods but [`Backend::read_back`] and [`Backend::submit`] are called while a frame is recorded,
-/// most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also beside a frame. Those that record take the worker as proof that they run in a job (M 10.3
-/// asserts it).
+/// The interface between frames and a device. All methods but [`Backend::read_back`] and [`Backend::submit`] are called
+/// while a frame is recorded, most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also
+/// beside a frame. Those that record take the worker as proof that they run in a job (M 10.3 asserts it).
 ///
 /// The order within a frame:
 ///
 /// 1. `limits`, `check_mesh` for each mesh that is new, and `begin`.
-/// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the current epoch, and
-///    the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of every pass `finish`, or `finish_together`. If
-///    all objects changed, a block is uploaded as soon as it is described, while other jobs describe other blocks.
+/// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the
+///    current epoch, and the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of
+///    every pass `finish`, or `finish_together`. If all objects changed, a block is uploaded as soon as it is
+///    described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass.
 /// 4. `read_back`.
 /// 5. Later, on the device thread, `submit`.
@@ -38,11 +39,12 @@ use crate::timeline::{Labels, TuningChoice};
 ///
 /// - Depth is reversed: 1 at the near plane, and 0 at the far plane or at infinity. Depth targets are cleared to 0, and
 ///   what is nearer has a greater depth.
-/// - Views with [`RenderView::is_cached`](crate::view::RenderView::is_cached) have no passes in the frame, but processes of other
-///   views sample their targets. So the targets of such a view keep their content from frame to frame.
-/// - Batches whose state has a [subdivision level](crate::command::DrawState::subdivision_level) above 0 draw their mesh
-///   [subdivided](crate::scene::Mesh::subdivided), as a triangle list whose longest edge is that of the mesh, halved that often.
-///   Objects whose mesh cannot be subdivided that far are drawn nevertheless, and counted as
+/// - Views with [`RenderView::is_cached`](crate::view::RenderView::is_cached) have no passes in the frame, but
+///   processes of other views sample their targets. So the targets of a cached view keep their content from frame to
+///   frame.
+/// - Batches whose state has a [subdivision level](crate::command::DrawState::subdivision_level) above 0 draw their
+///   mesh [subdivided](crate::scene::Mesh::subdivided), as a triangle list whose longest edge is that of the mesh,
+///   halved that often. Objects whose mesh cannot be subdivided that far are drawn nevertheless, and counted as
 ///   [`CoarseEdges`](crate::view::RejectionReason::CoarseEdges).
 /// - Partial batches draw only the triangles in [`DrawList::remaining`](crate::command::DrawList::remaining).
 /// - Batches are drawn in the order of their list, and passes in that of the queues.
@@ -70,8 +72,8 @@ pub trait Backend: Send + Sync + 'static {
         false
     }
 
-    /// Compiles the shaders of a plan's processes, and makes the pipelines for objects of these states of each process, ahead of the first
-    /// frame that needs them. A backend without pipelines does nothing.
+    /// Compiles the shaders of a plan's processes, and makes the pipelines for objects of these states of each process,
+    /// ahead of the first frame that needs them. A backend without pipelines does nothing.
     ///
     /// # Errors
     /// If the device refuses a shader or a pipeline.
@@ -91,12 +93,14 @@ pub trait Backend: Send + Sync + 'static {
         false
     }
 
-    /// Does as much of that work as should be done between two frames. The renderer has a [background job](crate::task::Scheduler::background)
-    /// call it after a frame was recorded, unless the last such job still runs; a scheduler with a single worker has no time for such jobs, so
-    /// there the calling thread does it when a frame was recorded.
+    /// Does as much of that work as should be done between two frames. The renderer has a [background
+    /// job](crate::task::Scheduler::background) call it after a frame was recorded, unless the last such job still
+    /// runs; a scheduler with a single worker has no time for such jobs, so there the calling thread does it when a
+    /// frame was recorded.
     fn work_in_background(&self) {}
 
-    /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes that it uploaded.
+    /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes
+    /// that it uploaded.
     fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
         let _ = count;
     }
@@ -109,7 +113,7 @@ pub trait Backend: Send + Sync + 'static {
     /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or
     /// not, before the first frame with it, and again after another backend or format was set. Objects with a mesh that
     /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::RejectionReason::UndrawableMesh);
-    /// the error becomes a warning. `begin` never sees such a mesh among the used ones.
+    /// the error becomes a warning. `begin` never sees that mesh among the used ones.
     ///
     /// # Errors
     /// If it cannot be drawn, as it exceeds a limit of the device, or is in buffers that the backend cannot read.
@@ -118,27 +122,29 @@ pub trait Backend: Send + Sync + 'static {
         Ok(())
     }
 
-    /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the meshes, the frame draws
-    /// none but the [used ones](crate::view::ObjectTable::used_meshes).
+    /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the
+    /// meshes, the frame draws none but the [used ones](crate::view::ObjectTable::used_meshes).
     ///
     /// # Errors
     /// If the device lacks room for the frame's resources, or refuses them.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
-    /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame alone.
+    /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame
+    /// alone.
     fn discard_frame(&self) {}
 
     /// Makes the next frame's [histories](crate::process::Declare::samples_previous) empty.
     fn forget_histories(&self) {}
 
-    /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. Such a view is never cached.
+    /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. That view is
+    /// never cached.
     fn imports_targets_of(&self, view: &str) -> bool {
         let _ = view;
         false
     }
 
-    /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if they hold none.
-    /// If it is the current one, nothing is uploaded.
+    /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if
+    /// they hold none. If it is the current one, nothing is uploaded.
     fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
         let _ = frame;
         0
@@ -150,8 +156,9 @@ pub trait Backend: Send + Sync + 'static {
         TargetMemory::default()
     }
 
-    /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the [columns](crate::scene::ObjectColumn) of these
-    /// objects that the plan reads: at least what changed since [`Backend::objects_epoch`]. Other blocks may be described meanwhile.
+    /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the
+    /// [columns](crate::scene::ObjectColumn) of these objects that the plan reads: at least what changed since
+    /// [`Backend::objects_epoch`]. Other blocks may be described meanwhile.
     ///
     /// # Errors
     /// If the device refuses.
@@ -199,15 +206,16 @@ pub trait Backend: Send + Sync + 'static {
         parts: &mut Vec<Self::Part>,
     ) -> Result<Self::Commands, BackendError>;
 
-    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission order. Constant
-    /// throughout a frame; by default every pass is finished alone. At most 16 passes are finished together.
+    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission
+    /// order. Constant throughout a frame; by default every pass is finished alone. At most 16 passes are finished
+    /// together.
     fn continues_previous_pass(&self, frame: &Self::Frame, pass: usize) -> bool {
         let _ = (frame, pass);
         false
     }
 
-    /// Finishes passes that follow each other in submission order, each as [`Backend::finish`] does, and calls `emit` with the commands
-    /// of each, in order. `parts` has those of each pass; the caller drops what the backend leaves.
+    /// Finishes passes that follow each other in submission order, each as [`Backend::finish`] does, and calls `emit`
+    /// with the commands of each, in order. `parts` has those of each pass; the caller drops what the backend leaves.
     ///
     /// # Errors
     /// If the device refuses one of the passes. The error names that one.
@@ -225,8 +233,8 @@ pub trait Backend: Send + Sync + 'static {
         Ok(())
     }
 
-    /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or made none by
-    /// measured cost. `labels` are those of the pass.
+    /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or
+    /// made none by measured cost. `labels` are those of the pass.
     fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let _ = (frame, pass, labels);
         None
@@ -235,7 +243,8 @@ pub trait Backend: Send + Sync + 'static {
     /// Has a view's target read back as a recorded frame leaves it, when the frame is submitted. It does not wait.
     ///
     /// # Errors
-    /// If there is no such target, or the device refuses; [`BackendError::CannotReadBack`] from a backend that does not implement it.
+    /// If there is no such target, or the device refuses; [`BackendError::CannotReadBack`] from a backend that does not
+    /// implement it.
     fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
         let _ = (frame, view, target);
         Err(BackendError::CannotReadBack)
@@ -246,8 +255,8 @@ pub trait Backend: Send + Sync + 'static {
     /// A view has one queue, unless its plan has it submitted [process by
     /// process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
     ///
-    /// The device sets each of `fences` when it has done all passes up to the fence's place; they are in the order of their places. A fence
-    /// that is dropped is abandoned, so after an error none need be set.
+    /// The device sets each of `fences` when it has done all passes up to the fence's place; they are in the order of
+    /// their places. A fence that is dropped is abandoned, so after an error none need be set.
     ///
     /// # Errors
     /// If the device refuses.

@@ -82,8 +82,8 @@ pub enum BackendError {
         /// The pass or resource that needed memory.
         label: String,
     },
-    /// The device was lost, with everything on it: see [`Renderer::replace_backend`](crate::Renderer::replace_backend). Every later frame on
-    /// it has this error.
+    /// The device was lost, with everything on it: see [`Renderer::replace_backend`](crate::Renderer::replace_backend).
+    /// Every later frame on it has this error.
     #[error("the device was lost: {message}")]
     DeviceLost {
         /// The device's message.
@@ -109,8 +109,8 @@ pub enum BackendError {
         /// The render process's name.
         process: String,
     },
-    /// A mesh [in the engine's own buffers](crate::scene::Mesh::from_buffers) has an attribute in a format that shaders read as another kind
-    /// of number. The process leaves its objects out, and warns with this error.
+    /// A mesh [in the engine's own buffers](crate::scene::Mesh::from_buffers) has an attribute in a format that shaders
+    /// read as another kind of number. The process leaves its objects out, and warns with this error.
     #[error(
         "process {process:?} reads {attribute:?} as {expected}, but mesh `{mesh}`, or one with the same layout, has it as {format}"
     )]

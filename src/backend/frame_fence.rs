@@ -5,16 +5,16 @@ use crate::fence::FenceSetter;
 /// A fence that the device sets at a place in a frame.
 #[derive(Debug)]
 pub struct FrameFence {
-    /// The number of passes before the place, in submission order. If it is that of all passes, the place is the end of the frame, after
-    /// everything that the backend adds.
+    /// The number of passes before the place, in submission order. If it is that of all passes, the place is the end of
+    /// the frame, after everything that the backend adds.
     pub passes: usize,
     /// Sets the fence.
     pub setter: FenceSetter,
 }
 
 impl FrameFence {
-    /// Sets the fences whose places come after this many passes at most, of fences that are in the order of their places. For devices that have
-    /// done what is submitted when the call returns.
+    /// Sets the fences whose places come after this many passes at most, of fences that are in the order of their
+    /// places. For devices that have done what is submitted when the call returns.
     ///
     /// ```
     /// # use drawloom::backend::FrameFence;

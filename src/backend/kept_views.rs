@@ -14,9 +14,10 @@ pub(crate) struct KeptView {
     pub(crate) is_same: bool,
 }
 
-/// For each view the one of the frame before whose targets it keeps, by the kinds and names of those: the view of the same kind and name, of
-/// several the one at the same place among them; otherwise one of the same kind that no other view keeps. Of several views with the same kind
-/// and name none is the same as before if their number has changed, because it is unknown which of them is new or gone.
+/// For each view the one of the frame before whose targets it keeps, by the kinds and names of those: the view of the
+/// same kind and name, of several the one at the same place among them; otherwise one of the same kind that no other
+/// view keeps. Of several views with the same kind and name none is the same as before if their number has changed,
+/// because it is unknown which of them is new or gone.
 pub(crate) fn kept_views<'a>(
     before: impl Iterator<Item = (ViewKind, &'a str)>,
     views: &'a [RenderView],
@@ -82,7 +83,8 @@ mod tests {
         // It is unknown which of two views of a name is gone, or is the new one.
         assert_eq!(found(&before, &[(Main, "main"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
         assert_eq!(found(&before[..2], &[(Main, "main"), (Main, "main")]), [Some((0, false)), None]);
-        // Another name takes the targets of a view that is gone, but not those of another kind, or of a view that is still there.
+        // Another name takes the targets of a view that is gone, but not those of another kind, or of a view that is
+        // still there.
         assert_eq!(found(&before, &[(Main, "other"), (Main, "side")]), [Some((0, false)), Some((3, true))]);
         assert_eq!(found(&before[..2], &[(Main, "mirror"), (Main, "main")]), [None, Some((0, true))]);
         assert_eq!(found(&[], &[(Main, "main")]), [None]);

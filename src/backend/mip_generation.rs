@@ -80,8 +80,8 @@ fn scaled(texture: &Texture, side: u32) -> Vec<Texel> {
     result
 }
 
-/// The filter weights of a resampling from `from` to `to` pixels: for each new pixel, old pixels and their weights. The filter
-/// is a tent as wide as the coarser grid's pixels. Indices wrap around, as texture coordinates do.
+/// The filter weights of a resampling from `from` to `to` pixels: for each new pixel, old pixels and their weights. The
+/// filter is a tent as wide as the coarser grid's pixels. Indices wrap around, as texture coordinates do.
 fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     let step = from as f64 / to as f64;
     let radius = step.max(1.0);
@@ -132,7 +132,8 @@ fn encoded(level: &[Texel]) -> Vec<u8> {
 
 static SRGB_BYTES: LazyLock<SrgbBytes> = LazyLock::new(SrgbBytes::new);
 
-/// Linear values as sRGB bytes, by search in a table: a power for each channel of each pixel would take most of the time of a chain.
+/// Linear values as sRGB bytes, by search in a table: a power for each channel of each pixel would take most of the
+/// time of a chain.
 struct SrgbBytes {
     /// The smallest value of each byte.
     smallest: [f32; 256],

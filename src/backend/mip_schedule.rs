@@ -7,8 +7,9 @@ use crate::view::RenderView;
 
 /// After which passes of a frame the mip levels of which targets are generated.
 ///
-/// That is after the last pass that writes a view's target before a pass samples it, or before the frame ends. So at the end of a frame
-/// all levels match level 0: histories are copies of them, and a view whose picture is cached needs none.
+/// That is after the last pass that writes a view's target before a pass samples it, or before the frame ends. So at
+/// the end of a frame all levels match level 0: histories are copies of them, and a view whose picture is cached needs
+/// none.
 #[derive(Debug, Default)]
 pub(crate) struct MipSchedule {
     /// By the index of the pass, the indices of views and of the plan's targets.
@@ -58,8 +59,8 @@ impl MipSchedule {
         schedule
     }
 
-    /// The targets whose levels are generated after a pass, by its index in the frame: the indices of their views, and those
-    /// of the plan's targets.
+    /// The targets whose levels are generated after a pass, by its index in the frame: the indices of their views, and
+    /// those of the plan's targets.
     pub(crate) fn after(&self, pass: usize) -> &[(usize, usize)] {
         self.after.get(&pass).map_or(&[], Vec::as_slice)
     }

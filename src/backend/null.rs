@@ -21,7 +21,8 @@ use crate::task::Worker;
 /// - each pass of commands is prepared once at most, with a sorted list that has one object per command, all of them in
 ///   the scene;
 /// - each bundle is recorded once, and has 1 to [`DrawList::BATCHES_PER_BUNDLE`] batches;
-/// - batches are not empty, draw existing meshes, and follow each other without overlaps and, except between those of pieces, without gaps;
+/// - batches are not empty, draw existing meshes, and follow each other without overlaps and, except between those of
+///   pieces, without gaps;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
 /// - a pass without commands has neither batches nor bundles;

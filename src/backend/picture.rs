@@ -28,7 +28,8 @@ impl Picture {
         bytes == Some(self.bytes.len()) && !self.bytes.is_empty()
     }
 
-    /// A pixel as shaders sample it: linear, and where the format lacks channels, those of opaque black. Whole numbers are rounded to f32.
+    /// A pixel as shaders sample it: linear, and where the format lacks channels, those of opaque black. Whole numbers
+    /// are rounded to f32.
     ///
     /// # Panics
     /// If the picture has no such pixel.

@@ -4,7 +4,8 @@ use super::{BackendError, Picture};
 
 /// A target as one frame leaves it, on its way to the CPU: see [`Backend::read_back`](super::Backend::read_back).
 pub trait ReadBack: Send {
-    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It does not wait.
+    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It
+    /// does not wait.
     ///
     /// # Errors
     /// If the frame was dropped, or the device is lost.

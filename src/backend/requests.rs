@@ -35,7 +35,8 @@ pub struct FrameRequest<'a> {
     pub objects: &'a ObjectTable,
     /// The most objects that a draw list has: all of the scene, and once more those of its pieces.
     pub list_capacity: usize,
-    /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes are finished.
+    /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes
+    /// are finished.
     pub generated: &'a [Arc<GeneratedContents>],
     /// Whether the backend records passes in bundles, even if another strategy is cheaper, unless the engine has fixed
     /// one. Set for [`PerDraw`](crate::Granularity::PerDraw) and [`Chunk`](crate::Granularity::Chunk).

@@ -13,8 +13,9 @@ use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::RejectionReason;
 
-/// Keeps subdivided meshes, as a backend's geometry `T`. A view that comes back finds those that it drew before, because to subdivide
-/// takes longer than the rest of a frame; so unused ones are dropped only where they take much memory.
+/// Keeps subdivided meshes, as a backend's geometry `T`. A view that comes back finds those that it drew before,
+/// because to subdivide takes longer than the rest of a frame; so unused ones are dropped only where they take much
+/// memory.
 pub(super) struct SubdivisionCache<T> {
     meshes: Mutex<HashMap<Key, Arc<CachedSubdivision<T>>>>,
     /// The identity of the assets that the meshes belong to.
@@ -56,10 +57,11 @@ impl<T> SubdivisionCache<T> {
     /// The maximum number of triangles of unused meshes: some 24 MB.
     const MAX_UNUSED_TRIANGLES: usize = 1 << 20;
 
-    /// Begins a frame: drops meshes of other assets, those whose source is gone, and, where unused ones have too many triangles, the
-    /// longest unused ones.
+    /// Begins a frame: drops meshes of other assets, those whose source is gone, and, where unused ones have too many
+    /// triangles, the longest unused ones.
     pub(super) fn begin_frame(&self, assets: &Assets) {
-        // Relaxed, here and below: frames begin one after the other, and the end of a frame's run orders its jobs' stores.
+        // Relaxed, here and below: frames begin one after the other, and the end of a frame's run orders its jobs'
+        // stores.
         let frame = self.frame.fetch_add(1, Ordering::Relaxed) + 1;
         let identity = assets.meshes.identity();
         let same_assets = self.assets.swap(identity, Ordering::Relaxed) == identity;
@@ -133,7 +135,8 @@ impl<T> SubdivisionCache<T> {
         let found = match cached {
             Some(cached) => cached,
             None => {
-                // Two passes may do this at once. One result is discarded, which is cheaper than holding the lock meanwhile.
+                // Two passes may do this at once. One result is discarded, which is cheaper than holding the lock
+                // meanwhile.
                 let (mesh, is_coarse) = match level_of_detail {
                     0 => subdivided(mesh, level),
                     coarser => subdivided(&mesh.at_level(coarser), level),

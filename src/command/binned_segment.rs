@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::{Bins, DrawState};
 
-/// The objects of one pass among a segment of a view's visible objects, ordered by bin: by draw state, by mesh, and by object.
+/// The objects of one pass among a segment of a view's visible objects, ordered by bin: by draw state, by mesh, and by
+/// object.
 ///
-/// They are counted and scattered (counting sort; Knuth, *The Art of Computer Programming* 3, 5.2), in time proportional to the
-/// numbers of objects and bins. Where there are many more bins than objects, they are sorted.
+/// They are counted and scattered (counting sort; Knuth, *The Art of Computer Programming* 3, 5.2), in time
+/// proportional to the numbers of objects and bins. Where there are many more bins than objects, they are sorted.
 #[derive(Clone, Debug, Default)]
 pub struct BinnedSegment {
     /// The objects in their own order, and the number of the bin of each.
@@ -98,8 +99,8 @@ impl BinnedSegment {
         }
     }
 
-    /// Makes this segment the objects in a range of positions of another one's order that `is_visible`, in the bins that `is_drawn`. They
-    /// are in order.
+    /// Makes this segment the objects in a range of positions of another one's order that `is_visible`, in the bins
+    /// that `is_drawn`. They are in order.
     pub(crate) fn select(
         &mut self,
         all: &Self,
@@ -134,7 +135,8 @@ impl BinnedSegment {
         by_bin.truncate(count);
     }
 
-    /// Divides the ordered objects of each bin that `has_levels` by `level_of` detail, the finest first. Objects of one level stay in order.
+    /// Divides the ordered objects of each bin that `has_levels` by `level_of` detail, the finest first. Objects of one
+    /// level stay in order.
     pub(crate) fn divide_by_level(&mut self, has_levels: impl Fn(u32) -> bool, level_of: impl Fn(u32) -> u32) {
         let Self { by_bin, runs, divided_runs, undivided, .. } = self;
         divided_runs.clear();
@@ -175,7 +177,8 @@ impl BinnedSegment {
         &mut self.by_bin
     }
 
-    /// One of the bins that have objects, with one of their levels of detail, by index in draw order, and the range of its objects.
+    /// One of the bins that have objects, with one of their levels of detail, by index in draw order, and the range of
+    /// its objects.
     pub(super) fn run(&self, index: usize) -> Option<((u32, u32), Range<usize>)> {
         let &Run { bin, level_of_detail, end } = self.runs.get(index)?;
         let start = index.checked_sub(1).map_or(0, |before| self.runs[before].end);

@@ -2,9 +2,9 @@
 
 use super::DrawState;
 
-/// The pairs of draw state and mesh that a scene's objects have, or had. Equal commands become one draw, so the objects of a bin
-/// are a batch. An object changes its bin seldom, so a pass counts its objects by bin and sorts nothing (Bevy's binned render
-/// phases).
+/// The pairs of draw state and mesh that a scene's objects have, or had. Equal commands become one draw, so the objects
+/// of a bin are a batch. An object changes its bin seldom, so a pass counts its objects by bin and sorts nothing
+/// (Bevy's binned render phases).
 ///
 /// Numbers depend on timing: use [`Bins::in_order`] wherever order matters.
 #[derive(Debug, Default)]

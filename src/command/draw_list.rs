@@ -8,14 +8,14 @@ use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
 #[derive(Clone, Debug, Default)]
 pub struct DrawList {
-    /// The commands in draw order, bucket by bucket, of a pass that sorts them. Only the first `bucket_count` vectors are part of the list; the others
-    /// keep their memory for later frames.
+    /// The commands in draw order, bucket by bucket, of a pass that sorts them. Only the first `bucket_count` vectors
+    /// are part of the list; the others keep their memory for later frames.
     commands: Vec<Vec<RenderCommand>>,
     bucket_count: usize,
     /// The batches in draw order: those of the pieces that the view executes, then all others.
     pub batches: Vec<Batch>,
-    /// What batches draw: the object index of each command, which are the 4 bytes per object that a pass uploads. Those of
-    /// [pieces](crate::scene::Piece) come first, also of pieces that the view does not execute.
+    /// What batches draw: the object index of each command, which are the 4 bytes per object that a pass uploads. Those
+    /// of [pieces](crate::scene::Piece) come first, also of pieces that the view does not execute.
     pub objects: Vec<u32>,
     /// Which of the objects and batches belong to pieces.
     pieces: ListPieces,
@@ -52,8 +52,8 @@ impl DrawList {
         self.bundle_size = (batches < Self::BATCHES_PER_BUNDLE).then_some(batches.max(1));
     }
 
-    /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no part of
-    /// it. Lists of [`Version::default`] may differ.
+    /// The version of the list: a backend that holds what it made of one need not make it again. Partial batches are no
+    /// part of it. Lists of [`Version::default`] may differ.
     pub fn version(&self) -> Version {
         self.version
     }
@@ -81,8 +81,8 @@ impl DrawList {
 
     /// Appends a bucket. The list takes the bucket's vectors and leaves its own in exchange, so neither allocates.
     ///
-    /// The bucket's first batch continues the list's last one where both have the same state and mesh, and `can_merge` holds
-    /// for that mesh's slot: the list does not depend on where the buckets begin.
+    /// The bucket's first batch continues the list's last one where both have the same state and mesh, and `can_merge`
+    /// holds for that mesh's slot: the list does not depend on where the buckets begin.
     pub fn append(&mut self, bucket: &mut Bucket, can_merge: impl Fn(u32) -> bool) {
         if self.bucket_count == self.commands.len() {
             self.commands.push(Vec::new());
@@ -105,8 +105,9 @@ impl DrawList {
         self.objects.extend_from_slice(&bucket.objects);
     }
 
-    /// Joins the segments of a pass that orders its objects by bin. Each bin becomes one batch for each level of detail. If `can_merge` is false for its mesh's
-    /// slot, each object becomes a batch. The list may take the vectors of the segments and leave its own in exchange.
+    /// Joins the segments of a pass that orders its objects by bin. Each bin becomes one batch for each level of
+    /// detail. If `can_merge` is false for its mesh's slot, each object becomes a batch. The list may take the vectors
+    /// of the segments and leave its own in exchange.
     ///
     /// The list has no commands. It does not depend on where the segments begin.
     pub fn join_bins<S: DerefMut<Target = BinnedSegment>>(
@@ -165,8 +166,8 @@ impl DrawList {
         self.batches.extend(batches);
     }
 
-    /// Makes a batch of one object partial: it draws only the triangles whose corners `append_indices` appends, three per
-    /// triangle. Calls come in ascending order of `batch`.
+    /// Makes a batch of one object partial: it draws only the triangles whose corners `append_indices` appends, three
+    /// per triangle. Calls come in ascending order of `batch`.
     #[cfg(feature = "occlusion")]
     pub(crate) fn make_partial(&mut self, batch: u32, append_indices: impl FnOnce(&mut Vec<u32>)) {
         let first = self.remaining_indices.len() as u32;
@@ -227,8 +228,9 @@ impl DrawList {
         }
     }
 
-    /// Replaces the batches of pieces, unless they are those of this version. They come in draw order; neighbours whose objects follow each other become
-    /// one batch where both have the same state and mesh, and `can_merge` holds for that mesh's slot.
+    /// Replaces the batches of pieces, unless they are those of this version. They come in draw order; neighbours whose
+    /// objects follow each other become one batch where both have the same state and mesh, and `can_merge` holds for
+    /// that mesh's slot.
     pub(crate) fn execute_pieces(
         &mut self,
         version: Version,
@@ -288,8 +290,8 @@ impl DrawList {
         }
     }
 
-    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of pieces does not depend on other objects, and that of
-    /// others not on pieces.
+    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of pieces does not depend
+    /// on other objects, and that of others not on pieces.
     pub fn bundle_slot(&self, index: usize) -> usize {
         index.checked_sub(self.pieces.bundle_count()).map_or(2 * index, |own| 2 * own + 1)
     }

@@ -65,7 +65,8 @@ impl DrawState {
         u32::from(self.0 >> 9)
     }
 
-    /// The part of the state that selects the pipeline, on which the level of detail has no influence. A subdivided mesh is a triangle list, whatever its own topology is.
+    /// The part of the state that selects the pipeline, on which the level of detail has no influence. A subdivided
+    /// mesh is a triangle list, whatever its own topology is.
     pub fn pipeline_state(self) -> Self {
         match self.subdivision_level() {
             0 => self.with_level_of_detail(0),

@@ -2,8 +2,8 @@
 
 use super::{Batch, Bucket, RenderCommand};
 
-/// Merges the bucket's sorted commands into batches: neighbours with the same mesh and state become one instanced draw. Where
-/// `can_merge` does not hold for a mesh's slot, each command of that mesh is a batch of its own.
+/// Merges the bucket's sorted commands into batches: neighbours with the same mesh and state become one instanced draw.
+/// Where `can_merge` does not hold for a mesh's slot, each command of that mesh is a batch of its own.
 ///
 /// Neighbours with different materials share a batch, because shaders find materials by object.
 pub(crate) fn instance(bucket: &mut Bucket, can_merge: impl Fn(u32) -> bool) {

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::Version;
 
-/// What a draw list has of [pieces](crate::scene::Piece): the objects of all of them, and the batches of those that the view executes. Both come
-/// before those of other objects, and stay as they are while these change.
+/// What a draw list has of [pieces](crate::scene::Piece): the objects of all of them, and the batches of those that the
+/// view executes. Both come before those of other objects, and do not change with these.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ListPieces {
     /// The version of the objects.

@@ -1,5 +1,6 @@
-//! Commands, each of which draws one object, independent of any device and small enough to sort by the million (M 10.3). They
-//! are sorted in buckets, merged into batches (instanced draws), and joined to one draw list per pass (M 10.5).
+//! Commands, each of which draws one object, independent of any device and small enough to sort by the million (M
+//! 10.3). They are sorted in buckets, merged into batches (instanced draws), and joined to one draw list per pass (M
+//! 10.5).
 
 mod binned_segment;
 mod bins;

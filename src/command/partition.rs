@@ -4,8 +4,8 @@ use drawloom_jobs::internal::ChunkedArray;
 
 use super::{RenderCommand, SortKey};
 
-/// The commands of a pass, divided into parts of equal size. All commands of a part come before those of the next, so the
-/// parts can be sorted independently.
+/// The commands of a pass, divided into parts of equal size. All commands of a part come before those of the next, so
+/// the parts can be sorted independently.
 ///
 /// Dividing is one job, and where parts are small it takes as long as sorting. So this is for a granularity that asks
 /// for it: [`Splitters`](super::Splitters) take less time.
@@ -16,8 +16,8 @@ pub(crate) struct Partition {
 }
 
 impl Partition {
-    /// Divides the first `count` commands into parts of `part_size`, of which the last may be smaller. Empty commands are left
-    /// out.
+    /// Divides the first `count` commands into parts of `part_size`, of which the last may be smaller. Empty commands
+    /// are left out.
     pub(crate) fn divide(&mut self, commands: &ChunkedArray<RenderCommand>, count: usize, part_size: usize) {
         self.part_size = part_size;
         self.commands.clear();

@@ -1,9 +1,10 @@
 //! A radix sort of integers.
 
-/// Sorts `entries` by the `width` bits that begin at bit `low`; no higher bit is set. The sort is stable. `swapped` and `counts`
-/// are scratch memory.
+/// Sorts `entries` by the `width` bits that begin at bit `low`; no higher bit is set. The sort is stable. `swapped` and
+/// `counts` are scratch memory.
 ///
-/// It runs a counting sort per digit, from the lowest to the highest (Knuth, *The Art of Computer Programming* 3, 5.2.5).
+/// It runs a counting sort per digit, from the lowest to the highest (Knuth, *The Art of Computer Programming* 3,
+/// 5.2.5).
 pub(super) fn radix_sort(
     entries: &mut Vec<u64>,
     swapped: &mut Vec<u64>,

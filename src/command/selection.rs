@@ -17,8 +17,8 @@ pub struct Selection {
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
     pub excluded_layers: LayerMask,
-    /// By the layers that the view shows, which [`Camera::layers`](crate::scene::Camera::layers) sets: objects must belong to one of these
-    /// as well.
+    /// By the layers that the view shows, which [`Camera::layers`](crate::scene::Camera::layers) sets: objects must
+    /// belong to one of these as well.
     pub visible_layers: LayerMask,
     /// In which order they are drawn.
     pub order: DrawOrder,
@@ -74,7 +74,8 @@ impl Selection {
         Self { order, ..self }
     }
 
-    /// Whether it contains objects of any layer, and of any material type, that blend like this and have the material in this slot.
+    /// Whether it contains objects of any layer, and of any material type, that blend like this and have the material
+    /// in this slot.
     pub fn contains(self, blend: Blend, material: u32) -> bool {
         let blends = match self.blending {
             Blending::Opaque => blend == Blend::None,
@@ -92,7 +93,8 @@ impl Default for Selection {
     }
 }
 
-/// The order in which a process draws objects (M 10.5, "multiple types of sorting"). Objects that it leaves open are drawn by index.
+/// The order in which a process draws objects (M 10.5, "multiple types of sorting"). Objects that it leaves open are
+/// drawn by index.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum DrawOrder {
@@ -100,12 +102,13 @@ pub enum DrawOrder {
     /// [`Quality::opaque_order`](crate::quality::Quality::opaque_order) says; then blended ones, back to front.
     #[default]
     ByState,
-    /// All by the distance of their centres along the view's axis, the nearest first: for expensive fragment shaders. As precise as
-    /// [`Quality::blended_order`](crate::quality::Quality::blended_order).
+    /// All by the distance of their centres along the view's axis, the nearest first: for expensive fragment shaders.
+    /// As precise as [`Quality::blended_order`](crate::quality::Quality::blended_order).
     FrontToBack,
     /// The farthest first, with the same precision: where what is drawn depends on what is behind it.
     BackToFront,
-    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`]. It is the first `u32` of each element.
+    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`]. It is the first
+    /// `u32` of each element.
     ByColumn(ColumnLayout),
 }
 
@@ -162,8 +165,8 @@ impl MaterialTypeFilter {
     }
 }
 
-/// A share of the materials: those whose slot modulo `of` is `index`. The shares 0 to `of` − 1 are disjoint and contain every
-/// material, so a process that is added once per share splits its work by material (L 5).
+/// A share of the materials: those whose slot modulo `of` is `index`. The shares 0 to `of` − 1 are disjoint and contain
+/// every material, so a process that is added once per share splits its work by material (L 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MaterialShare {
     /// Which share, counted from 0.

@@ -17,9 +17,9 @@ pub(crate) struct SortScratch {
     digit_counts: Vec<[u32; DIGIT_VALUES]>,
 }
 
-/// Sorts the first `count` commands whose keys lie in `range` into `sorted`, and leaves out empty commands. Equal keys are
-/// ordered by object, so the order is total: it depends neither on the algorithm nor on which worker filled which command, and
-/// the buckets in sequence are the same whatever their number.
+/// Sorts the first `count` commands whose keys lie in `range` into `sorted`, and leaves out empty commands. Equal keys
+/// are ordered by object, so the order is total: it depends neither on the algorithm nor on which worker filled which
+/// command, and the buckets in sequence are the same whatever their number.
 ///
 /// The commands lie in the order of their objects, as [`Fill`](crate::view::Fill) writes them.
 pub(crate) fn sort(

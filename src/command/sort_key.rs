@@ -2,8 +2,8 @@
 
 use super::DrawState;
 
-/// The 64-bit sort key of a command within its pass (M 10.5, "Sorting and Instancing"); smaller keys are drawn first. Commands
-/// with equal keys are ordered by object index.
+/// The 64-bit sort key of a command within its pass (M 10.5, "Sorting and Instancing"); smaller keys are drawn first.
+/// Commands with equal keys are ordered by object index.
 ///
 /// ```text
 /// bit    63 62 | 61 … 55 | 54 … 23 | 22 … 20         | 19 … 0
@@ -17,13 +17,13 @@ use super::DrawState;
 ///
 /// Commands of a process with a [draw order](super::DrawOrder) of its own are all ordered by a number, opaque or not.
 ///
-/// The picture depends on bits 63 and 62 (blended after opaque), on the depth of blended commands and on those numbers. All other bits only save
-/// state changes and overdraw. Depths are codes of a [`DepthKey`](crate::quality::DepthKey): the upper 20 bits for opaque
-/// commands, all 32 for blended ones. A [`DepthKey`](crate::quality::DepthKey) with fewer bits leaves the lower ones equal in all
-/// keys, and the sort skips bits that are equal.
+/// The picture depends on bits 63 and 62 (blended after opaque), on the depth of blended commands and on those numbers.
+/// All other bits only save state changes and overdraw. Depths are codes of a [`DepthKey`](crate::quality::DepthKey):
+/// the upper 20 bits for opaque commands, all 32 for blended ones. A [`DepthKey`](crate::quality::DepthKey) with fewer
+/// bits leaves the lower ones equal in all keys, and the sort skips bits that are equal.
 ///
-/// Materials have no bits: shaders find them by object, so a change of material is no change of state, and sorting by material
-/// would split batches.
+/// Materials have no bits: shaders find them by object, so a change of material is no change of state, and sorting by
+/// material would split batches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SortKey(u64);
 

@@ -5,14 +5,15 @@ use crate::process::{Deferred, Requirements};
 use crate::scene::{Assets, Material, SceneRef};
 use crate::view::{ObjectTable, RejectionReason, set_bits};
 
-/// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes no difference.
+/// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes
+/// no difference.
 ///
-/// While the witness needs transparency, a frame looks at no other object; without a witness, at those that changed. All objects
-/// are searched when the witness stops needing it, and without a witness when a material starts to need it.
+/// While the witness needs transparency, a frame looks at no other object; without a witness, at those that changed.
+/// All objects are searched when the witness stops needing it, and without a witness when a material starts to need it.
 ///
-/// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is visible changes
-/// with every step of a camera, and the processes of a frame should not. Objects beyond the device's room count too: the room depends on
-/// the processes, which depend on the witness.
+/// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is
+/// visible changes with every step of a camera, and the processes of a frame should not. Objects beyond the device's
+/// room count too: the room depends on the processes, which depend on the witness.
 #[derive(Debug, Default)]
 pub(super) struct BlendedObjectWitness {
     materials: BlendedMaterials,
@@ -26,8 +27,8 @@ struct Witness {
 }
 
 impl BlendedObjectWitness {
-    /// Whether an object of the scene needs transparency. The object table has begun the frame, so it knows which objects changed: after
-    /// a failed frame all of them, so nothing has to be invalidated here.
+    /// Whether an object of the scene needs transparency. The object table has begun the frame, so it knows which
+    /// objects changed: after a failed frame all of them, so nothing has to be invalidated here.
     pub(super) fn update(&mut self, scene: &SceneRef<'_>, objects: &ObjectTable) -> bool {
         let has_started = self.materials.update(scene.assets);
         let materials = &self.materials;
@@ -36,7 +37,8 @@ impl BlendedObjectWitness {
             let material = scene.materials[object];
             materials.contains(material).then_some(Witness { object, material })
         };
-        // An object that is not reported is drawn as it was, so its material of that time counts. Those without room are not drawn.
+        // An object that is not reported is drawn as it was, so its material of that time counts. Those without room
+        // are not drawn.
         let is_current = |object: usize| object >= objects.len() || objects.is_reported(object);
         let remains = |witness: Witness| match is_current(witness.object) {
             true => witness_of(witness.object),
@@ -60,8 +62,8 @@ impl BlendedObjectWitness {
         self.witness.is_some()
     }
 
-    /// Counts an object if the pipeline draws it in half floats because the backend cannot blend floats: the witness, or another one if
-    /// that has no room in the table.
+    /// Counts an object if the pipeline draws it in half floats because the backend cannot blend floats: the witness,
+    /// or another one if that has no room in the table.
     pub(super) fn count_half_floats(&self, scene: &SceneRef<'_>, deferred: Option<&Deferred>, objects: &ObjectTable) {
         let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
         let drawn = witness.and_then(|Witness { object, .. }| match object < objects.len() {
@@ -88,8 +90,8 @@ struct BlendedMaterials {
 }
 
 impl BlendedMaterials {
-    /// Updates the materials. Returns whether one that was there before starts to need transparency: objects that have it need not
-    /// be reported. No object that is not reported can have one that is new.
+    /// Updates the materials. Returns whether one that was there before starts to need transparency: objects that have
+    /// it need not be reported. No object that is not reported can have one that is new.
     fn update(&mut self, assets: &Assets) -> bool {
         let version = Some((assets.materials.identity(), assets.materials.revision()));
         if self.version == version {

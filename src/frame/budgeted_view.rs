@@ -12,11 +12,12 @@ pub struct BudgetedView {
     pub name: String,
     /// Views of lower priority are shed first. Of equal ones, the last is.
     pub priority: i32,
-    /// The view at its best: one camera, or several that are shed together, such as the sides of a cube map, a mirror and the mirrors in it,
-    /// or the samples of antialiasing. Their names are unique among all views of the budget.
+    /// The view at its best: one camera, or several that are shed together, such as the sides of a cube map, a mirror
+    /// and the mirrors in it, or the samples of antialiasing. Their names are unique among all views of the budget.
     pub cameras: Vec<Camera>,
-    /// Forms that cost less, each less than the one before: rung 1, rung 2, and so on. Rung 0 is the view at its best. Only the last one may
-    /// be [`Rung::LeftOut`]. A view whose ladder differs from that of the frame before is a new view: it is at its best, and not measured.
+    /// Forms that cost less, each less than the one before: rung 1, rung 2, and so on. Rung 0 is the view at its best.
+    /// Only the last one may be [`Rung::LeftOut`]. A view whose ladder differs from that of the frame before is a new
+    /// view: it is at its best, and not measured.
     pub ladder: Vec<Rung>,
 }
 
@@ -33,12 +34,13 @@ pub enum Rung {
 /// A cheaper form of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewForm {
-    /// The view is drawn every so many frames, at least 1: see [`Redraw::Interval`]. At 1, its cameras say how often. A camera with
-    /// [`Redraw::OnCameraChange`] keeps that.
+    /// The interval of frames in which the view is drawn, at least 1: see [`Redraw::Interval`]. At 1, its cameras say
+    /// how often. A camera with [`Redraw::OnCameraChange`] keeps that.
     pub interval: u32,
     /// The width and height of the picture, as a share of those of the cameras: above 0 and up to 1.
     pub size: f32,
-    /// The factor by which [`Camera::level_of_detail_scale`] is larger, at least 1: the error of coarser meshes, in pixels.
+    /// The factor by which [`Camera::level_of_detail_scale`] is larger, at least 1: the error of coarser meshes, in
+    /// pixels.
     pub level_of_detail_scale: f32,
     /// Cameras beyond this number are left out, at least 1.
     pub max_cameras: usize,
@@ -108,7 +110,8 @@ impl Rung {
         cameras.iter().take(form.max_cameras).map(draws).fold(0.0, |sum, draws| sum + draws)
     }
 
-    /// What drawing a camera costs before it was measured, as a share of what it costs at its best: proportional to the pixels.
+    /// What drawing a camera costs before it was measured, as a share of what it costs at its best: proportional to the
+    /// pixels.
     pub(super) fn expected_share(self) -> f32 {
         match self {
             Self::Drawn(form) => form.size * form.size,

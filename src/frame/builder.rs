@@ -64,7 +64,8 @@ impl<B: Backend> RendererBuilder<B> {
     }
 
     /// Sets the shadow maps for an engine's own processes that draw in views of
-    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). The settings of a [`Deferred`] pipeline that draws shadow maps override these.
+    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). The settings of a [`Deferred`] pipeline that draws shadow
+    /// maps override these.
     pub fn shadow_maps(mut self, maps: ShadowMaps) -> Self {
         self.shadow_maps = maps;
         self
@@ -76,26 +77,26 @@ impl<B: Backend> RendererBuilder<B> {
         self
     }
 
-    /// Sets whether equal commands become one instanced draw, which is the default. Otherwise each object is a draw of its own: the
-    /// same picture at a higher cost.
+    /// Sets whether equal commands become one instanced draw, which is the default. Otherwise each object is a draw of
+    /// its own: the same picture at a higher cost.
     pub fn instancing(mut self, instancing: bool) -> Self {
         self.instancing = instancing;
         self
     }
 
-    /// Sets the quality, of the frame and of the [`Deferred`] pipeline: see [`Deferred::quality`]. Without this call the pipeline keeps
-    /// its own settings, and everything else is [`Quality::balanced`].
+    /// Sets the quality, of the frame and of the [`Deferred`] pipeline: see [`Deferred::quality`]. Without this call
+    /// the pipeline keeps its own settings, and everything else is [`Quality::balanced`].
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = Some(quality);
         self
     }
 
-    /// Builds the renderer, which records on the scheduler's workers, and the submitter, which cannot leave this thread: the thread that
-    /// calls this is the device thread.
+    /// Builds the renderer, which records on the scheduler's workers, and the submitter, which cannot leave this
+    /// thread: the thread that calls this is the device thread.
     ///
     /// # Errors
-    /// If the processes make no frame, if the settings of shadow maps or the quality are invalid, or if the granularity is a chunk
-    /// of 0.
+    /// If the processes make no frame, if the settings of shadow maps or the quality are invalid, or if the granularity
+    /// is a chunk of 0.
     pub fn build(self, scheduler: Arc<Scheduler>) -> Result<(Renderer<B>, Submitter<B>), BuildError> {
         if self.granularity == Granularity::Chunk(0) {
             return Err(BuildError::EmptyChunk);

@@ -5,7 +5,8 @@ use crate::process::Draws;
 use crate::scene::{ColumnLayout, LayerMask, ObjectColumn, SceneError, SceneRef};
 use crate::view::ObjectTable;
 
-/// Copies of the columns that the latest frame read, and of the objects' layers. Only builds with debug assertions have any.
+/// Copies of the columns that the latest frame read, and of the objects' layers. Only builds with debug assertions have
+/// any.
 #[derive(Debug, Default)]
 pub(super) struct ChangeCheck {
     copies: Vec<(ColumnLayout, Vec<u8>)>,

@@ -96,19 +96,20 @@ impl<B: Backend> FrameContext<'_, B> {
         }
     }
 
-    /// Whether the draw list of a pass holds for this frame as it is.
+    /// Whether last frame's draw list of a pass can be reused.
     pub(super) fn keeps_list(&self, pass: usize) -> bool {
         self.can_keep_list(pass) && *self.tables.passes[pass].list_inputs.read() == Some(self.list_inputs(pass))
     }
 
-    /// Whether later frames may keep the draw list of a pass. Those of paraboloids are made anew, because a frame counts the objects
-    /// whose edges are too coarse while it makes them; so are those whose triangles are culled.
+    /// Whether later frames may keep the draw list of a pass. Those of paraboloids are made anew, because a frame
+    /// counts the objects whose edges are too coarse while it makes them; so are those whose triangles are culled.
     pub(super) fn can_keep_list(&self, pass: usize) -> bool {
         let view = &self.request.views[self.view_index_of(pass)];
         view.camera.projection != Projection::Paraboloid && !self.pass_culls_triangles(pass)
     }
 
-    /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share the workers.
+    /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share
+    /// the workers.
     pub(super) fn segment_count(&self, pass: usize) -> usize {
         let count = self.visible_count(pass);
         match self.granularity.draws_per_job() {
@@ -165,7 +166,8 @@ impl<B: Backend> FrameContext<'_, B> {
         self.culls_triangles && allows_triangle_culling(self.request, pass)
     }
 
-    /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one by one.
+    /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one
+    /// by one.
     pub(super) fn can_merge(&self, pass: usize, mesh: u32) -> bool {
         self.instancing && !(self.pass_culls_triangles(pass) && self.tables.culling.is_cullable(mesh))
     }

@@ -8,8 +8,8 @@ use drawloom_jobs::internal::{Estimate, Filter, job_size};
 
 use crate::timeline::{JobSize, Labels};
 
-/// What the items of a frame's stages cost. The nodes of one cost kind share an estimate; each node has its own width, and so a job
-/// size of its own. Nodes are counted in the order of the stage graph.
+/// What the items of a frame's stages cost. The nodes of one cost kind share an estimate; each node has its own width,
+/// and so a job size of its own. Nodes are counted in the order of the stage graph.
 #[derive(Debug, Default)]
 pub(super) struct CostModel {
     /// By node, the index of its cost kind. Not in `sizes`, because jobs read this one while others write there.
@@ -54,7 +54,8 @@ impl CostModel {
         }
     }
 
-    /// Takes over estimates of another model. `same` are pairs of cost kinds that are the same, of this model and of the other.
+    /// Takes over estimates of another model. `same` are pairs of cost kinds that are the same, of this model and of
+    /// the other.
     pub(super) fn inherit_estimates(&mut self, before: &Self, same: impl IntoIterator<Item = (usize, usize)>) {
         for (kind, kind_before) in same {
             self.costs[kind].estimate = before.costs[kind_before].estimate;
@@ -114,8 +115,8 @@ impl CostModel {
         self.sizes[node].used.store(items_per_job, Ordering::Relaxed);
     }
 
-    /// Takes out the job sizes of the latest frame, with the estimates before its [`update`](Self::update). Nodes that did not ask
-    /// for one are left out. `labels` are those of the nodes.
+    /// Takes out the job sizes of the latest frame, with the estimates before its [`update`](Self::update). Nodes that
+    /// did not ask for one are left out. `labels` are those of the nodes.
     pub(super) fn take_sizes(&mut self, labels: &[Arc<Labels>]) -> impl Iterator<Item = JobSize> {
         let nodes = self.sizes.iter_mut().zip(&self.kinds).zip(labels);
         nodes.filter_map(|((size, &kind), labels)| {

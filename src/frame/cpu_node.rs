@@ -6,12 +6,14 @@ use super::{NodeAccesses, NodeFrame};
 use crate::graph::NodeError;
 use crate::task::Worker;
 
-/// Work of the engine's own that is done by the jobs of a frame (S 9.5, L 5): animation before the objects are read, geometry, particles,
-/// rays for a few pixels, a mix of sound. [`Renderer::record_with_nodes`](crate::Renderer::record_with_nodes) takes nodes for one frame, so
-/// they borrow what they work on.
+/// Work of the engine's own that is done by the jobs of a frame (S 9.5, L 5): animation before the objects are read,
+/// geometry, particles, rays for a few pixels, a mix of sound.
+/// [`Renderer::record_with_nodes`](crate::Renderer::record_with_nodes) takes nodes for one frame, so they borrow what
+/// they work on.
 ///
-/// What a node reads and writes decides when it runs: before the stages of the frame, between them, after or beside them. It is in timelines,
-/// reports and spans under its name, like every stage, and runs even if nobody reads what it writes.
+/// What a node reads and writes decides when it runs: before the stages of the frame, between them, after or beside
+/// them. It is in timelines, reports and spans under its name, like every stage, and runs even if nobody reads what it
+/// writes.
 ///
 /// ```
 /// use std::ops::Range;
@@ -52,17 +54,18 @@ use crate::task::Worker;
 /// }
 /// ```
 ///
-/// A panic in any of these methods fails the frame with an error that names the node. Where the program is built with `panic = "abort"`, it
-/// ends the program instead.
+/// A panic in any of these methods fails the frame with an error that names the node. Where the program is built with
+/// `panic = "abort"`, it ends the program instead.
 pub trait CpuNode: Send + Sync {
     /// Its name, in timelines and errors. No other node of the frame may have it, and no stage.
     fn name(&self) -> &str;
 
-    /// Declares what it reads and writes. Frames with equal declarations share a graph, and one with another declaration builds a new one, so
-    /// it should depend on nothing that changes in every frame.
+    /// Declares what it reads and writes. Frames with equal declarations share a graph, and one with another
+    /// declaration builds a new one, so it should depend on nothing that changes in every frame.
     fn declare(&self, accesses: &mut NodeAccesses);
 
-    /// The number of items. It is called when everything that the node waits for is complete. A node of width 0 is complete at once.
+    /// The number of items. It is called when everything that the node waits for is complete. A node of width 0 is
+    /// complete at once.
     fn width(&self, frame: &NodeFrame<'_>) -> usize {
         let _ = frame;
         1
@@ -73,10 +76,11 @@ pub trait CpuNode: Send + Sync {
         None
     }
 
-    /// Processes some items: those of one job. Jobs of one node run in any order and at the same time, and must not wait for each other.
+    /// Processes some items: those of one job. Jobs of one node run in any order and at the same time, and must not
+    /// wait for each other.
     ///
     /// # Errors
-    /// An error fails the frame, as [`FrameError::Failed`](crate::FrameError::Failed) with the name of the node. The next frame is not
-    /// affected.
+    /// An error fails the frame, as [`FrameError::Failed`](crate::FrameError::Failed) with the name of the node. The
+    /// next frame is not affected.
     fn run(&self, frame: &NodeFrame<'_>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
 }

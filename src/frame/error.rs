@@ -76,8 +76,8 @@ pub enum FrameError {
         /// How many.
         views: usize,
     },
-    /// The [predicate on materials](crate::scene::ObjectFilter::materials) of a view's filter panicked. Where the program is built with
-    /// `panic = "abort"` the program ends instead.
+    /// The [predicate on materials](crate::scene::ObjectFilter::materials) of a view's filter panicked. Where the
+    /// program is built with `panic = "abort"` the program ends instead.
     #[error("the filter of view {view:?} panicked: {message}")]
     FilterPanicked {
         /// The view.
@@ -88,7 +88,7 @@ pub enum FrameError {
     /// The processes that the scene requires make no frame.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The scene cannot be drawn as it is.
+    /// The scene cannot be drawn.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The backend could not begin the frame, or a pass was not finished.
@@ -145,7 +145,8 @@ pub enum FrameError {
         /// What is wrong with it.
         problem: String,
     },
-    /// A node declares to fill a [buffer](crate::scene::GeneratedBuffer), and leaves out some of the elements that count.
+    /// A node declares to fill a [buffer](crate::scene::GeneratedBuffer), and leaves out some of the elements that
+    /// count.
     #[error("no node has filled chunk {chunk} of buffer {buffer:?}")]
     UnfilledBuffer {
         /// The buffer.
@@ -259,8 +260,8 @@ impl BudgetError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubmitError {
-    /// It was recorded by another renderer, or for a backend that this renderer [had before](super::Renderer::replace_backend) or has had
-    /// since.
+    /// It was recorded by another renderer, or for a backend that this renderer [had
+    /// before](super::Renderer::replace_backend) or has had since.
     #[error("the frame was recorded by another renderer, or for another backend")]
     ForeignFrame,
     /// The frame keeps a [view](crate::scene::Redraw) that an earlier frame was to draw, and that one was dropped,

@@ -22,12 +22,14 @@ use crate::fence::{Fence, FenceError};
 use crate::task::{JobPanic, catch};
 use crate::unwind::{Contained, discard, discard_all};
 
-/// Keeps a few frames in flight: it owns the device thread, which submits recorded frames, and keeps the engine from running further ahead of
-/// the device than its [`Buffering`] says (S figures 9.1 and 9.2). An engine may use it, or call [`Submitter::submit`] where it likes.
+/// Keeps a few frames in flight: it owns the device thread, which submits recorded frames, and keeps the engine from
+/// running further ahead of the device than its [`Buffering`] says (S figures 9.1 and 9.2). An engine may use it, or
+/// call [`Submitter::submit`] where it likes.
 ///
-/// The engine's thread updates its world and records; the world is its own again when recording ends (L 3), so it updates and records the
-/// next frame while the device thread submits this one and the device draws. The order of an iteration is that of this example: what it
-/// draws depends on the input after [`begin`](Self::begin), so that is where [latency](FrameTimes::latency) is measured from.
+/// The engine's thread updates its world and records; the world is its own again when recording ends (L 3), so it
+/// updates and records the next frame while the device thread submits this one and the device draws. The order of an
+/// iteration is that of this example: what it draws depends on the input after [`begin`](Self::begin), so that is where
+/// [latency](FrameTimes::latency) is measured from.
 ///
 /// ```
 /// # use std::sync::Arc;
@@ -78,7 +80,8 @@ where
     /// How long the device may take for a frame, if [nothing else](Self::set_device_limit) is set.
     pub const DEVICE_LIMIT: Duration = Duration::from_secs(30);
 
-    /// A loop around a renderer. The submitter moves to a thread of the loop, so that thread is the device thread from now on.
+    /// A loop around a renderer. The submitter moves to a thread of the loop, so that thread is the device thread from
+    /// now on.
     ///
     /// # Errors
     /// - [`FrameLoopError::ForeignSubmitter`] if the submitter is not the renderer's.
@@ -90,7 +93,8 @@ where
         let queues = Arc::new(LoopQueues::new(buffering, Self::DEVICE_LIMIT));
         // A loop from the first thread on, so that dropping it ends a thread if the other one cannot start.
         let mut frames = Self { renderer: Some(renderer), queues, threads: Vec::new(), begun: 0 };
-        // The submitter itself cannot leave its thread, which is what makes that the device thread; what it submits to can.
+        // The submitter itself cannot leave its thread, which is what makes that the device thread; what it submits to
+        // can.
         let (backend, timeline) = submitter.into_parts();
         frames.spawn("drawloom device", move |queues| submit_frames(Submitter::new(backend, timeline), queues))?;
         frames.spawn("drawloom completion", await_frames)?;
@@ -104,8 +108,9 @@ where
         Ok(())
     }
 
-    /// Begins a frame: waits until fewer frames are in flight than the buffering allows, and returns a slot for one, with the frames that
-    /// finished since the last call, in their order. A frame that is dropped instead of submitted frees its slot.
+    /// Begins a frame: waits until fewer frames are in flight than the buffering allows, and returns a slot for one,
+    /// with the frames that finished since the last call, in their order. A frame that is dropped instead of submitted
+    /// frees its slot.
     ///
     /// This waits no longer than the submissions of the frames in flight, and the [limit](Self::set_device_limit) of
     /// the device, allow. A slot that the engine holds counts as a frame in flight: to begin another frame while it
@@ -140,18 +145,20 @@ where
         self.queues.set_device_limit(limit);
     }
 
-    /// Puts another backend in the place of this one, from the next frame on, and waits for nothing: see [`Renderer::replace_backend`], which
-    /// also says what is left to the engine. Frames that were recorded before still go to the backend before, if they are handed over before
-    /// this call; a frame of it that comes later is reported as lost, with
-    /// [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame). Several frames in flight report one lost device, each for itself, so
-    /// an engine replaces a device once and ignores what frames with smaller [numbers](FrameSlot::number) report of the one before.
+    /// Puts another backend in the place of this one, from the next frame on, and waits for nothing: see
+    /// [`Renderer::replace_backend`], which also says what is left to the engine. Frames that were recorded before
+    /// still go to the backend before, if they are handed over before this call; a frame of it that comes later is
+    /// reported as lost, with [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame). Several frames in flight
+    /// report one lost device, each for itself, so an engine replaces a device once and ignores what frames with
+    /// smaller [numbers](FrameSlot::number) report of the one before.
     pub fn replace_backend(&mut self, backend: B) {
         let (backend, timeline) = self.renderer().replace_backend(backend).into_parts();
         self.queues.add_task(DeviceTask::ReplaceBackend(backend, timeline));
     }
 
-    /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since the last
-    /// [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is dropped.
+    /// Waits for all frames in flight, ends the threads, and returns the renderer and the frames that finished since
+    /// the last [`begin`](Self::begin). A slot that is still held is worth nothing afterwards: what it submits is
+    /// dropped.
     ///
     /// A thread of the loop cannot wait for itself: if it calls this, or drops the loop, it goes on with the frames in
     /// flight afterwards, and nobody is told of those.

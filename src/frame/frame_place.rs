@@ -19,8 +19,8 @@ pub enum FramePlace<'a> {
 }
 
 impl FramePlace<'_> {
-    /// The number of passes before the place, of a frame whose passes are submitted in this order. `None` if the frame has no such pass, as for
-    /// views that are [cached](crate::scene::Redraw).
+    /// The number of passes before the place, of a frame whose passes are submitted in this order. `None` if the frame
+    /// has no such pass, as for views that are [cached](crate::scene::Redraw).
     pub(super) fn passes_before<'a>(self, order: &[Pass], process_name: impl Fn(usize) -> &'a str) -> Option<usize> {
         let is_last = |pass: &Pass| match self {
             Self::Pass { process, view } => pass.view_index == view && process_name(pass.process_index) == process,

@@ -9,10 +9,10 @@ use crate::command::DrawList;
 /// Before that there are no draws. Updating objects and uploading them, which all cameras share, and culling them for a
 /// view are cut by measured cost in every mode; with [`PerCamera`](Self::PerCamera), culling is one job a view.
 ///
-/// Frames of all but [`Adaptive`](Self::Adaptive) are executed in parallel even where one worker alone would be faster. Two
-/// things are not divided: [pieces](crate::scene::Piece) keep their bundles of
-/// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws, and a backend whose recording strategy an engine has fixed
-/// records by that strategy.
+/// Frames of all but [`Adaptive`](Self::Adaptive) are executed in parallel even where one worker alone would be faster.
+/// Two things are not divided: [pieces](crate::scene::Piece) keep their bundles of
+/// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws, and a backend whose recording strategy an engine has
+/// fixed records by that strategy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Granularity {
     /// By measured cost: each stage of each process is divided into as many jobs as its work is worth. It adapts to a
@@ -21,8 +21,8 @@ pub enum Granularity {
     Adaptive,
     /// One job for each stage of a camera's processes: M's first design.
     PerCamera,
-    /// One job for each draw, which is recorded as a bundle of its own: M's "more advanced solution". To divide commands into
-    /// parts of one, one job sorts them all.
+    /// One job for each draw, which is recorded as a bundle of its own: M's "more advanced solution". To divide
+    /// commands into parts of one, one job sorts them all.
     PerDraw,
     /// One job for this many draws. Not 0. A job that records divides them into bundles of equal size, at most
     /// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws each, and rounds up to whole bundles.

@@ -121,10 +121,12 @@ impl NodeKeys {
         self.keys.iter().map(|key| &key.name)
     }
 
-    /// Adds what orders the nodes to a graph that has all stages. `ids` are those of the nodes, and `stages` the nodes of each stage.
+    /// Adds what orders the nodes to a graph that has all stages. `ids` are those of the nodes, and `stages` the nodes
+    /// of each stage.
     ///
     /// # Errors
-    /// If a node has the name of a stage, declares to write what only stages write, or comes after a node that is not there.
+    /// If a node has the name of a stage, declares to write what only stages write, or comes after a node that is not
+    /// there.
     pub(super) fn order<P>(
         &self,
         graph: &mut FrameGraph<P>,

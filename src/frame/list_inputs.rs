@@ -12,8 +12,8 @@ use crate::view::RenderView;
 pub(super) struct ListInputs {
     /// The version of the view's visible set.
     pub(super) visible: Version,
-    /// The versions of the lists of pieces and of the pieces that the view executes; `None` for a scene without pieces, or a pass that orders
-    /// its objects by depth.
+    /// The versions of the lists of pieces and of the pieces that the view executes; `None` for a scene without pieces,
+    /// or a pass that orders its objects by depth.
     pub(super) pieces: Option<[Version; 2]>,
     /// The version of the levels of detail in the view; `None` if all are 0.
     pub(super) levels: Option<Version>,
@@ -42,8 +42,8 @@ impl OrderInputs {
     }
 }
 
-/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order, and the view
-/// is not a paraboloid, where the subdivision level gives an object another state.
+/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order,
+/// and the view is not a paraboloid, where the subdivision level gives an object another state.
 pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthKey) -> bool {
     (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
         && opaque_order.bits == 0

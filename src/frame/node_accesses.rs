@@ -8,16 +8,18 @@ use crate::scene::{GeneratedBuffer, GeneratedSource};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FrameData {
-    /// The [columns](crate::scene::SceneRef::written) that nodes write and stage *objects* reads. It is there when the frame begins, so
-    /// nodes may read it that no other node writes for.
+    /// The [columns](crate::scene::SceneRef::written) that nodes write and stage *objects* reads. It is there when the
+    /// frame begins, so nodes may read it that no other node writes for.
     Transforms,
     /// The objects that each view sees. Stages write it, nodes read it.
     VisibleObjects,
     /// What each pass draws. Stages write it, nodes read it.
     DrawLists,
-    /// Whatever the engine's own code reads while passes are recorded, such as [raw passes](crate::process::Draws::Raw). Nodes write it.
+    /// Whatever the engine's own code reads while passes are recorded, such as [raw
+    /// passes](crate::process::Draws::Raw). Nodes write it.
     PassInputs,
-    /// The recorded passes. Stages write it; a node that reads it runs after all of them, and before the frame is handed over.
+    /// The recorded passes. Stages write it; a node that reads it runs after all of them, and before the frame is
+    /// handed over.
     RecordedPasses,
 }
 
@@ -56,9 +58,9 @@ impl From<&'static str> for NodeResource {
     }
 }
 
-/// What a node reads and writes, and so what it waits for, by the rules of a [`FrameGraph`](crate::graph::FrameGraph#order): the writers of a
-/// resource come first, then its modifiers, then its readers. Two nodes that both write a resource, or both modify it, must be
-/// [put in order](Self::after).
+/// What a node reads and writes, and so what it waits for, by the rules of a
+/// [`FrameGraph`](crate::graph::FrameGraph#order): the writers of a resource come first, then its modifiers, then its
+/// readers. Two nodes that both write a resource, or both modify it, must be [put in order](Self::after).
 #[derive(Debug, Default)]
 pub struct NodeAccesses {
     pub(super) accesses: Vec<NodeAccess>,

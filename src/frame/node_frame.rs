@@ -29,8 +29,8 @@ impl<'a> NodeFrame<'a> {
         self.request.views
     }
 
-    /// The objects that a view sees, by its index, in ascending order: of a [piece](crate::scene::Piece) that it executes, all that are drawn. There
-    /// are none in a view that does not exist or draws no object.
+    /// The objects that a view sees, by its index, in ascending order: of a [piece](crate::scene::Piece) that it
+    /// executes, all that are drawn. There are none in a view that does not exist or draws no object.
     ///
     /// # Errors
     /// If the node does not declare that it reads [`FrameData::VisibleObjects`].
@@ -52,7 +52,8 @@ impl<'a> NodeFrame<'a> {
         Ok(seen.into_iter().flatten())
     }
 
-    /// What a process draws in a view, by its index: the [batches](DrawList::batches) of the list. `None` where it draws no commands.
+    /// What a process draws in a view, by its index: the [batches](DrawList::batches) of the list. `None` where it
+    /// draws no commands.
     ///
     /// # Errors
     /// If the node does not declare that it reads [`FrameData::DrawLists`].
@@ -69,8 +70,8 @@ impl<'a> NodeFrame<'a> {
         Ok(table.filter(|table| table.selection.is_some()).map(|table| table.list.read()))
     }
 
-    /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with elements that
-    /// [count](Self::set_count) must be filled in each frame.
+    /// A chunk of a buffer to fill: what it holds before is anything that earlier frames have left. All chunks with
+    /// elements that [count](Self::set_count) must be filled in each frame.
     ///
     /// Other jobs that access the chunk wait while it is held, as long as the job that holds it works, so hold one at a
     /// time.
@@ -91,8 +92,8 @@ impl<'a> NodeFrame<'a> {
     /// A chunk of a buffer that other nodes have filled in this frame: its elements that [count](Self::set_count).
     ///
     /// # Errors
-    /// If the node does not declare that it reads the buffer, if no node of the frame fills it, or not this chunk, if there is no such chunk, or if
-    /// nobody lets go of it.
+    /// If the node does not declare that it reads the buffer, if no node of the frame fills it, or not this chunk, if
+    /// there is no such chunk, or if nobody lets go of it.
     pub fn filled<T: Pod>(
         &self,
         buffer: &GeneratedBuffer<T>,
@@ -110,8 +111,8 @@ impl<'a> NodeFrame<'a> {
         Ok(self.contents(buffer, Access::Read)?.count())
     }
 
-    /// Sets how many elements of a buffer count in this frame, from the first one on: at most its capacity. Without it all do. A node that may have
-    /// no items calls it in [`width`](super::CpuNode::width), as it is then not run.
+    /// Sets how many elements of a buffer count in this frame, from the first one on: at most its capacity. Without it
+    /// all do. A node that may have no items calls it in [`width`](super::CpuNode::width), as it is then not run.
     ///
     /// # Errors
     /// If the node does not declare that it fills the buffer.

@@ -5,7 +5,8 @@ use parking_lot::{Mutex, MutexGuard};
 use crate::backend::{Backend, BackendError};
 use crate::unwind::{discard, discard_all};
 
-/// What the jobs of one pass record: its parts in any order, then the finished pass. It keeps its memory from frame to frame.
+/// What the jobs of one pass record: its parts in any order, then the finished pass. It keeps its memory from frame to
+/// frame.
 pub(super) struct PassRecording<B: Backend> {
     /// By part index.
     parts: Mutex<Vec<Option<B::Part>>>,

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use parking_lot::Mutex;
 
-/// The passes of a frame in runs: neighbours in submission order that are finished together, by the job of the pass that becomes ready last.
-/// A pass that is finished alone is a run of its own.
+/// The passes of a frame in runs: neighbours in submission order that are finished together, by the job of the pass
+/// that becomes ready last. A pass that is finished alone is a run of its own.
 #[derive(Debug, Default)]
 pub(super) struct PassRuns {
     runs: Vec<PassRun>,
@@ -33,8 +33,8 @@ impl PassRuns {
     /// The passes of the longest run.
     pub(super) const MAX_PASSES: usize = 16;
 
-    /// Begins a frame of so many passes. `continues` says of a pass, by its index in submission order, whether it is finished together with
-    /// the one before it; the first one is not, nor one that would make its run too long.
+    /// Begins a frame of `passes` passes. `continues` says of a pass, by its index in submission order, whether it is
+    /// finished together with the one before it; the first one is not, nor one that would make its run too long.
     ///
     /// # Errors
     /// Those of `continues`.

@@ -8,8 +8,8 @@
 //!         an object, mesh or material of it changed, or a frame failed
 //! ```
 //!
-//! Only recorded pieces are executed. Before the jobs of a frame run, the table decides which these are, so views know which objects to leave out
-//! of their tests.
+//! Only recorded pieces are executed. Before the jobs of a frame run, the table decides which these are, so views know
+//! which objects to leave out of their tests.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -77,8 +77,8 @@ struct KnownPiece {
     recorded: Box<RwLock<RecordedPiece>>,
 }
 
-/// What a process draws of all recorded pieces: their objects by draw state, by mesh, and by piece, so that pieces which follow each other and are
-/// executed together become one batch for each mesh.
+/// What a process draws of all recorded pieces: their objects by draw state, by mesh, and by piece, so that pieces
+/// which follow each other and are executed together become one batch for each mesh.
 #[derive(Debug, Default)]
 struct JoinedPieces {
     version: Version,
@@ -404,8 +404,8 @@ impl PieceTable {
         &self.pieces[self.recording[index] as usize].piece.name
     }
 
-    /// Records one of the pieces that this frame records, by index among them. `is_recordable` says whether objects with the mesh in a slot may be
-    /// recorded, and `can_merge` whether they become one draw.
+    /// Records one of the pieces that this frame records, by index among them. `is_recordable` says whether objects
+    /// with the mesh in a slot may be recorded, and `can_merge` whether they become one draw.
     pub(super) fn record(
         &self,
         index: usize,
@@ -424,7 +424,8 @@ impl PieceTable {
         Version { frame: self.lists_revision + 1, index }
     }
 
-    /// Makes a draw list have what a process with a selection draws of the pieces that a view executes, whose version is `executed`.
+    /// Makes a draw list have what a process with a selection draws of the pieces that a view executes, whose version
+    /// is `executed`.
     pub(super) fn execute(
         &self,
         selection: Selection,

@@ -25,8 +25,8 @@ impl PlanCache {
     /// A cache with the plan of an empty scene.
     ///
     /// # Errors
-    /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend or on one that
-    /// replaces it.
+    /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend
+    /// or on one that replaces it.
     pub(super) fn new(
         deferred: Option<Deferred>,
         processes: Vec<Arc<dyn RenderProcess>>,
@@ -63,7 +63,8 @@ impl PlanCache {
         self.deferred.as_ref()
     }
 
-    /// Sets whether the backend can blend floats. If that changes, plans are compiled anew, and what they keep is determined anew.
+    /// Sets whether the backend can blend floats. If that changes, plans are compiled anew, and what they keep is
+    /// determined anew.
     pub(super) fn set_float_blending(&mut self, blends_floats: bool) {
         if let Some(deferred) = self.deferred.take() {
             if deferred.blends_floats() != blends_floats {
@@ -79,8 +80,8 @@ impl PlanCache {
         &self.current
     }
 
-    /// The plan for a scene with these valid lights, and with objects that need transparency if `transparency` is true, compiled if the
-    /// cache does not have it. It becomes the current plan.
+    /// The plan for a scene with these valid lights, and with objects that need transparency if `transparency` is true,
+    /// compiled if the cache does not have it. It becomes the current plan.
     ///
     /// # Errors
     /// If the processes make no frame.
@@ -96,8 +97,8 @@ impl PlanCache {
         Ok(Arc::clone(&self.current))
     }
 
-    /// Plans for such a scene and for others, which together have every pipeline that a plan may have. They are compiled if the cache does
-    /// not have them. The current plan does not change.
+    /// Plans for scenes like this one and for others, which together have every pipeline that a plan may have. They are
+    /// compiled if the cache does not have them. The current plan does not change.
     ///
     /// # Errors
     /// If the processes make no frame.

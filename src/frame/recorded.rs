@@ -21,7 +21,7 @@ use crate::view::RenderView;
 /// dropped without being submitted, the next frame draws all of its views, also those that it would have
 /// [cached](crate::scene::Redraw). Frames that were recorded before it is dropped, and that keep a view which it draws,
 /// are [refused](SubmitError::LostView). With wgpu, the thread that drops it then hands its uploads to the device,
-/// which may call back for work that has finished: hold no lock that such a callback takes.
+/// which may call back for work that has finished: hold no lock that a callback takes.
 #[must_use = "a frame is not drawn until it is submitted"]
 pub struct Recorded<B: Backend> {
     /// By view index.
@@ -59,10 +59,11 @@ impl<B: Backend> Recorded<B> {
         self.frame_number
     }
 
-    /// A fence that the device sets when it has done the frame up to this place (S 9.4). It is abandoned if the frame is dropped or
-    /// refused.
+    /// A fence that the device sets when it has done the frame up to this place (S 9.4). It is abandoned if the frame
+    /// is dropped or refused.
     ///
-    /// With wgpu each place but the end is a submission of its own. Where passes share a command encoder, the fence is set after the last of these.
+    /// With wgpu each place but the end is a submission of its own. Where passes share a command encoder, the fence is
+    /// set after the last of these.
     ///
     /// ```
     /// # use std::time::Duration;
@@ -78,7 +79,8 @@ impl<B: Backend> Recorded<B> {
     /// ```
     ///
     /// # Errors
-    /// [`FrameError::UnknownPlace`] if the frame has no such pass or view, or the view is [cached](crate::scene::Redraw).
+    /// [`FrameError::UnknownPlace`] if the frame has no such pass or view, or the view is
+    /// [cached](crate::scene::Redraw).
     pub fn fence_at(&mut self, place: FramePlace<'_>) -> Result<Fence, FrameError> {
         let process_name = |index: usize| self.plan.processes()[index].name.as_str();
         let passes = place.passes_before(&self.submission_order, process_name);
@@ -92,7 +94,8 @@ impl<B: Backend> Recorded<B> {
     /// Makes the submission of the frame wait until the CPU sets a fence (S 9.4), at most as long as `limit`. Otherwise
     /// [`Submitter::submit`] returns [`SubmitError::Fence`], and drops the frame.
     ///
-    /// Devices of wgpu cannot wait for the CPU themselves, so the device thread waits, and nothing behind this frame is submitted meanwhile.
+    /// Devices of wgpu cannot wait for the CPU themselves, so the device thread waits, and nothing behind this frame is
+    /// submitted meanwhile.
     pub fn submit_after(&mut self, fence: &Fence, limit: Duration) {
         self.fences.awaited.push((fence.clone(), limit));
     }
@@ -117,8 +120,8 @@ impl<B: Backend> Recorded<B> {
         self.views.views.get(view).map(|view| &view.camera)
     }
 
-    /// Has a view's target read back as a whole, as this frame leaves it, on any backend. It does not wait: ask the result when the frame is
-    /// submitted, or when [its end](FramePlace::End) is reached.
+    /// Has a view's target read back as a whole, as this frame leaves it, on any backend. It does not wait: ask the
+    /// result when the frame is submitted, or when [its end](FramePlace::End) is reached.
     ///
     /// # Errors
     /// If there is no such target, or the backend cannot read it back.
@@ -134,10 +137,11 @@ impl<B: Backend> Recorded<B> {
 
 #[cfg(feature = "wgpu")]
 impl Recorded<crate::backend::WgpuBackend> {
-    /// Reads back a rectangle of a view's target as this frame leaves it, without waiting: ask the result when the frame is
-    /// submitted. `origin` is the rectangle's upper left pixel, `size` its width and height.
+    /// Reads back a rectangle of a view's target as this frame leaves it, without waiting: ask the result when the
+    /// frame is submitted. `origin` is the rectangle's upper left pixel, `size` its width and height.
     ///
-    /// To find the object under the cursor, draw the indices of objects into a target of [`Format::R32Uint`], and read one pixel:
+    /// To find the object under the cursor, draw the indices of objects into a target of [`Format::R32Uint`], and read
+    /// one pixel:
     ///
     /// ```no_run
     /// # use drawloom::{Recorded, Submitter, backend::{WgpuBackend, BackendError}};
@@ -155,7 +159,8 @@ impl Recorded<crate::backend::WgpuBackend> {
     /// [`Format::R32Uint`]: crate::process::Format::R32Uint
     ///
     /// # Errors
-    /// If there is no such target, it is [transient](crate::backend::WgpuBackend::transient_targets), the rectangle is empty or not in it, or is a part of a depth target, which is copied as a whole.
+    /// If there is no such target, it is [transient](crate::backend::WgpuBackend::transient_targets), the rectangle is
+    /// empty or not in it, or is a part of a depth target, which is copied as a whole.
     pub fn read_back(
         &mut self,
         view: usize,

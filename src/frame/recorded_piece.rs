@@ -24,8 +24,8 @@ pub(super) struct RecordedPiece {
 type SlotRevision = (u32, Option<u64>);
 
 impl RecordedPiece {
-    /// Records a piece for these selections. `is_recordable` says whether objects with the mesh in a slot may be recorded, and `can_merge` whether
-    /// they become one draw.
+    /// Records a piece for these selections. `is_recordable` says whether objects with the mesh in a slot may be
+    /// recorded, and `can_merge` whether they become one draw.
     pub(super) fn record(
         &mut self,
         piece: &Piece,

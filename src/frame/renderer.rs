@@ -127,8 +127,8 @@ impl<B: Backend> Renderer<B> {
 
     /// Records a frame: everything up to submission. The calling thread works too.
     ///
-    /// What is derived from an object is kept for the next frame. [`SceneRef::changes`] says which objects changed since the last
-    /// call.
+    /// What is derived from an object is kept for the next frame. [`SceneRef::changes`] says which objects changed
+    /// since the last call.
     ///
     /// What cannot be drawn, or [has no room](Backend::limits), is left out, counted and named in the
     /// [statistics](FrameStatistics::rejections), and warned of when its number changes; everything else is drawn. A
@@ -142,8 +142,8 @@ impl<B: Backend> Renderer<B> {
         self.record_part(&scene, &[], true)
     }
 
-    /// Records a frame of the scene with these nodes, of its objects that [need transparency](Requirements::needs_transparency) only if
-    /// `transparency` is true.
+    /// Records a frame of the scene with these nodes, of its objects that [need
+    /// transparency](Requirements::needs_transparency) only if `transparency` is true.
     ///
     /// # Errors
     /// As [`record_with_nodes`](Self::record_with_nodes).
@@ -185,9 +185,9 @@ impl<B: Backend> Renderer<B> {
         }
     }
 
-    /// Makes the next frame be drawn as if it were the first: [histories](crate::process::Declare::samples_previous) are empty, every view is
-    /// drawn, and levels of detail are chosen without hysteresis. For a cut of the camera, or another world. Buffers that processes change keep
-    /// what they hold.
+    /// Makes the next frame be drawn as if it were the first: [histories](crate::process::Declare::samples_previous)
+    /// are empty, every view is drawn, and levels of detail are chosen without hysteresis. For a cut of the camera, or
+    /// another world. Buffers that processes change keep what they hold.
     pub fn forget_previous_frames(&mut self) {
         self.view_cache = ViewCache::default();
         self.tables.levels.clear();
@@ -200,22 +200,23 @@ impl<B: Backend> Renderer<B> {
         self.choices.extend(choices);
     }
 
-    /// Compiles the shaders of frames of this scene, and of all that may follow when lights, blended objects and reflections come and go, and
-    /// makes their pipelines for this scene's meshes and materials. Without this call that happens in the first frames that need them, as
-    /// it still does for mirrored objects and for meshes in the engine's own buffers. Call it while the world is loaded, on any
-    /// thread: it also finds what is wrong with the engine's processes. What drivers compile when something is first drawn is left to a
-    /// [`WarmUp`](super::WarmUp).
+    /// Compiles the shaders of frames of this scene, and of all that may follow when lights, blended objects and
+    /// reflections come and go, and makes their pipelines for this scene's meshes and materials. Without this call that
+    /// happens in the first frames that need them, as it still does for mirrored objects and for meshes in the engine's
+    /// own buffers. Call it while the world is loaded, on any thread: it also finds what is wrong with the engine's
+    /// processes. What drivers compile when something is first drawn is left to a [`WarmUp`](super::WarmUp).
     ///
     /// # Errors
-    /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as those of the first
-    /// frame.
+    /// If a process panics, its draws do not fit its declaration, or its shader does not compile: the same errors as
+    /// those of the first frame.
     pub fn prepare_pipelines(&mut self, scene: SceneRef<'_>) -> Result<(), FrameError> {
         self.preparation(&scene)?()
     }
 
-    /// Does what [`prepare_pipelines`](Self::prepare_pipelines) does as a [background job](Scheduler::background), while frames go on: before
-    /// a light is switched on, or glass comes into sight. Frames do not wait for it; one that needs a pipeline which is not there yet makes
-    /// it itself. On a scheduler of one worker nobody is there to help: then the pipelines are made by this call.
+    /// Does what [`prepare_pipelines`](Self::prepare_pipelines) does as a [background job](Scheduler::background),
+    /// while frames go on: before a light is switched on, or glass comes into sight. Frames do not wait for it; one
+    /// that needs a pipeline which is not there yet makes it itself. On a scheduler of one worker nobody is there to
+    /// help: then the pipelines are made by this call.
     ///
     /// ```
     /// # use drawloom::{FrameError, Renderer, backend::Backend, scene::SceneRef};
@@ -230,7 +231,8 @@ impl<B: Backend> Renderer<B> {
     /// ```
     ///
     /// # Errors
-    /// If a process panics, or its draws do not fit its declaration. A shader that does not compile is an error of the job.
+    /// If a process panics, or its draws do not fit its declaration. A shader that does not compile is an error of the
+    /// job.
     pub fn prepare_pipelines_in_background(
         &mut self,
         scene: SceneRef<'_>,
@@ -245,8 +247,8 @@ impl<B: Backend> Renderer<B> {
         Ok(job)
     }
 
-    /// A closure that makes the pipelines of this scene, and of those that may follow. It owns all that it needs, so that it can run in the
-    /// background.
+    /// A closure that makes the pipelines of this scene, and of those that may follow. It owns all that it needs, so
+    /// that it can run in the background.
     fn preparation(
         &mut self,
         scene: &SceneRef<'_>,
@@ -449,14 +451,14 @@ impl<B: Backend> Renderer<B> {
         &self.quality
     }
 
-    /// Whether the deferred pipeline has the settings of the [quality](Self::quality): false until a quality is set, and after
-    /// [`set_deferred`](Self::set_deferred).
+    /// Whether the deferred pipeline has the settings of the [quality](Self::quality): false until a quality is set,
+    /// and after [`set_deferred`](Self::set_deferred).
     pub fn pipeline_has_quality(&self) -> bool {
         self.pipeline_has_quality
     }
 
-    /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed. `None` where the
-    /// process draws no commands in that view, or the view was [cached](crate::scene::Redraw).
+    /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed.
+    /// `None` where the process draws no commands in that view, or the view was [cached](crate::scene::Redraw).
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
         let name = |pass: &Pass| graph.plan.processes()[pass.process_index].name.as_str();

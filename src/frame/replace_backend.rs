@@ -6,28 +6,32 @@ use super::{Renderer, Submitter};
 use crate::backend::{Backend, GuardedBackend};
 
 impl<B: Backend> Renderer<B> {
-    /// Puts another backend in the place of this one, from the next frame on: one on a new device, after the device was lost. The renderer
-    /// never does that by itself. The next frame uploads everything that it draws from the scene's assets again, makes targets and
-    /// pipelines, and is the same to the byte as it would have been on the device before, unless a process reads what only that one had.
-    /// Plans, measured costs, and what is derived from the scene on the CPU stay.
+    /// Puts another backend in the place of this one, from the next frame on: one on a new device, after the device was
+    /// lost. The renderer never does that by itself. The next frame uploads everything that it draws from the scene's
+    /// assets again, makes targets and pipelines, and is the same to the byte as it would have been on the device
+    /// before, unless a process reads what only that one had. Plans, measured costs, and what is derived from the scene
+    /// on the CPU stay.
     ///
-    /// The thread that calls this becomes the device thread: the returned submitter cannot leave it. An engine that records on another
-    /// thread hands the renderer to the device thread for this call, as when it was built. Frames that were recorded for the backend before
-    /// are refused by the new submitter, as [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame); the submitter before still
-    /// takes them, and refuses those that follow. The backend before is dropped with its submitter and frames.
+    /// The thread that calls this becomes the device thread: the returned submitter cannot leave it. An engine that
+    /// records on another thread hands the renderer to the device thread for this call, as when it was built. Frames
+    /// that were recorded for the backend before are refused by the new submitter, as
+    /// [`SubmitError::ForeignFrame`](super::SubmitError::ForeignFrame); the submitter before still takes them, and
+    /// refuses those that follow. The backend before is dropped with its submitter and frames.
     ///
     /// These are the engine's to do:
     ///
-    /// - What it set on the backend before, it sets on the new one: the recording and encoding strategy, the timing of passes, transient
-    ///   targets, and imports for the next frame.
-    /// - [Meshes in its own buffers](crate::scene::Mesh::from_buffers) and other resources of its own belong to the device before. It makes
-    ///   their buffers anew and replaces the assets. Otherwise objects with such a mesh are left out, and
-    ///   [named](crate::view::RejectionReason::UndrawableMesh), if the new device is of the same `wgpu::Instance`; wgpu cannot tell resources
-    ///   of several instances apart.
-    /// - A window's [surface](crate::backend::WindowSurface) belongs to a device too. It is dropped before another one is made.
-    /// - [Histories](crate::process::Declare::samples_previous) are empty, and buffers that processes share are zero, as in the first frame.
-    /// - Pipelines are made in the next frame, unless the engine calls [`prepare_pipelines`](Self::prepare_pipelines) before it. One that it
-    ///   prepares in the background for the backend before goes on, and its result is of no use.
+    /// - What it set on the backend before, it sets on the new one: the recording and encoding strategy, the timing of
+    ///   passes, transient targets, and imports for the next frame.
+    /// - [Meshes in its own buffers](crate::scene::Mesh::from_buffers) and other resources of its own belong to the
+    ///   device before. It makes their buffers anew and replaces the assets. Otherwise objects with these meshes are
+    ///   left out, and [named](crate::view::RejectionReason::UndrawableMesh), if the new device is of the same
+    ///   `wgpu::Instance`; wgpu cannot tell resources of several instances apart.
+    /// - A window's [surface](crate::backend::WindowSurface) belongs to a device too. It is dropped before another one
+    ///   is made.
+    /// - [Histories](crate::process::Declare::samples_previous) are empty, and buffers that processes share are zero,
+    ///   as in the first frame.
+    /// - Pipelines are made in the next frame, unless the engine calls [`prepare_pipelines`](Self::prepare_pipelines)
+    ///   before it. One that it prepares in the background for the backend before goes on, and its result is of no use.
     ///
     /// ```
     /// use drawloom::backend::{Backend, BackendError};

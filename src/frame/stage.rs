@@ -10,7 +10,8 @@ use crate::backend::{Backend, BackendError};
 use crate::graph::{Node, NodeError};
 use crate::task::Worker;
 
-/// One step of the frame's pipeline: of the whole frame, of one view, or of one pass. [`stages`](super::stages) lists all of them.
+/// One step of the frame's pipeline: of the whole frame, of one view, or of one pass. [`stages`](super::stages) lists
+/// all of them.
 pub(super) trait Stage<B: Backend>: Send + Sync {
     /// What does not depend on the frame.
     fn info(&self) -> &'static StageInfo;
@@ -26,8 +27,8 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
         1
     }
 
-    /// The number of items that a job over `items` counts as in the cost model. `None` where the cost model does not estimate the
-    /// stage.
+    /// The number of items that a job over `items` counts as in the cost model. `None` where the cost model does not
+    /// estimate the stage.
     fn measured_items(&self, frame: &FrameContext<'_, B>, items: Range<usize>) -> Option<usize> {
         let _ = frame;
         (self.info().chunking != Chunking::PerItem).then(|| items.len())
@@ -45,8 +46,8 @@ pub(super) trait Stage<B: Backend>: Send + Sync {
 pub(super) struct StageInfo {
     /// The name in timelines.
     pub(super) name: &'static str,
-    /// The name of the stage that this one waits for, and alternatives for frames without it, in order of preference: the stage
-    /// waits for the first that the pass, its view or the frame has.
+    /// The name of the stage that this one waits for, and alternatives for frames without it, in order of preference:
+    /// the stage waits for the first that the pass, its view or the frame has.
     pub(super) after: &'static [&'static str],
     /// Which of the [`StageTimes`](super::StageTimes) its time is part of.
     pub(super) group: StageGroup,

@@ -42,7 +42,8 @@ pub(super) struct StageGraph<B: Backend> {
     key: GraphKey,
 }
 
-/// What a cost kind is known by in all graphs: the stage or CPU node, and the kind of views and the name of the process.
+/// What a cost kind is known by in all graphs: the stage or CPU node, and the kind of views and the name of the
+/// process.
 type CostKindName<'a> = (&'a str, Option<(ViewKind, &'a str)>);
 
 /// What decides, beside the plan, which stages a frame has. Equal keys of one plan have equal graphs.
@@ -245,8 +246,8 @@ impl<B: Backend> StageGraph<B> {
         })
     }
 
-    /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a frame that requires
-    /// something else does not try out again what is known.
+    /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a
+    /// frame that requires something else does not try out again what is known.
     pub(super) fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
         self.schedule.inherit_measurements(&before.schedule);
         let kinds_before: HashMap<_, _> = before.cost_kind_names().collect();
@@ -445,7 +446,8 @@ impl<B: Backend> GraphBuilder<B> {
         keys.order(&mut self.graph, &ids, &self.nodes_of_stages)
     }
 
-    /// Adds a node to the cost model, and returns its index there. Its labels name the stage or CPU node whose cost kind it has.
+    /// Adds a node to the cost model, and returns its index there. Its labels name the stage or CPU node whose cost
+    /// kind it has.
     fn add_to_costs(&mut self, process: Option<usize>, labels: Labels) -> usize {
         let name = labels.stage.clone().unwrap_or_default();
         let next_kind = self.cost_kinds.len();

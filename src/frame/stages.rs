@@ -1,7 +1,7 @@
 //! The stages of a frame, in order.
 //!
-//! A stage is a type that holds all about itself: its [`StageInfo`](super::stage::StageInfo), when a frame needs it, its width and
-//! its work. To add one, implement [`Stage`] and add a line to one of these lists.
+//! A stage is a type that holds all about itself: its [`StageInfo`](super::stage::StageInfo), when a frame needs it,
+//! its width and its work. To add one, implement [`Stage`] and add a line to one of these lists.
 
 #[cfg(feature = "occlusion")]
 mod of_culling;

@@ -21,7 +21,8 @@ pub struct FrameStatistics {
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,
-    /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is not drawn.
+    /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is
+    /// not drawn.
     pub view_times: Vec<Duration>,
     /// What the frame did with the scene's [pieces](crate::scene::Piece).
     pub pieces: PieceStatistics,
@@ -70,12 +71,13 @@ pub struct ViewStatistics {
     /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
     #[cfg(feature = "occlusion")]
     pub culled_triangles: CulledTriangles,
-    /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) is 0 or no mesh
-    /// has levels.
+    /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail)
+    /// is 0 or no mesh has levels.
     pub levels_of_detail: Option<LevelStatistics>,
 }
 
-/// The triangles of objects at their levels of detail, over all processes of a view, before any are subdivided or culled.
+/// The triangles of objects at their levels of detail, over all processes of a view, before any are subdivided or
+/// culled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LevelStatistics {
     /// At the levels that are drawn. Cached views draw none.

@@ -30,8 +30,9 @@ impl TableKeys {
         Self { plan: Arc::clone(plan), passes: passes.to_vec(), views }
     }
 
-    /// Which tables of the graph `before` go on in this one, whose views are `views`. A view takes those of the view of its kind and name, or
-    /// else of one that is gone. That is safe, because a table records the inputs that it was made from.
+    /// Which tables of the graph `before` go on in this one, whose views are `views`. A view takes those of the view of
+    /// its kind and name, or else of one that is gone. That is safe, because a table records the inputs that it was
+    /// made from.
     pub(super) fn taken_from(&self, before: &Self, views: &[RenderView]) -> TakenTables {
         let names = before.views.iter().map(|(kind, name)| (*kind, name.as_str()));
         let of_views: Vec<_> = kept_views(names, views).into_iter().map(|kept| kept.map(|kept| kept.index)).collect();
@@ -47,7 +48,8 @@ impl TableKeys {
     }
 }
 
-/// Makes `tables` those at the indices in `taken`, each at most once. Where there is none, one that is left, or a new one.
+/// Makes `tables` those at the indices in `taken`, each at most once. Where there is none, one that is left, or a new
+/// one.
 pub(super) fn rearrange<T: Default>(tables: &mut Vec<T>, taken: &[Option<usize>]) {
     let mut before: Vec<_> = tables.drain(..).map(Some).collect();
     let taken: Vec<_> = taken.iter().map(|index| before.get_mut((*index)?)?.take()).collect();

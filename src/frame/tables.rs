@@ -54,8 +54,8 @@ pub(super) struct FrameTables {
 }
 
 impl FrameTables {
-    /// Gives the tables to the views and passes of a stage graph, so that what it shares with the graph before makes nothing anew. Does nothing
-    /// for the graph of the frame before.
+    /// Gives the tables to the views and passes of a stage graph, so that what it shares with the graph before makes
+    /// nothing anew. Does nothing for the graph of the frame before.
     pub(super) fn set_keys(&mut self, keys: &Arc<TableKeys>, views: &[RenderView]) {
         let before = match self.keys.replace(Arc::clone(keys)) {
             Some(before) if !Arc::ptr_eq(&before, keys) => before,

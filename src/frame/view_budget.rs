@@ -1,23 +1,27 @@
 //! The controller that keeps the cost of a frame's views within a budget.
 //!
-//! **What it predicts.** A frame costs what its views cost and a rest, which no view's form changes. A view costs what drawing one of its
-//! cameras costs on its rung, times the cameras that a frame draws on average. Both are measured, and [`ViewCost`] predicts the rungs on which
-//! the view is not. So the cost of any assignment of rungs is a sum, known without trying it.
+//! **What it predicts.** A frame costs what its views cost and a rest, which no view's form changes. A view costs what
+//! drawing one of its cameras costs on its rung, times the cameras that a frame draws on average. Both are measured,
+//! and [`ViewCost`] predicts the rungs on which the view is not. So the cost of any assignment of rungs is a sum, known
+//! without trying it.
 //!
-//! **How it chooses.** If the predicted cost exceeds the budget for [`OVER_FRAMES`] frames, it sheds: from the lowest priority on, each view
-//! descends its ladder until the prediction fits, all in one frame, as each frame over the budget is late. A view that would save next to
-//! nothing is passed over. If not even the last rungs fit, all views take these, and the budget is
-//! [exhausted](ViewBudget::is_exhausted). If there is room, it restores in the opposite order, one rung of one view at a time, and waits
-//! [`SETTLE_FRAMES`] for what that costs. While that view waits, no other view is restored, because it would take the room that the first one
-//! waits for. It also waits for views that it moved to another rung and has not measured there yet, as their costs count as 0, but not for
-//! ever: one that is cached never is.
+//! **How it chooses.** If the predicted cost exceeds the budget for [`OVER_FRAMES`] frames, it sheds: from the lowest
+//! priority on, each view descends its ladder until the prediction fits, all in one frame, as each frame over the
+//! budget is late. A view that would save next to nothing is passed over. If not even the last rungs fit, all views
+//! take these, and the budget is [exhausted](ViewBudget::is_exhausted). If there is room, it restores in the opposite
+//! order, one rung of one view at a time, and waits [`SETTLE_FRAMES`] for what that costs. While that view waits, no
+//! other view is restored, because it would take the room that the first one waits for. It also waits for views that it
+//! moved to another rung and has not measured there yet, as their costs count as 0, but not for ever: one that is
+//! cached never is.
 //!
-//! **Why it does not flap.** A rung is restored only if the prediction leaves room for a rise by [`HYSTERESIS`]. A restoration that is undone
-//! soon had a wrong prediction, so the view's pause before the next one doubles, up to [`MAX_PAUSE`].
+//! **Why it does not flap.** A rung is restored only if the prediction leaves room for a rise by [`HYSTERESIS`]. A
+//! restoration that is undone soon had a wrong prediction, so the view's pause before the next one doubles, up to
+//! [`MAX_PAUSE`].
 //!
-//! **How it finds out that it is wrong.** What a view that is left out costs is remembered, but cannot be measured, and the ratio of two rungs is
-//! wrong if the scene changed while it was measured. So a rung that is predicted not to fit is tried after [`TRIAL_PAUSES`] pauses, if there is
-//! room at all. The same doubling makes such trials rare where they fail.
+//! **How it finds out that it is wrong.** What a view that is left out costs is remembered, but cannot be measured, and
+//! the ratio of two rungs is wrong if the scene changed while it was measured. So a rung that is predicted not to fit
+//! is tried after [`TRIAL_PAUSES`] pauses, if there is room at all. The same doubling makes such trials rare where they
+//! fail.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -35,11 +39,12 @@ use crate::scene::Camera;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::unwind::emit;
 
-/// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best again when there is
-/// room (M 10.4: reflections are left out on slow hardware).
+/// Keeps what frames cost within a budget: draws views in cheaper forms, or not at all, and draws them at their best
+/// again when there is room (M 10.4: reflections are left out on slow hardware).
 ///
 /// The cost of a frame is thread time, summed over workers, or the device's time. Whether the camera of a view with
-/// [`Redraw::OnCameraChange`](crate::scene::Redraw::OnCameraChange) will change is not known, so it counts as drawn in every frame.
+/// [`Redraw::OnCameraChange`](crate::scene::Redraw::OnCameraChange) will change is not known, so it counts as drawn in
+/// every frame.
 ///
 /// ```
 /// # use std::sync::Arc;
@@ -136,7 +141,8 @@ const MAX_MEASURING_FRAMES: u64 = 128;
 /// A restoration that is undone within this number of frames was wrong.
 const RETRY_FRAMES: u64 = 64;
 
-/// After this many frames in a row that report no rung, or lack times, the budget warns: a frame in flight may have had other views.
+/// After this many frames in a row that report no rung, or lack times, the budget warns: a frame in flight may have had
+/// other views.
 const WARNING_FRAMES: u32 = 8;
 
 const MIN_PAUSE: u64 = 16;
@@ -154,7 +160,7 @@ const MEMORY_FRAMES: u64 = 256;
 const FILTER: Filter = Filter::limiting_outliers(8.0);
 
 impl ViewBudget {
-    /// A budget of so many milliseconds a frame.
+    /// A budget of `milliseconds` a frame.
     ///
     /// # Errors
     /// If that is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`].
@@ -178,7 +184,8 @@ impl ViewBudget {
     /// Sets the budget from the next frame on.
     ///
     /// # Errors
-    /// If it is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`]; then it stays as it is.
+    /// If it is not from [`BudgetError::MIN_MILLISECONDS`] to [`BudgetError::MAX_MILLISECONDS`]; the budget does not
+    /// change then.
     pub fn set_milliseconds(&mut self, milliseconds: f64) -> Result<(), BudgetError> {
         if !(BudgetError::MIN_MILLISECONDS..=BudgetError::MAX_MILLISECONDS).contains(&milliseconds) {
             return Err(BudgetError::InvalidBudget { milliseconds });
@@ -187,15 +194,16 @@ impl ViewBudget {
         Ok(())
     }
 
-    /// The cameras of the next frame, in the order of the views, each view in the form of its rung. The cameras of views that the budget may
-    /// not reduce may be among them, as views without a ladder, or be added by the engine.
+    /// The cameras of the next frame, in the order of the views, each view in the form of its rung. The cameras of
+    /// views that the budget may not reduce may be among them, as views without a ladder, or be added by the engine.
     ///
-    /// Give [`Self::choices`] to [`Renderer::add_choices`](super::Renderer::add_choices) before the frame of these cameras is recorded, as the
-    /// [example](ViewBudget) does. The frame reports its rungs only then, and without them the budget learns no view's cost. It warns of
-    /// frames that report none.
+    /// Give [`Self::choices`] to [`Renderer::add_choices`](super::Renderer::add_choices) before the frame of these
+    /// cameras is recorded, as the [example](ViewBudget) does. The frame reports its rungs only then, and without them
+    /// the budget learns no view's cost. It warns of frames that report none.
     ///
     /// # Errors
-    /// If a rung is invalid or comes after [`Rung::LeftOut`], or if two views or two of their cameras have the same name.
+    /// If a rung is invalid or comes after [`Rung::LeftOut`], or if two views or two of their cameras have the same
+    /// name.
     pub fn cameras(&mut self, views: &[BudgetedView]) -> Result<Vec<Camera>, BudgetError> {
         views.iter().try_for_each(BudgetedView::check)?;
         let mut names: Vec<_> = views.iter().map(|view| view.name.as_str()).collect();
@@ -222,8 +230,10 @@ impl ViewBudget {
         Ok(cameras)
     }
 
-    /// The rungs of the next frame, and what each costs a frame: for [`Renderer::add_choices`](super::Renderer::add_choices). Then they are in the
-    /// [statistics](FrameStatistics::tuning), the timeline and the report of the frame, and [`Self::update`] finds them there.
+    /// The rungs of the next frame, and what each costs a frame: for
+    /// [`Renderer::add_choices`](super::Renderer::add_choices). Then they are in the
+    /// [statistics](FrameStatistics::tuning), the timeline and the report of the frame, and [`Self::update`] finds them
+    /// there.
     pub fn choices(&self) -> impl Iterator<Item = TuningChoice> + '_ {
         self.requested().filter(|view| view.rungs.len() > 1).map(|view| {
             let alternative = |(rung, name): (usize, &Cow<'static, str>)| TuningAlternative {
@@ -251,9 +261,10 @@ impl ViewBudget {
         self.add_frame(statistics, stages.total().as_secs_f32() * 1e9, &costs);
     }
 
-    /// Chooses rungs by the device's time for a frame, with the statistics of that same frame: the sum of its passes' times, although a device may
-    /// draw several at once. A frame that [lacks](DevicePassTimes::skipped) times of passes is ignored, and a run of such frames is warned of. A
-    /// budget is kept by this or by [`Self::update`], not by both.
+    /// Chooses rungs by the device's time for a frame, with the statistics of that same frame: the sum of its passes'
+    /// times, although a device may draw several at once. A frame that [lacks](DevicePassTimes::skipped) times of
+    /// passes is ignored, and a run of such frames is warned of. A budget is kept by this or by [`Self::update`], not
+    /// by both.
     #[cfg(feature = "wgpu")]
     pub fn update_from_device(&mut self, statistics: &FrameStatistics, times: &DevicePassTimes) {
         self.incomplete = continued(self.incomplete, times.skipped > 0);
@@ -352,7 +363,8 @@ impl ViewBudget {
         }
     }
 
-    /// Restores one rung of the shed view with the highest priority, if that fits or if its turn has come to be measured.
+    /// Restores one rung of the shed view with the highest priority, if that fits or if its turn has come to be
+    /// measured.
     fn restore(&mut self) {
         // A view that is drawn seldom may not have been measured since it was restored.
         let is_awaited = |view: &ViewState| {

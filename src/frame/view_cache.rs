@@ -45,8 +45,9 @@ pub(super) struct InFlight {
 }
 
 impl ViewCache {
-    /// Decides which of the requested views a frame draws. The others become those that were drawn: of a light's shadow map also the light,
-    /// because the map is valid only with that one. The brightness of a light is always the requested one.
+    /// Decides which of the requested views a frame draws. The others become those that were drawn: of a light's shadow
+    /// map also the light, because the map is valid only with that one. The brightness of a light is always the
+    /// requested one.
     ///
     /// `is_imported` says whether the frame draws a view of this name into a texture of the engine's own.
     ///
@@ -198,7 +199,8 @@ struct Turns {
 }
 
 impl Turns {
-    /// Views of one interval are drawn in at most this many of its frames: each set of drawn views is a stage graph of its own.
+    /// Views of one interval are drawn in at most this many of its frames: each set of drawn views is a stage graph of
+    /// its own.
     const MAX_GROUPS: u32 = 8;
 
     /// Whether it is the turn of the next view, if that has an interval. `maps` are the maps that it is one of. Which

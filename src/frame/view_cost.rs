@@ -6,9 +6,9 @@ use super::budgeted_view::Rung;
 
 /// What drawing a camera of a view costs, in nanoseconds, averaged over its cameras.
 ///
-/// The costs of rungs have fixed ratios, their *shares* of the cost of rung 0, while the costs themselves change with the scene. So what is
-/// measured on one rung predicts all. A share is what the rung [expects](Rung::expected_share) until the view has been on the rung once; then
-/// it is what was measured, compared with the rung before.
+/// The costs of rungs have fixed ratios, their *shares* of the cost of rung 0, while the costs themselves change with
+/// the scene. So what is measured on one rung predicts all. A share is what the rung [expects](Rung::expected_share)
+/// until the view has been on the rung once; then it is what was measured, compared with the rung before.
 #[derive(Debug)]
 pub(super) struct ViewCost {
     /// On the rung `measured_on`.

@@ -24,7 +24,8 @@ struct PassingMaterials {
 }
 
 impl ViewFilter {
-    /// Makes it this filter for these materials. Asks the predicate if it is another one than before, or a material may have changed.
+    /// Makes it this filter for these materials. Asks the predicate if it is another one than before, or a material may
+    /// have changed.
     ///
     /// # Errors
     /// If the predicate panics; then nothing changes.

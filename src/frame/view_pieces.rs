@@ -7,7 +7,8 @@ use crate::quality::CullingVolume;
 use crate::scene::ObjectList;
 use crate::view::{Frustum, GroupBounds, Overlap};
 
-/// The pieces that a view executes, and the objects that it need not test because a recorded piece that lies outside or is executed has them.
+/// The pieces that a view executes, and the objects that it need not test because a recorded piece that lies outside or
+/// is executed has them.
 #[derive(Debug, Default)]
 pub(super) struct ViewPieces {
     /// What it was found with; `None` if the view executes no pieces.
@@ -48,7 +49,8 @@ enum Passing {
 }
 
 impl ViewPieces {
-    /// Finds the pieces that a view executes. If these are others than before, their version is `version`, which no other view's are.
+    /// Finds the pieces that a view executes. If these are others than before, their version is `version`, which no
+    /// other view's are.
     pub(super) fn find(
         &mut self,
         table: &PieceTable,

@@ -23,8 +23,8 @@ impl ViewTimes {
         self.nanoseconds[view].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
-    /// Takes away a time that the job of one of the view's stages spends on other views. The job's own time is added when it ends; until then
-    /// the sum may be below 0, and wraps.
+    /// Takes away a time that the job of one of the view's stages spends on other views. The job's own time is added
+    /// when it ends; until then the sum may be below 0, and wraps.
     pub(super) fn subtract(&self, view: usize, took: Duration) {
         // Relaxed: a sum, read after the run.
         self.nanoseconds[view].fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);

@@ -76,8 +76,8 @@ impl TestScope {
 const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
 
 impl ViewVisibility {
-    /// Begins a frame of a view that draws commands: decides which pieces it executes, and which objects it tests. The version is one that no
-    /// other view gets.
+    /// Begins a frame of a view that draws commands: decides which pieces it executes, and which objects it tests. The
+    /// version is one that no other view gets.
     ///
     /// # Errors
     /// If the predicate of the view's filter panics.

@@ -21,12 +21,12 @@ pub(super) struct FrameViews {
 }
 
 impl FrameViews {
-    /// The views that a scene requests: one for each camera in the scene's order, then, if `maps` is given, those of the shadow maps
-    /// of each light that casts shadows and reaches what a camera may see.
+    /// The views that a scene requests: one for each camera in the scene's order, then, if `maps` is given, those of
+    /// the shadow maps of each light that casts shadows and reaches what a camera may see.
     ///
     /// # Errors
-    /// If there are too many views, or those whose targets are layers of one texture differ in size, or are faces of a cube map and not
-    /// square.
+    /// If there are too many views, or those whose targets are layers of one texture differ in size, or are faces of a
+    /// cube map and not square.
     pub(super) fn new(
         scene: &SceneRef<'_>,
         valid: ValidLights,

@@ -12,16 +12,17 @@ use crate::view::LightClass;
 
 /// Frames to draw while a world is loaded, whose pictures are not shown.
 ///
-/// Many drivers compile a shader when something is first drawn with it, for the formats and numbers of layers of the textures that are bound
-/// then. [`Renderer::prepare_pipelines`] makes pipelines, but draws nothing. A warm-up draws what a scene may require when lights, blended
-/// objects and reflections come and go: first the whole scene; then, for each class of lights that it has, one light and no other; then no
-/// light at all, with everything else, without transparency, and without reflections. It also uploads the scene's meshes and textures, and
-/// makes its targets.
+/// Many drivers compile a shader when something is first drawn with it, for the formats and numbers of layers of the
+/// textures that are bound then. [`Renderer::prepare_pipelines`] makes pipelines, but draws nothing. A warm-up draws
+/// what a scene may require when lights, blended objects and reflections come and go: first the whole scene; then, for
+/// each class of lights that it has, one light and no other; then no light at all, with everything else, without
+/// transparency, and without reflections. It also uploads the scene's meshes and textures, and makes its targets.
 ///
-/// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of sight or dark, as
-/// those that are switched off are: a light that is drawn alone stands before a camera, and shines. Objects that no camera of the scene sees are
-/// not drawn, so neither is what only their materials need. Buffers that processes change keep what they hold. The first frame after the warm-up is
-/// [one without frames before it](Renderer::forget_previous_frames).
+/// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of
+/// sight or dark, as those that are switched off are: a light that is drawn alone stands before a camera, and shines.
+/// Objects that no camera of the scene sees are not drawn, so neither is what only their materials need. Buffers that
+/// processes change keep what they hold. The first frame after the warm-up is [one without frames before
+/// it](Renderer::forget_previous_frames).
 ///
 /// ```
 /// # #[cfg(feature = "wgpu")]
@@ -78,8 +79,8 @@ impl<'a> WarmUp<'a> {
         self.frames.len()
     }
 
-    /// Records the next frame, which the engine submits; `None` after the last one. The engine waits for the device between frames, as the
-    /// driver may compile in the meantime.
+    /// Records the next frame, which the engine submits; `None` after the last one. The engine waits for the device
+    /// between frames, as the driver may compile in the meantime.
     ///
     /// # Errors
     /// As [`Renderer::record`]. The warm-up goes on with the frame after it.

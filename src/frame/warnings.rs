@@ -52,8 +52,8 @@ impl Warnings {
         }
     }
 
-    /// Ends a frame of this plan. Warns of what raw passes have not asked for in the first frames that encoded them, though their processes
-    /// declare it. A process is in many plans: what one of them has shown is not observed again.
+    /// Ends a frame of this plan. Warns of what raw passes have not asked for in the first frames that encoded them,
+    /// though their processes declare it. A process is in many plans: what one of them has shown is not observed again.
     #[cfg(feature = "wgpu")]
     pub(super) fn report_unrequested(&mut self, plan: &FramePlan, draws: &[Draws<'_>]) {
         for (planned, draws) in plan.processes().iter().zip(draws) {

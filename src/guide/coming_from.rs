@@ -18,11 +18,11 @@
 //!
 //! What differs most, in one sentence each:
 //!
-//! - **From Bevy.** There is no app, no plugin and no world: the engine calls `record` and `submit` in its own loop. In return, nothing is
-//!   copied into a render world, and nothing is drawn that the engine did not lend.
+//! - **From Bevy.** There is no app, no plugin and no world: the engine calls `record` and `submit` in its own loop. In
+//!   return, nothing is copied into a render world, and nothing is drawn that the engine did not lend.
 //! - **From rend3.** The renderer keeps no objects: the engine lends all of them in each frame, and says which changed.
-//! - **From a hand-written renderer.** Passes say what they read and write, and not when they run. A pass that must run at a place says so
-//!   by `Place`, or by `after` and `before`.
+//! - **From a hand-written renderer.** Passes say what they read and write, and not when they run. A pass that must run
+//!   at a place says so by `Place`, or by `after` and `before`.
 //!
 //! [`CullingVolume`]: crate::quality::CullingVolume
 //! [`Camera`]: crate::scene::Camera

@@ -1,14 +1,15 @@
 //! From a plain wgpu renderer to Drawloom, in seven steps.
 //!
-//! The renderer that we begin with is the usual one: a device, a window, and a loop that writes the transforms of all objects into a
-//! buffer, opens a render pass, and draws one object after the other. It spends its frame on one thread. Each step below compiles and
-//! runs by itself, and leaves the rest of the engine as it is.
+//! The renderer that we begin with is the usual one: a device, a window, and a loop that writes the transforms of all
+//! objects into a buffer, opens a render pass, and draws one object after the other. It spends its frame on one thread.
+//! Each step below compiles and runs by itself, and leaves the rest of the engine unchanged.
 //!
 //! # 1. Give Drawloom the device
 //!
-//! The engine keeps its device and its queue: [`WgpuBackend`] gets handles to them, and uses them beside the engine. It requires the
-//! features [`WgpuBackend::REQUIRED_FEATURES`], and gains from [`WgpuBackend::optional_features`]. The [`Scheduler`] starts the threads.
-//! It runs the engine's own jobs too, so nobody starts a second set of threads that compete with these.
+//! The engine keeps its device and its queue: [`WgpuBackend`] gets handles to them, and uses them beside the engine. It
+//! requires the features [`WgpuBackend::REQUIRED_FEATURES`], and gains from [`WgpuBackend::optional_features`]. The
+//! [`Scheduler`] starts the threads. It runs the engine's own jobs too, so nobody starts a second set of threads that
+//! compete with these.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -31,8 +32,8 @@
 //!
 //! # 2. Turn vertex buffers and bind groups into assets
 //!
-//! A mesh is vertices and indices; a material is what the shipped pipeline shades. Drawloom uploads them when a frame first draws them,
-//! and objects name them by handles of 8 bytes.
+//! A mesh is vertices and indices; a material is what the shipped pipeline shades. Drawloom uploads them when a frame
+//! first draws them, and objects name them by handles of 8 bytes.
 //!
 //! ```
 //! use drawloom::glam::Vec3;
@@ -54,8 +55,9 @@
 //!
 //! # 3. Lend the objects
 //!
-//! The loop over objects goes. In its place the engine lends its arrays, one for each property, as a [`SceneRef`]: nothing is copied,
-//! and the loan ends when [`Renderer::record`] returns. A view, a draw list and a pass are made for each camera.
+//! The loop over objects goes. In its place the engine lends its arrays, one for each property, as a [`SceneRef`]:
+//! nothing is copied, and the loan ends when [`Renderer::record`] returns. A view, a draw list and a pass are made for
+//! each camera.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -102,15 +104,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! An engine that has no such arrays begins with [`Scene`], which owns them. One that has some of them lends these, and takes the
-//! others from a scene: `SceneRef { positions: &positions, ..scene.as_scene_ref() }`.
+//! An engine that has no such arrays begins with [`Scene`], which owns them. One that has some of them lends these, and
+//! takes the others from a scene: `SceneRef { positions: &positions, ..scene.as_scene_ref() }`.
 //!
 //! # 4. Draw into the window
 //!
-//! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own. A [`WindowSurface`]
-//! chooses formats, follows the window's size, and makes a lost surface anew; [`WindowDevice::open`] opens the device too, and an
-//! engine that has one makes a [`WindowDevice`] of its handles. If the device is lost, it opens another, and hands it to
-//! [`Renderer::replace_backend`].
+//! The picture goes straight into the texture of the window's surface, in the place of a target of Drawloom's own. A
+//! [`WindowSurface`] chooses formats, follows the window's size, and makes a lost surface anew; [`WindowDevice::open`]
+//! opens the device too, and an engine that has one makes a [`WindowDevice`] of its handles. If the device is lost, it
+//! opens another, and hands it to [`Renderer::replace_backend`].
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -139,14 +141,15 @@
 //! # }
 //! ```
 //!
-//! A window is drawn as often as the engine asks: a minimised one that asks for the next frame in each frame keeps a core busy.
-//! `examples/window` asks its windows whether they are visible, and has several on one device; `small_engine`, an example of
-//! `drawloom-egui`, has all of a small engine in one file.
+//! A window is drawn as often as the engine asks: a minimised one that asks for the next frame in each frame keeps a
+//! core busy. `examples/window` asks its windows whether they are visible, and has several on one device;
+//! `small_engine`, an example of `drawloom-egui`, has all of a small engine in one file.
 //!
 //! # 5. Bring the shaders
 //!
-//! A shader of the engine's becomes a [`RenderProcess`]: it declares what it reads and writes, and so where in the frame it is. A
-//! process over objects draws Drawloom's commands, culled, sorted and merged; one over the screen needs no geometry:
+//! A shader of the engine's becomes a [`RenderProcess`]: it declares what it reads and writes, and so where in the
+//! frame it is. A process over objects draws Drawloom's commands, culled, sorted and merged; one over the screen needs
+//! no geometry:
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -193,17 +196,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/own_content` has shaders that read data of objects, vertices and materials, move vertices, compute, and count.
+//! `examples/own_content` has shaders that read data of objects, vertices and materials, move vertices, compute, and
+//! count.
 //!
-//! A shader that does not compile is an error of the first frame that needs it, with the process, the line and the column;
-//! [`Renderer::prepare_pipelines`] finds it before, while the world is loaded.
+//! A shader that does not compile is an error of the first frame that needs it, with the process, the line and the
+//! column; [`Renderer::prepare_pipelines`] finds it before, while the world is loaded.
 //!
-//! A process passes values to its shader as a uniform. [`Parameters`] is one that changes between frames, with an example.
+//! A process passes values to its shader as a uniform. [`Parameters`] is one that changes between frames, with an
+//! example.
 //!
 //! # 6. Keep a pass of your own
 //!
-//! What Drawloom has no words for, as a library that encodes its own passes, gets the encoder in a [`RawPass`], at its place in the
-//! frame, on a worker:
+//! What Drawloom has no words for, as a library that encodes its own passes, gets the encoder in a [`RawPass`], at its
+//! place in the frame, on a worker:
 //!
 //! ```
 //! # use std::error::Error;
@@ -262,8 +267,8 @@
 //!
 //! # 7. Overlap, and look
 //!
-//! The world is free from the end of `record` on. So the next update runs on the workers while this thread submits; and an engine that
-//! says what changed pays for that alone. The timeline shows whether it helps.
+//! The world is free from the end of `record` on. So the next update runs on the workers while this thread submits; and
+//! an engine that says what changed pays for that alone. The timeline shows whether it helps.
 //!
 //! ```
 //! # use std::sync::Arc;
@@ -317,7 +322,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! To see it rather than read it, add the inspector, `drawloom-egui`, or write a page with `report::write_page` (feature `report`).
+//! To see it rather than read it, add the inspector, `drawloom-egui`, or write a page with `report::write_page`
+//! (feature `report`).
 //!
 //! [`Mesh::from_buffers`]: crate::scene::Mesh::from_buffers
 //! [`Parameters`]: crate::process::Parameters

@@ -1,4 +1,5 @@
-//! A guide for authors of engines. It has no code of its own: its examples are compiled and run with the documentation's tests.
+//! A guide for authors of engines. It has no code of its own: its examples are compiled and run with the
+//! documentation's tests.
 //!
 //! - [`from_wgpu`]: from a plain wgpu renderer to Drawloom, in seven steps.
 //! - [`coming_from`]: what the words of Bevy, rend3 and hand-written renderers are called here.

@@ -27,15 +27,17 @@ pub enum Access {
     MatchDepth,
     /// Read by the shader.
     Sample,
-    /// Read by the shader: what another target held at the end of the frame before. The name is that of [`previous_name`](super::previous_name).
+    /// Read by the shader: what another target held at the end of the frame before. The name is that of
+    /// [`previous_name`](super::previous_name).
     SamplePrevious,
     /// Read by the shader: a texture array that all views of this kind share.
     SampleLayers(ViewKind),
     /// Read by the shader: the target of another view, of this kind. Which view is
     /// [`Declaration::sampled_views`](super::Declaration::sampled_views) at this index.
     SampleView(ViewKind, usize),
-    /// Read by the shader: what the target of another view, or of the view itself, held at the end of the frame before. The name is that of
-    /// [`previous_name`](super::previous_name), the kind and the view are those of [`Access::SampleView`].
+    /// Read by the shader: what the target of another view, or of the view itself, held at the end of the frame before.
+    /// The name is that of [`previous_name`](super::previous_name), the kind and the view are those of
+    /// [`Access::SampleView`].
     SampleViewPrevious(ViewKind, usize),
     /// The target of a resolve: overwritten with the mean of a multisampled target's samples.
     Resolve(Format),

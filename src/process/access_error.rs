@@ -2,11 +2,11 @@
 
 use crate::scene::ViewKind;
 
-/// Why a raw pass does not get a resource that it asks for. The plan orders processes by what they declare, so another target may not be
-/// written yet, or not exist.
+/// Why a raw pass does not get a resource that it asks for. The plan orders processes by what they declare, so another
+/// target may not be written yet, or not exist.
 ///
-/// The frame fails with the first such error, as [`BackendError::Access`](crate::backend::BackendError::Access), even if the raw pass
-/// goes on without the resource.
+/// The frame fails with the first such error, as [`BackendError::Access`](crate::backend::BackendError::Access), even
+/// if the raw pass goes on without the resource.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AccessError {

@@ -2,8 +2,8 @@
 
 use crate::scene::Blend;
 
-/// How a drawn colour, the source, blends with the colour that a target has, the destination: one equation for red, green and blue, one
-/// for alpha. A process has one for each of its colour targets where [`Blend`] is not enough.
+/// How a drawn colour, the source, blends with the colour that a target has, the destination: one equation for red,
+/// green and blue, one for alpha. A process has one for each of its colour targets where [`Blend`] is not enough.
 ///
 /// ```
 /// use drawloom::process::{BlendComponent, BlendEquation, BlendFactor};
@@ -25,7 +25,8 @@ pub struct BlendEquation {
 }
 
 impl BlendEquation {
-    /// The source replaces the destination. The only equation for targets that [cannot be blended](super::Format::can_be_blended).
+    /// The source replaces the destination. The only equation for targets that [cannot be
+    /// blended](super::Format::can_be_blended).
     pub const REPLACE: Self = Self::sum(BlendFactor::One, BlendFactor::Zero);
     /// Source + destination.
     pub const ADDITIVE: Self = Self::sum(BlendFactor::One, BlendFactor::One);

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 
 use super::{BufferOffset, ShaderResource};
 
-/// A compute shader, run once in each of the process's views, or [once a frame](super::Declare::once_a_frame). It samples targets,
-/// and reads and changes [buffers](super::StorageBuffer).
+/// A compute shader, run once in each of the process's views, or [once a frame](super::Declare::once_a_frame). It
+/// samples targets, and reads and changes [buffers](super::StorageBuffer).
 ///
-/// The software backend has no compute shaders: frames with such a process return an error that names it.
+/// The software backend has no compute shaders: a frame with one returns an error that names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComputeDispatch<'a> {
     /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `compute`.

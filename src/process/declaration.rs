@@ -8,11 +8,12 @@ use crate::scene::{
     ViewKind,
 };
 
-/// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its own,
-/// of the size of its picture unless [`Declare::size`] says otherwise.
+/// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its
+/// own, of the size of its picture unless [`Declare::size`] says otherwise.
 ///
-/// A process can use only what it declares. What it declares and does not use is warned of through `tracing`: a target, buffer, column or
-/// material type that its shader has no variable for, or that its [raw pass](super::RawPassResources) never asks for.
+/// A process can use only what it declares. What it declares and does not use is warned of through `tracing`: a target,
+/// buffer, column or material type that its shader has no variable for, or that its [raw pass](super::RawPassResources)
+/// never asks for.
 #[derive(Debug, Default)]
 pub struct Declare {
     declaration: Declaration,
@@ -24,9 +25,9 @@ impl Declare {
         self.declaration.views = kind;
     }
 
-    /// Draws in views of this kind too, in targets of theirs, whenever a scene has such views, and draws there what others sample. The
-    /// pipeline's own processes draw in [`ViewKind::Reflection`] as they do in [`ViewKind::Main`]; an engine's do so with this call. It has no
-    /// effect on a process that draws once a frame.
+    /// Draws in views of this kind too, in targets of theirs, whenever a scene has such views, and draws there what
+    /// others sample. The pipeline's own processes draw in [`ViewKind::Reflection`] as they do in [`ViewKind::Main`];
+    /// an engine's do so with this call. It has no effect on a process that draws once a frame.
     pub fn also_views(&mut self, kind: ViewKind) {
         self.declaration.also_views.push(kind);
     }
@@ -58,9 +59,9 @@ impl Declare {
         self.access(target, Access::ClearDepthLayer(format));
     }
 
-    /// Tests against the depth that another process wrote, without writing it, and writes the [stencil](super::Stencil) beside it. What
-    /// has the stored depth passes the test, so that objects which are drawn already can be marked. In the map of a directional light, what
-    /// is beyond the far plane may pass: see [`Self::matches_depth`].
+    /// Tests against the depth that another process wrote, without writing it, and writes the [stencil](super::Stencil)
+    /// beside it. What has the stored depth passes the test, so that objects which are drawn already can be marked. In
+    /// the map of a directional light, what is beyond the far plane may pass: see [`Self::matches_depth`].
     pub fn marks_stencil(&mut self, target: &str) {
         self.access(target, Access::MarkStencil);
     }
@@ -77,18 +78,20 @@ impl Declare {
 
     /// Draws only where its depth equals the depth that another process wrote, without writing it.
     ///
-    /// In the map of a directional light, devices with [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES) clamp the
-    /// depth of what is beyond the far plane to 0, which equals the cleared depth. A fragment shader that discards pixels whose
+    /// In the map of a directional light, devices with
+    /// [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES) clamp the depth of what is beyond the
+    /// far plane to 0, which equals the cleared depth. A fragment shader that discards pixels whose
     /// `@builtin(position)` has a z of at most 0 draws the same on all devices.
     pub fn matches_depth(&mut self, target: &str) {
         self.access(target, Access::MatchDepth);
     }
 
-    /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on. The prelude's
-    /// `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
+    /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on. The
+    /// prelude's `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
     ///
-    /// In WGSL it is a `texture_2d<f32>`; a `texture_depth_2d` if its format has depth; a `texture_2d<u32>` for [`Format::R32Uint`] and
-    /// [`Format::Stencil8`]. The targets of the deferred pipeline are listed at [`GeometryBuffer`](super::GeometryBuffer):
+    /// In WGSL it is a `texture_2d<f32>`; a `texture_depth_2d` if its format has depth; a `texture_2d<u32>` for
+    /// [`Format::R32Uint`] and [`Format::Stencil8`]. The targets of the deferred pipeline are listed at
+    /// [`GeometryBuffer`](super::GeometryBuffer):
     ///
     /// ```wgsl
     /// @group(2) @binding(1) var depth_target: texture_depth_2d;
@@ -97,13 +100,14 @@ impl Declare {
         self.access(target, Access::Sample);
     }
 
-    /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`] does: the history
-    /// of temporal filters. The process may write the target itself.
+    /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`]
+    /// does: the history of temporal filters. The process may write the target itself.
     ///
-    /// That is the frame submitted last. It, and every frame that was recorded since and dropped, had a view of this kind and name, and its
-    /// target this size and format; of several views of one name none has a history after their number changed. Otherwise
-    /// all channels of the format are 0: a target with an alpha that is written as 1 tells whether it has a history. The price is a
-    /// copy of the target at the end of each frame. A raw pass finds it as the target [`previous_name`].
+    /// That is the frame submitted last. It, and every frame that was recorded since and dropped, had a view of this
+    /// kind and name, and its target this size and format; of several views of one name none has a history after their
+    /// number changed. Otherwise all channels of the format are 0: a target with an alpha that is written as 1 tells
+    /// whether it has a history. The price is a copy of the target at the end of each frame. A raw pass finds it as the
+    /// target [`previous_name`].
     ///
     /// A history that is mixed with a share a of each frame ends within r/a of the mean of what it is mixed with, as a
     /// fraction of it. Here r is what a write in the target's format loses: 2⁻¹⁰ for half floats and 2⁻²³ for floats if
@@ -112,24 +116,27 @@ impl Declare {
         self.access(&previous_name(target), Access::SamplePrevious);
     }
 
-    /// Sets the size of a target that the process creates: that it clears, resolves into, or overwrites in a raw pass. Without this call it has
-    /// the size of the view's picture. All targets that a process draws into, and the depth that it tests, have the same size.
+    /// Sets the size of a target that the process creates: that it clears, resolves into, or overwrites in a raw pass.
+    /// Without this call it has the size of the view's picture. All targets that a process draws into, and the depth
+    /// that it tests, have the same size.
     ///
-    /// The prelude's `view.width`, `view.height` and `clip_of_pixel` are those of the picture: shaders that draw into targets of other
-    /// sizes use `textureDimensions`, or the `clip` of `FullScreenPixel`.
+    /// The prelude's `view.width`, `view.height` and `clip_of_pixel` are those of the picture: shaders that draw into
+    /// targets of other sizes use `textureDimensions`, or the `clip` of `FullScreenPixel`.
     pub fn size(&mut self, target: &str, size: TargetSize) {
         let size = if size == TargetSize::Divided(1) { TargetSize::Picture } else { size };
         self.declaration.sizes.push((target.to_owned(), size));
     }
 
-    /// Makes a target multisampled, so that edges are smooth: four samples per pixel, the number that every device supports. The process
-    /// must clear the target, and not in layers. All targets that a process draws into, and the depth that it tests, must have the same
-    /// number of samples.
+    /// Makes a target multisampled, so that edges are smooth: four samples per pixel, the number that every device
+    /// supports. The process must clear the target, and not in layers. All targets that a process draws into, and the
+    /// depth that it tests, must have the same number of samples.
     ///
-    /// A shader that [samples](Declare::samples) such a target declares a `texture_multisampled_2d<f32>` or a
-    /// `texture_depth_multisampled_2d`. What reads it as any other target reads the one that it is [resolved](Declare::resolves) into.
+    /// A shader that [samples](Declare::samples) a multisampled target declares a `texture_multisampled_2d<f32>` or a
+    /// `texture_depth_multisampled_2d`. What reads it as any other target reads the one that it is
+    /// [resolved](Declare::resolves) into.
     ///
-    /// Triangle culling is off for such a process, because it tests the centres of pixels. The software backend returns an error.
+    /// Triangle culling is off for a process with multisampled targets, because it tests the centres of pixels. The
+    /// software backend returns an error.
     ///
     /// ```
     /// use drawloom::process::{ClearColor, Declare, Format};
@@ -147,8 +154,8 @@ impl Declare {
         self.declaration.multisampled.push(target.to_owned());
     }
 
-    /// Creates the target `resolved`, and writes the mean of the samples of `multisampled` into it when the process has drawn into that. It
-    /// has the same size, and `format` must be the same. A process resolves a target at most once.
+    /// Creates the target `resolved`, and writes the mean of the samples of `multisampled` into it when the process has
+    /// drawn into that. It has the same size, and `format` must be the same. A process resolves a target at most once.
     pub fn resolves(&mut self, multisampled: &str, resolved: &str, format: Format) {
         self.declaration.resolves.push((multisampled.to_owned(), resolved.to_owned()));
         self.access(resolved, Access::Resolve(format));
@@ -160,12 +167,13 @@ impl Declare {
         self.access(target, Access::SampleLayers(views));
     }
 
-    /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the next 1, and so
-    /// on. Each is an array with an element for each object of the scene, by `Object.index`. It may be longer than that.
+    /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the
+    /// next 1, and so on. Each is an array with an element for each object of the scene, by `Object.index`. It may be
+    /// longer than that.
     ///
     /// Frames whose scene has no such column fail. A device with the least number of storage buffers a shader,
-    /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS), has none left for columns: request
-    /// `max_storage_buffers_per_shader_stage` of 4 and one for each column.
+    /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS), has none left for columns:
+    /// request `max_storage_buffers_per_shader_stage` of 4 and one for each column.
     ///
     /// ```
     /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -218,10 +226,10 @@ impl Declare {
         self.declaration.columns.push(column.layout());
     }
 
-    /// Reads the values of materials of a [material type](MaterialType) in the shader, at `@group(3)` behind the columns: the
-    /// first such type has the next binding, and so on. Each is an array with an element for each material of the scene, by
-    /// `Object.material`; those of other types are all zeros. If a material changes, only the blocks of
-    /// 1 KiB that its values are in are uploaded.
+    /// Reads the values of materials of a [material type](MaterialType) in the shader, at `@group(3)` behind the
+    /// columns: the first such type has the next binding, and so on. Each is an array with an element for each material
+    /// of the scene, by `Object.material`; those of other types are all zeros. If a material changes, only the blocks
+    /// of 1 KiB that its values are in are uploaded.
     ///
     /// For the number of storage buffers that a device needs, see [`Declare::reads_column`].
     pub fn reads_materials<T: Pod>(&mut self, material_type: MaterialType<T>) {
@@ -230,8 +238,8 @@ impl Declare {
         }
     }
 
-    /// Reads an engine's own attribute of vertices: a field of the prelude's `VertexInput`, by its name. Meshes without it have the
-    /// default for each vertex.
+    /// Reads an engine's own attribute of vertices: a field of the prelude's `VertexInput`, by its name. Meshes without
+    /// it have the default for each vertex.
     ///
     /// ```
     /// use drawloom::process::Declare;
@@ -253,18 +261,19 @@ impl Declare {
         }
     }
 
-    /// Reads a buffer in the shader, at `@group(2)` after the sampled targets: the first of the process's buffers has the next binding,
-    /// the next the one after that, and so on. It comes after the processes that change the buffer.
+    /// Reads a buffer in the shader, at `@group(2)` after the sampled targets: the first of the process's buffers has
+    /// the next binding, the next the one after that, and so on. It comes after the processes that change the buffer.
     ///
-    /// A device with only [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS) has no storage buffers left for
-    /// these: see [`Declare::reads_column`].
+    /// A device with only [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS) has no storage
+    /// buffers left for these: see [`Declare::reads_column`].
     pub fn reads_buffer<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
         self.declaration.buffers.push((buffer.layout(), BufferAccess::Read));
     }
 
-    /// Reads and writes a buffer in the shader, with a binding as [`Declare::reads_buffer`] has. Compute and fragment shaders have it, and
-    /// vertex shaders have not. Processes that change the same buffer need an order. A process that draws in several views sees what it
-    /// changed in those that are submitted before: in the order of the scene's cameras, if these are of one kind.
+    /// Reads and writes a buffer in the shader, with a binding as [`Declare::reads_buffer`] has. Compute and fragment
+    /// shaders have it, and vertex shaders have not. Processes that change the same buffer need an order. A process
+    /// that draws in several views sees what it changed in those that are submitted before: in the order of the scene's
+    /// cameras, if these are of one kind.
     pub fn changes_buffer<T: Pod>(&mut self, buffer: StorageBuffer<T>) {
         self.declaration.buffers.push((buffer.layout(), BufferAccess::Change));
     }
@@ -279,8 +288,8 @@ impl Declare {
         self.access(target, Access::Write(format));
     }
 
-    /// A raw pass reads and writes a target with its own commands; as a storage texture too, if [`Format::can_be_stored`] and it is not
-    /// multisampled.
+    /// A raw pass reads and writes a target with its own commands; as a storage texture too, if
+    /// [`Format::can_be_stored`] and it is not multisampled.
     pub fn changes(&mut self, target: &str) {
         self.access(target, Access::Change);
     }
@@ -300,17 +309,19 @@ impl Declare {
         self.declaration.before.push(process.to_owned());
     }
 
-    /// Puts the process at a place of the [deferred pipeline](super::Deferred): after all of the pipeline's processes before it, and
-    /// before those behind it. Processes at the same place that write the same target still need an order.
+    /// Puts the process at a place of the [deferred pipeline](super::Deferred): after all of the pipeline's processes
+    /// before it, and before those behind it. Processes at the same place that write the same target still need an
+    /// order.
     pub fn at(&mut self, place: Place) {
         let [begin, end] = place.slots();
         self.after(begin);
         self.before(end);
     }
 
-    /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a compute shader
-    /// for particles. Its targets are those of that view, so processes that draw in each view may not use them. If views are
-    /// [cached](crate::scene::Redraw), it draws in the first that is not, and not at all if all are.
+    /// Draws once a frame, in the first of its views, instead of once in each: for work that all views share, such as a
+    /// compute shader for particles. Its targets are those of that view, so processes that draw in each view may not
+    /// use them. If views are [cached](crate::scene::Redraw), it draws in the first that is not, and not at all if all
+    /// are.
     pub fn once_a_frame(&mut self) {
         self.declaration.once_a_frame = true;
     }
@@ -434,8 +445,8 @@ pub struct DeclaredAttribute {
     pub default: Vec<u8>,
 }
 
-/// The name of the copy that holds a target's history. The copy is made at the end of each frame: passes read what the target held in
-/// the frame before, and once the frame is submitted, the copy is that of the frame itself.
+/// The name of the copy that holds a target's history. The copy is made at the end of each frame: passes read what the
+/// target held in the frame before, and once the frame is submitted, the copy is that of the frame itself.
 pub fn previous_name(target: &str) -> String {
     format!("{target}{PREVIOUS_SUFFIX}")
 }

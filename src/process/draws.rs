@@ -52,13 +52,13 @@ pub struct CommandDraws<'a> {
     /// what is behind it from culling. [Masked](crate::scene::Material::is_masked) objects never do. A warning
     /// names a process whose shader does so, and which does not set this.
     pub discards: bool,
-    /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the object's shape of
-    /// this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns `in`, and which the shipped
-    /// processes and [`SURFACE_SHADER`](super::SURFACE_SHADER) call. [`Deferred::deformation`](super::Deferred::deformation) sets it for
-    /// all processes of the pipeline.
+    /// The process's own WGSL function `fn deform(in: VertexInput, object: Object) -> VertexInput`: the vertex in the
+    /// object's shape of this frame, for skinning, morph targets or wind. It replaces the prelude's, which returns
+    /// `in`, and which the shipped processes and [`SURFACE_SHADER`](super::SURFACE_SHADER) call.
+    /// [`Deferred::deformation`](super::Deferred::deformation) sets it for all processes of the pipeline.
     ///
-    /// The objects' bounds contain what it returns. Deformed objects hide nothing behind them from culling, and their triangles are not
-    /// culled on the CPU.
+    /// The objects' bounds contain what it returns. Deformed objects hide nothing behind them from culling, and their
+    /// triangles are not culled on the CPU.
     pub deformation: Option<&'a str>,
     /// Which objects are drawn.
     pub selection: Selection,
@@ -198,8 +198,9 @@ impl Draws<'_> {
         }
     }
 
-    /// Whether it draws objects that write depth all over the shape of their meshes, and so hide what is behind them: opaque ones, neither
-    /// deformed nor inside out, without discarding pixels, and whatever the stencil. Those with a mask do not.
+    /// Whether it draws objects that write depth all over the shape of their meshes, and so hide what is behind them:
+    /// opaque ones, neither deformed nor inside out, without discarding pixels, and whatever the stencil. Those with a
+    /// mask do not.
     pub fn hides(&self) -> bool {
         let Self::Commands(draws) = self else { return false };
         let writes_all = draws.writes_depth && draws.stencil.is_none_or(|stencil| stencil.always_passes());

@@ -8,8 +8,8 @@ pub enum FaceCulling {
     /// Front faces; back faces too if the material is double-sided.
     #[default]
     ByMaterial,
-    /// Back faces only. Of double-sided materials both are drawn. For outlines that are drawn as inverted hulls, for thickness, and for
-    /// shadow maps with less bias.
+    /// Back faces only. Of double-sided materials both are drawn. For outlines that are drawn as inverted hulls, for
+    /// thickness, and for shadow maps with less bias.
     Reversed,
     /// Both faces: nothing is culled.
     Nothing,

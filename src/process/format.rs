@@ -2,8 +2,8 @@
 
 use crate::quality::{DiffuseFormat, NormalFormat};
 
-/// The format of a target. Unless it says otherwise, it can be drawn to and read on every adapter. Objects with blended materials are
-/// drawn to those that [cannot be blended](Format::can_be_blended) as if they did not blend.
+/// The format of a target. Unless it says otherwise, it can be drawn to and read on every adapter. Objects with blended
+/// materials are drawn to those that [cannot be blended](Format::can_be_blended) as if they did not blend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
@@ -41,8 +41,8 @@ pub enum Format {
     /// Depth, a float.
     Depth32Float,
     /// Depth, a float, and a [stencil](super::Stencil). Devices need the feature `DEPTH32FLOAT_STENCIL8`, which
-    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) has if the adapter has it. It is not read
-    /// back, and shaders sample its depth.
+    /// [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) has if the adapter has it. It
+    /// is not read back, and shaders sample its depth.
     Depth32FloatStencil8,
     /// A [stencil](super::Stencil) without depth, which shaders sample as a whole number.
     Stencil8,
@@ -79,7 +79,7 @@ impl Format {
         self.is_depth_stencil() || self.can_be_resolved()
     }
 
-    /// Whether such a target's samples can be [resolved](super::Declare::resolves) on every adapter.
+    /// Whether the samples of a target of this format can be [resolved](super::Declare::resolves) on every adapter.
     pub fn can_be_resolved(self) -> bool {
         self.is_filterable()
     }

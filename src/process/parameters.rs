@@ -8,14 +8,16 @@ use parking_lot::{Mutex, ReentrantMutex};
 
 /// Parameters of a shader that the engine changes between frames, while the renderer has the process that reads them.
 ///
-/// Clones share their value: the engine keeps one, and the process has another. A frame has the value at the time when it is recorded.
+/// Clones share their value: the engine keeps one, and the process has another. A frame has the value at the time when
+/// it is recorded.
 ///
-/// In WGSL they are the uniform at `@group(2) @binding(0)`, so `T` has the layout that WGSL gives the shader's type: `f32` is `f32`, and
-/// `[f32; 4]` is `vec4<f32>`. What follows a `vec3<f32>` in a structure is aligned as its own type says, and elements of arrays are
-/// multiples of 16 bytes.
+/// In WGSL they are the uniform at `@group(2) @binding(0)`, so `T` has the layout that WGSL gives the shader's type:
+/// `f32` is `f32`, and `[f32; 4]` is `vec4<f32>`. What follows a `vec3<f32>` in a structure is aligned as its own type
+/// says, and elements of arrays are multiples of 16 bytes.
 ///
-/// Lavapipe of Mesa 22.3 compiles a large shader anew for each pass, and keeps all that it compiled, if the shader branches on a member of
-/// the structure and reads its first four bytes. A first member that no shader reads prevents that.
+/// Lavapipe of Mesa 22.3 compiles a large shader anew for each pass, and keeps all that it compiled, if the shader
+/// branches on a member of the structure and reads its first four bytes. A first member that no shader reads prevents
+/// that.
 ///
 /// ```
 /// use drawloom::process::{Declare, Draws, FullScreen, Parameters, Place, RenderProcess};

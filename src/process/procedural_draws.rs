@@ -6,11 +6,11 @@ use super::{BlendEquation, BufferOffset, ShaderResource, Stencil};
 use crate::command::Cull;
 use crate::scene::Blend;
 
-/// Vertices that come from no mesh: the vertex shader makes them from their numbers, and from buffers, columns and resources. For
-/// particles, lines of a debugger, or objects that a compute shader has chosen. They are drawn in each of the process's views,
-/// whatever the view sees.
+/// Vertices that come from no mesh: the vertex shader makes them from their numbers, and from buffers, columns and
+/// resources. For particles, lines of a debugger, or objects that a compute shader has chosen. They are drawn in each
+/// of the process's views, whatever the view sees.
 ///
-/// The software backend does not draw them: frames with such a process return an error that names it.
+/// The software backend does not draw them: a frame with one returns an error that names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProceduralDraws<'a> {
     /// WGSL, appended to [`SHADER_PRELUDE`](super::SHADER_PRELUDE), with the entry point `vertex`, whose inputs are
@@ -67,8 +67,9 @@ pub enum DrawCount {
         /// The number of instances.
         instances: u32,
     },
-    /// Four `u32` in a buffer, which the process [declares](super::Declare::reads_arguments): the number of vertices, that of
-    /// instances, the first vertex, and the first instance, which is 0 on devices without `INDIRECT_FIRST_INSTANCE`.
+    /// Four `u32` in a buffer, which the process [declares](super::Declare::reads_arguments): the number of vertices,
+    /// that of instances, the first vertex, and the first instance, which is 0 on devices without
+    /// `INDIRECT_FIRST_INSTANCE`.
     Indirect(BufferOffset),
 }
 

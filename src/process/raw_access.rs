@@ -144,12 +144,13 @@ struct Requests {
     requested: Vec<bool>,
     /// Whether a pass began since the latest frame ended.
     is_encoded: bool,
-    /// The number of frames with such a pass.
+    /// The number of frames with a raw pass of the process.
     frames: u32,
 }
 
 impl RequestLog {
-    /// A raw pass may use a resource only in some frames. One that it leaves alone in its first 60 is taken for one that it never uses.
+    /// A raw pass may use a resource only in some frames. One that it leaves alone in its first 60 is taken for one
+    /// that it never uses.
     pub(crate) const OBSERVED_FRAMES: u32 = 60;
 
     /// The log of a process that has declared this.
@@ -158,8 +159,8 @@ impl RequestLog {
         Self(Mutex::new(Requests { requested, is_encoded: false, frames: 0 }))
     }
 
-    /// Ends a frame. In the last of those that are observed, lists what is declared, and whether the raw pass has ever asked for it; nothing
-    /// in other frames.
+    /// Ends a frame. In the last of those that are observed, lists what is declared, and whether the raw pass has ever
+    /// asked for it; nothing in other frames.
     pub(crate) fn end_frame(&self, declaration: &Declaration) -> Vec<(String, bool)> {
         let Requests { requested, is_encoded, frames } = &mut *self.0.lock();
         if !std::mem::take(is_encoded) {

@@ -17,7 +17,8 @@ pub trait RawPass: Send + Sync {
     /// Encodes the pass.
     ///
     /// # Errors
-    /// Any error of the engine, or an [`AccessError`] of a lookup: the frame fails with an error that names the process.
+    /// Any error of the engine, or an [`AccessError`] of a lookup: the frame fails with an error that names the
+    /// process.
     fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -25,18 +26,19 @@ pub trait RawPass: Send + Sync {
     ) -> Result<(), Box<dyn Error + Send + Sync>>;
 }
 
-/// The resources of a raw pass: those that its process declares. It gets no others, in any build: processes are ordered by what they
-/// declare, so another target may not be written yet, or not exist in the next plan.
+/// The resources of a raw pass: those that its process declares. It gets no others, in any build: processes are ordered
+/// by what they declare, so another target may not be written yet, or not exist in the next plan.
 ///
-/// A lookup that fails makes the frame fail, with an error that names the process and the resource, even if `encode` goes on without the
-/// resource. The next frame is not affected. `tracing` warns, once, of what the process declares and the pass has not asked for in the
-/// first 60 frames that encode it: a declaration orders processes, and keeps those that write the target.
+/// A lookup that fails makes the frame fail, with an error that names the process and the resource, even if `encode`
+/// goes on without the resource. The next frame is not affected. `tracing` warns, once, of what the process declares
+/// and the pass has not asked for in the first 60 frames that encode it: a declaration orders processes, and keeps
+/// those that write the target.
 ///
 /// Textures and buffers that a pass destroys are made anew for a later frame: histories and buffers without what they
 /// held. The frame itself fails, and so do those that were recorded before its submission.
 ///
-/// Nothing checks how a pass uses what it gets: wgpu has no textures that can only be read, so no error tells of a pass that writes a
-/// target which its process only [reads](super::Declare::reads).
+/// Nothing checks how a pass uses what it gets: wgpu has no textures that can only be read, so no error tells of a pass
+/// that writes a target which its process only [reads](super::Declare::reads).
 pub struct RawPassResources<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
@@ -46,8 +48,8 @@ pub struct RawPassResources<'a> {
     pub size: [u32; 2],
     /// The layouts of [`RawPassResources::bind_groups`], for pipelines of the pass's own.
     pub bind_group_layouts: [&'a wgpu::BindGroupLayout; 2],
-    /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders: the view,
-    /// all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
+    /// `@group(0)` and `@group(1)` of the [prelude](super::SHADER_PRELUDE), for vertex, fragment and compute shaders:
+    /// the view, all objects and the lights that reach the view; materials and their textures. `drawn` is empty.
     pub bind_groups: [&'a wgpu::BindGroup; 2],
     pub(crate) access: RawAccess<'a>,
     pub(crate) columns: &'a dyn Fn(ColumnLayout) -> Option<wgpu::BufferBinding<'a>>,
@@ -58,8 +60,8 @@ pub struct RawPassResources<'a> {
 }
 
 impl RawPassResources<'_> {
-    /// A new buffer with these bytes, for this frame. A write through the queue would be seen by every frame that is recorded and not
-    /// yet submitted.
+    /// A new buffer with these bytes, for this frame. A write through the queue would be seen by every frame that is
+    /// recorded and not yet submitted.
     pub fn buffer_of(&self, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
         self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents: bytes, usage })
     }
@@ -80,12 +82,12 @@ impl RawPassResources<'_> {
         self.access.material_type(material_type.layout(), || (self.materials)(material_type.layout()))
     }
 
-    /// A buffer that processes share, with the usages `STORAGE`, `INDIRECT`, `COPY_SRC` and `COPY_DST`. To fill it, copy from
-    /// [`RawPassResources::buffer_of`].
+    /// A buffer that processes share, with the usages `STORAGE`, `INDIRECT`, `COPY_SRC` and `COPY_DST`. To fill it,
+    /// copy from [`RawPassResources::buffer_of`].
     ///
     /// # Errors
-    /// If the process does not declare that it [reads](super::Declare::reads_buffer) or [changes](super::Declare::changes_buffer) it, or
-    /// takes [arguments](super::Declare::reads_arguments) from it.
+    /// If the process does not declare that it [reads](super::Declare::reads_buffer) or
+    /// [changes](super::Declare::changes_buffer) it, or takes [arguments](super::Declare::reads_arguments) from it.
     pub fn buffer<T: Pod>(&self, buffer: StorageBuffer<T>) -> Result<&wgpu::Buffer, AccessError> {
         self.access.buffer(buffer.layout(), || (self.buffers)(buffer.layout()))
     }
@@ -102,8 +104,8 @@ impl RawPassResources<'_> {
     /// The texture array of this name that all views of a kind share.
     ///
     /// # Errors
-    /// If the process does not declare that it [samples the layers](super::Declare::samples_layers), or, where the views are of its own
-    /// kind, uses the target as others; or if the views share no target of this name.
+    /// If the process does not declare that it [samples the layers](super::Declare::samples_layers), or, where the
+    /// views are of its own kind, uses the target as others; or if the views share no target of this name.
     pub fn layered_target(&self, views: ViewKind, name: &str) -> Result<&wgpu::Texture, AccessError> {
         self.access.layered_target(views, name, || (self.layered)(views, name))
     }

@@ -7,8 +7,8 @@ use crate::unwind::Contained;
 
 /// A step of a frame, from the objects that a view sees to a recorded pass (L 3.3).
 ///
-/// A process draws once in each view of its kind, or [once a frame](Declare::once_a_frame). All workers share it while a frame is recorded, so it keeps what
-/// changes over frames behind a lock or in an atomic.
+/// A process draws once in each view of its kind, or [once a frame](Declare::once_a_frame). All workers share it while
+/// a frame is recorded, so it keeps what changes over frames behind a lock or in an atomic.
 ///
 /// ```
 /// use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
@@ -49,9 +49,10 @@ pub trait RenderProcess: Send + Sync {
     /// beside it.
     fn declare(&self, declare: &mut Declare);
 
-    /// What it draws. Called once per frame, and by [`Renderer::prepare_pipelines`](crate::Renderer::prepare_pipelines), in the background
-    /// also beside a frame: so a call should change nothing. The result may change: new parameters cost nothing, another shader or blending
-    /// needs new pipelines.
+    /// What it draws. Called once per frame, and by
+    /// [`Renderer::prepare_pipelines`](crate::Renderer::prepare_pipelines), in the background also beside a frame: so a
+    /// call should change nothing. The result may change: new parameters cost nothing, another shader or blending needs
+    /// new pipelines.
     fn draws(&self) -> Draws<'_>;
 
     /// What the software backend runs in place of the process's WGSL. Without one, frames with this process return an

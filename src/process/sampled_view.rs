@@ -15,7 +15,7 @@ pub struct SampledView {
 pub enum SampledShape {
     /// The picture of one view.
     Picture,
-    /// A texture array of so many views.
+    /// A texture array of this number of views.
     Layers(u32),
     /// A cube map of six views.
     Cube,

@@ -4,30 +4,31 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Something of the engine's own that a process's shader reads, at `@group(3)`: after the
-/// [columns](super::Declare::reads_column) and [materials](super::Declare::reads_materials) that the process reads, each has the next
-/// binding.
+/// [columns](super::Declare::reads_column) and [materials](super::Declare::reads_materials) that the process reads,
+/// each has the next binding.
 ///
-/// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another `wgpu::Instance`.
+/// Handles are of the renderer's device. wgpu recognises those of another device, unless it belongs to another
+/// `wgpu::Instance`.
 ///
 /// Bytes and buffers take a storage buffer each, and a device with only
 /// [`WgpuBackend::REQUIRED_LIMITS`](crate::backend::WgpuBackend::REQUIRED_LIMITS) has none left for them.
 ///
-/// The bind group is made by the crate, and made anew only when a resource is another one. A CPU shader does not get these: it
-/// brings its own, since [`RenderProcess::cpu_shader`](super::RenderProcess) is called once a frame.
+/// The bind group is made by the crate, and made anew only when a resource is another one. A CPU shader does not get
+/// these: it brings its own, since [`RenderProcess::cpu_shader`](super::RenderProcess) is called once a frame.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ShaderResource<'a> {
-    /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is recorded; the blocks
-    /// of 1 KiB that changed are uploaded. There are 4 or more, in multiples of 4.
+    /// Bytes that the CPU writes, such as skinning palettes: `var<storage, read>`. They are copied when the frame is
+    /// recorded; the blocks of 1 KiB that changed are uploaded. There are 4 or more, in multiples of 4.
     Bytes(Cow<'a, [u8]>),
     /// The same for several processes: uploaded once for all that have this `Arc`.
     SharedBytes(Arc<[u8]>),
     /// A buffer with the usage `STORAGE`: `var<storage, read>`.
     #[cfg(feature = "wgpu")]
     Buffer(wgpu::Buffer),
-    /// A texture with the usage `TEXTURE_BINDING`. Write all of it before the first frame that reads it is recorded, or write it only by
-    /// copies from buffers. Otherwise `Queue::write_texture` can deadlock with a submission on another thread, such as that of a
-    /// [`FrameLoop`](crate::FrameLoop) (wgpu issue 9460, up to 30.0.2).
+    /// A texture with the usage `TEXTURE_BINDING`. Write all of it before the first frame that reads it is recorded, or
+    /// write it only by copies from buffers. Otherwise `Queue::write_texture` can deadlock with a submission on another
+    /// thread, such as that of a [`FrameLoop`](crate::FrameLoop) (wgpu issue 9460, up to 30.0.2).
     #[cfg(feature = "wgpu")]
     Texture {
         /// The view of it.
@@ -38,7 +39,8 @@ pub enum ShaderResource<'a> {
     /// Another texture in each view. What is said of [`Texture`](Self::Texture) holds for each.
     #[cfg(feature = "wgpu")]
     TextureOfView {
-        /// The textures of views, by name. All have the format of `other`, or one that shaders read as the same kind of number.
+        /// The textures of views, by name. All have the format of `other`, or one that shaders read as the same kind of
+        /// number.
         views: Arc<[(String, wgpu::TextureView)]>,
         /// The texture of all other views.
         other: wgpu::TextureView,

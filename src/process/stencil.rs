@@ -1,8 +1,8 @@
 //! The stencil test.
 
-/// How what a process draws is tested against the stencil of its depth target, and how it changes the stencil: a byte for each pixel
-/// of targets of a [format with a stencil](super::Format::has_stencil), cleared to 0 with the depth. Both sides of triangles are
-/// treated alike.
+/// How what a process draws is tested against the stencil of its depth target, and how it changes the stencil: a byte
+/// for each pixel of targets of a [format with a stencil](super::Format::has_stencil), cleared to 0 with the depth.
+/// Both sides of triangles are treated alike.
 ///
 /// ```
 /// use drawloom::process::{Comparison, Stencil};
@@ -35,7 +35,7 @@ impl Stencil {
         Self { on_pass: StencilOperation::Replace, ..Self::test(Comparison::Always, value) }
     }
 
-    /// Draws where this comparison holds, and leaves the stencil as it is.
+    /// Draws where this comparison holds, and leaves the stencil unchanged.
     pub const fn test(comparison: Comparison, reference: u8) -> Self {
         let keep = StencilOperation::Keep;
         Self {

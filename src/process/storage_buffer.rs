@@ -6,11 +6,12 @@ use bytemuck::Pod;
 
 use crate::scene::GeneratedBuffer;
 
-/// A buffer on the device that processes of a renderer share: particles, palettes, arguments of indirect draws. Make it once, as a
-/// constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that orders them.
+/// A buffer on the device that processes of a renderer share: particles, palettes, arguments of indirect draws. Make it
+/// once, as a constant: processes [declare](super::Declare::changes_buffer) that they change or read it, and that
+/// orders them.
 ///
-/// There is one for all views. It is all zeros until a shader writes it, a [raw pass](super::RawPassResources::buffer) fills it, or
-/// [CPU nodes](StorageBuffer::generated) do, and keeps its content from frame to frame, in the order in
+/// There is one for all views. It is all zeros until a shader writes it, a [raw pass](super::RawPassResources::buffer)
+/// fills it, or [CPU nodes](StorageBuffer::generated) do, and keeps its content from frame to frame, in the order in
 /// which frames are submitted.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
@@ -34,8 +35,8 @@ impl<T: Pod> StorageBuffer<T> {
         Self { layout, element: PhantomData }
     }
 
-    /// The same buffer, which [CPU nodes](crate::CpuNode) fill before all processes: see [`generated`](Self::generated). Processes may then
-    /// read it even if no process writes it.
+    /// The same buffer, which [CPU nodes](crate::CpuNode) fill before all processes: see
+    /// [`generated`](Self::generated). Processes may then read it even if no process writes it.
     pub const fn filled_by_nodes(mut self) -> Self {
         self.layout.is_filled_by_nodes = true;
         self
@@ -46,9 +47,9 @@ impl<T: Pod> StorageBuffer<T> {
         self.layout
     }
 
-    /// What [CPU nodes](crate::CpuNode) fill, so that processes which declare to read this buffer draw it in the same frame: particles, or
-    /// the arguments of an indirect draw, by which a node says how many there are. A frame whose nodes fill it has that content from its
-    /// beginning on, before all processes.
+    /// What [CPU nodes](crate::CpuNode) fill, so that processes which declare to read this buffer draw it in the same
+    /// frame: particles, or the arguments of an indirect draw, by which a node says how many there are. A frame whose
+    /// nodes fill it has that content from its beginning on, before all processes.
     ///
     /// ```
     /// use drawloom::process::StorageBuffer;

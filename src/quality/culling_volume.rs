@@ -11,6 +11,7 @@ pub enum CullingVolume {
     Sphere,
     /// The axis-aligned bounding box. If an engine has set larger bounds than the mesh's, it is the box around those.
     Box,
-    /// The oriented bounding box, along the object's axes. As for [`CullingVolume::Box`], an engine's bounds replace it.
+    /// The oriented bounding box, along the object's axes. As for [`CullingVolume::Box`], an engine's bounds replace
+    /// it.
     OrientedBox,
 }

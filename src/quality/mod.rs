@@ -1,6 +1,7 @@
 //! The settings of frames that trade accuracy for speed.
 //!
-//! Those of a pipeline, a camera or a view are where these are: [`ShadowMaps::cascades`](crate::view::ShadowMaps::cascades) and
+//! Those of a pipeline, a camera or a view are where these are:
+//! [`ShadowMaps::cascades`](crate::view::ShadowMaps::cascades) and
 //! [`max_distance`](crate::view::ShadowMaps::max_distance), [`Camera::redraw`](crate::scene::Camera::redraw),
 //! [`Camera::impostor`](crate::scene::Camera::impostor) and the forms of views in a [`ViewBudget`](crate::ViewBudget).
 

@@ -41,10 +41,11 @@ impl RadianceSum {
     /// Let h be 2⁻¹⁰ and u 2⁻²³: what an addition in half floats and in floats loses of the sum if a device truncates,
     /// and twice what it loses if it rounds to nearest. No partial sum exceeds the last one, so
     ///
-    /// - n blends in half floats lose nh, and h for the conversion of each light. None loses more than its own light, so all lose at most 1;
+    /// - n blends in half floats lose nh, and h for the conversion of each light. None loses more than its own light,
+    ///   so all lose at most 1;
     /// - n blends in floats lose nu, the conversion of each light u, and the addition to `radiance` h;
-    /// - in a shader each light is one of up to 32 terms, their sum one of up to 32, and that one of n/1024. The last two additions, the
-    ///   division by π and the product with the diffuse colour make 5u more.
+    /// - in a shader each light is one of up to 32 terms, their sum one of up to 32, and that one of n/1024. The last
+    ///   two additions, the division by π and the product with the diffuse colour make 5u more.
     ///
     /// Beside it, a half float is off by up to 2⁻²⁴ per addition to it, in absolute terms: its smallest step. A sum
     /// above 60,000 counts as 60,000.

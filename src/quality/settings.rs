@@ -8,8 +8,9 @@ use super::{
 /// The settings that trade a frame's accuracy for speed.
 ///
 /// There are three presets: [`Quality::fast`], [`Quality::balanced`], which is the default, and [`Quality::exact`].
-/// [`Knob::ALL`](super::Knob::ALL) lists all settings with values to choose from, and `benches/examples/tradeoff` measures error and cost of each for a scene of your own. Settings of shadow cascades, views and
-/// impostors are [elsewhere](crate::quality).
+/// [`Knob::ALL`](super::Knob::ALL) lists all settings with values to choose from, and `benches/examples/tradeoff`
+/// measures error and cost of each for a scene of your own. Settings of shadow cascades, views and impostors are
+/// [elsewhere](crate::quality).
 ///
 /// ```
 /// use drawloom::quality::{CullingVolume, Quality};
@@ -30,10 +31,11 @@ pub struct Quality {
     /// bits. With 0 bits they are not ordered by depth.
     ///
     /// Error: pairs drawn back to front, which cause overdraw but do not change the picture, except that of coinciding
-    /// surfaces the first drawn wins. Cost: with 0 bits, objects are counted by state and mesh, and a draw list is kept while
-    /// the same objects are seen. From 1 bit on, every visible object becomes a command, and commands are sorted anew in every
-    /// frame in which an object or the camera moves: 9 to 16 ns an object and view. That saves from half of the fragments of a city
-    /// of one mesh to next to none where meshes are many (`benches/README.md`, "The order of opaque objects").
+    /// surfaces the first drawn wins. Cost: with 0 bits, objects are counted by state and mesh, and a draw list is kept
+    /// while the same objects are seen. From 1 bit on, every visible object becomes a command, and commands are sorted
+    /// anew in every frame in which an object or the camera moves: 9 to 16 ns an object and view. That saves from half
+    /// of the fragments of a city of one mesh to next to none where meshes are many (`benches/README.md`, "The order of
+    /// opaque objects").
     pub opaque_order: DepthKey,
     /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
     ///
@@ -52,8 +54,8 @@ pub struct Quality {
     ///
     /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
     /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
-    /// a while, whatever it saves on the device. It requires that an engine's own shaders draw opaque objects exactly as their meshes are, or say that
-    /// they [discard](crate::process::CommandDraws::discards) parts of them or
+    /// a while, whatever it saves on the device. It requires that an engine's own shaders draw opaque objects exactly
+    /// as their meshes are, or say that they [discard](crate::process::CommandDraws::discards) parts of them or
     /// [deform](crate::process::CommandDraws::deformation) them; objects that they move in another way must have bounds
     /// other than their mesh's.
     #[cfg(feature = "occlusion")]
@@ -71,17 +73,19 @@ pub struct Quality {
     /// Error: degrees of the normal, and texels. Cost: 32 or 20 bytes per vertex. Meshes are uploaded again when it
     /// changes.
     pub vertices: VertexFormat,
-    /// The largest error of [levels of detail](crate::scene::Mesh::with_levels), in pixels of a view's picture, 0 or more. Each object
-    /// is drawn at the coarsest level whose error is at most this, at the nearest distance of its bounds; at 0, all are drawn at level 0.
-    /// [`Camera::level_of_detail_scale`](crate::scene::Camera::level_of_detail_scale) multiplies it. In shadow maps it is twice as large,
-    /// in pixels of the map.
+    /// The largest error of [levels of detail](crate::scene::Mesh::with_levels), in pixels of a view's picture, 0 or
+    /// more. Each object is drawn at the coarsest level whose error is at most this, at the nearest distance of its
+    /// bounds; at 0, all are drawn at level 0.
+    /// [`Camera::level_of_detail_scale`](crate::scene::Camera::level_of_detail_scale) multiplies it. In shadow maps it
+    /// is twice as large, in pixels of the map.
     ///
-    /// Error: no point of a surface is drawn farther than this from the surface of level 0, provided that the errors of the levels hold
-    /// and bounds contain their objects. When a level changes, which it does with a margin of a quarter of this, nothing moves by more
-    /// than twice this. Shading changes with the vertices that remain. Where an object has another level in a shadow map than in a
-    /// picture, its surface may shadow itself within these errors, which [`ShadowQuality::bias`] does not know of. Cost: if a mesh has
-    /// levels, up to 30 ns for each object that a view sees, in frames in which it or the camera moves: lists in which a level changes are
-    /// made anew. It saves triangles.
+    /// Error: no point of a surface is drawn farther than this from the surface of level 0, provided that the errors of
+    /// the levels hold and bounds contain their objects. When a level changes, which it does with a margin of a quarter
+    /// of this, nothing moves by more than twice this. Shading changes with the vertices that remain. Where an object
+    /// has another level in a shadow map than in a picture, its surface may shadow itself within these errors, which
+    /// [`ShadowQuality::bias`] does not know of. Cost: if a mesh has levels, up to 30 ns for each object that a view
+    /// sees, in frames in which it or the camera moves: lists in which a level changes are made anew. It saves
+    /// triangles.
     pub level_of_detail: f32,
     /// Whether a depth pre-pass precedes the geometry buffer.
     ///

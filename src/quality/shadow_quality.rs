@@ -18,9 +18,9 @@ pub struct ShadowQuality {
     /// surfaces shadow themselves in stripes (shadow acne); above, light leaks through under objects (peter-panning).
     pub bias: f32,
     /// Maps are drawn every `interval` frames, at least 1, those of different lights in turns: a map is a view that is
-    /// [redrawn](crate::scene::Redraw) every so many frames. They are also drawn at once if a light with a map is added
-    /// or removed, or if the quality or the plan changes; those of a directional light for a main camera, if one no
-    /// longer fits what that sees: if its centre is off by a quarter of its radius, or its radius is a quarter too
+    /// [redrawn](crate::scene::Redraw) in this interval of frames. They are also drawn at once if a light with a map is
+    /// added or removed, or if the quality or the plan changes; those of a directional light for a main camera, if one
+    /// no longer fits what that sees: if its centre is off by a quarter of its radius, or its radius is a quarter too
     /// small; those of other lights, if their range grows by more than an eighth. In between, a light with a map keeps
     /// its position, direction and range.
     ///

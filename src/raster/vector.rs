@@ -1,8 +1,8 @@
 //! Vectors of any [`Real`], because glam's vectors are not generic.
 //!
-//! CPU shaders spend much of their time here. Where crates are built in several units and without link-time optimisation, as in a debug build
-//! with optimisations, only functions that are marked are inlined across units. Those of the standard library that map arrays are not, so `map`
-//! and `with` loop.
+//! CPU shaders spend much of their time here. Where crates are built in several units and without link-time
+//! optimisation, as in a debug build with optimisations, only functions that are marked are inlined across units. Those
+//! of the standard library that map arrays are not, so `map` and `with` loop.
 
 use std::ops::{Add, Index, IndexMut, Mul, Neg, Sub};
 

@@ -15,11 +15,12 @@ use crate::handle::Handle;
 use crate::task::{Scheduler, catch};
 use crate::unwind::{Contained, discard};
 
-/// Loads meshes, materials and textures by [background jobs](Scheduler::background). A handle can be made on any thread and used at once; its
-/// content arrives with [`Assets::receive`]. Clones load for the same assets.
+/// Loads meshes, materials and textures by [background jobs](Scheduler::background). A handle can be made on any thread
+/// and used at once; its content arrives with [`Assets::receive`]. Clones load for the same assets.
 ///
 /// Until its mesh and its material have arrived, an object is not drawn, and counted as
-/// [`NotResident`](crate::view::RejectionReason::NotResident); a material whose texture has not arrived has its plain colour.
+/// [`NotResident`](crate::view::RejectionReason::NotResident); a material whose texture has not arrived has its plain
+/// colour.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -67,8 +68,8 @@ struct Waiting {
     loads: BinaryHeap<Load>,
     /// The number of calls of [`AssetLoader::load`] so far.
     count: u64,
-    /// Background jobs that have not begun. Each loads one thing, then queues the next job, so that other background jobs need not wait until
-    /// everything is loaded.
+    /// Background jobs that have not begun. Each loads one thing, then queues the next job, so that other background
+    /// jobs need not wait until everything is loaded.
     queued_jobs: usize,
     /// Background jobs that have begun. What they load no longer waits.
     running_jobs: usize,
@@ -104,7 +105,8 @@ pub struct Arrivals {
 pub struct LoadError {
     /// The name that [`AssetLoader::load`] was called with.
     pub name: String,
-    /// Why not: the error of the closure, its [panic](crate::task::JobPanic), or a [`SceneError`](super::SceneError) about what it returned.
+    /// Why not: the error of the closure, its [panic](crate::task::JobPanic), or a [`SceneError`](super::SceneError)
+    /// about what it returned.
     pub source: BoxedError,
 }
 
@@ -120,13 +122,14 @@ impl AssetLoader {
         }
     }
 
-    /// Has a background job call `load`, those with a higher priority first, and returns the handle of what it will return. `name` is for
-    /// errors. The asset has the same priority in [streaming](Assets::set_priority) when it arrives.
+    /// Has a background job call `load`, those with a higher priority first, and returns the handle of what it will
+    /// return. `name` is for errors. The asset has the same priority in [streaming](Assets::set_priority) when it
+    /// arrives.
     ///
     /// As many assets are loaded at once as [workers run background jobs](Scheduler::set_background_workers).
     ///
-    /// With a single worker, no job runs in the background: then each call of [`Assets::receive`] loads one asset. If the scheduler is gone,
-    /// each call of this function loads one, the most urgent of those that wait.
+    /// With a single worker, no job runs in the background: then each call of [`Assets::receive`] loads one asset. If
+    /// the scheduler is gone, each call of this function loads one, the most urgent of those that wait.
     pub fn load<T: Asset, E: Into<BoxedError>>(
         &self,
         name: impl Into<String>,
@@ -183,8 +186,8 @@ impl Assets {
         AssetLoader::new(self, scheduler)
     }
 
-    /// Adds what a loader has loaded since the last call: call it between two frames. The handles of what could not be loaded are stale from
-    /// then on.
+    /// Adds what a loader has loaded since the last call: call it between two frames. The handles of what could not be
+    /// loaded are stale from then on.
     pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
         loader.receive(self)
     }
@@ -197,7 +200,8 @@ impl fmt::Debug for AssetLoader {
 }
 
 impl Shared {
-    /// Queues a background job if more loads wait than jobs are queued for them, and not every worker but the first has a job.
+    /// Queues a background job if more loads wait than jobs are queued for them, and not every worker but the first has
+    /// a job.
     fn queue_job(shared: &Arc<Self>, scheduler: &Scheduler) {
         let mut waiting = shared.waiting.lock();
         let jobs = waiting.queued_jobs + waiting.running_jobs;

@@ -4,7 +4,8 @@ use super::{Material, Mesh, SceneError, Texture};
 use crate::handle::{Handle, SlotReserver, Slots, StaleHandle};
 
 /// Owns meshes, materials and textures. An engine with its own storage for objects keeps its assets here too, so that a
-/// frame uploads an asset only when it is new or has changed; and a mesh not before the first frame in which an object has it.
+/// frame uploads an asset only when it is new or has changed; and a mesh not before the first frame in which an object
+/// has it.
 ///
 /// ```
 /// use drawloom::glam::Vec3;
@@ -67,7 +68,8 @@ impl Assets {
         T::slots(self).is_reserved(handle)
     }
 
-    /// Removes an asset, whether it has arrived or not. Returns it if it has; otherwise it is dropped when it is loaded.
+    /// Removes an asset, whether it has arrived or not. Returns it if it has; otherwise it is dropped when it is
+    /// loaded.
     ///
     /// # Errors
     /// If the handle is stale.
@@ -105,8 +107,9 @@ impl Assets {
     }
 
     /// Sets in which order a backend that streams brings meshes and textures to the device: those with a higher
-    /// priority first, once those that are in sight are there. It may change at any time. If not everything in sight fits into the streaming budget, it
-    /// also decides what is left out. It is 0 where nothing is set; materials have none.
+    /// priority first, once those that are in sight are there. It may change at any time. If not everything in sight
+    /// fits into the streaming budget, it also decides what is left out. It is 0 where nothing is set; materials have
+    /// none.
     ///
     /// # Errors
     /// If the handle is stale, or the asset has not [arrived](Self::receive) yet.

@@ -9,7 +9,8 @@ use super::{ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// The name of the camera and of its view, in reports and for views that [read](crate::process::Declare::samples_view) its targets.
+    /// The name of the camera and of its view, in reports and for views that
+    /// [read](crate::process::Declare::samples_view) its targets.
     pub name: String,
     /// In the world, in metres.
     pub position: DVec3,
@@ -17,14 +18,15 @@ pub struct Camera {
     pub orientation: Quat,
     /// How positions are projected onto the picture.
     pub projection: Projection,
-    /// How far the picture's centre is to the right of the view direction, and above it, in halves of the picture's width and
-    /// height: the lens shift of an off-centre frustum. 0 for most cameras, and always without perspective.
+    /// How far the picture's centre is to the right of the view direction, and above it, in halves of the picture's
+    /// width and height: the lens shift of an off-centre frustum. 0 for most cameras, and always without perspective.
     /// [`Camera::tile`] and [`Camera::jittered`] set it.
     pub shift: Vec2,
     /// The picture of which it draws a part; `None` if it draws a whole one. [`Camera::tile`] and [`Camera::jittered`]
     /// set it.
     pub whole: Option<WholePicture>,
-    /// Only what is in front of this plane is drawn: an oblique near plane. `None` for most cameras, and always without perspective.
+    /// Only what is in front of this plane is drawn: an oblique near plane. `None` for most cameras, and always without
+    /// perspective.
     pub clip_plane: Option<ClipPlane>,
     /// The distance of the near plane, in metres, 1e-27 or more.
     pub near: f32,
@@ -33,17 +35,18 @@ pub struct Camera {
     pub far: f32,
     /// Width and height of the picture, in pixels.
     pub size: [u32; 2],
-    /// Multiplies [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) in this camera's view: 1 for most cameras, more
-    /// where coarser objects will do, and 0 for full detail. Finite, and not negative.
+    /// Multiplies [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) in this camera's view: 1 for
+    /// most cameras, more where coarser objects will do, and 0 for full detail. Finite, and not negative.
     pub level_of_detail_scale: f32,
-    /// Only objects that belong to one of these layers are drawn, whichever process draws them: all but the mirror in its own reflection,
-    /// or all but what only another player sees.
+    /// Only objects that belong to one of these layers are drawn, whichever process draws them: all but the mirror in
+    /// its own reflection, or all but what only another player sees.
     pub layers: LayerMask,
     /// Only objects that it lets pass are drawn, of those in the layers: by a list of objects, and by their materials.
     pub filter: ObjectFilter,
-    /// Whether processes [sample other views](crate::process::Declare::samples_view) in this one. Without it, what shows another view
-    /// looks as if the frame did not have that: in the faces of a cube map, say, so that a ball may show a screen's surroundings and
-    /// the screen the ball. What views held [in the frame before](crate::process::Declare::samples_view_previous) is shown all the same.
+    /// Whether processes [sample other views](crate::process::Declare::samples_view) in this one. Without it, what
+    /// shows another view looks as if the frame did not have that: in the faces of a cube map, say, so that a ball may
+    /// show a screen's surroundings and the screen the ball. What views held [in the frame
+    /// before](crate::process::Declare::samples_view_previous) is shown all the same.
     pub samples_views: bool,
     /// The purpose of the picture, which determines the render processes that draw it.
     pub kind: ViewKind,
@@ -115,8 +118,9 @@ impl Camera {
         }
     }
 
-    /// The name of a view that only this camera's view reads, as [`Declare::samples_view`](crate::process::Declare::samples_view)
-    /// says: `main/mirror` for the view `mirror` of the camera `main`.
+    /// The name of a view that only this camera's view reads, as
+    /// [`Declare::samples_view`](crate::process::Declare::samples_view) says: `main/mirror` for the view `mirror` of
+    /// the camera `main`.
     pub fn child_name(&self, view: &str) -> String {
         child_name(&self.name, view)
     }

@@ -1,5 +1,6 @@
-//! How long a job waits for a chunk that a job of a CPU node holds: a minute while that job works, not counting the time
-//! for which a debugger stops the process. A chunk that nobody will let go of is an error, as a rule after a second.
+//! How long a job waits for a chunk that a job of a CPU node holds: a minute while that job works, not counting the
+//! time for which a debugger stops the process. A chunk that nobody will let go of is an error, as a rule after a
+//! second.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

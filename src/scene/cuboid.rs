@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::{Mesh, SceneError, Topology, Vertex};
 
 impl Mesh {
-    /// A box around the origin of object space, of this size in metres, with separate normals for each side, and the whole of a texture
-    /// on each: upright on those that stand. The signs of the size do not count.
+    /// A box around the origin of object space, of this size in metres, with separate normals for each side, and the
+    /// whole of a texture on each: upright on those that stand. The signs of the size do not count.
     ///
     /// # Errors
     /// If the size is not finite, or too large.

@@ -1,4 +1,5 @@
-//! Cameras derived from another one or from a position: of a part of a picture, in a mirror, through a portal, and of a cube map.
+//! Cameras derived from another one or from a position: of a part of a picture, in a mirror, through a portal, and of a
+//! cube map.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -23,7 +24,7 @@ impl Camera {
     /// ```
     ///
     /// # Panics
-    /// If there is no such tile. So many tiles that the field of view is too small for a camera are an error of the frame.
+    /// If there is no such tile. If tiles are too many for the field of view of a camera, the frame has an error.
     pub fn tile(&self, [column, row]: [u32; 2], count: u32) -> Self {
         assert!(column < count && row < count, "tile {column} {row} is not one of {count} by {count}");
         // From the whole picture's centre to the tile's, in halves of the tile.
@@ -47,8 +48,8 @@ impl Camera {
         camera
     }
 
-    /// This camera, looking past its picture's centre by `offset` pixels to the right and up: the sub-pixel jitter of temporal
-    /// antialiasing, and of antialiasing by the mean of several cameras (M 10.1). Neither changes a
+    /// This camera, looking past its picture's centre by `offset` pixels to the right and up: the sub-pixel jitter of
+    /// temporal antialiasing, and of antialiasing by the mean of several cameras (M 10.1). Neither changes a
     /// paraboloid.
     pub fn jittered(&self, offset: Vec2) -> Self {
         let halves = Vec2::new(self.size[0] as f32, self.size[1] as f32) * 0.5;
@@ -66,13 +67,15 @@ impl Camera {
         self.position += self.orientation.as_dquat().normalize() * metres.as_dvec2().extend(0.0);
     }
 
-    /// The camera whose picture a plane mirror shows this camera, for a view that the process of the mirror's surface samples as `mirror`:
-    /// see [`Declare::samples_view`](crate::process::Declare::samples_view). The plane's normal is on the reflecting side.
+    /// The camera whose picture a plane mirror shows this camera, for a view that the process of the mirror's surface
+    /// samples as `mirror`: see [`Declare::samples_view`](crate::process::Declare::samples_view). The plane's normal is
+    /// on the reflecting side.
     ///
-    /// A camera cannot be mirrored, as front faces would become back faces. So this one sees left and right swapped: what this camera has at
-    /// (x, y) is at (1 - x, y) in the mirror's picture, as shares of width and height. The mirror shows nothing if this camera is behind it,
-    /// so leave the view out then. In perspective, what is behind the mirror is not drawn. The mirror's own surface lies in the plane:
-    /// it must be single-sided, or in none of the camera's [layers](Camera::layers).
+    /// A camera cannot be mirrored, as front faces would become back faces. So this one sees left and right swapped:
+    /// what this camera has at (x, y) is at (1 - x, y) in the mirror's picture, as shares of width and height. The
+    /// mirror shows nothing if this camera is behind it, so leave the view out then. In perspective, what is behind the
+    /// mirror is not drawn. The mirror's own surface lies in the plane: it must be single-sided, or in none of the
+    /// camera's [layers](Camera::layers).
     ///
     /// ```
     /// use drawloom::glam::{DVec3, Vec3};
@@ -105,12 +108,13 @@ impl Camera {
         }
     }
 
-    /// The camera whose picture a portal shows this camera, for a view that the process of the portal's surface samples as `portal` at
-    /// the same position of the picture. Who enters the portal at `entry` leaves it at `exit`: each is a point and an orientation whose
-    /// +Z leads out of the portal.
+    /// The camera whose picture a portal shows this camera, for a view that the process of the portal's surface samples
+    /// as `portal` at the same position of the picture. Who enters the portal at `entry` leaves it at `exit`: each is a
+    /// point and an orientation whose +Z leads out of the portal.
     ///
-    /// For a portal that is visible through itself, derive a camera from the result again, as often as the recursion is to be seen. A camera
-    /// has one clip plane: the derived one replaces that of this camera. Leave the view out if this camera is behind the entry.
+    /// For a portal that is visible through itself, derive a camera from the result again, as often as the recursion is
+    /// to be seen. A camera has one clip plane: the derived one replaces that of this camera. Leave the view out if
+    /// this camera is behind the entry.
     pub fn through_portal(&self, portal: &str, entry: (DVec3, Quat), exit: (DVec3, Quat)) -> Self {
         let [entered, left] = [entry.1, exit.1].map(|orientation| orientation.as_dquat().normalize());
         // What goes into the entry comes out of the exit: half a turn between them.
@@ -127,10 +131,10 @@ impl Camera {
         }
     }
 
-    /// The cameras of the six faces of a cube map around `position`, with the names `name/0` to `name/5`, for a process that
-    /// [samples](crate::process::Declare::samples_view_cube) them as `name`. Each picture is `side` pixels wide and high and sees from `near`
-    /// to infinity. What shows the cube map must be in none of the cameras' [layers](Camera::layers), or it hides everything else. They
-    /// [sample no views](Camera::samples_views).
+    /// The cameras of the six faces of a cube map around `position`, with the names `name/0` to `name/5`, for a process
+    /// that [samples](crate::process::Declare::samples_view_cube) them as `name`. Each picture is `side` pixels wide
+    /// and high and sees from `near` to infinity. What shows the cube map must be in none of the cameras'
+    /// [layers](Camera::layers), or it hides everything else. They [sample no views](Camera::samples_views).
     pub fn cube_faces(name: &str, position: DVec3, side: u32, near: f32) -> [Self; 6] {
         // The order and the upper edges of WebGPU's faces, which are left-handed: the world's -Z is the cube's +Z.
         let faces = [

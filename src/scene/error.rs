@@ -58,15 +58,16 @@ pub enum SceneError {
         /// The number of vertices.
         vertices: usize,
     },
-    /// An object that changed since the last frame, although [`SceneRef::changes`](super::SceneRef::changes) does not report it. It is
-    /// found with debug assertions only.
+    /// An object that changed since the last frame, although [`SceneRef::changes`](super::SceneRef::changes) does not
+    /// report it. It is found with debug assertions only.
     #[error("object {object} changed since the last frame, but the scene's changes do not report it")]
     UnreportedChange {
         /// The index of the first such object.
         object: usize,
     },
     /// A value of a [column](super::ObjectColumn) that changed since the last frame, although
-    /// [`SceneRef::changes`](super::SceneRef::changes) does not report its object. It is found with debug assertions only.
+    /// [`SceneRef::changes`](super::SceneRef::changes) does not report its object. It is found with debug assertions
+    /// only.
     #[error(
         "the column {column:?} of object {object} changed since the last frame, but the scene's changes do not report it"
     )]

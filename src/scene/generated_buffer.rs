@@ -16,10 +16,11 @@ use super::Topology;
 use super::chunk_users::ChunkUsers;
 use crate::leaked_guards::unlock;
 
-/// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the vertices of a
-/// terrain (S 9.5). When the frame is submitted, its content goes to the device, ahead of all passes. Each frame has a content of its own
-/// until then, so that frames in flight do not meet. A frame that does not fill a buffer draws what the last submitted frame has filled, as
-/// long as what draws it stays on the device; a mesh that comes later, and another device, begin without a content.
+/// Memory that [CPU nodes](crate::CpuNode) fill while a frame is recorded, and that this frame draws: particles, or the
+/// vertices of a terrain (S 9.5). When the frame is submitted, its content goes to the device, ahead of all passes.
+/// Each frame has a content of its own until then, so that frames in flight do not meet. A frame that does not fill a
+/// buffer draws what the last submitted frame has filled, as long as what draws it stays on the device; a mesh that
+/// comes later, and another device, begin without a content.
 ///
 /// A [mesh](super::Mesh::generated) is drawn from it by the whole pipeline. One that a
 /// [`StorageBuffer`](crate::process::StorageBuffer::generated) makes is read by shaders.
@@ -74,9 +75,9 @@ impl<T: Pod> GeneratedBuffer<T> {
     /// What a chunk has, in bytes, unless the engine chooses another length.
     const CHUNK_BYTES: usize = 16 << 10;
 
-    /// A buffer with room for this many elements. It takes no memory until a frame fills it: a frame to which the system
-    /// refuses memory fails with [`FrameError::GeneratedMemory`](crate::FrameError::GeneratedMemory). A system that
-    /// overcommits, as Linux does, may grant more than it has, and end the process when nodes fill the buffer.
+    /// A buffer with room for this many elements. It takes no memory until a frame fills it: a frame to which the
+    /// system refuses memory fails with [`FrameError::GeneratedMemory`](crate::FrameError::GeneratedMemory). A system
+    /// that overcommits, as Linux does, may grant more than it has, and end the process when nodes fill the buffer.
     ///
     /// # Panics
     /// If it has none, or `T` has no bytes, a size that is not a multiple of 4 bytes, or an alignment of more than 16.
@@ -259,8 +260,8 @@ impl GeneratedContents {
     fn new(layout: GeneratedLayout) -> Option<Self> {
         let mut chunks = Vec::new();
         chunks.try_reserve_exact(layout.chunk_count()).ok()?;
-        // A system that overcommits grants memory that it does not have, in small pieces, and ends the process when the memory is
-        // written. As a rule it refuses one piece that is larger than its memory.
+        // A system that overcommits grants memory that it does not have, in small pieces, and ends the process when the
+        // memory is written. As a rule it refuses one piece that is larger than its memory.
         let mut all = Vec::<u8>::new();
         all.try_reserve_exact(layout.bytes()).ok()?;
         // Otherwise the compiler may leave out memory that nobody uses.
@@ -350,8 +351,8 @@ impl GeneratedContents {
         self.chunks[..used].iter().position(|chunk| !chunk.try_read().is_some_and(|chunk| chunk.is_filled))
     }
 
-    /// If its elements are indices: how many of those that count form whole triangles, and the last one of these. Further ones that are equal to
-    /// it form triangles without area.
+    /// If its elements are indices: how many of those that count form whole triangles, and the last one of these.
+    /// Further ones that are equal to it form triangles without area.
     #[cfg(any(feature = "wgpu", feature = "software", test))]
     pub(crate) fn whole_triangles(&self, topology: Topology) -> (usize, u32) {
         let count = match (topology, self.count()) {

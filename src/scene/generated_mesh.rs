@@ -11,9 +11,10 @@ use super::mesh::{check_corner_count, triangle_count};
 use super::{Bounds, GeneratedBuffer, Mesh, SceneError, Topology, Vertex};
 
 impl Mesh {
-    /// A mesh whose vertices [CPU nodes](crate::CpuNode) make anew in each frame, and if they like its indices: a terrain around the
-    /// camera, or a surface that is subdivided (S 9.5). All processes draw it, shadow maps among them. `bounding_box` is its minimum and
-    /// maximum in object space, in metres, in all frames: triangles outside of it may be missing.
+    /// A mesh whose vertices [CPU nodes](crate::CpuNode) make anew in each frame, and if they like its indices: a
+    /// terrain around the camera, or a surface that is subdivided (S 9.5). All processes draw it, shadow maps among
+    /// them. `bounding_box` is its minimum and maximum in object space, in metres, in all frames: triangles outside of
+    /// it may be missing.
     ///
     /// Like a mesh [in the engine's own buffers](Self::from_buffers) it has no triangles that the CPU sees when it
     /// culls, so it is never an occluder, and neither subdivided for paraboloids nor culled by triangle. The software
@@ -48,8 +49,8 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// The mesh of one frame as one that the CPU knows, from what its buffers are filled with; `None` while one never was, and if no
-    /// triangle counts.
+    /// The mesh of one frame as one that the CPU knows, from what its buffers are filled with; `None` while one never
+    /// was, and if no triangle counts.
     ///
     /// # Errors
     /// If a vertex is not finite, or an index is not one of a vertex.

@@ -11,10 +11,10 @@ use super::{Camera, Projection, ViewKind};
 const ROUNDING: f64 = 1e-6;
 
 impl Camera {
-    /// The camera whose picture an impostor shows: of what lies within `radius` metres around `center`, seen from this camera's position
-    /// (M 10.1). What the impostor stands for belongs in the result's [layers](Camera::layers), and in no other camera's. The impostor is a
-    /// square at `center` with the camera's orientation and a half-width of [`Camera::impostor_half_width`]; from this camera's position it
-    /// looks as the original does.
+    /// The camera whose picture an impostor shows: of what lies within `radius` metres around `center`, seen from this
+    /// camera's position (M 10.1). What the impostor stands for belongs in the result's [layers](Camera::layers), and
+    /// in no other camera's. The impostor is a square at `center` with the camera's orientation and a half-width of
+    /// [`Camera::impostor_half_width`]; from this camera's position it looks as the original does.
     ///
     /// `before` is the result of an earlier frame. It is returned again, so that the view need not be drawn again,
     /// while it has the same name and side and what it shows is displaced, where it is, by at most about `radius` ·
@@ -23,7 +23,8 @@ impl Camera {
     /// picture of something very small or far away is wider than it, and what its camera rounds displaces it by up to
     /// two millionths of its distance: less than a hundredth of a pixel of this camera.
     ///
-    /// The result [samples no views](Camera::samples_views). It is `None` if this camera is inside of the radius, where only the original looks right.
+    /// The result [samples no views](Camera::samples_views). It is `None` if this camera is inside of the radius, where
+    /// only the original looks right.
     pub fn impostor(
         &self,
         name: &str,
@@ -54,14 +55,14 @@ impl Camera {
         })
     }
 
-    /// Half the width of the picture, in metres, at a distance of so many metres: of the square at the centre of what an
+    /// Half the width of the picture, in metres, at a distance in metres: of the square at the centre of what an
     /// [impostor](Camera::impostor) stands for.
     pub fn impostor_half_width(&self, center: DVec3) -> f64 {
         self.projection.half_height() * center.distance(self.position)
     }
 
-    /// By how much the picture of `before` displaces what this camera sees within a radius around a centre, in radii. It is NaN or
-    /// infinite if the picture shows something else.
+    /// By how much the picture of `before` displaces what this camera sees within a radius around a centre, in radii.
+    /// It is NaN or infinite if the picture shows something else.
     fn impostor_error(&self, before: &Self, (center, radius): (DVec3, f64)) -> f64 {
         let Projection::Perspective { field_of_view } = before.projection else { return f64::INFINITY };
         let [distance, drawn_from] = [self, before].map(|camera| center.distance(camera.position));
@@ -72,8 +73,9 @@ impl Camera {
         let turn = forward.angle_between(center - self.position);
         let [half_width, needed] = [field_of_view, sphere_field_of_view(drawn_from, radius)].map(half_sine);
         let size = (half_width / needed - 1.0).abs();
-        // What lies x metres beside the centre and z metres before it is drawn at x · d / (d − z) on the square, seen from a distance of d.
-        // Of two distances this differs by at most radius² / 2 · |d − d'| / ((d − radius) · (d' − radius)), as x · z is at most radius² / 2.
+        // What lies x metres beside the centre and z metres before it is drawn at x · d / (d − z) on the square, seen
+        // from a distance of d. Of two distances this differs by at most radius² / 2 · |d − d'| / ((d − radius) · (d' −
+        // radius)), as x · z is at most radius² / 2.
         let perspective = 0.5 * radius * (distance - drawn_from).abs() / ((distance - radius) * (drawn_from - radius));
         turn + size + perspective
     }

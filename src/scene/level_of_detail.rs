@@ -1,7 +1,7 @@
 //! A level of detail of a mesh.
 
-/// Coarser triangles of a mesh, over the same vertices, for where it is small in the picture. The mesh itself is level 0; the others are
-/// counted from 1.
+/// Coarser triangles of a mesh, over the same vertices, for where it is small in the picture. The mesh itself is level
+/// 0; the others are counted from 1.
 #[derive(Clone, Debug)]
 pub struct LevelOfDetail {
     pub(super) indices: Vec<u32>,
@@ -23,9 +23,10 @@ impl LevelOfDetail {
 
     /// A level with these indices, which form triangles as those of its mesh do.
     ///
-    /// `error` is in metres in object space: no point of the surface of level 0 is farther than that from this level's surface, and no
-    /// point of this surface is farther from that of level 0 (the Hausdorff distance). Whoever supplies the level vouches for it; what
-    /// [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) promises rests on it.
+    /// `error` is in metres in object space: no point of the surface of level 0 is farther than that from this level's
+    /// surface, and no point of this surface is farther from that of level 0 (the Hausdorff distance). Whoever supplies
+    /// the level vouches for it; what [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail) promises
+    /// rests on it.
     pub fn new(indices: Vec<u32>, error: f32) -> Self {
         Self { indices, error, longest_edge: 0.0 }
     }

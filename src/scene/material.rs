@@ -22,18 +22,18 @@ pub struct Material {
     pub opacity: f32,
     /// How the surface is blended with what is behind it.
     pub blend: Blend,
-    /// Makes the material a mask: a surface with holes. A hole is where alpha, which is `opacity` times the alpha of the
-    /// `texture`, is below this cutoff, which is from 0 to 1. Holes show in pictures and in shadows; elsewhere the
+    /// Makes the material a mask: a surface with holes. A hole is where alpha, which is `opacity` times the alpha of
+    /// the `texture`, is below this cutoff, which is from 0 to 1. Holes show in pictures and in shadows; elsewhere the
     /// surface is opaque. `None` is a surface without holes. Blended materials ignore the cutoff. It is glTF's
     /// `alphaCutoff` for `alphaMode: MASK`.
     ///
     /// Masked objects write depth, so leaves need no order. They hide nothing from occlusion culling. A mask has no
     /// holes while its texture is not on the device.
     ///
-    /// Shaders read the mask at the texture's full resolution at every distance, so the surface covers the same share of
-    /// distant pixels as of near ones. The average of many texels would be below the cutoff everywhere, or nowhere. Each
-    /// pixel is covered or not, as by triangles of that size. Devices round when they filter, so an alpha counts as equal
-    /// to the cutoff if it is less by up to 1/4096 of the cutoff.
+    /// Shaders read the mask at the texture's full resolution at every distance, so the surface covers the same share
+    /// of distant pixels as of near ones. The average of many texels would be below the cutoff everywhere, or nowhere.
+    /// Each pixel is covered or not, as by triangles of that size. Devices round when they filter, so an alpha counts
+    /// as equal to the cutoff if it is less by up to 1/4096 of the cutoff.
     pub alpha_cutoff: Option<f32>,
     /// Whether back faces are drawn too.
     pub double_sided: bool,

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use super::Material;
 use crate::unwind::discard;
 
-/// Chooses materials: a function of the engine's own. A clone shares the function, and predicates are equal if they share one, so an engine
-/// makes a predicate once and clones it.
+/// Chooses materials: a function of the engine's own. A clone shares the function, and predicates are equal if they
+/// share one, so an engine makes a predicate once and clones it.
 ///
-/// A view calls it once for each material when it first has the predicate, and again after a material changed; not for each object, and
-/// not in each frame. So it must depend on nothing but the material. What depends on something else is another predicate.
+/// A view calls it once for each material when it first has the predicate, and again after a material changed; not for
+/// each object, and not in each frame. So it must depend on nothing but the material. What depends on something else is
+/// another predicate.
 ///
 /// ```
 /// use drawloom::scene::{Blend, Material, MaterialPredicate};

@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 
-/// A material type that an engine defines: a name, and the structure that shaders read of each material. Make it once, as a constant:
-/// [materials](super::Material::values) bring values for it, and a process [declares](crate::process::Declare::reads_materials) that its
-/// shader reads them and [selects](crate::command::Selection::of_material_type) the objects that have such a material.
+/// A material type that an engine defines: a name, and the structure that shaders read of each material. Make it once,
+/// as a constant: [materials](super::Material::values) bring values for it, and a process
+/// [declares](crate::process::Declare::reads_materials) that its shader reads them and
+/// [selects](crate::command::Selection::of_material_type) the objects that have a material of the type.
 ///
 /// The shipped depth pre-pass, geometry buffer and transparency leave these objects to that process: without one they
 /// are not drawn. Opaque ones cast shadows like others, and those whose material [is a
 /// mask](super::Material::is_masked) cast them in its shape: see [`ShadowCasters`](crate::process::ShadowCasters).
 ///
-/// `T` has the layout of the structure in WGSL, padding included: a `vec3<f32>` begins at a multiple of 16 bytes, and the size of `T` is
-/// a multiple of the greatest alignment of its fields.
+/// `T` has the layout of the structure in WGSL, padding included: a `vec3<f32>` begins at a multiple of 16 bytes, and
+/// the size of `T` is a multiple of the greatest alignment of its fields.
 ///
 /// ```
 /// use drawloom::command::Selection;
@@ -94,8 +95,8 @@ impl<T: Pod> MaterialType<T> {
     /// A type of this name. Two types of one name are the same type.
     ///
     /// # Panics
-    /// If the size of `T` is 0 or not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
-    /// the compiler.
+    /// If the size of `T` is 0 or not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is
+    /// an error of the compiler.
     pub const fn new(name: &'static str) -> Self {
         assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "a material has 4, 8, 12 ... bytes");
         Self { name, values: PhantomData }

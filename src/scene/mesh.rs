@@ -11,8 +11,8 @@ use super::generated_geometry::GeneratedGeometry;
 use super::vertex_attribute::MeshAttribute;
 use super::{AttributeFormat, AttributeLayout, AttributeValue, LevelOfDetail, SceneError, Topology, VertexAttribute};
 
-/// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are counter-clockwise. Clones share
-/// their vertices and indices.
+/// A mesh: vertices, indices and topology. Object space is right-handed and in metres; front faces are
+/// counter-clockwise. Clones share their vertices and indices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     pub(super) name: String,
@@ -38,8 +38,8 @@ impl Mesh {
     /// Checks the parts, and computes bounds and the length of the longest edge.
     ///
     /// # Errors
-    /// If the mesh has no triangle, an index is out of range, the number of indices of a triangle list is not a multiple of
-    /// 3, a vertex is not finite, or the bounding sphere has no finite radius.
+    /// If the mesh has no triangle, an index is out of range, the number of indices of a triangle list is not a
+    /// multiple of 3, a vertex is not finite, or the bounding sphere has no finite radius.
     pub fn new(
         name: impl Into<String>,
         topology: Topology,
@@ -61,8 +61,8 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A mesh in the engine's own buffers. `bounding_box` is its minimum and maximum in object space, in metres: triangles outside of
-    /// it may be missing.
+    /// A mesh in the engine's own buffers. `bounding_box` is its minimum and maximum in object space, in metres:
+    /// triangles outside of it may be missing.
     ///
     /// The CPU does not see its triangles. So it has no [`vertices`](Self::vertices), [`indices`](Self::indices),
     /// [`attribute`](Self::attribute) or [`longest_edge`](Self::longest_edge), is never an occluder, is neither
@@ -70,8 +70,9 @@ impl Mesh {
     /// with equal layouts share pipelines.
     ///
     /// # Errors
-    /// If it has no triangle, no positions, an attribute twice or in a format that does not fit it, a buffer without the usage for it, a
-    /// stream that is misaligned or exceeds its buffer, or if the bounding box is inverted, not finite or too large.
+    /// If it has no triangle, no positions, an attribute twice or in a format that does not fit it, a buffer without
+    /// the usage for it, a stream that is misaligned or exceeds its buffer, or if the bounding box is inverted, not
+    /// finite or too large.
     #[cfg(feature = "wgpu")]
     pub fn from_buffers(
         name: impl Into<String>,
@@ -151,8 +152,8 @@ impl Mesh {
     /// Adds the values of an attribute, one for each vertex.
     ///
     /// # Errors
-    /// If there is not one value for each vertex, a value is not finite, the mesh has the attribute already, or is [in the engine's own
-    /// buffers](Self::from_buffers).
+    /// If there is not one value for each vertex, a value is not finite, the mesh has the attribute already, or is [in
+    /// the engine's own buffers](Self::from_buffers).
     pub fn with_attribute<T: AttributeValue>(
         mut self,
         attribute: VertexAttribute<T>,
@@ -190,22 +191,24 @@ impl Mesh {
         known.map(|known| known.bytes.as_slice())
     }
 
-    /// The attributes of another mesh with the same vertices, followed by ones that were added halfway between two others.
+    /// The attributes of another mesh with the same vertices, followed by ones that were added halfway between two
+    /// others.
     pub(super) fn with_attributes_of(self, other: &Self, midpoint_ends: &[[u32; 2]]) -> Self {
         let attributes = other.attributes.iter().map(|attribute| attribute.subdivided(midpoint_ends)).collect();
         Self { attributes: Arc::new(attributes), ..self }
     }
 
-    /// Enables or disables triangle culling. If enabled, each frame tests every triangle in every view, and leaves out those
-    /// that [`RenderView::cull_triangles`](crate::view::RenderView::cull_triangles) finds invisible. Enabling it turns a strip
-    /// into a list.
+    /// Enables or disables triangle culling. If enabled, each frame tests every triangle in every view, and leaves out
+    /// those that [`RenderView::cull_triangles`](crate::view::RenderView::cull_triangles) finds invisible. Enabling it
+    /// turns a strip into a list.
     ///
-    /// It is worth it for large meshes in frames that are limited by the device, if the device takes longer for a vertex than
-    /// a CPU core for a triangle. Each object of such a mesh is a draw of its own. Shaders must not move the vertices of such
-    /// a mesh: triangles that a shader would move into view may be missing.
+    /// It is worth it for large meshes in frames that are limited by the device, if the device takes longer for a
+    /// vertex than a CPU core for a triangle. Each of its objects is a draw of its own. Shaders must not move the
+    /// vertices of such a mesh: triangles that a shader would move into view may be missing.
     ///
-    /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11 million
-    /// triangles at most; further objects are drawn whole. So are meshes [in the engine's own buffers](Self::from_buffers).
+    /// Frames then need memory for each triangle and pass: some 16 bytes, and 12 to 18 on the device. A pass tests 11
+    /// million triangles at most; further objects are drawn whole. So are meshes [in the engine's own
+    /// buffers](Self::from_buffers).
     #[cfg(feature = "occlusion")]
     pub fn with_triangle_culling(self, enabled: bool) -> Self {
         let enabled = enabled && self.has_triangles();
@@ -264,8 +267,8 @@ impl Mesh {
         self.corners
     }
 
-    /// The length of the longest edge, in metres in object space: rounded up from f64, and infinite beyond the range of f32.
-    /// Triangles with two corners at the same position draw nothing and do not count.
+    /// The length of the longest edge, in metres in object space: rounded up from f64, and infinite beyond the range of
+    /// f32. Triangles with two corners at the same position draw nothing and do not count.
     pub fn longest_edge(&self) -> f32 {
         self.longest_edge
     }
@@ -294,7 +297,7 @@ impl Mesh {
     }
 }
 
-/// The number of triangles that so many corners form.
+/// The number of triangles that this number of corners forms.
 pub(super) fn triangle_count(topology: Topology, corners: usize) -> usize {
     match topology {
         Topology::TriangleList => corners / 3,

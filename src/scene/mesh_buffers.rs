@@ -2,11 +2,12 @@
 
 use super::{AttributeValue, VertexAttribute};
 
-/// The vertices, and the indices if there are any, of a [mesh](super::Mesh::from_buffers) in buffers that the engine owns: nothing is kept
-/// twice. The mesh keeps the buffers alive. Their content is the engine's: what it writes before a frame is submitted is drawn.
+/// The vertices, and the indices if there are any, of a [mesh](super::Mesh::from_buffers) in buffers that the engine
+/// owns: nothing is kept twice. The mesh keeps the buffers alive. Their content is the engine's: what it writes before
+/// a frame is submitted is drawn.
 ///
-/// Vertices are interleaved in one stream, or in several: a stream has some of the attributes of each vertex. Shaders read attributes by
-/// their names, converted from the format that they have here.
+/// Vertices are interleaved in one stream, or in several: a stream has some of the attributes of each vertex. Shaders
+/// read attributes by their names, converted from the format that they have here.
 ///
 /// ```no_run
 /// use drawloom::glam::Vec3;
@@ -40,7 +41,7 @@ pub struct MeshBuffers {
     pub streams: Vec<VertexStream>,
     /// The number of vertices.
     pub vertex_count: u32,
-    /// The indices; `None` for a mesh whose vertices form triangles as they are.
+    /// The indices; `None` for a mesh whose vertices form triangles in their own order.
     pub indices: Option<IndexBuffer>,
 }
 
@@ -64,8 +65,8 @@ pub struct StreamLayout {
     pub attributes: Vec<StreamAttribute>,
 }
 
-/// An attribute in a stream. Its offset is in bytes from the beginning of the vertex: a multiple of 4, or of the size of the format if
-/// that is less.
+/// An attribute in a stream. Its offset is in bytes from the beginning of the vertex: a multiple of 4, or of the size
+/// of the format if that is less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct StreamAttribute {
     /// Its name: that of a [`VertexAttribute`], or "position", "normal" or "uv".
@@ -75,25 +76,26 @@ pub struct StreamAttribute {
 }
 
 impl StreamAttribute {
-    /// The position in object space, in metres. Every mesh must have it. The format must have three or four components that shaders read
-    /// as `f32`.
+    /// The position in object space, in metres. Every mesh must have it. The format must have three or four components
+    /// that shaders read as `f32`.
     pub const fn position(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: POSITION, format, offset }
     }
 
-    /// The normal in object space, of any length, in a format as that of [positions](Self::position). A mesh without normals has those of
-    /// its triangles.
+    /// The normal in object space, of any length, in a format as that of [positions](Self::position). A mesh without
+    /// normals has those of its triangles.
     pub const fn normal(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: NORMAL, format, offset }
     }
 
-    /// Texture coordinates, in a format of two or more components that shaders read as `f32`. Those of a mesh without them are 0.
+    /// Texture coordinates, in a format of two or more components that shaders read as `f32`. Those of a mesh without
+    /// them are 0.
     pub const fn uv(format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: UV, format, offset }
     }
 
-    /// An attribute of the engine's own. The format need not be that of `T`, if shaders read it as the same kind of number: `Snorm8x4`
-    /// for `[f32; 4]`, or `Uint8x4` for `[u32; 4]`.
+    /// An attribute of the engine's own. The format need not be that of `T`, if shaders read it as the same kind of
+    /// number: `Snorm8x4` for `[f32; 4]`, or `Uint8x4` for `[u32; 4]`.
     pub const fn of<T: AttributeValue>(attribute: VertexAttribute<T>, format: wgpu::VertexFormat, offset: u64) -> Self {
         Self { name: attribute.layout().name, format, offset }
     }
@@ -185,8 +187,8 @@ pub(crate) enum NumberKind {
     Double,
 }
 
-/// The indices of a mesh, in a buffer with the usage `INDEX`. Each must be less than the number of vertices. Drawloom cannot check that;
-/// what is drawn otherwise depends on the device, which reads nothing outside of the buffers.
+/// The indices of a mesh, in a buffer with the usage `INDEX`. Each must be less than the number of vertices. Drawloom
+/// cannot check that; what is drawn otherwise depends on the device, which reads nothing outside of the buffers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IndexBuffer {
     /// The buffer.

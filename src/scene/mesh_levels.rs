@@ -6,10 +6,11 @@ use super::mesh::{check_corner_count, triangle_count};
 use super::{LevelOfDetail, Mesh, SceneError};
 
 impl Mesh {
-    /// Replaces the mesh's coarser levels, the finest first. Views draw them where their errors are small enough in the picture: see
-    /// [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail).
+    /// Replaces the mesh's coarser levels, the finest first. Views draw them where their errors are small enough in the
+    /// picture: see [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail).
     ///
-    /// A level draws vertices of the mesh, with its topology and attributes. Only objects that are drawn at level 0 hide others.
+    /// A level draws vertices of the mesh, with its topology and attributes. Only objects that are drawn at level 0
+    /// hide others.
     ///
     /// ```
     /// use drawloom::scene::{LevelOfDetail, Mesh, Topology, Vertex};
@@ -27,10 +28,10 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// If a level has no triangle, or not fewer than the level before it; if its error is not finite, or not above that of the level
-    /// before it (0 of level 0); if an index is out of range, or a part of a triangle is left over; if there are more than
-    /// [`LevelOfDetail::MAX_COUNT`]; or if the mesh is [in the engine's own buffers](Self::from_buffers), whose indices the CPU does not
-    /// know.
+    /// If a level has no triangle, or not fewer than the level before it; if its error is not finite, or not above that
+    /// of the level before it (0 of level 0); if an index is out of range, or a part of a triangle is left over; if
+    /// there are more than [`LevelOfDetail::MAX_COUNT`]; or if the mesh is [in the engine's own
+    /// buffers](Self::from_buffers), whose indices the CPU does not know.
     pub fn with_levels(mut self, levels: impl IntoIterator<Item = LevelOfDetail>) -> Result<Self, SceneError> {
         self.levels = Arc::default();
         let (mut triangles, mut error) = (self.triangle_count(), 0.0);
@@ -45,7 +46,7 @@ impl Mesh {
         Ok(self)
     }
 
-    /// What is wrong with a level that comes after one with so many triangles and such an error.
+    /// The problem of a level, if any, after a level with these triangles and this error.
     fn level_problem(&self, index: usize, level: &LevelOfDetail, triangles: usize, error: f32) -> Option<String> {
         let (indices, vertices) = (level.indices(), self.vertices().len());
         let count = triangle_count(self.topology(), indices.len());
@@ -79,7 +80,7 @@ impl Mesh {
         &self.levels
     }
 
-    /// The indices of a level; those of the coarsest one if there are not so many.
+    /// The indices of a level; those of the coarsest one if there are fewer levels.
     pub(crate) fn indices_of(&self, level: u32) -> &[u32] {
         let coarser = (level as usize).min(self.levels.len()).checked_sub(1);
         coarser.map_or(self.indices(), |index| self.levels[index].indices())

@@ -1,7 +1,7 @@
 //! Scenes: objects, meshes, materials, lights and cameras.
 //!
-//! A frame reads a [`SceneRef`], which borrows slices. [`Scene`] owns such slices; an engine with storage of its own lends
-//! its own instead.
+//! A frame reads a [`SceneRef`], which borrows slices. [`Scene`] owns such slices; an engine with storage of its own
+//! lends its own instead.
 
 mod asset_loader;
 mod assets;

@@ -10,13 +10,13 @@ use parking_lot::{Mutex, MutexGuard};
 use super::Bounds;
 use super::chunk_users::ChunkUsers;
 
-/// A column of a scene that [CPU nodes](crate::CpuNode) write while the frame is recorded, before the stages read it: positions that an
-/// animation moves, or a simulation. The engine lends its own storage, so nothing is copied, and has it back when
-/// [`record_with_nodes`](crate::Renderer::record_with_nodes) returns.
+/// A column of a scene that [CPU nodes](crate::CpuNode) write while the frame is recorded, before the stages read it:
+/// positions that an animation moves, or a simulation. The engine lends its own storage, so nothing is copied, and has
+/// it back when [`record_with_nodes`](crate::Renderer::record_with_nodes) returns.
 ///
-/// It is cut into chunks of [`NodeColumn::CHUNK`] objects. Nodes write a chunk as often as they like, each after those that it is ordered
-/// after, until its first read; after that, a write is an error. So an engine makes a column for each recording. Chunks that no node writes keep
-/// what the engine has put there.
+/// It is cut into chunks of [`NodeColumn::CHUNK`] objects. Nodes write a chunk as often as they like, each after those
+/// that it is ordered after, until its first read; after that, a write is an error. So an engine makes a column for
+/// each recording. Chunks that no node writes keep what the engine has put there.
 ///
 /// ```
 /// use drawloom::glam::DVec3;
@@ -79,9 +79,9 @@ impl<'a, T> NodeColumn<'a, T> {
     /// holds it works, so hold one at a time.
     ///
     /// # Errors
-    /// If it has been read in this frame, because the node does not declare that it writes [`FrameData::Transforms`](crate::FrameData::Transforms);
-    /// or if nobody lets go of it: this job holds it, or one that waits for another chunk, or one that has leaked it,
-    /// or any for a minute.
+    /// If it has been read in this frame, because the node does not declare that it writes
+    /// [`FrameData::Transforms`](crate::FrameData::Transforms); or if nobody lets go of it: this job holds it, or one
+    /// that waits for another chunk, or one that has leaked it, or any for a minute.
     ///
     /// # Panics
     /// If there is no such chunk.
@@ -192,9 +192,9 @@ impl<T: Send + Sync> WrittenColumn<T> for NodeColumn<'_, T> {
     }
 }
 
-/// The columns of a scene that [CPU nodes](crate::CpuNode) write while it is recorded. Each that is there takes the place of the slice of
-/// the same name, which is then not read, and may be empty. [`SceneRef::changes`](super::SceneRef::changes) are about them too: they name
-/// every object that a node may change.
+/// The columns of a scene that [CPU nodes](crate::CpuNode) write while it is recorded. Each that is there takes the
+/// place of the slice of the same name, which is then not read, and may be empty.
+/// [`SceneRef::changes`](super::SceneRef::changes) are about them too: they name every object that a node may change.
 ///
 /// A node that writes one of them declares that it writes [`FrameData::Transforms`](crate::FrameData::Transforms).
 #[derive(Clone, Copy, Debug, Default)]

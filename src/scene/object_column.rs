@@ -4,8 +4,9 @@ use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
-/// A name for data that an engine has for each object, such as a tint, the offset of a skinning palette, or the transform of the
-/// frame before. Make it once, as a constant: scenes bring values for it, and processes declare that their shaders read them.
+/// A name for data that an engine has for each object, such as a tint, the offset of a skinning palette, or the
+/// transform of the frame before. Make it once, as a constant: scenes bring values for it, and processes declare that
+/// their shaders read them.
 ///
 /// `T` has the layout of an element of the array in WGSL, padding included: `array<vec3<f32>>` has 16 bytes an element.
 ///
@@ -33,8 +34,8 @@ impl<T: Pod> ObjectColumn<T> {
     /// A column of this name. Two columns of one name are the same column.
     ///
     /// # Panics
-    /// If the size of `T` is 0 or not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is an error of
-    /// the compiler.
+    /// If the size of `T` is 0 or not a multiple of 4 bytes, which no storage buffer can have. For a constant, that is
+    /// an error of the compiler.
     pub const fn new(name: &'static str) -> Self {
         assert!(size_of::<T>() > 0 && size_of::<T>().is_multiple_of(4), "an element has 4, 8, 12 ... bytes");
         Self { name, element: PhantomData }

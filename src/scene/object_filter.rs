@@ -2,19 +2,20 @@
 
 use super::{MaterialPredicate, ObjectSet};
 
-/// Which objects a camera's view shows, beside its [layers](super::Camera::layers): all, or those that a list and a predicate on materials
-/// let pass.
+/// Which objects a camera's view shows, beside its [layers](super::Camera::layers): all, or those that a list and a
+/// predicate on materials let pass.
 ///
-/// It decides what is visible, for all processes of the view at once, as if the scene had no other objects: what it leaves out hides
-/// nothing either, and is not among the [visible objects](crate::ViewStatistics::visible). A view that shows no object is an empty picture, and no
-/// error. A filter costs only the view that has it.
+/// It decides what is visible, for all processes of the view at once, as if the scene had no other objects: what it
+/// leaves out hides nothing either, and is not among the [visible objects](crate::ViewStatistics::visible). A view that
+/// shows no object is an empty picture, and no error. A filter costs only the view that has it.
 ///
-/// Shadow maps are views of their own, and show what [`ShadowMaps::layers`](crate::view::ShadowMaps::layers) says, whatever the filter of
-/// the view that they light. So an object that a camera leaves out still casts its shadow there, as the player's own body does in the
-/// player's own view.
+/// Shadow maps are views of their own, and show what [`ShadowMaps::layers`](crate::view::ShadowMaps::layers) says,
+/// whatever the filter of the view that they light. So an object that a camera leaves out still casts its shadow there,
+/// as the player's own body does in the player's own view.
 ///
-/// Cameras derived from another one ([`reflected`](super::Camera::reflected), [`through_portal`](super::Camera::through_portal),
-/// [`tile`](super::Camera::tile)) inherit its filter; that of an [impostor](super::Camera::impostor) does not.
+/// Cameras derived from another one ([`reflected`](super::Camera::reflected),
+/// [`through_portal`](super::Camera::through_portal), [`tile`](super::Camera::tile)) inherit its filter; that of an
+/// [impostor](super::Camera::impostor) does not.
 ///
 /// ```
 /// use drawloom::glam::{DVec3, Vec3};
@@ -40,7 +41,8 @@ pub struct ObjectFilter {
 /// Which objects a list lets pass.
 ///
 /// An index at which the scene has no object makes no difference to what is drawn. Each is counted once a frame as
-/// [`RejectionReason::UnknownObject`](crate::view::RejectionReason::UnknownObject), since the list may be one of an earlier scene.
+/// [`RejectionReason::UnknownObject`](crate::view::RejectionReason::UnknownObject), since the list may be one of an
+/// earlier scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ObjectList {
     /// All.

@@ -4,12 +4,12 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A set of a scene's objects, by index: what an [`ObjectFilter`](super::ObjectFilter) lists. A clone shares its memory, which is 16 bytes
-/// for each 64 indices of the scene among which one is in the set.
+/// A set of a scene's objects, by index: what an [`ObjectFilter`](super::ObjectFilter) lists. A clone shares its
+/// memory, which is 16 bytes for each 64 indices of the scene among which one is in the set.
 ///
-/// An index is that of an entry in the slices of a [`SceneRef`](super::SceneRef), in every frame anew. If an object moves to another
-/// index, the set contains whichever object is at the index now, so an engine then makes the set again.
-/// [`Scene::object_set`](super::Scene::object_set) makes one of handles.
+/// An index is that of an entry in the slices of a [`SceneRef`](super::SceneRef), in every frame anew. If an object
+/// moves to another index, the set contains whichever object is at the index now, so an engine then makes the set
+/// again. [`Scene::object_set`](super::Scene::object_set) makes one of handles.
 ///
 /// ```
 /// use drawloom::scene::ObjectSet;

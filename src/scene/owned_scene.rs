@@ -11,8 +11,8 @@ use super::{
 };
 use crate::handle::{Handle, Slots, StaleHandle};
 
-/// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and removed
-/// between frames.
+/// A scene that owns its objects, as one array per property, and their assets. Everything can be added, changed and
+/// removed between frames.
 ///
 /// ```
 /// use drawloom::glam::DVec3;
@@ -32,7 +32,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// The lights.
     pub lights: Vec<Light>,
-    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this radiance.
+    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this
+    /// radiance.
     pub ambient: Vec3,
     /// The radiance of the background, linear.
     pub background: Vec3,
@@ -209,8 +210,8 @@ impl Scene {
         self.handles.iter().copied().map(ObjectHandle)
     }
 
-    /// The set of some objects at their present indices, for an [`ObjectFilter`](super::ObjectFilter). Removing an object changes indices:
-    /// make the set again then.
+    /// The set of some objects at their present indices, for an [`ObjectFilter`](super::ObjectFilter). Removing an
+    /// object changes indices: make the set again then.
     ///
     /// ```
     /// # use drawloom::glam::DVec3;
@@ -270,7 +271,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Adds what a loader has loaded since the last call, and sets the bounds of the objects whose meshes arrived. See [`Assets::receive`].
+    /// Adds what a loader has loaded since the last call, and sets the bounds of the objects whose meshes arrived. See
+    /// [`Assets::receive`].
     pub fn receive(&mut self, loader: &AssetLoader) -> Arrivals {
         let arrivals = self.assets.receive(loader);
         if !arrivals.meshes.is_empty() {

@@ -19,8 +19,8 @@ pub struct PackedVertex {
 }
 
 impl PackedVertex {
-    /// Packs a vertex with texture coordinates relative to `uv_origin`, which are integers. Coordinates are clamped to the
-    /// range of half floats, ±65,504.
+    /// Packs a vertex with texture coordinates relative to `uv_origin`, which are integers. Coordinates are clamped to
+    /// the range of half floats, ±65,504.
     pub fn new(vertex: &Vertex, uv_origin: DVec2) -> Self {
         let normal = Vec3::from(vertex.normal).as_dvec3().normalize_or_zero();
         let [x, y, z] = (normal * NORMAL_SCALE).round().to_array().map(|component| component as i8);
@@ -41,9 +41,9 @@ impl PackedVertex {
 }
 
 impl Mesh {
-    /// The packed vertices. Textures repeat and half floats are most precise near 0, so texture coordinates are relative to
-    /// the integers nearest to the middle of their range. [`VertexFormat::max_uv_error`](crate::quality::VertexFormat::max_uv_error)
-    /// bounds the error.
+    /// The packed vertices. Textures repeat and half floats are most precise near 0, so texture coordinates are
+    /// relative to the integers nearest to the middle of their range.
+    /// [`VertexFormat::max_uv_error`](crate::quality::VertexFormat::max_uv_error) bounds the error.
     pub fn packed_vertices(&self) -> Vec<PackedVertex> {
         let uvs = || self.vertices().iter().map(|vertex| Vec2::from(vertex.uv).as_dvec2());
         let low = uvs().fold(DVec2::MAX, DVec2::min);

@@ -2,24 +2,28 @@
 
 use super::ObjectSet;
 
-/// A piece of the scene: objects that stand still together, such as a room's furniture, a block of a city, or a forest. It is recorded once,
-/// and executed by every view that sees any of it, in this frame and in later ones: L 3.2's command buffers, which other contexts execute.
+/// A piece of the scene: objects that stand still together, such as a room's furniture, a block of a city, or a forest.
+/// It is recorded once, and executed by every view that sees any of it, in this frame and in later ones: L 3.2's
+/// command buffers, which other contexts execute.
 ///
-/// A piece that a view executes costs that view one culling test, and no visibility, sort or merge of its objects. What the backend has uploaded
-/// of it stays, and so do its bundles while the view executes the same pieces. In exchange a view that sees a corner of a piece draws all of it. So a piece is worth it if its objects are
-/// seen together: some hundreds or thousands of them, close to each other.
+/// A piece that a view executes costs that view one culling test, and no visibility, sort or merge of its objects. What
+/// the backend has uploaded of it stays, and so do its bundles while the view executes the same pieces. In exchange a
+/// view that sees a corner of a piece draws all of it. So a piece is worth it if its objects are seen together: some
+/// hundreds or thousands of them, close to each other.
 ///
-/// Pieces change no picture, except where surfaces of two objects lie at the same depth: objects of pieces are drawn before the others. What cannot
-/// be executed is drawn as if it were in no piece:
+/// Pieces change no picture, except where surfaces of two objects lie at the same depth: objects of pieces are drawn
+/// before the others. What cannot be executed is drawn as if it were in no piece:
 ///
-/// - blended objects, which need an order; objects whose mesh has levels of detail that views choose from; objects whose
-///   triangles are culled (`Mesh::with_triangle_culling`);
-/// - a piece with an object that [changed](super::SceneRef::changes), until the first frame in which none of them does. That frame
-///   records the piece anew; the next one executes it. In frames that report [`Changes::Unknown`](super::Changes::Unknown) any object may have
-///   changed, so an engine that wants pieces executed reports its changes;
-/// - all pieces in a view with a process that draws opaque objects in an order, by [depth](crate::quality::Quality::opaque_order), by
-///   [the engine's](crate::command::DrawOrder) or [before blended ones](crate::command::Selection::ALL); in maps of paraboloids; and while a view
-///   tests for occlusion (`Quality::occlusion`), which finds hidden objects one by one;
+/// - blended objects, which need an order; objects whose mesh has levels of detail that views choose from; objects
+///   whose triangles are culled (`Mesh::with_triangle_culling`);
+/// - a piece with an object that [changed](super::SceneRef::changes), until the first frame in which none of them does.
+///   That frame records the piece anew; the next one executes it. In frames that report
+///   [`Changes::Unknown`](super::Changes::Unknown) any object may have changed, so an engine that wants pieces executed
+///   reports its changes;
+/// - all pieces in a view with a process that draws opaque objects in an order, by
+///   [depth](crate::quality::Quality::opaque_order), by [the engine's](crate::command::DrawOrder) or [before blended
+///   ones](crate::command::Selection::ALL); in maps of paraboloids; and while a view tests for occlusion
+///   (`Quality::occlusion`), which finds hidden objects one by one;
 /// - a piece of which a view's [filter](super::Camera::filter) shows only some objects, and one that reaches beyond the
 ///   [far plane](super::Camera::far) of a perspective view.
 ///
@@ -44,8 +48,8 @@ pub struct Piece {
     /// Its name, which no other piece of the scene has.
     pub name: String,
     /// Its objects, by index, none of which is in another piece. Those at which the scene has no object are counted as
-    /// [`RejectionReason::UnknownObject`](crate::view::RejectionReason::UnknownObject). If an object moves to another index, the engine makes the
-    /// set again.
+    /// [`RejectionReason::UnknownObject`](crate::view::RejectionReason::UnknownObject). If an object moves to another
+    /// index, the engine makes the set again.
     pub objects: ObjectSet,
 }
 

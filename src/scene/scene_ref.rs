@@ -9,20 +9,20 @@ use super::{
 };
 use crate::handle::Handle;
 
-/// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage without
-/// copying. [`Scene::as_scene_ref`](super::Scene::as_scene_ref) returns one, too.
+/// A scene as a frame reads it: borrowed slices with one entry per object, so that an engine lends its own storage
+/// without copying. [`Scene::as_scene_ref`](super::Scene::as_scene_ref) returns one, too.
 ///
-/// Only [`Renderer::record`](crate::Renderer::record) reads it. When that returns, the borrow ends and the engine may change
-/// its world (L 3).
+/// Only [`Renderer::record`](crate::Renderer::record) reads it. When that returns, the borrow ends and the engine may
+/// change its world (L 3).
 #[derive(Clone, Copy, Debug)]
 pub struct SceneRef<'a> {
     /// The origin of each object in the world, in metres: up to 2³² m, 4.3 million kilometres, from the world's origin.
     pub positions: &'a [DVec3],
     /// The rotation from object space to the world; of unit length.
     pub orientations: &'a [Quat],
-    /// The scale along the object's own axes, applied before the rotation; negative factors mirror. The position of a vertex
-    /// is accurate to about a millionth of its distance from the camera. The error grows with the object's size divided by its
-    /// distance: an object a million times as large as its distance appears at the wrong position.
+    /// The scale along the object's own axes, applied before the rotation; negative factors mirror. The position of a
+    /// vertex is accurate to about a millionth of its distance from the camera. The error grows with the object's size
+    /// divided by its distance: an object a million times as large as its distance appears at the wrong position.
     pub scales: &'a [Vec3],
     /// A bounding sphere of each object, in object space before scaling.
     pub bounds: &'a [Bounds],
@@ -30,8 +30,9 @@ pub struct SceneRef<'a> {
     pub meshes: &'a [Handle<Mesh>],
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
-    /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty if every
-    /// object belongs to all. A process that does not draw all layers makes its list anew in each frame in which an object changes.
+    /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty
+    /// if every object belongs to all. A process that does not draw all layers makes its list anew in each frame in
+    /// which an object changes.
     pub layers: &'a [LayerMask],
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.
@@ -48,14 +49,16 @@ pub struct SceneRef<'a> {
     pub lights: &'a [Light],
     /// The cameras; each has a view (M 10.4).
     pub cameras: &'a [Camera],
-    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this radiance.
+    /// Ambient radiance, linear, uniform in all directions: a surface with a diffuse reflectance of 1 has this
+    /// radiance.
     pub ambient: Vec3,
     /// The radiance of the background, linear.
     pub background: Vec3,
 }
 
 impl<'a> SceneRef<'a> {
-    /// A scene without objects, lights and cameras, dark and with a black background. Of its objects, any may have changed.
+    /// A scene without objects, lights and cameras, dark and with a black background. Of its objects, any may have
+    /// changed.
     ///
     /// An engine names what it has, and takes the rest from here:
     ///
@@ -126,8 +129,8 @@ impl SceneRef<'_> {
     }
 
     /// # Errors
-    /// If a slice or a column has another length than `positions`, or two columns have the same name. The error names the first
-    /// one.
+    /// If a slice or a column has another length than `positions`, or two columns have the same name. The error names
+    /// the first one.
     pub(crate) fn check_lengths(&self) -> Result<(), SceneError> {
         let positions = self.object_count();
         let slices = [
@@ -173,7 +176,8 @@ impl SceneRef<'_> {
     }
 
     /// Centre and radius, in metres, of a sphere around all objects that can be drawn. Without any it is a sphere of
-    /// radius 1 around the world's origin. It reads all [written columns](Self::written), so nodes can write them no more.
+    /// radius 1 around the world's origin. It reads all [written columns](Self::written), so nodes can write them no
+    /// more.
     pub fn bounding_sphere(self) -> (DVec3, f64) {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for object in self.drawable_objects() {

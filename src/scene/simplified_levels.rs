@@ -4,21 +4,22 @@ use meshopt::{SimplifyOptions, simplify_decoder};
 
 use super::{LevelOfDetail, Mesh, SceneError};
 
-/// The error of a level is so many times meshoptimizer's.
+/// The error of a level, as a multiple of meshoptimizer's.
 const ERROR_FACTOR: f32 = 6.0;
 
 /// A level with more than this share of the triangles of the one before it is not worth its memory.
 const LARGEST_SHARE: f64 = 0.8;
 
 impl Mesh {
-    /// Replaces the mesh's coarser levels by ones that meshoptimizer simplifies, each of about half of the triangles of the one before it,
-    /// down to where the mesh's topology allows no fewer. A strip becomes a list. A mesh
-    /// [in the engine's own buffers](Self::from_buffers) stays as it is.
+    /// Replaces the mesh's coarser levels by ones that meshoptimizer simplifies, each of about half of the triangles of
+    /// the one before it, down to where the mesh's topology allows no fewer. A strip becomes a list. A mesh [in the
+    /// engine's own buffers](Self::from_buffers) does not change.
     ///
-    /// Vertices are collapsed by quadric error (Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997), and
-    /// seams of normals, texture coordinates and attributes stay. The [error](LevelOfDetail::error) rests on an estimate: meshoptimizer
-    /// states a mean of squared distances to planes, not the largest distance. Of terrains, tori, spheres and plateaus the largest distance
-    /// was up to 4.8 times as much, so levels state six times as much. Where a bound must hold, measure the levels, and supply them by
+    /// Vertices are collapsed by quadric error (Garland and Heckbert, "Surface Simplification Using Quadric Error
+    /// Metrics", 1997), and seams of normals, texture coordinates and attributes stay. The
+    /// [error](LevelOfDetail::error) rests on an estimate: meshoptimizer states a mean of squared distances to planes,
+    /// not the largest distance. Of terrains, tori, spheres and plateaus the largest distance was up to 4.8 times as
+    /// much, so levels state six times as much. Where a bound must hold, measure the levels, and supply them by
     /// [`Mesh::with_levels`].
     ///
     /// It takes some milliseconds for each 10,000 triangles.

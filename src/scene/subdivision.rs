@@ -23,8 +23,8 @@ impl Mesh {
     /// [`longest_edge`](Self::longest_edge) of the result is then still above `longest`. A `longest` that is NaN or not
     /// positive cannot be reached, and subdivides up to the limit.
     ///
-    /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result is a single
-    /// degenerate triangle. A mesh [in the engine's own buffers](Self::from_buffers) stays as it is.
+    /// Triangles with two corners at the same position are left out, as they draw nothing. If none remains, the result
+    /// is a single degenerate triangle. A mesh [in the engine's own buffers](Self::from_buffers) does not change.
     ///
     /// The result has no levels of detail, and its triangles are not culled, whatever the mesh has.
     ///
@@ -89,7 +89,8 @@ impl Surface {
         long_edges
     }
 
-    /// Splits each long edge once. Adds a triangle for each of the `splits` long edges of each triangle, and no more vertices than that.
+    /// Splits each long edge once. Adds a triangle for each of the `splits` long edges of each triangle, and no more
+    /// vertices than that.
     fn split(&mut self, long_edges: &[[bool; 3]], splits: usize) {
         let triangles = std::mem::take(&mut self.triangles);
         self.triangles.reserve(triangles.len() + splits);

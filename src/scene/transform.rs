@@ -9,7 +9,7 @@ pub(crate) fn transform_is_valid(position: DVec3, orientation: Quat, scale: Vec3
 
 /// Whether this is the squared length of a unit vector or quaternion, within a tolerance.
 ///
-/// Repeated rotations in an engine's own arithmetic may drift by a thousandth. Users of such a value normalise it first.
+/// Repeated rotations in an engine's own arithmetic may drift by a thousandth. Users of the value normalise it first.
 pub(crate) fn is_unit(length_squared: f32) -> bool {
     (length_squared - 1.0).abs() < 2e-3
 }

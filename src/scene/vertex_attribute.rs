@@ -4,8 +4,9 @@ use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
-/// A name for data that meshes have for each vertex beside [`Vertex`](super::Vertex), such as tangents, colours, or joints and
-/// weights. Make it once, as a constant: meshes bring values for it, and processes declare that their shaders read them.
+/// A name for data that meshes have for each vertex beside [`Vertex`](super::Vertex), such as tangents, colours, or
+/// joints and weights. Make it once, as a constant: meshes bring values for it, and processes declare that their
+/// shaders read them.
 ///
 /// ```
 /// use drawloom::scene::{Mesh, Topology, Vertex, VertexAttribute};
@@ -19,7 +20,8 @@ use bytemuck::Pod;
 /// # Ok::<(), drawloom::scene::SceneError>(())
 /// ```
 ///
-/// A shader has it as a field of `VertexInput`: see [`Declare::reads_attribute`](crate::process::Declare::reads_attribute).
+/// A shader has it as a field of `VertexInput`: see
+/// [`Declare::reads_attribute`](crate::process::Declare::reads_attribute).
 pub struct VertexAttribute<T> {
     name: &'static str,
     /// Neither owns nor borrows a `T`.
@@ -27,12 +29,12 @@ pub struct VertexAttribute<T> {
 }
 
 impl<T: AttributeValue> VertexAttribute<T> {
-    /// An attribute of this name, which is that of a field of `VertexInput` in shaders. Two attributes of one name are the same
-    /// attribute.
+    /// An attribute of this name, which is that of a field of `VertexInput` in shaders. Two attributes of one name are
+    /// the same attribute.
     ///
     /// # Panics
-    /// If the name is not made of ASCII letters, digits and underscores, begins with a digit or an underscore, or is that of a field
-    /// that every vertex has. For a constant, that is an error of the compiler.
+    /// If the name is not made of ASCII letters, digits and underscores, begins with a digit or an underscore, or is
+    /// that of a field that every vertex has. For a constant, that is an error of the compiler.
     pub const fn new(name: &'static str) -> Self {
         assert!(is_field_name(name), "the name of an attribute is that of a field in WGSL");
         Self { name, value: PhantomData }

@@ -7,8 +7,8 @@ use super::{ObjectTable, SelectionFilter, VisibleSet, set_bits};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 use crate::scene::Blend;
 
-/// A view that sees more than one in this many objects walks all objects in the order of their bins. Another one collects and orders
-/// what it sees. An object that is passed by costs a quarter of one that is collected.
+/// A view that sees more than one in this many objects walks all objects in the order of their bins. Another one
+/// collects and orders what it sees. An object that is passed by costs a quarter of one that is collected.
 const WALK_THRESHOLD: usize = 4;
 
 /// Whether a process that draws a selection may walk all objects in the order of their bins.

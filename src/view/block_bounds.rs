@@ -31,7 +31,8 @@ impl BlockBounds {
         self.groups[group / GroupBounds::GROUPS].set_union(group % GroupBounds::GROUPS, &self.blocks[group]);
     }
 
-    /// Calls `visit` with the blocks of a range, in order, and how they lie; not with those that lie outside a frustum as a whole.
+    /// Calls `visit` with the blocks of a range, in order, and how they lie; not with those that lie outside a frustum
+    /// as a whole.
     pub(crate) fn visit_overlapping(
         &self,
         frustum: &Frustum,

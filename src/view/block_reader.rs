@@ -4,7 +4,8 @@ use parking_lot::RwLockReadGuard;
 
 use super::{ObjectBlock, ObjectTable};
 
-/// Reads blocks of an object table. The block that was read last stays locked, because what comes next is mostly in the same one.
+/// Reads blocks of an object table. The block that was read last stays locked, because what comes next is mostly in the
+/// same one.
 pub(super) struct BlockReader<'a> {
     table: &'a ObjectTable,
     /// With its index.

@@ -16,8 +16,8 @@ pub(super) struct CameraPlanes {
     pub(super) far: f32,
 }
 
-/// The slopes of two opposite planes: a point c metres aside of the view direction and f metres along it is between them if
-/// slope · f + offset ≥ |scale · c − skew · f|.
+/// The slopes of two opposite planes: a point c metres aside of the view direction and f metres along it is between
+/// them if slope · f + offset ≥ |scale · c − skew · f|.
 #[derive(Clone, Copy)]
 pub(super) struct PairSlopes {
     pub(super) slope: f64,
@@ -28,15 +28,16 @@ pub(super) struct PairSlopes {
 impl PairSlopes {
     const PARALLEL: Self = Self { slope: 0.0, scale: 1.0, skew: 0.0 };
 
-    /// Planes through the camera: half their distance at 1 m, and how far their middle is aside of the view direction there.
+    /// Planes through the camera: half their distance at 1 m, and how far their middle is aside of the view direction
+    /// there.
     fn of_tangents(half: f64, middle: f64) -> Self {
         // The longer normal of the two has unit length.
         let scale = 1.0 / (half + middle.abs()).hypot(1.0);
         Self { slope: half * scale, scale, skew: middle * scale }
     }
 
-    /// The inward normal of the left or lower plane, with a sign of 1, or the right or upper one, with -1: along the axis of the pair, and
-    /// along the view direction.
+    /// The inward normal of the left or lower plane, with a sign of 1, or the right or upper one, with -1: along the
+    /// axis of the pair, and along the view direction.
     pub(super) fn normal(self, sign: f64) -> [f64; 2] {
         [self.scale * sign, self.slope - self.skew * sign]
     }

@@ -80,7 +80,8 @@ mod tests {
     use super::*;
     use crate::view::frustum::tests::any_camera;
 
-    /// The corners, at a distance, of the smallest picture around the camera's own that is symmetric about its axis; in camera space.
+    /// The corners, at a distance, of the smallest picture around the camera's own that is symmetric about its axis; in
+    /// camera space.
     fn corners(camera: &Camera, along: f64) -> [DVec3; 4] {
         let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);
         let [half_width, half_height] = match camera.projection {
@@ -120,7 +121,8 @@ mod tests {
                 let along = aside.dot(rotation * DVec3::NEG_Z);
                 prop_assert!((aside.length() - along).abs() < rounding, "{} along the axis", along);
                 prop_assert!(along < end + rounding, "{} beyond the far end", along);
-                // The smallest one has its centre where both ends are equally far away, or at the far end if the near one is within it.
+                // The smallest one has its centre where both ends are equally far away, or at the far end if the near
+                // one is within it.
                 prop_assert!((far - radius).abs() < rounding && near < radius + rounding, "{} {} of {}", near, far, radius);
                 prop_assert!(
                     (near - radius).abs() < rounding || (along - end).abs() < rounding,

@@ -56,7 +56,8 @@ impl ChangedObjects {
         self.blocks.clear();
     }
 
-    /// The reported objects, and those at indices that the last frame did not have. Indices beyond `objects` are ignored.
+    /// The reported objects, and those at indices that the last frame did not have. Indices beyond `objects` are
+    /// ignored.
     pub(super) fn set(&mut self, changes: Changes<'_>, objects_before: usize, objects: usize) {
         self.all = None;
         self.words.clear();

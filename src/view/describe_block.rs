@@ -43,13 +43,14 @@ impl BitOrAssign for Findings {
 /// If fewer objects of a word change, its bounds are extended. Otherwise they are computed anew.
 const EXTENSION_LIMIT: u32 = 16;
 
-/// After this many frames with changes, the bounds of a word are computed anew in any case: objects that travel would leave them large.
+/// After this many frames with changes, the bounds of a word are computed anew in any case: objects that travel would
+/// leave them large.
 const EXTENDED_FRAMES: u64 = 32;
 
 /// Describes the changed objects of a block.
 ///
-/// Packets that changed as a whole are read from the columns as they are. The other objects are gathered: scattered changes share
-/// packets, so eight of them cost one packet, not eight.
+/// Packets that changed as a whole are read directly from the columns. The other objects are gathered: scattered
+/// changes share packets, so eight of them cost one packet, not eight.
 pub(super) fn describe_block(inputs: &DescriptionInputs, block: &mut ObjectBlock, changed: &ChangedBlock) -> Findings {
     let (mut findings, mut gathered) = (Findings::default(), [0; ObjectBlock::WORDS]);
     for (word, &mask) in changed.masks.iter().enumerate().filter(|(_, mask)| **mask != 0) {
@@ -102,7 +103,8 @@ fn describe_packets(inputs: &DescriptionInputs, block: &mut ObjectBlock, first: 
     findings
 }
 
-/// Describes the changed objects of a block that are in a mask for each of its words, and completes the bounds of these words.
+/// Describes the changed objects of a block that are in a mask for each of its words, and completes the bounds of these
+/// words.
 #[multiversion(targets("x86_64+avx2"))]
 fn describe_gathered(
     inputs: &DescriptionInputs,

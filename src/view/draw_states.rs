@@ -7,8 +7,8 @@ use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
 use crate::scene::{Assets, Material, MaterialLayout, MaterialValues, Mesh, Topology};
 
-/// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache lines; the assets
-/// themselves are much larger.
+/// What meshes and materials add to the draw states of objects, by slot. An object's two entries lie in two cache
+/// lines; the assets themselves are much larger.
 #[derive(Debug, Default)]
 pub(super) struct DrawStates {
     /// The meshes and materials that the tables are of; `None` before the first update.
@@ -34,7 +34,7 @@ struct MeshEntry {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct MaterialEntry {
     material: Handle<Material>,
-    /// Those of objects with triangle lists, as they are and mirrored.
+    /// Those of objects with triangle lists, unmirrored and mirrored.
     states: [DrawState; 2],
     /// Whether the arrays of materials reach to it.
     is_in_arrays: bool,
@@ -52,8 +52,8 @@ struct AssetVersion {
 }
 
 impl DrawStates {
-    /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there before, or was loaded
-    /// after its handle was made: no object can have been described with another one that is new.
+    /// Updates the tables from the assets. Returns whether a mesh or material changed, or was removed, that was there
+    /// before, or was loaded after its handle was made: no object can have been described with another one that is new.
     pub(super) fn update(&mut self, assets: &Assets, limits: &TableLimits<'_>) -> bool {
         let Assets { meshes, materials, .. } = assets;
         let version = AssetVersion {
@@ -123,7 +123,7 @@ impl DrawStates {
         self.types_revision
     }
 
-    /// The state of an object; `None` if a handle is stale, or the object cannot be drawn with such a mesh or material.
+    /// The state of an object; `None` if a handle is stale, or the object cannot be drawn with its mesh or material.
     #[inline(always)]
     pub(super) fn get(&self, mesh: Handle<Mesh>, material: Handle<Material>, scale: Vec3) -> Option<DrawState> {
         let MeshEntry { mesh: known_mesh, topology, is_drawable, .. } = (*self.meshes.get(mesh.index() as usize)?)?;
@@ -152,13 +152,14 @@ impl DrawStates {
     }
 }
 
-/// The states of objects with triangle lists and such a material, as they are and mirrored.
+/// The states of objects with triangle lists and this material, unmirrored and mirrored.
 fn states_of(material: &Material) -> [DrawState; 2] {
     let culls = if material.double_sided { [Cull::Nothing; 2] } else { [Cull::Back, Cull::Front] };
     culls.map(|cull| DrawState::new(Topology::TriangleList, cull, material.blend).with_mask(material.is_masked()))
 }
 
-/// The states that selected objects with these meshes and materials may have, each once: without subdivision, at level of detail 0, and not mirrored.
+/// The states that selected objects with these meshes and materials may have, each once: without subdivision, at level
+/// of detail 0, and not mirrored.
 pub(crate) fn possible_draw_states(selection: Selection, assets: &Assets) -> Vec<DrawState> {
     let mut states = Vec::new();
     let mut topologies = [Topology::TriangleList, Topology::TriangleStrip].to_vec();

@@ -15,8 +15,8 @@ use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, ColumnValues, Projection, SceneRef};
 
 /// Fills the commands of one pass. Mesh, material and draw state are copied from the object table, which workers only
-/// read. The depth is computed for each view, and so are the state's level of detail and, if the view is a paraboloid, its
-/// subdivision level.
+/// read. The depth is computed for each view, and so are the state's level of detail and, if the view is a paraboloid,
+/// its subdivision level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fill<'a> {
     /// The frame's objects.

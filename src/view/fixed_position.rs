@@ -60,10 +60,10 @@ pub(super) fn is_within_reach(coordinate: f64) -> bool {
 
 /// The step that is nearest to a coordinate within reach; of two, the even one.
 ///
-/// It takes a few operations that exist as vector instructions; the conversion from f64 to i64 does not. Adding [`INTEGERS`] to a
-/// number below 2⁵¹ rounds it to an integer, and the sum's bits minus those of [`INTEGERS`] are that integer. The coordinate is split
-/// into a multiple of 4 m, which are 2³² steps, and a rest of at most 2 m. The subtraction is exact: the rest is a multiple of the
-/// coordinate's last place, and no larger than the coordinate.
+/// It takes a few operations that exist as vector instructions; the conversion from f64 to i64 does not. Adding
+/// [`INTEGERS`] to a number below 2⁵¹ rounds it to an integer, and the sum's bits minus those of [`INTEGERS`] are that
+/// integer. The coordinate is split into a multiple of 4 m, which are 2³² steps, and a rest of at most 2 m. The
+/// subtraction is exact: the rest is a multiple of the coordinate's last place, and no larger than the coordinate.
 #[inline(always)]
 pub(super) fn nearest_step(coordinate: f64) -> i64 {
     const STEPS_PER_METRE: f64 = 1_073_741_824.0;

@@ -36,8 +36,9 @@ pub struct Frustum {
 /// lies between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SidePlanes {
-    /// The normals are `slope · forward ± across`, of at most unit length: a shorter one only makes tests accept more. Without a shift
-    /// it is perpendicular to `forward`, and its length is the cosine of half the field of view; 1 without perspective.
+    /// The normals are `slope · forward ± across`, of at most unit length: a shorter one only makes tests accept more.
+    /// Without a shift it is perpendicular to `forward`, and its length is the cosine of half the field of view; 1
+    /// without perspective.
     across: Vec3,
     /// Without a shift, the sine of half the field of view; 0 without perspective.
     slope: f32,
@@ -94,11 +95,11 @@ impl Frustum {
     /// the slope, the error is 7u·slope·N. The error of across·c is 5u·|across|·N. Their difference and its sum with
     /// the offset o add 2u(slope + |across|)N and u|o|. Slope and |across| are sine and cosine of one angle, so the
     /// error of the distance from a side plane is at most (9·slope + 7·|across|)uN + u|o| ≤ 11.5uN + u|o|, and that
-    /// from the near or the far plane 6uN + u|o|. With a
-    /// shift, let h and m be the tangents of half the picture and of its centre. Then slope is h ÷ √(1 + (h + |m|)²) and |across| is
-    /// √(1 + m²) ÷ √(1 + (h + |m|)²), and the sum is smaller. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the
-    /// offset, which also covers the tolerance's own rounding. Subnormal numbers lose less than the smallest normal
-    /// number, which the offset includes as well. The bound consists of magnitudes from before any cancellation.
+    /// from the near or the far plane 6uN + u|o|. With a shift, let h and m be the tangents of half the picture and of
+    /// its centre. Then slope is h ÷ √(1 + (h + |m|)²) and |across| is √(1 + m²) ÷ √(1 + (h + |m|)²), and the sum is
+    /// smaller. The tolerance is 16u(N + r) in the sphere's radius and 16u|o| in the offset, which also covers the
+    /// tolerance's own rounding. Subnormal numbers lose less than the smallest normal number, which the offset includes
+    /// as well. The bound consists of magnitudes from before any cancellation.
     ///
     /// NaN does not intersect. A centre so far away that it overflows does.
     #[inline]

@@ -9,7 +9,8 @@ use crate::scene::{Light, Projection};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuLight {
-    /// The position relative to the camera, in metres; for a directional light, the position of its shadow map's camera.
+    /// The position relative to the camera, in metres; for a directional light, the position of its shadow map's
+    /// camera.
     pub position: Vec3,
     /// 0 directional, 1 point, 2 spot, 3 hemispherical.
     pub kind: u32,

@@ -22,8 +22,9 @@ use crate::scene::{Projection, ViewKind};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GpuView {
-    /// 0, and read by no shader. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders that branch on
-    /// a member of it: it compiles them anew for each pass, and never frees what it compiled. What no shader reads is not inlined.
+    /// 0, and read by no shader. Lavapipe of Mesa 22.3 inlines the first four bytes of a uniform buffer into shaders
+    /// that branch on a member of it: it compiles them anew for each pass, and never frees what it compiled. What no
+    /// shader reads is not inlined.
     pub _unread: [f32; 4],
     /// From world axes relative to the origin below to clip space: see [`RenderView::clip_from_relative`].
     pub clip_from_relative: Mat4,

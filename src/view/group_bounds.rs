@@ -8,11 +8,11 @@ use multiversion::multiversion;
 use super::frustum::ROUNDING_TOLERANCE;
 use super::{BoundingSphere, BoundingSpheres, Frustum};
 
-/// The bounds of [`GroupBounds::GROUPS`] groups of spheres: for each an axis-aligned box around the centres, and the largest radius.
-/// A group is a word of spheres, a block, or a group of blocks.
+/// The bounds of [`GroupBounds::GROUPS`] groups of spheres: for each an axis-aligned box around the centres, and the
+/// largest radius. A group is a word of spheres, a block, or a group of blocks.
 ///
-/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms", 1976). The groups
-/// are tested together, in about the time of four spheres.
+/// They are a hierarchy of bounding volumes (Clark, "Hierarchical Geometric Models for Visible Surface Algorithms",
+/// 1976). The groups are tested together, in about the time of four spheres.
 #[derive(Clone, Debug)]
 pub(crate) struct GroupBounds {
     /// The corners of the boxes in the world, in metres.
@@ -101,8 +101,8 @@ fn filled_extent(coordinates: &Word<f64>, radii: &Word<f32>) -> [f64; 2] {
     })
 }
 
-/// One number made of all of them, in the order of a tournament: each round makes one number of two, all of which compile to a few
-/// vector instructions. `choose` must not depend on the order.
+/// One number made of all of them, in the order of a tournament: each round makes one number of two, all of which
+/// compile to a few vector instructions. `choose` must not depend on the order.
 #[inline(always)]
 fn reduce<T: Copy + Default>(numbers: &Word<T>, choose: impl Fn(T, T) -> T) -> T {
     const HALF: usize = Frustum::WORD / 2;
@@ -128,15 +128,17 @@ impl Default for GroupBounds {
 impl Frustum {
     /// How the spheres of each group lie.
     ///
-    /// A verdict other than [`Overlap::Partial`] is that of [`Frustum::intersects_spheres`] on each sphere. That computes the distance
-    /// of a centre c from a plane with an error of at most 12uN + 2u|o|, where N = ‖c‖₁ and o is the plane's offset, and compares it with
-    /// the radius r and a tolerance of 16u(N + r) and some roundings of that. Here everything is computed in f64, whose rounding
-    /// errors are negligible, and the margin of 64u(N + r) + 4u|o|, of the largest N and r in the group, exceeds all of it.
+    /// A verdict other than [`Overlap::Partial`] is that of [`Frustum::intersects_spheres`] on each sphere. That
+    /// computes the distance of a centre c from a plane with an error of at most 12uN + 2u|o|, where N = ‖c‖₁ and o is
+    /// the plane's offset, and compares it with the radius r and a tolerance of 16u(N + r) and some roundings of that.
+    /// Here everything is computed in f64, whose rounding errors are negligible, and the margin of 64u(N + r) + 4u|o|,
+    /// of the largest N and r in the group, exceeds all of it.
     pub(crate) fn overlaps(&self, bounds: &GroupBounds) -> [Overlap; GroupBounds::GROUPS] {
         overlaps(self, bounds)
     }
 
-    /// Whether a sphere of a group may lie beyond the far plane as a whole, so that [`Frustum::intersects_spheres`] does not find it.
+    /// Whether a sphere of a group may lie beyond the far plane as a whole, so that [`Frustum::intersects_spheres`]
+    /// does not find it.
     pub(crate) fn may_end_before(&self, bounds: &GroupBounds, group: usize) -> bool {
         if self.far.is_infinite() {
             return false;

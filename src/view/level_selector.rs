@@ -22,8 +22,8 @@ pub(crate) struct LevelSelector {
 /// The pixels by which a point moves in the picture for each metre of a small displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Magnification {
-    /// At a depth of 1 m on the view's axis, in pixels per metre, and the largest secant of the angle between the axis and a ray of the
-    /// picture.
+    /// At a depth of 1 m on the view's axis, in pixels per metre, and the largest secant of the angle between the axis
+    /// and a ray of the picture.
     Perspective { focal: f64, largest_secant: f64 },
     /// In pixels per metre.
     Orthographic(f64),
@@ -34,7 +34,7 @@ enum Magnification {
 /// A level becomes coarser only where this share of the error that is allowed is enough.
 const COARSENING_SHARE: f64 = 0.75;
 
-/// In shadow maps the error may be so many times as large.
+/// How many times as large the error may be in shadow maps.
 const SHADOW_SCALE: f64 = 2.0;
 
 impl LevelSelector {
@@ -60,21 +60,22 @@ impl LevelSelector {
         }
     }
 
-    /// The level of an object within a bounding sphere, whose mesh is enlarged by `scale` at most and has these errors. `before` is its
-    /// level in the frame before, or more than any level if it had none.
+    /// The level of an object within a bounding sphere, whose mesh is enlarged by `scale` at most and has these errors.
+    /// `before` is its level in the frame before, or more than any level if it had none.
     ///
-    /// It becomes finer as soon as its error exceeds what is allowed, so that no error ever does, and coarser only with some margin. So an
-    /// object that moves back and forth keeps its level.
+    /// It becomes finer as soon as its error exceeds what is allowed, so that no error ever does, and coarser only with
+    /// some margin. So an object that moves back and forth keeps its level.
     pub(super) fn level(&self, bounds: BoundingSphere, scale: f32, levels: &LevelErrors, before: u32) -> u32 {
         let largest = self.largest_error / (self.pixels_per_metre(bounds) * f64::from(scale));
         before.clamp(levels.coarsest(largest * COARSENING_SHARE), levels.coarsest(largest))
     }
 
-    /// An upper bound of how many pixels a point within a sphere moves in the picture, for each metre that it moves within the sphere.
+    /// An upper bound of how many pixels a point within a sphere moves in the picture, for each metre that it moves
+    /// within the sphere.
     ///
-    /// In perspective, at a depth of z and an angle of φ from the axis, moving by a small length moves a point's image by at most
-    /// focal ÷ z × sec φ times as much: the direction that turns the ray away from the axis is the fastest. A paraboloid enlarges by half
-    /// of 1 ÷ cos² (φ ÷ 2) in all directions, which is 1 at the rim.
+    /// In perspective, at a depth of z and an angle of φ from the axis, moving by a small length moves a point's image
+    /// by at most focal ÷ z × sec φ times as much: the direction that turns the ray away from the axis is the fastest.
+    /// A paraboloid enlarges by half of 1 ÷ cos² (φ ÷ 2) in all directions, which is 1 at the rim.
     fn pixels_per_metre(&self, BoundingSphere { center, radius }: BoundingSphere) -> f64 {
         let (offset, radius) = (center - self.eye, f64::from(radius));
         match self.magnification {
@@ -134,7 +135,8 @@ mod tests {
         }
     }
 
-    /// Whether a corner of the picture sees a clip plane, which its camera is behind, beyond the near plane or not at all.
+    /// Whether a corner of the picture sees a clip plane, which its camera is behind, beyond the near plane or not at
+    /// all.
     fn reaches_beyond_near_plane(camera: &Camera, plane: &ClipPlane) -> bool {
         let Projection::Perspective { field_of_view } = camera.projection else { return false };
         let half = (f64::from(field_of_view) / 2.0).tan();
@@ -145,8 +147,8 @@ mod tests {
         corners.as_flattened().iter().any(|corner| plane.distance(camera.position + orientation * *corner) < 0.0)
     }
 
-    /// Where a point is in the picture, in pixels from its upper left corner, by the definition of the projections; `None` if it is not in
-    /// the picture, or nearer than the near plane.
+    /// Where a point is in the picture, in pixels from its upper left corner, by the definition of the projections;
+    /// `None` if it is not in the picture, or nearer than the near plane.
     fn pixel(camera: &Camera, point: DVec3) -> Option<DVec2> {
         let local = camera.orientation.as_dquat().normalize().inverse() * (point - camera.position);
         let size = DVec2::from(camera.size.map(f64::from));
@@ -220,7 +222,8 @@ mod tests {
             }
         }
 
-        /// A disc across the view's axis moves by as much as its level says, so the next level would move it by too much.
+        /// A disc across the view's axis moves by as much as its level says, so the next level would move it by too
+        /// much.
         #[test]
         fn the_level_is_the_coarsest_that_is_allowed(
             camera in any_camera(), distance in 1.0..300.0_f64, pixels in 0.1..20.0_f32,

@@ -9,13 +9,13 @@ use crate::scene::{Light, LightKind, ViewKind};
 
 /// The lights that reach one view, grouped by class: each class is one instanced draw.
 ///
-/// If a light of the frame has several shadow maps, one more [`GpuLight`] follows for each layer of the maps: the light as that
-/// map shows it. So a light with any number of maps is as small as one with a single map.
+/// If a light of the frame has several shadow maps, one more [`GpuLight`] follows for each layer of the maps: the light
+/// as that map shows it. So a light with any number of maps is as small as one with a single map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightTable {
     gpu_lights: Vec<GpuLight>,
-    /// For each layer of the shadow maps, if a light has several: the index of the light among the valid ones and of the view;
-    /// `None` for a shadow camera of the engine's own.
+    /// For each layer of the shadow maps, if a light has several: the index of the light among the valid ones and of
+    /// the view; `None` for a shadow camera of the engine's own.
     layers: Vec<Option<(usize, usize)>>,
     /// The class and the index among the frame's valid lights of each light that reaches the view, ordered by class.
     reaching: Vec<(usize, usize)>,
@@ -56,8 +56,8 @@ impl LightClass {
 
 impl LightTable {
     /// Replaces the table by those of `lights`, the frame's valid lights, that may reach what `view` sees. Within a
-    /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their own,
-    /// and the shadow maps that `views` draw of them. The table of a shadow map is empty.
+    /// class, lights keep the order of the scene. If `shadows` is true, lights that cast shadows have classes of their
+    /// own, and the shadow maps that `views` draw of them. The table of a shadow map is empty.
     pub fn fill(&mut self, view: &RenderView, lights: &[Light], views: &[RenderView], shadows: bool) {
         self.fill_within(view, (lights, &[]), views, shadows, (usize::MAX, &mut Vec::new()));
     }
@@ -145,14 +145,14 @@ impl LightTable {
         self.reaching.len()
     }
 
-    /// For each light: its index among the frame's valid lights, and the index of the view that draws its first shadow map,
-    /// if any.
+    /// For each light: its index among the frame's valid lights, and the index of the view that draws its first shadow
+    /// map, if any.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         self.reaching.iter().map(|&(_, light)| (light, self.shadow_views.get(light).copied().flatten()))
     }
 
-    /// For each of [`LightTable::gpu_lights`] by layer: the light's index among the frame's valid lights and that of the view that
-    /// draws the layer; `None` for a shadow camera of the engine's own.
+    /// For each of [`LightTable::gpu_lights`] by layer: the light's index among the frame's valid lights and that of
+    /// the view that draws the layer; `None` for a shadow camera of the engine's own.
     pub fn layer_sources(&self) -> &[Option<(usize, usize)>] {
         &self.layers
     }

@@ -47,8 +47,8 @@ impl ObjectBlock {
     /// The number of words in a block.
     pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
 
-    /// Replaces eight objects, from `object` of the scene on, by their descriptions. Returns a mask of those whose mesh, material or
-    /// state changed, and with them perhaps their bin.
+    /// Replaces eight objects, from `object` of the scene on, by their descriptions. Returns a mask of those whose
+    /// mesh, material or state changed, and with them perhaps their bin.
     ///
     /// # Panics
     /// If not all of them are in the same block.
@@ -83,8 +83,8 @@ impl ObjectBlock {
         (0..LANES).fold(0, set)
     }
 
-    /// Replaces an object of the scene by its description in a packet. Returns whether its mesh, material or state changed. If it
-    /// is invalid, no view sees it.
+    /// Replaces an object of the scene by its description in a packet. Returns whether its mesh, material or state
+    /// changed. If it is invalid, no view sees it.
     #[inline(always)]
     pub(super) fn set_object(
         &mut self,
@@ -164,9 +164,9 @@ impl ObjectBlock {
         self.bins = [0; Self::SIZE];
     }
 
-    /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see [`ObjectBlock::visible`]. Calls
-    /// `put` with each and a mask of the objects that a view may see. Words that lie outside or inside as a whole have the same masks
-    /// as if their objects were tested.
+    /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see
+    /// [`ObjectBlock::visible`]. Calls `put` with each and a mask of the objects that a view may see. Words that lie
+    /// outside or inside as a whole have the same masks as if their objects were tested.
     ///
     /// # Panics
     /// If `words` are not within the block.
@@ -196,8 +196,8 @@ impl ObjectBlock {
         self.drawable[word]
     }
 
-    /// Tests objects of a word against a frustum: see [`ObjectBlock::visible`]. The mask that it returns is among `tested`; bit 0 of
-    /// both is the word's first object.
+    /// Tests objects of a word against a frustum: see [`ObjectBlock::visible`]. The mask that it returns is among
+    /// `tested`; bit 0 of both is the word's first object.
     pub(crate) fn visible_among(&self, frustum: &Frustum, volume: CullingVolume, word: usize, tested: u64) -> u64 {
         let first = word * Frustum::WORD;
         if tested.count_ones() as usize >= WORD_TEST_THRESHOLD {
@@ -207,8 +207,8 @@ impl ObjectBlock {
     }
 
     /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
-    /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no rejected
-    /// one; it may contain a few invisible ones.
+    /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no
+    /// rejected one; it may contain a few invisible ones.
     ///
     /// Spheres are tested first, whatever the volume: they decide most objects to be entirely outside or inside. Only
     /// the others' boxes are tested.

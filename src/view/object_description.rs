@@ -257,8 +257,9 @@ fn rotated(orientations: &[Lanes<f32>; 4], scales: &[Lanes<f32>; 3], vectors: &[
     rotated
 }
 
-/// The bounding spheres of objects in the world: centres and radii. The radii include an upper bound of the distance in metres
-/// between an object's computed centre and where devices draw it. If a sphere is not finite, its radius is NaN or infinite.
+/// The bounding spheres of objects in the world: centres and radii. The radii include an upper bound of the distance in
+/// metres between an object's computed centre and where devices draw it. If a sphere is not finite, its radius is NaN
+/// or infinite.
 #[inline(always)]
 fn bounding_spheres(inputs: &ObjectInputs, offsets: &[Lanes<f32>; 3]) -> ([Lanes<f64>; 3], Lanes<f32>) {
     let ObjectInputs { positions, scales, radii, .. } = inputs;
@@ -276,8 +277,8 @@ fn bounding_spheres(inputs: &ObjectInputs, offsets: &[Lanes<f32>; 3]) -> ([Lanes
     (centers, world_radii)
 }
 
-/// An upper bound of the distance in metres between an object's computed centre and where devices draw it. `offset` is the sum of
-/// the absolute coordinates of the rotated offset of the centre from the object's position.
+/// An upper bound of the distance in metres between an object's computed centre and where devices draw it. `offset` is
+/// the sum of the absolute coordinates of the rotated offset of the centre from the object's position.
 ///
 /// The offset is rotated in f32: at most some 40 roundings of 2⁻²⁴ (thirteen of the orientation's length and direction
 /// and of the scaled centre, 24 of the products and sums), and the sum of its coordinates is no less than its length;

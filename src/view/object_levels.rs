@@ -10,11 +10,12 @@ use super::{ObjectTable, VisibleSet, set_bits};
 use crate::command::Version;
 use crate::scene::SceneRef;
 
-/// The level of detail of each object that a view sees. It is kept from frame to frame, because a level depends on the one before.
+/// The level of detail of each object that a view sees. It is kept from frame to frame, because a level depends on the
+/// one before.
 #[derive(Debug, Default)]
 pub(crate) struct ObjectLevels {
-    /// By the index of an object. An object that the view does not see keeps the level that it had. When an object is removed,
-    /// the last object takes its index and its level.
+    /// By the index of an object. An object that the view does not see keeps the level that it had. When an object is
+    /// removed, the last object takes its index and its level.
     levels: Vec<AtomicU8>,
     /// Whether a level changed since the latest [`ObjectLevels::complete`].
     has_changed: AtomicBool,
@@ -25,12 +26,13 @@ pub(crate) struct ObjectLevels {
 const UNCHOSEN: u8 = u8::MAX;
 
 impl ObjectLevels {
-    /// Makes room for so many objects.
+    /// Makes room for this number of objects.
     pub(crate) fn resize(&mut self, objects: usize) {
         self.levels.resize_with(objects, || AtomicU8::new(UNCHOSEN));
     }
 
-    /// Chooses the levels of the `visible` objects of a word. Jobs that choose at the same time must have different words.
+    /// Chooses the levels of the `visible` objects of a word. Jobs that choose at the same time must have different
+    /// words.
     pub(crate) fn choose(
         &self,
         selector: &LevelSelector,
@@ -58,7 +60,8 @@ impl ObjectLevels {
         }
     }
 
-    /// Call it once, after all levels have been chosen. If they differ from those before, they get `version`, which no others have.
+    /// Call it once, after all levels have been chosen. If they differ from those before, they get `version`, which no
+    /// others have.
     pub(crate) fn complete(&self, version: Version) {
         if self.has_changed.swap(false, Ordering::Relaxed) {
             *self.version.write() = version;

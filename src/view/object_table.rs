@@ -19,10 +19,11 @@ use crate::leaked_guards::unlock;
 use crate::quality::CullingVolume;
 use crate::scene::{Changes, MaterialLayout, SceneRef};
 
-/// A scene's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are rejected.
+/// A scene's objects: their GPU layout, their bounds, and how they are drawn. Objects that cannot be drawn are
+/// rejected.
 ///
-/// The table is kept from frame to frame, and a frame describes the objects that changed. [`ObjectTable::epoch`] counts the
-/// frames with changes; what else is kept from frame to frame compares epochs.
+/// The table is kept from frame to frame, and a frame describes the objects that changed. [`ObjectTable::epoch`] counts
+/// the frames with changes; what else is kept from frame to frame compares epochs.
 ///
 /// Objects are in blocks, each with its own lock: jobs that fill different blocks never wait for each other, and one
 /// uncontended lock per block costs a fraction of a nanosecond per object.
@@ -84,13 +85,14 @@ impl ObjectTable {
     /// Objects in a block.
     pub const BLOCK_SIZE: usize = ObjectBlock::SIZE;
 
-    /// Sets the bounding volume that culling tests, from the next [`ObjectTable::begin_frame`] on. The default is spheres.
+    /// Sets the bounding volume that culling tests, from the next [`ObjectTable::begin_frame`] on. The default is
+    /// spheres.
     pub fn configure(&mut self, volume: CullingVolume) {
         self.culling = volume;
     }
 
-    /// Makes room for a scene's objects, and finds out which of them have to be described, those that changed or all, and which meshes
-    /// they use.
+    /// Makes room for a scene's objects, and finds out which of them have to be described, those that changed or all,
+    /// and which meshes they use.
     pub fn begin_frame(&mut self, scene: &SceneRef<'_>) {
         self.begin_frame_within(scene, &TableLimits::NONE);
     }
@@ -166,7 +168,8 @@ impl ObjectTable {
         self.draw_states.types_revision()
     }
 
-    /// Ends a frame that succeeded: the next one describes the objects that change until then. Without this call it describes all.
+    /// Ends a frame that succeeded: the next one describes the objects that change until then. Without this call it
+    /// describes all.
     pub fn end_frame(&mut self) {
         self.is_current = true;
     }
@@ -199,7 +202,8 @@ impl ObjectTable {
         self.changed.are_all()
     }
 
-    /// Describes the objects that changed in some blocks, which are counted as [`ObjectTable::changed_block_count`] counts them.
+    /// Describes the objects that changed in some blocks, which are counted as [`ObjectTable::changed_block_count`]
+    /// counts them.
     pub fn describe(&self, scene: &SceneRef<'_>, blocks: Range<usize>) {
         let Self { draw_states, bins, epoch, .. } = self;
         let inputs = DescriptionInputs { scene, draw_states, bins, epoch: *epoch };
@@ -222,7 +226,8 @@ impl ObjectTable {
         }
     }
 
-    /// Completes the table when all changed objects are described: orders new bins, and counts the objects that are rejected.
+    /// Completes the table when all changed objects are described: orders new bins, and counts the objects that are
+    /// rejected.
     pub fn finish(&self) {
         self.bins.write().sort();
         self.rejections.count_range(RejectionReason::ObjectLimit, self.length..self.scene_length);
@@ -238,11 +243,11 @@ impl ObjectTable {
         }
     }
 
-    /// Orders the objects by bin, unless they are, for passes that use [`ObjectTable::objects_by_bin`]. Call it once a frame, when the
-    /// table is complete.
+    /// Orders the objects by bin, unless they are, for passes that use [`ObjectTable::objects_by_bin`]. Call it once a
+    /// frame, when the table is complete.
     ///
-    /// It waits for a frame with the same inputs as the one before: where an object is drawn in another way in every frame, or
-    /// their number changes, ordering all of them each time would cost more than it saves.
+    /// It waits for a frame with the same inputs as the one before: where an object is drawn in another way in every
+    /// frame, or their number changes, ordering all of them each time would cost more than it saves.
     pub(crate) fn order_by_bin(&self) {
         let by_bin = &mut *self.by_bin.write();
         let inputs = Some(self.bin_inputs());
@@ -259,7 +264,8 @@ impl ObjectTable {
         by_bin.made_for = inputs;
     }
 
-    /// All objects ordered by bin, those that no view sees among them; `None` in a frame for which they are not ordered.
+    /// All objects ordered by bin, those that no view sees among them; `None` in a frame for which they are not
+    /// ordered.
     pub(crate) fn objects_by_bin(&self) -> Option<MappedRwLockReadGuard<'_, BinnedSegment>> {
         let by_bin = self.by_bin.read();
         let is_current = by_bin.made_for == Some(self.bin_inputs());
@@ -275,7 +281,8 @@ impl ObjectTable {
         self.changed.contains(object)
     }
 
-    /// An object that changed although it was not reported; `None` if there is none. Call it when the table is complete.
+    /// An object that changed although it was not reported; `None` if there is none. Call it when the table is
+    /// complete.
     pub(crate) fn unreported_change(&self, scene: &SceneRef<'_>) -> Option<usize> {
         let is_as_before = |&object: &usize| {
             let before = self.block(object / Self::BLOCK_SIZE).description(object % Self::BLOCK_SIZE);
@@ -326,8 +333,8 @@ impl ObjectTable {
         block_ranges(objects, Self::BLOCK_SIZE)
     }
 
-    /// Calls `visit` with ranges of objects that contain all objects of some blocks that changed after an epoch. The ranges ascend;
-    /// between two of them are at least `gap` objects.
+    /// Calls `visit` with ranges of objects that contain all objects of some blocks that changed after an epoch. The
+    /// ranges ascend; between two of them are at least `gap` objects.
     pub fn for_each_change(&self, blocks: Range<usize>, epoch: u64, gap: usize, visit: impl FnMut(Range<usize>)) {
         let mut ranges = RangeMerger { merged: 0..0, gap, visit };
         if epoch + 1 == self.epoch && self.changed.word_count() > 0 && !self.all_changed() {

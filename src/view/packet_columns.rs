@@ -22,7 +22,8 @@ pub(super) struct PacketColumns<'a> {
     pub(super) materials: &'a Lanes<Handle<Material>>,
 }
 
-/// The entries of up to eight objects that do not lie side by side in the columns. Unused lanes repeat the first object.
+/// The entries of up to eight objects that do not lie side by side in the columns. Unused lanes repeat the first
+/// object.
 pub(super) struct GatheredColumns {
     positions: Lanes<DVec3>,
     orientations: Lanes<Quat>,

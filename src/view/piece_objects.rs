@@ -11,8 +11,8 @@ pub(crate) type ObjectWord = (usize, u64);
 
 const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / u64::BITS as usize;
 
-/// Collects the objects of a set that need no order and look the same in every view: drawable opaque ones with meshes that `is_recordable`. Returns
-/// their bounds, those of the first group.
+/// Collects the objects of a set that need no order and look the same in every view: drawable opaque ones with meshes
+/// that `is_recordable`. Returns their bounds, those of the first group.
 pub(crate) fn recordable_objects(
     table: &ObjectTable,
     set: &ObjectSet,

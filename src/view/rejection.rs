@@ -134,8 +134,8 @@ pub enum RejectionReason {
     /// A texture is wider or higher than [`Texture::MAX_DETAIL`](crate::scene::Texture::MAX_DETAIL), and drawn with
     /// less detail than it was given with.
     ReducedTexture,
-    /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not have. The other
-    /// objects are drawn as it says.
+    /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not
+    /// have. The other objects are drawn as it says.
     UnknownObject,
     /// A blended object is added in half floats, because the device does not blend floats, although
     /// [`Quality::radiance_sum`](crate::quality::Quality::radiance_sum) asks for them. It is drawn nevertheless, with

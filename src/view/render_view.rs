@@ -21,8 +21,8 @@ pub struct RenderView {
     pub main_view: Option<usize>,
     /// The layer that it draws of the targets that all views of its kind share.
     pub layer: u32,
-    /// How many frames before this one the view was drawn: 0 if this frame draws it. Camera, frustum and light are those that it was drawn
-    /// with.
+    /// How many frames before this one the view was drawn: 0 if this frame draws it. Camera, frustum and light are
+    /// those that it was drawn with.
     pub age: u32,
 }
 
@@ -49,8 +49,8 @@ impl RenderView {
         self.camera.kind
     }
 
-    /// Whether its targets hold what an earlier frame drew. Then no render process draws in it, but others read its targets: see
-    /// [`Redraw`](crate::scene::Redraw).
+    /// Whether its targets hold what an earlier frame drew. Then no render process draws in it, but others read its
+    /// targets: see [`Redraw`](crate::scene::Redraw).
     pub fn is_cached(&self) -> bool {
         self.age > 0
     }
@@ -163,9 +163,9 @@ impl RenderView {
     }
 
     /// The picture's axes in the world: right and up, each as long as half the picture (in perspective, at a distance
-    /// of 1), and forward, which in perspective is the ray of the picture's centre, a [shift](Camera::shift) from the view direction.
-    /// The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in perspective; otherwise it
-    /// starts at x·right + y·up and has the direction forward.
+    /// of 1), and forward, which in perspective is the ray of the picture's centre, a [shift](Camera::shift) from the
+    /// view direction. The ray of a pixel at (x, y) in clip space has the direction x·right + y·up + forward in
+    /// perspective; otherwise it starts at x·right + y·up and has the direction forward.
     pub fn picture_axes(&self) -> [Vec3; 3] {
         let half = match self.camera.projection {
             Projection::Perspective { field_of_view } => (field_of_view * 0.5).tan(),
@@ -189,8 +189,8 @@ const MAX_DEPTH_MARGIN: f64 = 0.5;
 /// Half a unit in the last place of the f32 from 0.5 to 1.
 const UNIT_ROUNDOFF: f64 = 1.0 / (1_u32 << 24) as f64;
 
-/// Where no ray of the picture comes closer to the clip plane's normal than this, nothing in front of the plane is visible, and the row
-/// stays finite.
+/// Where no ray of the picture comes closer to the clip plane's normal than this, nothing in front of the plane is
+/// visible, and the row stays finite.
 const MIN_OBLIQUE_SLOPE: f64 = 1e-6;
 
 #[cfg(test)]

@@ -92,13 +92,14 @@ impl ShadowMaps {
     ///
     /// # The error of a point light's maps
     ///
-    /// A perspective map keeps straight edges straight, so a shadow's edge in a map is off by what rasterization rounds:
-    /// corners are snapped to 1/256 of a pixel, and a pixel is in shadow as a whole, by its centre, at most half a
-    /// pixel from the edge along each axis. The filter turns that into a fade. A position whose distance from the edge
-    /// is more than `filter` + 1 pixels along each axis of the face reads no pixel beyond the edge, and is exact. Across
-    /// the edge of the cube nothing is added: each face is wider than 90° by the `filter` + 1 pixels that are read, so
-    /// no filter leaves its map, and at the edge of the cube the pixels of both faces have the same width. This holds for maps of at least
-    /// 8/3 · (`filter` + 1) pixels: a smaller one has no room for so many pixels beyond the edge.
+    /// A perspective map keeps straight edges straight, so a shadow's edge in a map is off by what rasterization
+    /// rounds: corners are snapped to 1/256 of a pixel, and a pixel is in shadow as a whole, by its centre, at most
+    /// half a pixel from the edge along each axis. The filter turns that into a fade. A position whose distance from
+    /// the edge is more than `filter` + 1 pixels along each axis of the face reads no pixel beyond the edge, and is
+    /// exact. Across the edge of the cube nothing is added: each face is wider than 90° by the `filter` + 1 pixels that
+    /// are read, so no filter leaves its map, and at the edge of the cube the pixels of both faces have the same width.
+    /// This holds for maps of at least 8/3 · (`filter` + 1) pixels: a smaller one has no room for the pixels beyond the
+    /// edge.
     pub fn cameras(&self, name: &str, light: &Light, cameras: &[Camera]) -> Vec<Camera> {
         if !light.casts_shadow() || self.problem().is_some() {
             return Vec::new();
@@ -187,8 +188,9 @@ impl ShadowMaps {
         let spheres = (0..self.cascades).map(|cascade| {
             let slice = cascade_slice([main.near, far], self.split_lambda, cascade, self.cascades);
             let (center, radius) = visible_sphere(main, slice)?;
-            // Snapping moves the map by less than a pixel, so it is a pixel larger on every side. With several cascades it is also
-            // larger by what the filter reads, so that no point of the slice falls through to the coarser map.
+            // Snapping moves the map by less than a pixel, so it is a pixel larger on every side. With several cascades
+            // it is also larger by what the filter reads, so that no point of the slice falls through to the coarser
+            // map.
             let radius = match self.cascades {
                 1 => radius * (1.0 + 4.0 / f64::from(self.side)),
                 _ => self.extent_with_margin(radius, self.filter + 2),

@@ -5,9 +5,10 @@ use glam::{DVec3, Vec3};
 use super::RenderView;
 use crate::scene::SceneRef;
 
-/// The subdivision level of an object that a paraboloid view draws at a level of detail: how often its edges are halved until none is seen under
-/// more than `widest_angle` radians; see [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge).
-/// `None` for an object that lies entirely behind the camera and so casts no shadow.
+/// The subdivision level of an object that a paraboloid view draws at a level of detail: how often its edges are halved
+/// until none is seen under more than `widest_angle` radians; see
+/// [`ShadowQuality::widest_edge`](crate::quality::ShadowQuality::widest_edge). `None` for an object that lies entirely
+/// behind the camera and so casts no shadow.
 ///
 /// The distance is that of the nearest point of the mesh's box, so instances at one distance have one level. Where the
 /// box is very near, or contains the camera, the distance of every triangle is computed instead. The level may exceed

@@ -23,8 +23,8 @@ impl TableLimits<'_> {
     pub(crate) const NONE: TableLimits<'static> =
         TableLimits { objects: Self::MAX_OBJECTS, material_bytes: u64::MAX, can_draw: &|_| true, revision: 0 };
 
-    /// Whether arrays reach to the material in a slot, which has `value_bytes` bytes of the engine's own values. In every
-    /// backend a material takes at most as much as an object.
+    /// Whether arrays reach to the material in a slot, which has `value_bytes` bytes of the engine's own values. In
+    /// every backend a material takes at most as much as an object.
     pub(crate) fn reach_material(&self, slot: usize, value_bytes: usize) -> bool {
         let stride = value_bytes.max(size_of::<GpuObject>()) as u64;
         (slot as u64 + 1).checked_mul(stride).is_some_and(|end| end <= self.material_bytes)

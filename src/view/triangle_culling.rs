@@ -19,8 +19,8 @@ impl RenderView {
     /// is far larger than its distance, is culled only if all its corners are beyond one side of the picture. Positions
     /// are those of camera-relative transforms.
     ///
-    /// An object that cannot be drawn has no triangles, and one whose mesh is
-    /// [in the engine's own buffers](crate::scene::Mesh::from_buffers) none that are known here: then `remaining` stays as it is, although
+    /// An object that cannot be drawn has no triangles, and one whose mesh is [in the engine's own
+    /// buffers](crate::scene::Mesh::from_buffers) none that are known here: then `remaining` does not change, although
     /// the object may be visible.
     ///
     /// # Panics
@@ -33,8 +33,8 @@ impl RenderView {
         )
     }
 
-    /// Whether a matrix that is known alone decides what is visible of a triangle. That is not so for a paraboloid, nor for a shadow
-    /// map whose depth is clamped at the near plane, nor for a camera that may still be replaced.
+    /// Whether a matrix that is known alone decides what is visible of a triangle. That is not so for a paraboloid, nor
+    /// for a shadow map whose depth is clamped at the near plane, nor for a camera that may still be replaced.
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
             Projection::Perspective { .. } => true,
@@ -106,8 +106,8 @@ impl RenderView {
     }
 }
 
-/// A bound of a device's position error of a vertex, in metres. `origin` is its object's position relative to the camera, and `local` its own
-/// relative to the object's.
+/// A bound of a device's position error of a vertex, in metres. `origin` is its object's position relative to the
+/// camera, and `local` its own relative to the object's.
 fn position_error(origin: DVec3, local: DVec3) -> f64 {
     origin.length() * ERROR_PER_DISTANCE + local.length() * ERROR_PER_SIZE + FIXED_POINT_ERROR
 }

@@ -6,8 +6,9 @@ use super::set_bits;
 use crate::handle::Handle;
 use crate::scene::{Assets, Mesh, SceneRef};
 
-/// The meshes that an object of the scene has, or had in an earlier frame: what a backend uploads. A mesh that no object has any more
-/// stays among them until it is removed from the assets, so that an object that comes back finds it on the device.
+/// The meshes that an object of the scene has, or had in an earlier frame: what a backend uploads. A mesh that no
+/// object has any more stays among them until it is removed from the assets, so that an object that comes back finds it
+/// on the device.
 ///
 /// A frame looks at the objects that changed, and at none while all meshes of the assets are used.
 #[derive(Debug, Default)]
@@ -16,7 +17,8 @@ pub struct UsedMeshes {
     version: Option<(u64, u64, u64)>,
     /// By slot: each mesh of the assets that can be drawn.
     meshes: Vec<Option<Handle<Mesh>>>,
-    /// By slot: whether there is a mesh that is not used. A frame in which all objects changed looks here for each of them.
+    /// By slot: whether there is a mesh that is not used. A frame in which all objects changed looks here for each of
+    /// them.
     is_unused: Vec<bool>,
     /// The number of meshes that are not used.
     unused: usize,
@@ -48,8 +50,8 @@ impl UsedMeshes {
         self.revision
     }
 
-    /// Adds the meshes of the objects that changed. Those of the others are among the used ones already: an object that has not changed
-    /// cannot have a mesh that is new.
+    /// Adds the meshes of the objects that changed. Those of the others are among the used ones already: an object that
+    /// has not changed cannot have a mesh that is new.
     pub(super) fn update(&mut self, scene: &SceneRef<'_>, changed: &ChangedObjects, draw_states: &DrawStates) {
         self.update_assets(scene.assets, draw_states);
         let unused_before = self.unused;

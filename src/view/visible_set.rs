@@ -9,11 +9,11 @@ use parking_lot::RwLock;
 
 use crate::command::Version;
 
-/// The objects that a view sees: a bit for each object, in words of 64, and a prefix sum over the words that are not empty. A view
-/// that sees few of many objects pays for the few.
+/// The objects that a view sees: a bit for each object, in words of 64, and a prefix sum over the words that are not
+/// empty. A view that sees few of many objects pays for the few.
 ///
-/// Frustum culling sets bits and occlusion culling clears them. Any worker may do either for any object; the result does
-/// not depend on which. So the compacted order is always that of the objects.
+/// Frustum culling sets bits and occlusion culling clears them. Any worker may do either for any object; the result
+/// does not depend on which. So the compacted order is always that of the objects.
 ///
 /// A set may be kept for the next frame, which tests only the objects that changed.
 #[derive(Debug, Default)]
@@ -67,8 +67,8 @@ impl VisibleSet {
         self.compacted.get_mut().total = 0;
     }
 
-    /// Replaces the objects of a word that are in a mask: those in `visible` are visible, the others are not. Objects replaced at the
-    /// same time must differ, but may share words.
+    /// Replaces the objects of a word that are in a mask: those in `visible` are visible, the others are not. Objects
+    /// replaced at the same time must differ, but may share words.
     pub fn replace(&self, word: usize, mask: u64, visible: u64) {
         // Relaxed, here and below: jobs that read the bits depend on this job.
         let bits = visible & mask;
@@ -121,8 +121,8 @@ impl VisibleSet {
         word.load(Ordering::Relaxed) >> (object % Self::OBJECTS_PER_WORD) & 1 == 1
     }
 
-    /// Computes the prefix sum. Call it once, after all objects have been tested and hidden ones removed. If the set differs from the
-    /// one that was compacted before, it gets `version`, which no other set has.
+    /// Computes the prefix sum. Call it once, after all objects have been tested and hidden ones removed. If the set
+    /// differs from the one that was compacted before, it gets `version`, which no other set has.
     pub fn compact(&self, version: Version) {
         let Compacted { words, total, version: current } = &mut *self.compacted.write();
         let (mut length, mut rank, mut differs) = (0, 0, false);
@@ -185,8 +185,8 @@ impl VisibleSet {
     }
 
     /// Calls `visit(rank, word, bits)` for each word, in order, with the visible objects whose rank (index among the
-    /// visible objects) is in `ranks`. Bit `b` is object `word × OBJECTS_PER_WORD + b`; the lowest set bit has the rank `rank`.
-    /// Ranks beyond the last are ignored.
+    /// visible objects) is in `ranks`. Bit `b` is object `word × OBJECTS_PER_WORD + b`; the lowest set bit has the rank
+    /// `rank`. Ranks beyond the last are ignored.
     pub fn visit(&self, ranks: Range<usize>, mut visit: impl FnMut(usize, usize, u64)) {
         let compacted = self.compacted.read();
         let words = compacted.filled_words();

@@ -1,5 +1,5 @@
-//! Scenes in which nothing uses a feature, each with a renderer that has the feature and one that does not: a frame of both should cost the
-//! same.
+//! Scenes in which nothing uses a feature, each with a renderer that has the feature and one that does not: a frame of
+//! both should cost the same.
 
 use std::sync::Arc;
 

@@ -12,7 +12,8 @@ pub fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     device_without(wgpu::Features::empty())
 }
 
-/// A device on the machine's best adapter. A program's cases share two: all calls on one thread get the same, and the first one opens it.
+/// A device on the machine's best adapter. A program's cases share two: all calls on one thread get the same, and the
+/// first one opens it.
 ///
 /// # Errors
 /// The error of the call that tried to open it.
@@ -20,7 +21,8 @@ pub fn shared_device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
     Ok(shared_by_this_thread().device.get_or_init(|| device().map_err(|error| error.to_string())).clone()?)
 }
 
-/// A backend on the [`shared_device`]. Each device compiles a pipeline once, for all its cases: that takes longer than most of them draw.
+/// A backend on the [`shared_device`]. Each device compiles a pipeline once, for all its cases: that takes longer than
+/// most of them draw.
 pub fn shared_backend() -> Result<WgpuBackend, Box<dyn Error>> {
     let (device, queue) = shared_device()?;
     Ok(shared_by_this_thread().library.get_or_init(|| PipelineLibrary::new(device, queue)).backend()?)
@@ -32,8 +34,8 @@ struct SharedDevice {
     library: OnceLock<PipelineLibrary>,
 }
 
-/// A software driver has one thread for each device's queue, so cases that share a device wait for each other. A third device would compile all
-/// pipelines once more.
+/// A software driver has one thread for each device's queue, so cases that share a device wait for each other. A third
+/// device would compile all pipelines once more.
 static SHARED_DEVICES: [SharedDevice; 2] =
     [const { SharedDevice { device: OnceLock::new(), library: OnceLock::new() } }; 2];
 

@@ -228,8 +228,8 @@ impl ChangingWorld {
         self.tints.push(random.vector(0.0, 1.0).extend(1.0).to_array());
     }
 
-    /// Reports changes in one of the possible ways: repeated, in any order, with more objects than changed, and with objects that
-    /// do not exist.
+    /// Reports changes in one of the possible ways: repeated, in any order, with more objects than changed, and with
+    /// objects that do not exist.
     fn report(&mut self, mut changed: Vec<u32>) -> Report {
         let count = self.positions.len() as u32;
         match self.random.below(5) {

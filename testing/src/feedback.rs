@@ -11,7 +11,8 @@ use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{Camera, Redraw, Scene, ViewKind};
 use drawloom::{RendererBuilder, glam::DVec3};
 
-/// Draws a gradient, half of what the view `left` held in the frame before, and a quarter of what the view `right` held, into `light`.
+/// Draws a gradient, half of what the view `left` held in the frame before, and a quarter of what the view `right`
+/// held, into `light`.
 #[derive(Clone, Copy, Debug)]
 pub struct Feedback;
 

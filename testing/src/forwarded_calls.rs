@@ -1,6 +1,6 @@
 //! What backends that wrap another one have in common.
 
-/// The methods of [`Backend`](drawloom::backend::Backend) that a wrapper of the backend `inner` passes on as they are.
+/// The methods of [`Backend`](drawloom::backend::Backend) that a wrapper of the backend `inner` forwards unchanged.
 macro_rules! forward_unchanged_calls {
     () => {
         fn uploaded_bytes(&self) -> u64 {
@@ -84,7 +84,7 @@ macro_rules! forward_limits {
     };
 }
 
-/// The methods that prepare, record and finish a frame, where a wrapper passes them on as they are, too.
+/// The methods that prepare, record and finish a frame, where a wrapper forwards them unchanged, too.
 macro_rules! forward_recording_calls {
     () => {
         fn prepare_pipelines(

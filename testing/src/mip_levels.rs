@@ -63,7 +63,8 @@ pub struct DrawnFrame {
     pub outputs: [Vec<[f64; 4]>; 3],
 }
 
-/// Draws frames with `draw` and compares them with the oracle. Filters between pixels and levels may err by `filter_error`.
+/// Draws frames with `draw` and compares them with the oracle. Filters between pixels and levels may err by
+/// `filter_error`.
 ///
 /// # Errors
 /// If a frame cannot be drawn, or differs.

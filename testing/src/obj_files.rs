@@ -1,4 +1,5 @@
-//! OBJ files that the project generates: an interior, a hall of many objects, and small ones that other loaders stumble over.
+//! OBJ files that the project generates: an interior, a hall of many objects, and small ones that other loaders stumble
+//! over.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -28,8 +29,8 @@ impl ObjFile {
     }
 }
 
-/// A room of 4 × 3 × 4 m around x = z = 0, open towards +Z: a red wall on the left, a green one on the right, a lamp of 1 × 0.8 m in the
-/// ceiling, a block and a slab.
+/// A room of 4 × 3 × 4 m around x = z = 0, open towards +Z: a red wall on the left, a green one on the right, a lamp of
+/// 1 × 0.8 m in the ceiling, a block and a slab.
 pub fn interior() -> ObjFile {
     let mut writer = Writer::new();
     let corner = |x: f64, y: f64, z: f64| DVec3::new(2.0 * x, 3.0 * y, 2.0 * z);
@@ -55,8 +56,8 @@ pub fn interior() -> ObjFile {
     writer.finish(library)
 }
 
-/// A nave along x, 60 × 10 × 12 m: two rows of columns, arches between them, and a vault in segments. The texture of its columns is
-/// missing.
+/// A nave along x, 60 × 10 × 12 m: two rows of columns, arches between them, and a vault in segments. The texture of
+/// its columns is missing.
 pub fn hall() -> ObjFile {
     let mut writer = Writer::new();
     let bays = -7..=7;

@@ -65,8 +65,8 @@ pub fn culled(mesh: &Mesh) -> Mesh {
     mesh.clone().with_triangle_culling(true)
 }
 
-/// `count` boxes and squares in all directions, with several meshes and materials, opaque and blended, some mirrored, with two
-/// lights and two cameras. Every call returns the same scene.
+/// `count` boxes and squares in all directions, with several meshes and materials, opaque and blended, some mirrored,
+/// with two lights and two cameras. Every call returns the same scene.
 pub fn field(count: usize) -> Scene {
     make_field(count).unwrap()
 }

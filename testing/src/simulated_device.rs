@@ -12,8 +12,8 @@ use crate::forwarded_calls::{
     forward_limits, forward_picture_uploads, forward_recording_calls, forward_unchanged_calls,
 };
 
-/// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a given time for each.
-/// Its passes take equal shares of that time.
+/// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a
+/// given time for each. Its passes take equal shares of that time.
 pub struct SimulatedDevice<B> {
     inner: B,
     /// The times of the next frames, before `frame_time`.
@@ -46,8 +46,8 @@ impl<B> SimulatedDevice<B> {
         Self { inner, next_times: Mutex::default(), frame_time, device }
     }
 
-    /// Another backend on the same device, which takes so long for each of its frames: those of both are drawn in the order in which they are
-    /// submitted.
+    /// Another backend on the same device, which takes so long for each of its frames: those of both are drawn in the
+    /// order in which they are submitted.
     pub fn beside<C>(&self, inner: C, frame_time: Duration) -> SimulatedDevice<C> {
         SimulatedDevice { inner, next_times: Mutex::default(), frame_time, device: Arc::clone(&self.device) }
     }

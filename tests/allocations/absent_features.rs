@@ -1,4 +1,5 @@
-//! What a scene does not use requests no memory: its frames have as many allocations as with a renderer that lacks the feature.
+//! What a scene does not use requests no memory: its frames have as many allocations as with a renderer that lacks the
+//! feature.
 
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! A steady frame allocates nothing on any thread, neither in graphs nor in loops. Finished jobs release their memory.
 //!
-//! The allocator of this binary counts for all threads, so everything is in one test. A second test, or the harness that starts
-//! it, would be counted too.
+//! The allocator of this binary counts for all threads, so everything is in one test. A second test, or the harness
+//! that starts it, would be counted too.
 //!
-//! Queues keep their memory, and allocate only when they hold more jobs than ever before. If a worker is late, that may happen in
-//! any frame. So the test first fills each queue with more jobs than the frames could put there.
+//! Queues keep their memory, and allocate only when they hold more jobs than ever before. If a worker is late, that may
+//! happen in any frame. So the test first fills each queue with more jobs than the frames could put there.
 
 mod absent_features;
 mod pieces;
@@ -43,8 +43,8 @@ const WARM_UP: usize = 50;
 const COUNTED: usize = 100;
 const ROUNDS: usize = 3;
 
-/// Runs frames, and returns the number of allocations in the best of three rounds. When a thread steals or waits for a lock for
-/// the first time, that may allocate, in any frame.
+/// Runs frames, and returns the number of allocations in the best of three rounds. When a thread steals or waits for a
+/// lock for the first time, that may allocate, in any frame.
 fn allocations_of(mut frame: impl FnMut(usize)) -> usize {
     (0..WARM_UP).for_each(&mut frame);
     let rounds = (0..ROUNDS).map(|_| {
@@ -101,8 +101,8 @@ fn layered(seed: u64, layers: &[usize]) -> Schedule<TestNode> {
     graph.compile().expect("the graph is valid")
 }
 
-/// A root that sleeps for the given time, and then a chain of nodes, the spine. Each makes its successor ready, and a tooth on which
-/// nothing depends. So the worker that runs the spine queues all teeth.
+/// A root that sleeps for the given time, and then a chain of nodes, the spine. Each makes its successor ready, and a
+/// tooth on which nothing depends. So the worker that runs the spine queues all teeth.
 fn comb() -> Schedule<Closure<'static, Duration>> {
     let nothing = || Closure::new(|_: &Duration, _, _| Ok(()));
     let mut graph = FrameGraph::new();

@@ -17,7 +17,8 @@ const OBJECTS: u32 = 600;
 const FRAMES: usize = 120;
 const COUNTED: usize = 60;
 
-/// The allocations of most frames, while a camera moves; and how many frames executed another number of pieces than the frame before.
+/// The allocations of most frames, while a camera moves; and how many frames executed another number of pieces than the
+/// frame before.
 fn allocations(pieces: &[Piece]) -> (usize, usize) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(Quality::balanced());

@@ -1,5 +1,5 @@
-//! The file `ORDERINGS.md` in the source folder of a crate lists every atomic of the crate, and names tests that exist. A
-//! crate without atomics needs no such file.
+//! The file `ORDERINGS.md` in the source folder of a crate lists every atomic of the crate, and names tests that exist.
+//! A crate without atomics needs no such file.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -43,8 +43,8 @@ fn unknown_tests(orderings: &str, sources: &[Source]) -> Vec<String> {
     listed.into_iter().filter(|test| !functions.contains(test)).collect()
 }
 
-/// The backticked names in the columns "covered by", which are the last. A cell like "as `field`" refers to another row,
-/// and a name with a slash is a file.
+/// The backticked names in the columns "covered by", which are the last. A cell like "as `field`" refers to another
+/// row, and a name with a slash is a file.
 fn covering_tests(orderings: &str) -> Vec<String> {
     let cells = orderings.lines().filter_map(|line| line.strip_suffix('|')?.rsplit('|').next());
     let cells = cells.map(str::trim).filter(|cell| !cell.starts_with("as "));
@@ -91,8 +91,8 @@ fn listed_atomics(orderings: &str) -> BTreeSet<String> {
     whole.collect()
 }
 
-/// The names of fields and statics with types that mention an atomic, and of tuple structs, enums and type aliases that mention
-/// one. Locals and parameters do not count, nor do items that only tests are built with.
+/// The names of fields and statics with types that mention an atomic, and of tuple structs, enums and type aliases that
+/// mention one. Locals and parameters do not count, nor do items that only tests are built with.
 fn declared_atomics(trees: &[TokenTree]) -> Vec<String> {
     let (mut names, mut at) = (Vec::new(), 0);
     while let Some(tree) = trees.get(at) {

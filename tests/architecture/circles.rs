@@ -3,8 +3,8 @@
 //!
 //! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
 //! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a
-//! re-export of an item that the file does not use itself. So a `mod.rs` that only declares modules and re-exports their
-//! items is not part of a circle.
+//! re-export of an item that the file does not use itself. So a `mod.rs` that only declares modules and re-exports
+//! their items is not part of a circle.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

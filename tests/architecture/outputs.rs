@@ -46,7 +46,7 @@ fn written_directly(sources: &[Source]) -> Vec<String> {
 /// What prints, or names a stream to print to.
 const PRINTERS: [&str; 7] = ["print", "println", "eprint", "eprintln", "dbg", "stdout", "stderr"];
 
-/// What of clap ends a program, and prints the arguments as they are.
+/// The calls of clap that end a program, and print the arguments unescaped.
 const PARSERS: [&str; 5] = ["::parse()", "::parse_from(", ".get_matches()", ".exit()", "Error::exit"];
 
 /// What else is left: an event loop, and a span.

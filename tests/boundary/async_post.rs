@@ -14,7 +14,7 @@ use crate::frames::worlds;
 use crate::fuse::{self, Kind, Owned, PLANNED, call};
 use crate::within_time;
 
-/// A step of the engine's, which leaves a picture as it is.
+/// A step of the engine's, which does not change a picture.
 struct OwnStep {
     _dropped: Owned<()>,
 }

@@ -168,8 +168,8 @@ impl<S: Subject> Engine<S> {
     }
 }
 
-/// Builds a renderer, draws two scenes of which the second needs another plan, and changes the pipeline and the quality.
-/// Returns the pictures and the errors.
+/// Builds a renderer, draws two scenes of which the second needs another plan, and changes the pipeline and the
+/// quality. Returns the pictures and the errors.
 fn build_and_change<S: Subject>() -> (Vec<Vec<u8>>, Vec<String>) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let build = || builder::<S>(&scheduler).build(Arc::clone(&scheduler)).map_err(|error| error.to_string());

@@ -1,4 +1,5 @@
-//! Code of the engine's that a call runs for the engine, on its own thread: a panic unwinds to the caller, and changes nothing.
+//! Code of the engine's that a call runs for the engine, on its own thread: a panic unwinds to the caller, and changes
+//! nothing.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread;

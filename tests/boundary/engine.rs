@@ -280,7 +280,7 @@ impl ReadBack for OwnReadBack {
     }
 }
 
-/// A process of the engine's, which leaves the picture as it is.
+/// A process of the engine's, which does not change the picture.
 pub struct OwnProcess {
     _dropped: Owned<()>,
 }
@@ -373,8 +373,8 @@ impl DeviceProgress for OwnDevice {
     }
 }
 
-/// A subscriber of everything. It panics whenever it is told of an event or a span of Drawloom's for the first time: that
-/// happens once in a program, in whichever case comes first.
+/// A subscriber of everything. It panics whenever it is told of an event or a span of Drawloom's for the first time:
+/// that happens once in a program, in whichever case comes first.
 #[derive(Default)]
 pub struct OwnSubscriber {
     spans: AtomicU64,

@@ -68,8 +68,8 @@ pub fn calls() -> Vec<&'static str> {
     CALLS.lock().unwrap().clone()
 }
 
-/// Calls `work`, and returns which of its calls of a kind to try: of those of each name the first two, the last one, and
-/// one between.
+/// Calls `work`, and returns which of its calls of a kind to try: of those of each name the first two, the last one,
+/// and one between.
 pub fn calls_to_try(kind: Kind, work: impl FnOnce()) -> Vec<usize> {
     arm(kind, usize::MAX, true);
     work();

@@ -1,4 +1,5 @@
-//! Nodes that are declared wrongly, fail or panic. Each error names the node, and the next frame is that of an engine without them.
+//! Nodes that are declared wrongly, fail or panic. Each error names the node, and the next frame is that of an engine
+//! without them.
 
 use drawloom::glam::DVec3;
 use drawloom::graph::GraphProblem;

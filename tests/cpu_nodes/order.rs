@@ -57,8 +57,8 @@ fn declared() -> impl Strategy<Value = Vec<Declared>> {
     })
 }
 
-/// Which nodes come before which, by index, and before which moments of the frame, whose indices follow: its objects are read, what is visible
-/// and drawn is known, recording begins, and all passes are recorded.
+/// Which nodes come before which, by index, and before which moments of the frame, whose indices follow: its objects
+/// are read, what is visible and drawn is known, recording begins, and all passes are recorded.
 fn required_order(nodes: &[Declared]) -> Vec<Vec<bool>> {
     let [objects, lists, inputs, recorded] = [0, 1, 2, 3].map(|moment| nodes.len() + moment);
     let count = nodes.len() + 4;

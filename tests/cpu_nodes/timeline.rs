@@ -114,7 +114,8 @@ impl io::Write for Written {
 
 #[test]
 fn spans_name_nodes() {
-    /// While there is only one subscriber, the thread that is first to reach a span decides for all threads whether a subscriber wants it.
+    /// While there is only one subscriber, the thread that is first to reach a span decides for all threads whether a
+    /// subscriber wants it.
     static SECOND: LazyLock<Dispatch> = LazyLock::new(|| Dispatch::new(NoSubscriber::default()));
     LazyLock::force(&SECOND);
     let (scene, written) = (field(100), Written::default());

@@ -15,8 +15,8 @@ pub struct Capture {
     picture: Vec<u8>,
 }
 
-/// Reads both targets. Radiance may be infinite, where the sum of lights exceeds the range of half floats; tone mapping clamps
-/// it.
+/// Reads both targets. Radiance may be infinite, where the sum of lights exceeds the range of half floats; tone mapping
+/// clamps it.
 ///
 /// # Errors
 /// If the radiance of a pixel is NaN or negative infinity.
@@ -100,21 +100,23 @@ fn are_different(one: &[u8; 4], other: &[u8; 4]) -> bool {
     one.iter().zip(other).any(|(one, other)| one.abs_diff(*other) > ROUNDING)
 }
 
-/// The most by which a channel of the picture may differ where both pictures show the same. Radiance is rounded to half floats, 2⁻¹¹ of
-/// it, once for each light and pane: a dozen times at most, 0.6% in all. The tone curve and sRGB turn a change of 1% into at most 0.3% of
-/// the range. So the two differ by half a step of 255 at most, and by 1 when both are rounded to whole steps.
+/// The most by which a channel of the picture may differ where both pictures show the same. Radiance is rounded to half
+/// floats, 2⁻¹¹ of it, once for each light and pane: a dozen times at most, 0.6% in all. The tone curve and sRGB turn a
+/// change of 1% into at most 0.3% of the range. So the two differ by half a step of 255 at most, and by 1 when both are
+/// rounded to whole steps.
 const ROUNDING: u8 = 1;
 
 /// The greatest distance in pixels by which either of two pictures may have a vertex in the wrong place: see
 /// [`GpuView`](drawloom::view::GpuView).
 pub const PRECISION: f64 = 1e-3;
 
-/// Fails if two pictures of equivalent scenes differ by more than what moving every vertex by up to `shift` pixels can change.
+/// Fails if two pictures of equivalent scenes differ by more than what moving every vertex by up to `shift` pixels can
+/// change.
 ///
-/// A pixel shows another surface only if an edge passes its centre on the other side. Of the pixels that an edge runs through, it passes a
-/// share of `2 shift` within `shift` of the centre. What such a pixel shows instead may be visible nowhere else, so there is no bound of
-/// its colour, but one of the number of such pixels: `2 shift` times the pixels that differ from a neighbour. With a shift of 0 no pixel may
-/// differ.
+/// A pixel shows another surface only if an edge passes its centre on the other side. Of the pixels that an edge runs
+/// through, it passes a share of `2 shift` within `shift` of the centre. What that pixel shows instead may be visible
+/// nowhere else, so there is no bound of its colour, but one of the number of such pixels: `2 shift` times the pixels
+/// that differ from a neighbour. With a shift of 0 no pixel may differ.
 pub fn assert_alike(context: &str, one: Option<&Capture>, other: Option<&Capture>, shift: f64) -> Result<(), Failed> {
     assert_alike_except(context, one, other, shift, |_| false)
 }

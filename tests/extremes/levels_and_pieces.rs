@@ -71,7 +71,7 @@ fn most_moved(view: &View, center: DVec3, radius: f64, error: f64) -> f64 {
     most
 }
 
-/// Fails if a pixel is unlike a sphere, but for what its levels cut off, so many pixels, and the pixel itself.
+/// Fails if a pixel is unlike a sphere, but for the pixels that its levels cut off, and the pixel itself.
 fn expect_sphere(
     scene: &MarkerScene,
     capture: &Capture,

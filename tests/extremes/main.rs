@@ -1,8 +1,9 @@
-//! Scenes with extreme numbers, on every backend. Each is drawn correctly, refused with a specific error, or drawn without
-//! the parts that cannot be drawn, which are counted. No case panics, hangs, draws NaN, or leaves something out silently.
+//! Scenes with extreme numbers, on every backend. Each is drawn correctly, refused with a specific error, or drawn
+//! without the parts that cannot be drawn, which are counted. No case panics, hangs, draws NaN, or leaves something out
+//! silently.
 //!
-//! Without an adapter the cases on wgpu are ignored; with `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Slow
-//! ones are ignored without `DRAWLOOM_SLOW_CASES=1`.
+//! Without an adapter the cases on wgpu are ignored; with `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
+//! Slow ones are ignored without `DRAWLOOM_SLOW_CASES=1`.
 //!
 //! There are no cases for shear, which a transform cannot express: it is one scale along the object's own axes and one
 //! rotation, and objects have no parents.

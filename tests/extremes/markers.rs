@@ -110,8 +110,8 @@ impl MarkerScene {
         harness.draw_whole(&self.scene)
     }
 
-    /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and unless at
-    /// least `min_visible` markers have such pixels.
+    /// Draws the scene. Fails unless each pixel that is not at an edge has the colour that the oracle expects, and
+    /// unless at least `min_visible` markers have such pixels.
     pub fn expect(&self, harness: &mut Harness, context: &str, min_visible: usize) -> Result<(), Failed> {
         let drawn = harness.draw_whole(&self.scene).map_err(|failed| with_context(context, failed))?;
         self.compare(&drawn, min_visible).map_err(|failed| with_context(context, failed))

@@ -30,8 +30,8 @@ pub const CASES: &[Case] = &[
 
 const SIZE: [u32; 2] = [48, 32];
 
-/// Shadow maps of directional lights are aligned to a grid in the world, so moving the scene moves shadow edges by up to a
-/// texel: see [`is_at_shadow_edge`].
+/// Shadow maps of directional lights are aligned to a grid in the world, so moving the scene moves shadow edges by up
+/// to a texel: see [`is_at_shadow_edge`].
 fn without_sun_shadows(scene: &mut Scene) {
     for light in &mut scene.lights {
         if let Light::Directional { casts_shadow, .. } = light {
@@ -40,9 +40,10 @@ fn without_sun_shadows(scene: &mut Scene) {
     }
 }
 
-/// Whether a pixel is so close to an edge of the sun's shadow that the edge may move across it, given the picture with and that without this
-/// shadow. The maps have 1,024 pixels across some 2.4 × 60 m, and a pixel of the picture is 14 cm wide at a distance of 8 m: an edge moves by
-/// up to a pixel of the map, and fades over one on either side of it. Each of these is a pixel of the picture.
+/// Whether a pixel is so close to an edge of the sun's shadow that the edge may move across it, given the picture with
+/// and that without this shadow. The maps have 1,024 pixels across some 2.4 × 60 m, and a pixel of the picture is 14 cm
+/// wide at a distance of 8 m: an edge moves by up to a pixel of the map, and fades over one on either side of it. Each
+/// of these is a pixel of the picture.
 fn is_at_shadow_edge(here: &Capture, bare: &Capture) -> Vec<bool> {
     let shadow = here.differs_from(bare);
     (0..shadow.len()).map(|index| here.around(index, 2).any(|other| shadow[other] != shadow[index])).collect()
@@ -148,8 +149,8 @@ fn scaled_scenes(harness: &mut Harness) -> Result<(), Failed> {
     for factor in [1e-6, 1e-3, 0.1, 30.0, 1e3, 1e6, 1e7] {
         let context = format!("{factor:e} times as large");
         let other = harness.draw_whole(&enlarged(factor)?).map_err(|failed| with_context(&context, failed))?;
-        // Positions are rounded to steps of 2⁻³⁰ m, half a step each for the camera and the object. The nearest object is 5.5 m away before
-        // scaling, and the focal length is 55 pixels.
+        // Positions are rounded to steps of 2⁻³⁰ m, half a step each for the camera and the object. The nearest object
+        // is 5.5 m away before scaling, and the focal length is 55 pixels.
         let by_steps = 55.0 * 0.5_f64.powi(30) / (5.5 * factor);
         assert_alike(&context, other.capture.as_ref(), usual.capture.as_ref(), 2.0 * PRECISION + by_steps)?;
     }
@@ -223,8 +224,8 @@ fn scales(harness: &mut Harness) -> Result<(), Failed> {
     Ok(())
 }
 
-/// The error of a vertex is a millionth of its distance, so an object much larger than its distance appears elsewhere. It
-/// still is drawn, and causes no wrong colours.
+/// The error of a vertex is a millionth of its distance, so an object much larger than its distance appears elsewhere.
+/// It still is drawn, and causes no wrong colours.
 fn larger_than_far(harness: &mut Harness) -> Result<(), Failed> {
     let camera = camera(SIZE);
     let control = Marker::before(&camera, 5.0, 1.0).moved(&camera, -2.0, 1.0).colored(BLUE);

@@ -77,7 +77,7 @@ fn expect_same(feature: &'static str, column: &str, [found, expected]: [&Drawn; 
     expect_within((feature, column, "byte"), "three objects", [one.different_bytes(other) as f64, 0.0])
 }
 
-/// A cube with vertices that are so many times as far from the origin.
+/// A cube with vertices that are `half` times as far from the origin.
 fn cube_of(half: f64) -> Result<Mesh, SceneError> {
     changed(&cube(), |position| position.map(|number| number * half as f32))
 }

@@ -1,4 +1,5 @@
-//! Every call of a frame fails once, in turn. The frame is refused with an error that says what failed and where, and the next one is right.
+//! Every call of a frame fails once, in turn. The frame is refused with an error that says what failed and where, and
+//! the next one is right.
 
 use std::iter::repeat_n;
 use std::time::Duration;
@@ -153,7 +154,8 @@ enum Reported {
 }
 
 impl Reported {
-    /// Those of frames that differ in their calls: without pieces, a frame in which nothing moved makes no call that others do not make.
+    /// Those of frames that differ in their calls: without pieces, a frame in which nothing moved makes no call that
+    /// others do not make.
     fn of(worlds: &Worlds) -> impl Iterator<Item = Self> {
         let of_pieces = worlds.has_pieces().then_some(Self::Nothing);
         [Self::Everything, Self::MovedObjects].into_iter().chain(of_pieces)

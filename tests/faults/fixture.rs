@@ -24,7 +24,7 @@ pub struct Setting {
     /// Whether there are shadow maps, and post-processing beyond tone mapping.
     pub is_full: bool,
     pub tests_occlusion: bool,
-    /// Shadow maps are drawn every so many frames.
+    /// The interval of frames in which shadow maps are drawn.
     pub shadow_interval: u32,
 }
 

@@ -1,7 +1,7 @@
 //! Devices that fail: every call of a frame fails once, devices are lost, and others take their place.
 //!
-//! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then. Slow cases are ignored
-//! without `DRAWLOOM_SLOW_CASES=1`.
+//! Cases that need an adapter are reported as ignored without one. With `DRAWLOOM_REQUIRE_ADAPTER=1` they fail then.
+//! Slow cases are ignored without `DRAWLOOM_SLOW_CASES=1`.
 
 mod calls;
 #[cfg(feature = "wgpu")]

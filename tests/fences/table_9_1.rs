@@ -11,7 +11,8 @@ use drawloom::{FramePlace, SubmitError};
 
 use crate::{Fixture, LONG};
 
-/// Waits until someone waits for a fence of this name, and returns who. A wait of a fence that nobody sets tells of all others.
+/// Waits until someone waits for a fence of this name, and returns who. A wait of a fence that nobody sets tells of all
+/// others.
 fn await_waiter(fence: &str) -> FenceWait {
     let (_setter, probe) = Fence::new("probe");
     let start = Instant::now();
@@ -108,11 +109,12 @@ fn rows_4_to_6_the_cpu_waits_for_a_report_that_the_device_sets() {
 
 /// | `SetReport(12)` | `SetReport(15)` | ? | Race condition |
 ///
-/// It does not compile, which the documentation of [`Fence`] tests as well: a fence has one setter, which setting consumes and nothing clones.
+/// It does not compile, which the documentation of [`Fence`] tests as well: a fence has one setter, which setting
+/// consumes and nothing clones.
 #[test]
 fn row_7_the_race_is_refused_by_types() {
-    /// Implemented once for all types, and once more for those that can be cloned, so that naming its function for one of these is
-    /// ambiguous.
+    /// Implemented once for all types, and once more for those that can be cloned, so that naming its function for one
+    /// of these is ambiguous.
     trait AmbiguousIfClone<Which> {
         fn check() {}
     }

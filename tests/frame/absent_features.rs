@@ -1,5 +1,5 @@
-//! What a scene does not use costs nothing: its frames have the passes, stages, draws, pipelines, buffers and textures that they have with
-//! a renderer that lacks the feature. wgpu itself counts what the device has.
+//! What a scene does not use costs nothing: its frames have the passes, stages, draws, pipelines, buffers and textures
+//! that they have with a renderer that lacks the feature. wgpu itself counts what the device has.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! Invalid input is refused with an error that names it, or counted and left out. No case panics, and the next frame is complete.
+//! Invalid input is refused with an error that names it, or counted and left out. No case panics, and the next frame is
+//! complete.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -164,7 +165,8 @@ fn slices_of_different_lengths_are_refused_by_name() {
     }
 }
 
-/// Renders with a process that reads the column `tint`, after which a good scene is drawn. Returns the error of the first scene.
+/// Renders with a process that reads the column `tint`, after which a good scene is drawn. Returns the error of the
+/// first scene.
 fn error_of_columns(columns: &[ColumnValues<'_>]) -> FrameError {
     let builder = Renderer::builder(NullBackend).process(Tinted).output("tinted");
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();

@@ -1,4 +1,5 @@
-//! Objects are drawn at the coarsest level of detail whose error is small enough in the picture, and keep it for a while.
+//! Objects are drawn at the coarsest level of detail whose error is small enough in the picture, and keep it for a
+//! while.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,8 +18,8 @@ use drawloom_testing::random::Random;
 use drawloom_testing::scenes::leveled::{globe, halved, whole};
 use drawloom_testing::scenes::{cube, culled, sized, with_meshes};
 
-/// Globes and cubes of many sizes around the origin, some of them blended or mirrored, seen by a camera of each projection: a main one off
-/// centre, a parallel one, and a shadow camera of each kind.
+/// Globes and cubes of many sizes around the origin, some of them blended or mirrored, seen by a camera of each
+/// projection: a main one off centre, a parallel one, and a shadow camera of each kind.
 fn globes(count: usize) -> Scene {
     let mut scene = Scene::new();
     let meshes = [scene.add(globe()).unwrap(), scene.add(cube()).unwrap(), scene.add(globe()).unwrap()];
@@ -144,7 +145,7 @@ impl Model {
         [0.0].into_iter().chain(levels).map(|error| error * largest_scale * pixels_per_metre).collect()
     }
 
-    /// Checks the levels of a frame. Those that rounding may decide are taken as they are.
+    /// Checks the levels of a frame. Those that rounding may decide are accepted.
     fn check(&mut self, scene: &SceneRef<'_>, allowed: f64, levels: &Levels) {
         for ((view, object), &level) in levels {
             let Some(camera) = scene.cameras.iter().find(|camera| camera.name == *view) else { continue };

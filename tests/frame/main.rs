@@ -62,8 +62,8 @@ fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>,
 
 /// What this thread reports through `tracing` during a call, as text.
 fn reported(call: impl FnOnce()) -> String {
-    /// While there is only one subscriber, the thread that is first to reach an event decides for all threads whether a subscriber wants
-    /// it, and it may have none. So there is a second one.
+    /// While there is only one subscriber, the thread that is first to reach an event decides for all threads whether a
+    /// subscriber wants it, and it may have none. So there is a second one.
     static SECOND: LazyLock<Dispatch> = LazyLock::new(|| Dispatch::new(NoSubscriber::default()));
     LazyLock::force(&SECOND);
     let written = Arc::new(Mutex::new(Vec::new()));

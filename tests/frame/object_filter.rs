@@ -37,7 +37,8 @@ fn renderer(
     builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
 }
 
-/// What decides about materials: some that blending decides, which is part of an object's draw state, and some that other fields do.
+/// What decides about materials: some that blending decides, which is part of an object's draw state, and some that
+/// other fields do.
 const TESTS: [fn(&Material) -> bool; 5] = [
     |material| material.blend == Blend::None,
     |material| material.double_sided,
@@ -104,7 +105,8 @@ fn any_quality() -> impl Strategy<Value = Quality> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Each view is there twice, without a filter and with one, and the filtered one shows those objects of the other that pass.
+    /// Each view is there twice, without a filter and with one, and the filtered one shows those objects of the other
+    /// that pass.
     #[test]
     fn a_view_shows_the_objects_that_its_filter_lets_pass(
         seed in any::<u64>(), count in 0_usize..700, quality in any_quality(), workers in 1_usize..5, chunk in 0_usize..300,

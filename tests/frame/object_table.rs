@@ -156,7 +156,8 @@ proptest! {
         for step in 0..40 {
             let scene = world.as_scene_ref();
             if step % 10 == 3 {
-                // A frame that fails early does not look at the objects, and the next one is not told of their changes again.
+                // A frame that fails early does not look at the objects, and the next one is not told of their changes
+                // again.
                 table.invalidate();
             } else {
                 let (before, revision) = (used_meshes(&table, scene.assets), table.used_meshes().revision());

@@ -13,8 +13,8 @@ use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer, ViewStatistics};
 use drawloom_testing::scenes::{cube, field, sized};
 
-/// A wall in front of the first camera, and small cubes behind and beside it, one in four of them glass. The second camera views the
-/// scene from behind, so that its cubes are in front of the wall.
+/// A wall in front of the first camera, and small cubes behind and beside it, one in four of them glass. The second
+/// camera views the scene from behind, so that its cubes are in front of the wall.
 pub fn wall_and_cubes() -> Scene {
     let mut scene = Scene::new();
     let mesh = scene.add(cube()).unwrap();

@@ -271,7 +271,8 @@ fn a_view_executes_the_pieces_that_it_sees_and_that_its_filter_shows_as_a_whole(
     assert!(pieces == 0 && (1..ROWS * IN_ROW).contains(&visible), "{pieces} {visible}");
 }
 
-/// The shadow of the sun is drawn by a process for all materials, which may walk the objects in the order of their bins.
+/// The shadow of the sun is drawn by a process for all materials, which may walk the objects in the order of their
+/// bins.
 #[test]
 fn shares_of_materials_draw_each_object_once_with_pieces_and_without() {
     const SHARES: u32 = 3;

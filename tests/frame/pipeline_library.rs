@@ -1,4 +1,5 @@
-//! Backends of one library share what they compile, and only what the device accepts. wgpu itself counts what the device has.
+//! Backends of one library share what they compile, and only what the device accepts. wgpu itself counts what the
+//! device has.
 
 use std::sync::Arc;
 

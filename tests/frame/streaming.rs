@@ -37,8 +37,8 @@ fn sized_mesh(name: &str, vertices: usize) -> Mesh {
 }
 
 impl World {
-    /// A row of objects along x, 10 m apart, each with a mesh of its own, in front of a camera that sees one or two of them. There is
-    /// one worker, so that what happens does not depend on time.
+    /// A row of objects along x, 10 m apart, each with a mesh of its own, in front of a camera that sees one or two of
+    /// them. There is one worker, so that what happens does not depend on time.
     fn new(count: usize, budget: StreamingBudget) -> Self {
         let (device, queue) = adapter::noop_device().unwrap();
         let backend = WgpuBackend::new(device, queue).unwrap().stream_resources(budget).unwrap();
@@ -231,7 +231,8 @@ fn fragmented_world() -> World {
 
 #[test]
 fn room_is_made_where_a_mesh_fits() {
-    // In each page are two meshes that were seen at different times. The new one takes more than one of them, and less than a page.
+    // In each page are two meshes that were seen at different times. The new one takes more than one of them, and less
+    // than a page.
     let mut world = fragmented_world();
     world.add(sized_mesh("large", 1500), 100.0);
     world.look_at(100.0);

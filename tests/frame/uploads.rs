@@ -32,8 +32,8 @@ fn statistics_and_timeline_report_the_uploaded_bytes() {
     let meshes = used.into_iter().map(|mesh| scene.assets().get(mesh).unwrap());
     let meshes: usize = meshes.map(|mesh| size_of_val(mesh.vertices()) + size_of_val(mesh.indices())).sum();
     for (frame, statistics) in uploaded.iter().enumerate() {
-        // Nothing is known of what changed, so all objects are uploaded. The same objects are seen, so only blended ones may have
-        // another order, and only the first frame uploads a four-byte index of every command.
+        // Nothing is known of what changed, so all objects are uploaded. The same objects are seen, so only blended
+        // ones may have another order, and only the first frame uploads a four-byte index of every command.
         let commands: usize = statistics.views.iter().map(|view| view.commands).sum();
         let (objects, indices) = ((600 * size_of::<GpuObject>()) as u64, (commands * 4) as u64);
         let [least, most] =

@@ -1,4 +1,5 @@
-//! Loops with several frames in flight: how many there are, what is told of each, and that its pictures are those of a plain loop.
+//! Loops with several frames in flight: how many there are, what is told of each, and that its pictures are those of a
+//! plain loop.
 
 mod failures;
 mod in_flight;

@@ -1,5 +1,5 @@
-//! A world is updated and recorded for frame N + 1 while frame N is submitted, which on the software backend is when it is drawn. The
-//! pictures are those of a loop that does one thing after the other, and has no pieces.
+//! A world is updated and recorded for frame N + 1 while frame N is submitted, which on the software backend is when it
+//! is drawn. The pictures are those of a loop that does one thing after the other, and has no pieces.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,7 +30,8 @@ fn world() -> Scene {
     scene
 }
 
-/// Moves the first half of the objects, differently in each frame. Now and then another one, so that a piece is recorded anew. Returns what moved.
+/// Moves the first half of the objects, differently in each frame. Now and then another one, so that a piece is
+/// recorded anew. Returns what moved.
 fn update(scene: &mut Scene, frame: usize) -> Vec<u32> {
     let handles: Vec<_> = scene.objects().collect();
     let moving = (0..MOVING as u32).chain((frame % 5 == 4).then_some(MOVING as u32 + frame as u32)).collect::<Vec<_>>();

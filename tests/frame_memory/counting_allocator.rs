@@ -15,7 +15,8 @@ struct CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 static IS_COUNTING: AtomicBool = AtomicBool::new(false);
-/// By a hash of the backtrace's addresses: a backtrace is resolved once, which takes milliseconds, and then only counted.
+/// By a hash of the backtrace's addresses: a backtrace is resolved once, which takes milliseconds, and then only
+/// counted.
 static SITES: LazyLock<Mutex<HashMap<u64, AllocationSite>>> = LazyLock::new(Mutex::default);
 
 thread_local! {
@@ -69,14 +70,15 @@ fn hash_of_backtrace() -> u64 {
     unsafe extern "C" fn mix(context: *mut c_void, hash: *mut c_void) -> c_int {
         // SAFETY: `context` is valid: the unwinder passes its own.
         let address = unsafe { _Unwind_GetIP(context) };
-        // SAFETY: `hash` is valid and not aliased: the unwinder passes the pointer that `hash_of_backtrace` gave it, which does not
-        // use the value meanwhile.
+        // SAFETY: `hash` is valid and not aliased: the unwinder passes the pointer that `hash_of_backtrace` gave it,
+        // which does not use the value meanwhile.
         let hash = unsafe { &mut *hash.cast::<u64>() };
         *hash = (*hash ^ address as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
         0
     }
     let mut hash = 0_u64;
-    // SAFETY: The callback must not unwind, and its argument must stay valid: `mix` does not, and `hash` outlives the call.
+    // SAFETY: The callback must not unwind, and its argument must stay valid: `mix` does not, and `hash` outlives the
+    // call.
     unsafe { _Unwind_Backtrace(mix, (&raw mut hash).cast()) };
     hash
 }

@@ -1,10 +1,11 @@
-//! Counts the allocations of steady frames by the code that allocates: the crate, which must not allocate in its jobs, or wgpu.
+//! Counts the allocations of steady frames by the code that allocates: the crate, which must not allocate in its jobs,
+//! or wgpu.
 //!
-//! The allocator of this binary counts for all threads, so there is only one test. Frames are static and repeat exactly.
-//! Counting starts after a warm-up in which tables, pools and queues grow to their final size.
+//! The allocator of this binary counts for all threads, so there is only one test. Frames are static and repeat
+//! exactly. Counting starts after a warm-up in which tables, pools and queues grow to their final size.
 //!
-//! `DRAWLOOM_SHOW_ALLOCATIONS=1 cargo test --test frame_memory -- --nocapture` prints every call site as well. The owner of an
-//! allocation is read from its backtrace, so this needs a build with line tables, and Unix's unwinder.
+//! `DRAWLOOM_SHOW_ALLOCATIONS=1 cargo test --test frame_memory -- --nocapture` prints every call site as well. The
+//! owner of an allocation is read from its backtrace, so this needs a build with line tables, and Unix's unwinder.
 
 #![cfg(unix)]
 
@@ -35,8 +36,8 @@ const WARM_UP_FRAMES: usize = 30;
 const COUNTED_FRAMES: usize = 20;
 const MAX_ROUNDS: usize = 3;
 
-/// With `RUST_BACKTRACE` wgpu captures backtraces itself: these allocate, and take a lock that the counting allocator needs too.
-/// The standard library reads the variable once, so the test runs in a child process without it.
+/// With `RUST_BACKTRACE` wgpu captures backtraces itself: these allocate, and take a lock that the counting allocator
+/// needs too. The standard library reads the variable once, so the test runs in a child process without it.
 #[test]
 #[cfg_attr(not(debug_assertions), ignore = "backtraces need line tables")]
 fn jobs_of_steady_frames_do_not_allocate() {
@@ -77,8 +78,8 @@ fn own_allocations(report: &Report) -> usize {
     report.allocations_of(Owner::Drawloom, Phase::Jobs)
 }
 
-/// The allocations of the first round of frames whose jobs do not allocate, or of the last one. A thread may allocate when it does something
-/// for the first time, in any frame.
+/// The allocations of the first round of frames whose jobs do not allocate, or of the last one. A thread may allocate
+/// when it does something for the first time, in any frame.
 fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Report {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let (device, queue) = adapter::noop_device().unwrap();
@@ -97,8 +98,8 @@ fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Repor
         counting_allocator::count(false);
         submission.wait().unwrap();
     };
-    // Resolving a backtrace takes far longer than a frame. So some warm-up frames count, which resolves the backtraces, and the
-    // others let the scheduler learn a frame's usual cost again.
+    // Resolving a backtrace takes far longer than a frame. So some warm-up frames count, which resolves the backtraces,
+    // and the others let the scheduler learn a frame's usual cost again.
     (0..WARM_UP_FRAMES).for_each(|index| frame(index % 3 == 2));
     let mut round = || {
         counting_allocator::reset();

@@ -190,7 +190,8 @@ fn a_path_that_may_have_no_end_or_is_too_large_is_refused() {
     assert_eq!(CameraPath::load(&large).unwrap_err(), "it has more than 67108864 bytes");
 }
 
-/// A triangle far away makes the scene large, but what is near to the camera covers the same pixels as without the triangle.
+/// A triangle far away makes the scene large, but what is near to the camera covers the same pixels as without the
+/// triangle.
 #[test]
 fn a_far_triangle_hides_nothing_of_a_near_cube() -> Result<(), Box<dyn Error>> {
     let cube = "v -1 0 -1\nv 1 0 -1\nv 1 2 -1\nv -1 2 -1\nv -1 0 1\nv 1 0 1\nv 1 2 1\nv -1 2 1\n\

@@ -30,7 +30,8 @@ fn setting(name: &str, default: u64) -> u64 {
     env::var(name).map_or(default, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number: {text}")))
 }
 
-/// The frames from one rest to the next. At a rest the world is as it was at first, no frame is in flight, and resources are counted.
+/// The frames from one rest to the next. At a rest the world is as it was at first, no frame is in flight, and
+/// resources are counted.
 const FRAMES_PER_REST: u64 = if cfg!(debug_assertions) { 100 } else { 1_000 };
 /// The rests after which memory no longer grows: caches hold what they ever will.
 const WARM_UP_RESTS: usize = 10;

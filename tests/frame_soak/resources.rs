@@ -31,8 +31,8 @@ impl Resources {
         }
     }
 
-    /// Counts until there are so many threads, but not more than a thousand times. The OS goes on listing a thread for a while after it was
-    /// joined.
+    /// Counts until there is this number of threads, but not more than a thousand times. The OS goes on listing a
+    /// thread for a while after it was joined.
     pub fn count_with_threads(threads: usize) -> Self {
         let mut now = Self::count();
         for _ in 0..1_000 {

@@ -7,7 +7,7 @@ use drawloom::scene::{
 };
 use drawloom_testing::random::Random;
 
-/// A world, and what of it may go.
+/// A world, and its parts that may go.
 pub struct World {
     pub scene: Scene,
     objects: Vec<ObjectHandle>,

@@ -158,7 +158,7 @@ fn boxed<B: Backend>(
     Ok(Box::new(Fixture { renderer, submitter, draws }))
 }
 
-/// Limits of so many bytes for what shaders read, and of as much for a buffer as all views can need.
+/// Limits of this number of bytes for what shaders read, and of as much for a buffer as all views can need.
 pub fn binding(binding_bytes: usize) -> Option<SceneLimits> {
     Some(SceneLimits { binding_bytes: binding_bytes as u64, ..SceneLimits::NONE })
 }

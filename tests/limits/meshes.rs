@@ -29,7 +29,7 @@ pub const CASES: &[Case] = &[
 /// A room of 4 KiB for each buffer: 128 vertices, or 1,024 indices.
 const ROOM: SceneLimits = SceneLimits { buffer_bytes: 4096, binding_bytes: 4096, ..SceneLimits::NONE };
 
-/// Some triangles in a plane, of so many vertices and indices.
+/// Some triangles in a plane, of this number of vertices and indices.
 fn sheet(name: &str, topology: Topology, vertices: usize, indices: usize) -> Mesh {
     let vertex = |index: usize| Vertex {
         position: [(index % 7) as f32 * 0.2, (index % 5) as f32 * 0.3, 0.0],

@@ -118,7 +118,7 @@ const RESULTS: &[&str] = &[
 /// files. They document what an index that is not there does, and their own tests have their extremes.
 const TOOLS: &[&str] = &["command::", "drawloom_gltf::", "raster::", "view::", "handle::Slots::"];
 
-/// Bytes that shaders read as they are.
+/// Bytes that shaders read unconverted.
 const BYTES: &[&str] = &["parameters"];
 
 /// Numbers of a scene that `tests/extremes` draws on every backend: in `numbers`, `cameras`, `positions`, `lights` and

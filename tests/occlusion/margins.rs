@@ -69,7 +69,8 @@ fn any_turn(random: &mut Random) -> DQuat {
     DQuat::from_axis_angle(random.direction().normalize(), random.between(-3.0, 3.0))
 }
 
-/// The depth of an inclined wall differs within a tile: cubes at the farther end of a tile are beyond the depth of its middle.
+/// The depth of an inclined wall differs within a tile: cubes at the farther end of a tile are beyond the depth of its
+/// middle.
 #[test]
 fn what_is_just_in_front_of_an_inclined_wall_is_not_hidden() {
     let mut random = Random::new();
@@ -91,7 +92,8 @@ fn what_is_just_in_front_of_an_inclined_wall_is_not_hidden() {
             let hit = ray * (center.dot(normal) / ray.dot(normal));
             let on_wall = tilt.inverse() * (hit - center);
             if (-50.0..-1.0).contains(&hit.z) && on_wall.abs().max_element() < 29.0 {
-                // A cube reaches at most √3 of its half width from its centre. A tenth of it exceeds a device's errors, 10⁻⁵ of the depth.
+                // A cube reaches at most √3 of its half width from its centre. A tenth of it exceeds a device's errors,
+                // 10⁻⁵ of the depth.
                 let half = -hit.z * 2e-4;
                 front.push((hit + normal * (half * 1.85), half));
                 back.push((hit * 1.5, half));
@@ -135,9 +137,10 @@ fn what_is_just_in_front_of_the_farther_of_two_walls_is_not_hidden() {
     assert!(hidden_behind > 40 * 4 * 100 * 9 / 10, "{hidden_behind} cubes behind both walls are hidden");
 }
 
-/// A device may draw the wall farther away than it is, and what is behind the wall nearer. Its bounds, as shares of the depth in steps of
-/// 2⁻²⁰: 1 for the position of either, 4 for the depth that it computes of either, and a quarter for interpolating it. So up to 10 steps
-/// behind a wall nothing is hidden. The wall's size adds 0.07 to its position's. 11 steps behind, everything is hidden.
+/// A device may draw the wall farther away than it is, and what is behind the wall nearer. Its bounds, as shares of the
+/// depth in steps of 2⁻²⁰: 1 for the position of either, 4 for the depth that it computes of either, and a quarter for
+/// interpolating it. So up to 10 steps behind a wall nothing is hidden. The wall's size adds 0.07 to its position's. 11
+/// steps behind, everything is hidden.
 #[test]
 fn what_a_device_may_draw_in_front_of_a_wall_is_not_hidden() {
     for depth in [1.0, 10.0, 1e3, 1e6] {

@@ -180,8 +180,9 @@ fn an_object_that_crosses_the_near_plane_is_never_hidden_and_hides_only_beyond_t
     assert_eq!(walls.hidden(), [3, 4]);
 }
 
-/// The camera looks along a wall that begins behind it. Rounding may turn the face beside it into one that is seen from behind, or the other
-/// way round, if it is nearer than 256 times the wall's position error: here 256 × 8.7e-5 m = 0.022 m.
+/// The camera looks along a wall that begins behind it. Rounding may turn the face beside it into one that is seen from
+/// behind, or the other way round, if it is nearer than 256 times the wall's position error: here 256 × 8.7e-5 m =
+/// 0.022 m.
 #[test]
 fn a_clipped_wall_hides_nothing_if_it_is_seen_almost_edge_on() {
     for (gap, expected) in [(0.1, &[2][..]), (0.019, &[])] {

@@ -1,8 +1,8 @@
 //! The pictures of the example `own_content` are compared with stored references.
 //!
-//! Without an adapter the cases are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them.
-//! Slow ones are ignored without `DRAWLOOM_SLOW_CASES=1`.
-//! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
+//! Without an adapter the cases are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails
+//! them. Slow ones are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references:
+//! check each of them before you commit it.
 
 #[path = "../../examples/own_content/bloom.rs"]
 mod bloom;

@@ -116,7 +116,7 @@ fn scene(views: usize) -> Scene {
     scene
 }
 
-/// Whether the first so many columns are drawn, and no others.
+/// Whether only the first `count` columns are drawn.
 fn check_columns(picture: &Picture, count: u32) -> Result<(), Failed> {
     for column in 0..8 {
         let expected = if column < count { [count as u8 * 10, 255, 0] } else { [0; 3] };

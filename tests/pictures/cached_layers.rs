@@ -86,8 +86,8 @@ fn layer(index: u32, redraw: Redraw) -> Camera {
     Camera { redraw, ..camera }
 }
 
-/// Draws frames, and compares each with what is drawn of the same world if no view is cached. `draw` returns the pictures of the main
-/// camera, which is the first one, and how many frames ago each other view was drawn.
+/// Draws frames, and compares each with what is drawn of the same world if no view is cached. `draw` returns the
+/// pictures of the main camera, which is the first one, and how many frames ago each other view was drawn.
 fn check(
     mut draw: impl FnMut(SceneRef<'_>) -> Result<(Vec<Picture>, Vec<u32>), Failed>,
     mut draw_all: impl FnMut(SceneRef<'_>) -> Result<(Vec<Picture>, Vec<u32>), Failed>,

@@ -105,8 +105,8 @@ fn self_shadowing() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A shadow that fades from 0 to 1 over w metres differs from a sharp one by w/4 square metres for each metre of its edge.
-/// So the sum of differences is proportional to the width of a map's pixel.
+/// A shadow that fades from 0 to 1 over w metres differs from a sharp one by w/4 square metres for each metre of its
+/// edge. So the sum of differences is proportional to the width of a map's pixel.
 fn edges() -> Result<(), Failed> {
     let blocked = Panel::new(DVec3::new(-2.0, 0.5, -2.0), DVec3::new(2.0, 0.0, 0.6), DVec3::new(-0.6, 0.0, 2.0));
     let panels = vec![floor(), blocked.double_sided()];

@@ -111,7 +111,7 @@ impl RenderProcess for DrawColumns {
     }
 }
 
-/// Colours so many columns.
+/// Colours this number of columns.
 struct Columns {
     colors: GeneratedBuffer<[f32; 4]>,
     arguments: GeneratedBuffer<[u32; 4]>,

@@ -55,8 +55,8 @@ fn across_edges() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Every point whose light is not what a ray finds is nearer to the edge of the shadow, along both axes of its face, than
-/// the bound of [`ShadowMaps::cameras`].
+/// Every point whose light is not what a ray finds is nearer to the edge of the shadow, along both axes of its face,
+/// than the bound of [`ShadowMaps::cameras`].
 fn error_in_pixels() -> Result<(), Failed> {
     for filter in [0, 1, 4] {
         let maps = ShadowMaps { filter, side: 128, ..MAPS };

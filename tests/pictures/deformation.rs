@@ -106,8 +106,8 @@ impl<R: Real> DeformationCpuShader<R> for CpuPush {
 /// A push beyond the bottom turns a cube inside out.
 const PUSHES: [f32; 5] = [0.0, 0.5, 1.5, 2.5, 1.0];
 
-/// A floor, four opaque cubes, a blended one that is pushed, and a blended one in front that is not. The cubes have the shape of the
-/// frame if the pipeline does not give it to them.
+/// A floor, four opaque cubes, a blended one that is pushed, and a blended one in front that is not. The cubes have the
+/// shape of the frame if the pipeline does not give it to them.
 fn scene(is_in_shape: bool) -> Result<(Scene, Vec<LayerMask>), Failed> {
     let mut scene = Scene::new();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(1.0, 5.0, 11.0), DVec3::ZERO), [192, 108])];
@@ -146,7 +146,8 @@ fn scene(is_in_shape: bool) -> Result<(Scene, Vec<LayerMask>), Failed> {
     Ok((scene, layers))
 }
 
-/// The mesh with its top pushed down, its triangles culled on the CPU, colours, and the attribute that says what the top is.
+/// The mesh with its top pushed down, its triangles culled on the CPU, colours, and the attribute that says what the
+/// top is.
 fn with_top(mesh: &Mesh, push: f32) -> Result<Mesh, Failed> {
     let top = |vertex: &Vertex| if vertex.position[1] > 0.0 { 1.0_f32 } else { 0.0 };
     let tops: Vec<_> = mesh.vertices().iter().map(top).collect();

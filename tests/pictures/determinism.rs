@@ -44,8 +44,8 @@ fn opaque(mut scene: Scene) -> Result<Scene, Failed> {
     Ok(scene)
 }
 
-/// The deferred pipeline, with long edges in the shadow maps of lamps: subdivided meshes take as many draws, but seconds less time for each
-/// renderer.
+/// The deferred pipeline, with long edges in the shadow maps of lamps: subdivided meshes take as many draws, but
+/// seconds less time for each renderer.
 fn with_coarse_edges(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
     let balanced = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { widest_edge: 20.0, ..balanced.shadows }, ..balanced };

@@ -77,7 +77,8 @@ fn no_timestamps() -> Result<(), Failed> {
     Ok(())
 }
 
-/// On its noop backend, wgpu's validation of indirect draws panics when a pass is finished, on the thread that finishes it.
+/// On its noop backend, wgpu's validation of indirect draws panics when a pass is finished, on the thread that finishes
+/// it.
 fn indirect_draw_on_noop() -> Result<(), Failed> {
     for encoding in [EncodingStrategy::PerPass, EncodingStrategy::OnSubmit] {
         let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;

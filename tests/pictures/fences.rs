@@ -109,7 +109,8 @@ fn lost_device() -> Result<(), Failed> {
     Ok(())
 }
 
-/// The pictures of a camera that moves around, drawn one after the other, and with the next frame recorded while one is submitted.
+/// The pictures of a camera that moves around, drawn one after the other, and with the next frame recorded while one is
+/// submitted.
 fn overlapped() -> Result<(), Failed> {
     const FRAMES: usize = 10;
     let move_camera = |scene: &mut Scene, frame: usize| {

@@ -40,7 +40,8 @@ fn fixture(quality: Quality) -> Result<Fixture, Failed> {
 /// The size of pictures in which each pixel shows one vertex.
 const SIDE: usize = 128;
 
-/// A scene with one quad per pixel, row by row. Each faces the camera and has one of these normals and texture coordinates.
+/// A scene with one quad per pixel, row by row. Each faces the camera and has one of these normals and texture
+/// coordinates.
 fn one_quad_per_pixel(quads: &[(Vec3, Vec2)], material: Material, textures: Vec<Texture>) -> Result<Scene, Failed> {
     let (mut vertices, mut indices) = (Vec::new(), Vec::new());
     for (number, (normal, uv)) in quads.iter().enumerate() {
@@ -66,8 +67,8 @@ fn one_quad_per_pixel(quads: &[(Vec3, Vec2)], material: Material, textures: Vec<
     Ok(scene)
 }
 
-/// One normal per pixel: the axes, some beside the fold of the octahedron, some midway between the steps of each format where
-/// the steps are largest, and the rest distributed evenly (a Fibonacci spiral).
+/// One normal per pixel: the axes, some beside the fold of the octahedron, some midway between the steps of each format
+/// where the steps are largest, and the rest distributed evenly (a Fibonacci spiral).
 fn directions() -> Vec<Vec3> {
     let mut all = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
     for index in 0..200 {
@@ -262,7 +263,8 @@ fn packed_without_loss() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Fails if the distance between the scene's picture in this quality and `balanced`, its picture in the balanced one, exceeds `max`.
+/// Fails if the distance between the scene's picture in this quality and `balanced`, its picture in the balanced one,
+/// exceeds `max`.
 fn expect_within(
     name: &str,
     (scene, balanced): (&Scene, &Picture),
@@ -277,8 +279,9 @@ fn expect_within(
     Ok(())
 }
 
-/// The error of a cosine is at most the angle, 0.0068. The error of a picture is at most as much, because the tone curve is
-/// flatter than sRGB's inverse where it matters, plus half a step of 255. One tile may also differ in a few pixels of a texture.
+/// The error of a cosine is at most the angle, 0.0068. The error of a picture is at most as much, because the tone
+/// curve is flatter than sRGB's inverse where it matters, plus half a step of 255. One tile may also differ in a few
+/// pixels of a texture.
 fn packed_within_bound() -> Result<(), Failed> {
     let max = Distance { root_mean_square: 0.0068 + 0.002, worst_tile: 0.03 };
     let scene = colonnade()?;

@@ -108,8 +108,8 @@ fn in_software(configure: Configure<'_, SoftwareBackend>) -> Result<Drawer<Softw
 
 type NewDrawer<B> = fn(Configure<'_, B>) -> Result<Drawer<B>, Failed>;
 
-/// Compares a scene's picture with that of the same pipeline if it keeps these processes, none of which the scene requires. The kept
-/// processes have passes in each view, which the scene alone does not have.
+/// Compares a scene's picture with that of the same pipeline if it keeps these processes, none of which the scene
+/// requires. The kept processes have passes in each view, which the scene alone does not have.
 fn expect_same<B: Backend>(drawer: &mut Drawer<B>, scene: &Scene, kept: &[String]) -> Result<(), Failed> {
     let mut drawn = |pipeline: Deferred| {
         drawer.renderer.set_deferred(pipeline)?;
@@ -164,7 +164,8 @@ fn on_software() -> Result<(), Failed> {
     each(in_software)
 }
 
-/// With everything kept a scene that grows needs no other plan. Pipelines of processes that draw no objects are there from the start.
+/// With everything kept a scene that grows needs no other plan. Pipelines of processes that draw no objects are there
+/// from the start.
 fn no_new_plans() -> Result<(), Failed> {
     let keeping = names().into_iter().fold(deferred(), Deferred::keep);
     let mut fixture = Fixture::with(2, |builder| builder.deferred(keeping))?;

@@ -1,7 +1,8 @@
 //! Long draw lists: each object is drawn once, in its own pixel, and no other.
 //!
-//! Every object covers the centre of one pixel. A process stores the object's number there, and counts how often the pixel is drawn. An
-//! oracle computes in f64, from the positions of object and camera, which pixel that is; it shares no code with the crate.
+//! Every object covers the centre of one pixel. A process stores the object's number there, and counts how often the
+//! pixel is drawn. An oracle computes in f64, from the positions of object and camera, which pixel that is; it shares
+//! no code with the crate.
 
 use drawloom::RendererBuilder;
 use drawloom::backend::RecordingStrategy;
@@ -71,8 +72,8 @@ impl RenderProcess for Numbers {
 /// Metres across a pixel.
 const PIXEL: f64 = 0.125;
 
-/// Objects in the pixels of a picture that is large enough, in an order that jumps across it. They are of several meshes, so a list has
-/// several batches.
+/// Objects in the pixels of a picture that is large enough, in an order that jumps across it. They are of several
+/// meshes, so a list has several batches.
 fn scene(count: usize) -> Result<Scene, Failed> {
     let width = count.isqrt() + 1;
     let orientation = Quat::from_euler(EulerRot::YXZ, 0.7, -0.4, 0.2);
@@ -145,7 +146,8 @@ fn compare(
 /// In which order objects are drawn: lists that are binned and lists that are sorted.
 const ORDERS: [DrawOrder; 2] = [DrawOrder::ByState, DrawOrder::FrontToBack];
 
-/// Draws lists of these lengths: at first, after the first object and the last have changed places, and without the first.
+/// Draws lists of these lengths: at first, after the first object and the last have changed places, and without the
+/// first.
 fn check_counts(counts: &[usize]) -> Result<(), Failed> {
     for &count in counts {
         let whole = scene(count)?;

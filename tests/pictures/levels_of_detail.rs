@@ -1,4 +1,5 @@
-//! Levels of detail move what is drawn by no more than the quality allows, and backends draw the triangles of the level.
+//! Levels of detail move what is drawn by no more than the quality allows, and backends draw the triangles of the
+//! level.
 
 use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy};
 use drawloom::glam::DVec3;
@@ -67,8 +68,8 @@ fn fewer_meshes() -> Result<(), Failed> {
     expect(found == fresh.draw(&few)?, || "the meshes of the scene before change the picture".to_owned())
 }
 
-/// With errors that are all allowed, a scene looks as one with the meshes of its coarsest levels. One has a light that subdivides
-/// meshes, and in another triangles are culled.
+/// With errors that are all allowed, a scene looks as one with the meshes of its coarsest levels. One has a light that
+/// subdivides meshes, and in another triangles are culled.
 fn coarsest_levels() -> Result<(), Failed> {
     let scenes: [fn() -> Scene; 4] = [
         || with_meshes(everything(), |mesh| if mesh.name() == "cube" { globe() } else { halved(mesh) }),

@@ -311,7 +311,7 @@ fn mirrored() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Leaves its objects as they are.
+/// Does not change its objects.
 struct Still;
 
 const STILL: LayerMask = LayerMask::layer(3);

@@ -224,7 +224,8 @@ fn from_within() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Lights to the left, right, above and below of a picture, which reach its outermost pixels with the last tenth of their range.
+/// Lights to the left, right, above and below of a picture, which reach its outermost pixels with the last tenth of
+/// their range.
 fn outside_of_the_picture() -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     let wall = Panel::facing(DVec3::ZERO, DVec3::Z, 20.0);

@@ -1,8 +1,10 @@
 //! Pictures drawn by wgpu on the machine's adapter.
 //!
-//! Without an adapter, without its timestamps, or without the scenes beside the repository, the cases that need them are reported as
-//! ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. The
-//! [`slow_cases`] are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit it.
+//! Without an adapter, without its timestamps, or without the scenes beside the repository, the cases that need them
+//! are reported as ignored. `DRAWLOOM_REQUIRE_ADAPTER=1`, `DRAWLOOM_REQUIRE_TIMESTAMPS=1` and
+//! `DRAWLOOM_REQUIRE_SCENES=1` make each of these fail them. The [`slow_cases`] are ignored without
+//! `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the references: check each of them before you commit
+//! it.
 
 mod attributes;
 mod buffers;

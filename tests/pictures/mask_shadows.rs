@@ -151,8 +151,9 @@ fn on_software() -> Result<(), Failed> {
     Ok(())
 }
 
-/// The map reaches some 150 m towards the sun. The triangles of the mask extend from below the floor to far beyond that, and
-/// the edge of a hole is on the floor. Devices without depth clip control have an entry point of their own for this.
+/// The map reaches some 150 m towards the sun. The triangles of the mask extend from below the floor to far beyond
+/// that, and the edge of a hole is on the floor. Devices without depth clip control have an entry point of their own
+/// for this.
 fn across_the_near_plane() -> Result<(), Failed> {
     for missing in [wgpu::Features::empty(), WgpuBackend::DEPTH_CLIP_FEATURES] {
         let device = adapter::device_without(missing)?;

@@ -100,7 +100,8 @@ const FLAT: MaterialType<Flat> = MaterialType::new("flat");
 /// With larger values.
 const STRIPED: MaterialType<[[f32; 4]; 2]> = MaterialType::new("striped");
 
-/// Draws the objects of one type in their material's colour. Without types, those of a layer, with the same bytes as a resource.
+/// Draws the objects of one type in their material's colour. Without types, those of a layer, with the same bytes as a
+/// resource.
 #[derive(Clone)]
 struct Colored {
     is_striped: bool,

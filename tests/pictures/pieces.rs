@@ -88,7 +88,8 @@ impl<B: Backend> Painter<B> {
         Ok((pictures.collect::<Result<_, _>>()?, executed))
     }
 
-    /// Draws a scene with pieces, and compares its pictures with those of another renderer, which is told of no pieces and of no changes.
+    /// Draws a scene with pieces, and compares its pictures with those of another renderer, which is told of no pieces
+    /// and of no changes.
     fn compare(&mut self, plain: &mut Self, scene: SceneRef<'_>, name: &str) -> Result<usize, Failed> {
         let (found, executed) = self.draw(scene)?;
         let (expected, none) = plain.draw(SceneRef { pieces: &[], changes: Changes::Unknown, ..scene })?;

@@ -32,8 +32,8 @@ pub const CASES: &[Case] = &[
     ("negative_radiance_is_black_and_infinite_radiance_white", extreme_radiance),
 ];
 
-/// An engine's full-screen process. Its WGSL is a function body that returns a colour, computed from `pixel`, the pixel's
-/// centre, and `source`, the colour of the source target there.
+/// An engine's full-screen process. Its WGSL is a function body that returns a colour, computed from `pixel`, the
+/// pixel's centre, and `source`, the colour of the source target there.
 struct Step {
     name: &'static str,
     source: Option<String>,

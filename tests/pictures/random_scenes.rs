@@ -1,7 +1,7 @@
 //! wgpu's pictures of random scenes against those of the software backend.
 //!
-//! `cargo test` draws a few. `DRAWLOOM_STRESS_SECONDS=600 cargo test --release --test pictures random_scenes` draws more for that many
-//! seconds.
+//! `cargo test` draws a few. `DRAWLOOM_STRESS_SECONDS=600 cargo test --release --test pictures random_scenes` draws
+//! more for that many seconds.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -171,9 +171,10 @@ impl Spread {
         spread
     }
 
-    /// Devices round vertices to 1/256 of a pixel. An edge that moves by half of that to either side passes the centre of at most one in 256 of
-    /// the pixels that it runs through, which are fewer than those at edges. How many these are in a scene is random: four standard deviations
-    /// of their number come on top. Shadow maps have edges of their own, whose few pixels are several of the picture.
+    /// Devices round vertices to 1/256 of a pixel. An edge that moves by half of that to either side passes the centre
+    /// of at most one in 256 of the pixels that it runs through, which are fewer than those at edges. How many these
+    /// are in a scene is random: four standard deviations of their number come on top. Shadow maps have edges of their
+    /// own, whose few pixels are several of the picture.
     fn is_within_bound(&self) -> bool {
         let expected = self.edges as f64 / 256.0;
         self.inside == 0 && self.at_edges as f64 <= expected + 4.0 * expected.sqrt() + 4.0

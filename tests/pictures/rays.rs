@@ -377,8 +377,8 @@ fn slice_ends(maps: &ShadowMaps, camera: &Camera) -> Vec<f64> {
     (1..=maps.cascades).map(end).collect()
 }
 
-/// The width of a pixel of a light's maps: in metres for a directional light, for each of its cascades, and at a distance
-/// of 1 m for others, as the documentation of [`ShadowMaps`] defines it.
+/// The width of a pixel of a light's maps: in metres for a directional light, for each of its cascades, and at a
+/// distance of 1 m for others, as the documentation of [`ShadowMaps`] defines it.
 fn map_pixels(light: &Light, maps: &ShadowMaps, camera: &Camera) -> Vec<f64> {
     let side = f64::from(maps.side);
     let pixel = match *light {
@@ -456,7 +456,8 @@ fn illuminance(light: &Light, point: DVec3, normal: DVec3, error: f64) -> [f64; 
     [ends[0] * shape[0], ends[1] * shape[1]]
 }
 
-/// The fraction of a light's intensity in a direction. `more` is added to the cosine of the angle from the light's axis.
+/// The fraction of a light's intensity in a direction. `more` is added to the cosine of the angle from the light's
+/// axis.
 fn shape(light: &Light, along: DVec3, more: f64) -> f64 {
     match *light {
         Light::Spot { direction, inner_angle, outer_angle, .. } => {

@@ -31,7 +31,8 @@ const MIRRORED: LayerMask = LayerMask::layer(1);
 const DIRECT: LayerMask = LayerMask::layer(2);
 const SURFACE: LayerMask = LayerMask::layer(7);
 
-/// A red cube that only the mirror shows, and a yellow one that only the camera sees, both moved to the right, in metres.
+/// A red cube that only the mirror shows, and a yellow one that only the camera sees, both moved to the right, in
+/// metres.
 fn scene(mirrored: f64, direct: f64, redraw: Redraw) -> Result<Scene, Failed> {
     let mut scene = Scene::new();
     let mesh = scene.add(cube())?;

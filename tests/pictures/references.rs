@@ -36,8 +36,8 @@ pub fn colonnade() -> Result<Scene, Failed> {
     Ok(small(demo::colonnade()?))
 }
 
-/// The project's own scene in a smaller picture. Its lamp casts no shadow: the subdivision of all objects near it takes half a second for
-/// each renderer, and `everything` has such a lamp as well.
+/// The project's own scene in a smaller picture. Its lamp casts no shadow: the subdivision of all objects near it takes
+/// half a second for each renderer, and `everything` has that lamp as well.
 pub fn small_colonnade() -> Result<Scene, Failed> {
     let mut scene = colonnade()?;
     scene.cameras[0].size = [160, 90];

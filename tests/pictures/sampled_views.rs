@@ -38,8 +38,8 @@ const SIZE: [u32; 2] = [96, 64];
 pub const SURFACE: LayerMask = LayerMask::layer(7);
 const WORLD: LayerMask = LayerMask::layer(0);
 
-/// Draws the objects of a layer with the picture of another view, at the same position of the picture or mirrored. Black where there is no
-/// such view.
+/// Draws the objects of a layer with the picture of another view, at the same position of the picture or mirrored.
+/// Black where there is no such view.
 #[derive(Clone, Copy)]
 pub struct Surface {
     name: &'static str,

@@ -219,9 +219,11 @@ fn extreme_scales() -> Result<(), Failed> {
     let position = DVec3::new(-0.4, 3.0, 0.9);
     for light in lights() {
         let is_sun = matches!(light, Light::Directional { .. });
-        // The camera is inside of the large ones, and sees no side of them. Nor does a lamp. They hide the sun, which is outside.
+        // The camera is inside of the large ones, and sees no side of them. Nor does a lamp. They hide the sun, which
+        // is outside.
         let large = if is_sun {
-            // Of still larger triangles a map has a wrong slope, as they cross its near plane: `larger_than_maps` draws them.
+            // Of still larger triangles a map has a wrong slope, as they cross its near plane: `larger_than_maps` draws
+            // them.
             [Vec3::new(-1e2, 1e2, 1e2), Vec3::splat(1e3)]
         } else {
             [Vec3::new(-1e6, 1e3, 1e5), Vec3::splat(1e20)]

@@ -332,7 +332,8 @@ fn across_the_near_plane(near_plane: NearPlane) -> Result<(), Failed> {
             // Its shadow falls to the left, from x = 2, and begins at z = -0.5.
             let half = DVec3::new(size, size, 2.0 * size);
             let mut panels = Panel::closed_box(DVec3::new(2.0 + size, size - 1.0, 2.0 * size - 0.5), half);
-            // A pillar of nothing but sides, which stands free, and reaches as far down as up, beyond the map's far plane.
+            // A pillar of nothing but sides, which stands free, and reaches as far down as up, beyond the map's far
+            // plane.
             let pillar = DVec3::new(0.15, size, 0.15);
             panels.extend(Panel::closed_box(DVec3::new(0.3, 0.0, -2.5), pillar));
             panels.push(Panel::facing(DVec3::ZERO, DVec3::Y, 6.0));

@@ -1,4 +1,5 @@
-//! Small passes that share a command encoder draw what they draw in encoders of their own, and what the device refuses is still named.
+//! Small passes that share a command encoder draw what they draw in encoders of their own, and what the device refuses
+//! is still named.
 
 use std::sync::Arc;
 

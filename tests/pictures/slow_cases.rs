@@ -1,5 +1,5 @@
-//! Cases that take a second and more, most of them as they draw with each recording strategy or in software. Less of the same is in faster
-//! cases.
+//! Cases that take a second and more, most of them as they draw with each recording strategy or in software. Less of
+//! the same is in faster cases.
 
 use libtest_mimic::Trial;
 

@@ -47,7 +47,8 @@ fn cascades() -> Result<(), Failed> {
     compare_with(scene, ShadowMaps { side: 256, cascades: 4, max_distance: 12.0, ..ShadowMaps::default() })
 }
 
-/// The shadow of a ramp begins where the ramp is higher than the bias, which a clip plane near the camera and across its view makes larger.
+/// The shadow of a ramp begins where the ramp is higher than the bias, which a clip plane near the camera and across
+/// its view makes larger.
 fn behind_a_clip_plane() -> Result<(), Failed> {
     let projection = Projection::Perspective { field_of_view: 2.0 * 0.5_f32.atan() };
     // Its corners are on corners of pixels, or in their centres, where neither backend moves them.

@@ -228,9 +228,9 @@ impl RenderProcess for MapDepth {
     }
 }
 
-/// Each triangle of the pillar reaches from a sun's map to beyond its far plane, where it would cover further pixels of the
-/// map. Devices without depth clip control leave these out by themselves. The tower reaches to in front of the near plane,
-/// where all devices draw it.
+/// Each triangle of the pillar reaches from a sun's map to beyond its far plane, where it would cover further pixels of
+/// the map. Devices without depth clip control leave these out by themselves. The tower reaches to in front of the near
+/// plane, where all devices draw it.
 fn in_a_map() -> Result<(), Failed> {
     let mut panels = Panel::closed_box(DVec3::new(0.5, -200.0, -1.0), DVec3::new(0.2, 201.0, 0.2));
     panels.extend(Panel::closed_box(DVec3::new(-0.6, 100.2, 0.4), DVec3::new(0.2, 100.0, 0.2)));

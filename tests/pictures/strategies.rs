@@ -1,5 +1,5 @@
-//! Every recording and encoding strategy draws the same bytes while scenes change. Cached bundles are replayed if and only
-//! if nothing that they depend on has changed.
+//! Every recording and encoding strategy draws the same bytes while scenes change. Cached bundles are replayed if and
+//! only if nothing that they depend on has changed.
 
 use std::sync::Arc;
 
@@ -42,8 +42,8 @@ pub fn strategies() -> Vec<(RecordingStrategy, EncodingStrategy)> {
     recordings.flat_map(|recording| ENCODING_STRATEGIES.map(|encoding| (recording, encoding))).collect()
 }
 
-/// A few of the strategies: each way to record once, and with these each way to encode at least once. For scenes whose passes have too few
-/// draws to be split.
+/// A few of the strategies: each way to record once, and with these each way to encode at least once. For scenes whose
+/// passes have too few draws to be split.
 pub fn few_strategies() -> Vec<(RecordingStrategy, EncodingStrategy)> {
     let mut next_encoding = ENCODING_STRATEGIES.into_iter().cycle();
     let mut few = strategies();
@@ -74,8 +74,8 @@ pub fn fixture_with(recording: RecordingStrategy, encoding: EncodingStrategy) ->
     fixture_of(backend()?.recording_strategy(recording).encoding_strategy(encoding))
 }
 
-/// A fixture with cached bundles on a device that no other case uses. So the device is done with a frame when its picture is read,
-/// and the next frame has the same buffers and their bundles.
+/// A fixture with cached bundles on a device that no other case uses. So the device is done with a frame when its
+/// picture is read, and the next frame has the same buffers and their bundles.
 fn fixture_alone(encoding: EncodingStrategy) -> Result<Fixture, Failed> {
     let (device, queue) = adapter::device()?;
     let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles);
@@ -130,8 +130,8 @@ fn move_all(scene: &mut Scene, by: f64) -> Result<(), Failed> {
 
 type Change = fn(&mut Scene) -> Result<(), Failed>;
 
-/// The change of a scene before each frame: none at first, then everything moves, an object is removed and added, assets are
-/// added, a picture is resized.
+/// The change of a scene before each frame: none at first, then everything moves, an object is removed and added,
+/// assets are added, a picture is resized.
 const CHANGES: [Change; 8] = [
     |_| Ok(()),
     |_| Ok(()),

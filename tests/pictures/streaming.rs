@@ -1,4 +1,5 @@
-//! Meshes in pages, textures in arrays that grow, and both streamed: the pictures are those of a new renderer that uploads everything at once.
+//! Meshes in pages, textures in arrays that grow, and both streamed: the pictures are those of a new renderer that
+//! uploads everything at once.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -61,7 +62,7 @@ fn expect_same(found: &[Picture], expected: &[Picture], when: &str) -> Result<()
     }
 }
 
-/// A wavy disc of so many corners around its centre.
+/// A wavy disc of this number of corners around its centre.
 pub fn disc(corners: u32, wave: f32) -> Mesh {
     let corner = |number: u32| {
         let angle = number as f32 / corners as f32 * std::f32::consts::TAU;

@@ -305,7 +305,8 @@ fn many_batches() -> Result<(), Failed> {
     if pictures[0] == pictures[1] { Ok(()) } else { Err("one mesh gives another picture than two".into()) }
 }
 
-/// A white square that fills the picture. Its `map_d` is black on the left. On the right it is white in one file and grey in another.
+/// A white square that fills the picture. Its `map_d` is black on the left. On the right it is white in one file and
+/// grey in another.
 fn masked() -> Result<(), Failed> {
     let square = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
     let file = format!("mtllib a.mtl\nusemtl a\n{square}");

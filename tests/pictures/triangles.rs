@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
 
 type Make = fn() -> Result<Scene, Failed>;
 
-/// Scenes, each with an n: every n-th mesh is cullable. And whether passes have so many draws that they are split.
+/// Scenes, each with an n: every n-th mesh is cullable. And whether passes have enough draws to be split.
 const SCENES: [(Make, usize, bool); 4] = [
     (|| Ok(everything()), 1, false),
     (|| Ok(field(300)), 1, false),

@@ -126,7 +126,8 @@ fn without_colors() -> Result<(), Failed> {
         (draw(with.clone(), &scene, "picture")?, draw(without.clone(), &scene, "picture")?),
         (draw_in_software(with, &scene, "picture")?, draw_in_software(without, &scene, "picture")?),
     ] {
-        // A white that is interpolated may be less than 1 by a rounding, which no more than rounds a byte the other way.
+        // A white that is interpolated may be less than 1 by a rounding, which no more than rounds a byte the other
+        // way.
         let pairs = found.bytes.iter().zip(&expected.bytes);
         let worst = pairs.map(|(one, other)| one.abs_diff(*other)).max();
         if worst > Some(1) {

@@ -68,8 +68,8 @@ fn no_new_pipelines() -> Result<(), Failed> {
     if count(&cold) > made_in_first { Ok(()) } else { Err("no step requires another pipeline".into()) }
 }
 
-/// The pictures, and what is accumulated, of some frames in which the boxes move, after the first frames of a warm-up in which these are
-/// elsewhere.
+/// The pictures, and what is accumulated, of some frames in which the boxes move, after the first frames of a warm-up
+/// in which these are elsewhere.
 fn frames<B: Backend>(
     (mut renderer, submitter): (Renderer<B>, Submitter<B>),
     warm_up_frames: usize,

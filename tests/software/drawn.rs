@@ -162,7 +162,8 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     }
 }
 
-/// Every light reads its own shadow maps: the radiance of all is the sum of what each adds alone, where its maps are the first.
+/// Every light reads its own shadow maps: the radiance of all is the sum of what each adds alone, where its maps are
+/// the first.
 #[test]
 fn lights_with_shadows_add_up() {
     let mut scene = Scene::new();

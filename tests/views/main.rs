@@ -1,9 +1,9 @@
-//! The gallery of the example `views`: its contact sheet is compared with the one that is shown, and what stands for something else in it
-//! with what that stands for.
+//! The gallery of the example `views`: its contact sheet is compared with the one that is shown, and what stands for
+//! something else in it with what that stands for.
 //!
-//! Without an adapter the cases on one are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter fails them. Slow cases
-//! are ignored without `DRAWLOOM_SLOW_CASES=1`.
-//! `DRAWLOOM_RENEW_REFERENCES=1` rewrites the sheet: look at it before you commit it.
+//! Without an adapter the cases on one are reported as ignored. With `DRAWLOOM_REQUIRE_ADAPTER=1` a missing adapter
+//! fails them. Slow cases are ignored without `DRAWLOOM_SLOW_CASES=1`. `DRAWLOOM_RENEW_REFERENCES=1` rewrites the
+//! sheet: look at it before you commit it.
 
 #[path = "../../examples/views/contact_sheet.rs"]
 mod contact_sheet;
@@ -113,9 +113,9 @@ fn stored_sheet() -> PathBuf {
 
 /// How much a tile of a sheet may differ from the one that is shown.
 ///
-/// The screen and the ball show pictures that are larger than they are, one pixel of them in each of theirs. Where that pixel lies next to an
-/// edge, rounding decides on which side, and all of it differs: 0.076 in the worst tile in software, and 0.044 on an NVIDIA H100. A tile whose
-/// content is missing differs by more.
+/// The screen and the ball show pictures that are larger than they are, one pixel of them in each of theirs. Where that
+/// pixel lies next to an edge, rounding decides on which side, and all of it differs: 0.076 in the worst tile in
+/// software, and 0.044 on an NVIDIA H100. A tile whose content is missing differs by more.
 const MAX_WORST_TILE: f64 = 0.1;
 
 /// Compares a sheet with the one that is shown, and stores it as the temporary file `name` if they differ.
@@ -129,7 +129,8 @@ fn expect_stored_sheet(drawn: &RgbImage, name: &str) -> Result<(), Failed> {
     Err(format!("{distance:?} between {} and {}", stored_sheet().display(), found.display()).into())
 }
 
-/// The content of each cell, which is below its label, is replaced by its mean colour: no other plain colour is nearer to it.
+/// The content of each cell, which is below its label, is replaced by its mean colour: no other plain colour is nearer
+/// to it.
 fn a_cell_without_its_content() -> Result<(), Failed> {
     let sheet = image::open(stored_sheet())?.to_rgb8();
     let [width, height] = gallery::SIZE;
@@ -219,7 +220,8 @@ fn impostor_turns() -> Result<(), Failed> {
         }
         latest = next;
     }
-    // The camera is above the tree, so 0.39 radians around its axis are a smaller angle, but more than three times that of a redraw.
+    // The camera is above the tree, so 0.39 radians around its axis are a smaller angle, but more than three times that
+    // of a redraw.
     if redrawn.len() != 3 {
         return Err(format!("it was drawn again at steps {redrawn:?}").into());
     }

@@ -1,9 +1,9 @@
 //! Shows [Drawloom](https://docs.rs/drawloom)'s frames in [Tracy](https://github.com/wolfpld/tracy): the work of each
 //! worker, on one timeline.
 //!
-//! An engine with a `tracing` subscriber adds [`layer`] to it; an engine without one calls [`install`]. Then a viewer can connect.
-//! It shows a zone for each node that a worker runs, the number of ready nodes, and the number of queued jobs.
-//! [`name_worker`] and [`mark_frame`] make the timeline easier to read:
+//! An engine with a `tracing` subscriber adds [`layer`] to it; an engine without one calls [`install`]. Then a viewer
+//! can connect. It shows a zone for each node that a worker runs, the number of ready nodes, and the number of queued
+//! jobs. [`name_worker`] and [`mark_frame`] make the timeline easier to read:
 //!
 //! ```
 //! use drawloom::task::Scheduler;
@@ -52,11 +52,12 @@ pub enum Zones {
 
 /// A layer for an engine's own subscriber, which must be a [`Registry`] with layers.
 ///
-/// Each node is a zone with the node's name. All other spans up to [`DEBUG`](tracing::Level::DEBUG), Drawloom's or not, are zones
-/// with the span's name, and events are messages. Fields are not part of a zone's name, because Tracy is limited to about
-/// 32,000 different names. To show fewer zones, add a [filter](Layer::with_filter) to the layer.
+/// Each node is a zone with the node's name. All other spans up to [`DEBUG`](tracing::Level::DEBUG), Drawloom's or not,
+/// are zones with the span's name, and events are messages. Fields are not part of a zone's name, because Tracy is
+/// limited to about 32,000 different names. To show fewer zones, add a [filter](Layer::with_filter) to the layer.
 ///
-/// The plots use an event of level [`TRACE`](tracing::Level::TRACE), so a level filter on the whole subscriber removes them.
+/// The plots use an event of level [`TRACE`](tracing::Level::TRACE), so a level filter on the whole subscriber removes
+/// them.
 pub fn layer<S>(zones: Zones) -> impl Layer<S> + Send + Sync
 where
     S: Subscriber + for<'span> LookupSpan<'span>,
@@ -85,8 +86,8 @@ pub fn install(zones: Zones) -> Result<(), InstallError> {
 #[error("the program already has a subscriber: add drawloom_tracy::layer to that one")]
 pub struct InstallError;
 
-/// Names the calling thread after a worker. Use it as the hook of `SchedulerBuilder::on_start`. Worker 0 is the thread that calls
-/// the scheduler; it can be named by calling this with 0.
+/// Names the calling thread after a worker. Use it as the hook of `SchedulerBuilder::on_start`. Worker 0 is the thread
+/// that calls the scheduler; it can be named by calling this with 0.
 pub fn name_worker(index: usize) {
     let name = if index == 0 { "caller".to_owned() } else { format!("worker {index}") };
     Client::start().set_thread_name(&name);

@@ -3,14 +3,14 @@
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling
 //!     cargo bench -p drawloom-benches --no-default-features --bench culling -- --quick
 //!
-//! First the time per object: all volumes, spheres tested one by one, and the usual planes in f32, in a plain loop and written for
-//! SIMD, interleaved. All write a bit for each object.
+//! First the time per object: all volumes, spheres tested one by one, and the usual planes in f32, in a plain loop and
+//! written for SIMD, interleaved. All write a bit for each object.
 //!
-//! Then the check: cameras at all extremes (`drawloom_testing::culling::cameras`), a new one every 256 objects, against an f64
-//! oracle (`drawloom_testing::culling::oracle`). Three in four spheres, and as many objects, touch a plane, an edge or a corner of
-//! the frustum to within four steps of f32 (*tangent*); the others are *anywhere*. Spheres are tested directly; objects pass from
-//! the scene through the object table, with scales from 0 to 1e20. A false cull fails the run, and so do too many kept objects
-//! that are outside.
+//! Then the check: cameras at all extremes (`drawloom_testing::culling::cameras`), a new one every 256 objects, against
+//! an f64 oracle (`drawloom_testing::culling::oracle`). Three in four spheres, and as many objects, touch a plane, an
+//! edge or a corner of the frustum to within four steps of f32 (*tangent*); the others are *anywhere*. Spheres are
+//! tested directly; objects pass from the scene through the object table, with scales from 0 to 1e20. A false cull
+//! fails the run, and so do too many kept objects that are outside.
 //!
 //! `target/drawloom/culling.json` has the same.
 

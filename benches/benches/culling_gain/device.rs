@@ -169,7 +169,7 @@ impl Device {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    /// Draws so many objects of each mesh, from the first of the list on.
+    /// Draws this number of objects of each mesh, from the first of the list on.
     pub fn draw(&self, encoder: &mut wgpu::CommandEncoder, counts: impl Iterator<Item = usize>) {
         let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {

@@ -31,7 +31,8 @@ impl Contender for DrawloomPipeline {
         Ok(time)
     }
 
-    /// The draws are all batches of objects, and one for each process that draws lights. Every class of lights must be in view.
+    /// The draws are all batches of objects, and one for each process that draws lights. Every class of lights must be
+    /// in view.
     fn counts(&self) -> Counts {
         let views = &self.statistics.views;
         let processes = self.renderer.plan().processes();

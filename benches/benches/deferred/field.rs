@@ -15,8 +15,8 @@ const MATERIALS: usize = 16;
 /// The contents of a field of boxes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Field {
-    /// Small lights, half of them point lights and half spot lights, that reach about 3 m. A smaller number of lights is a prefix of
-    /// a larger one.
+    /// Small lights, half of them point lights and half spot lights, that reach about 3 m. A smaller number of lights
+    /// is a prefix of a larger one.
     pub lights: usize,
     /// Spot lights that cast shadows, high above the field.
     pub shadow_maps: usize,

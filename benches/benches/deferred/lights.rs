@@ -64,7 +64,8 @@ impl Pipeline {
 }
 
 /// # Errors
-/// Returns an error if a frame cannot be drawn, an object or light is not visible, or pipelines draw different pictures.
+/// Returns an error if a frame cannot be drawn, an object or light is not visible, or pipelines draw different
+/// pictures.
 pub fn measure(
     extent: &Extent,
     backend: BackendName,
@@ -162,8 +163,8 @@ pub fn check_same<'a>(
     Ok(())
 }
 
-/// The share of bytes that differ by more than rounding: the geometry buffer stores a byte per channel of the diffuse colour, and
-/// half floats are added in another order.
+/// The share of bytes that differ by more than rounding: the geometry buffer stores a byte per channel of the diffuse
+/// colour, and half floats are added in another order.
 fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
     const ROUNDING: u8 = 3;
     let differing = one.bytes.iter().zip(&other.bytes).filter(|(one, other)| one.abs_diff(**other) > ROUNDING);
@@ -173,7 +174,8 @@ fn share_that_differs(one: &Picture, other: &Picture) -> f64 {
 /// A few pixels on edges may differ.
 const MAX_DIFFERENT: f64 = 2e-4;
 
-/// The targets: with one worker, the deferred pipeline takes no longer than the faster of the renderers written by hand.
+/// The targets: with one worker, the deferred pipeline takes no longer than the faster of the renderers written by
+/// hand.
 pub fn targets(rows: &[Row]) -> Targets {
     let mut targets = Targets::new();
     for row in rows.iter().filter(|row| (row.pipeline, row.workers) == (Pipeline::Deferred, 1)) {

@@ -1,5 +1,5 @@
-//! A forward pipeline of this crate's processes. It draws the same picture as the deferred one, for lights without shadows and
-//! opaque objects.
+//! A forward pipeline of this crate's processes. It draws the same picture as the deferred one, for lights without
+//! shadows and opaque objects.
 
 use drawloom::RendererBuilder;
 use drawloom::backend::WgpuBackend;

@@ -1,20 +1,24 @@
-//! The cost of the deferred pipeline: by the number of lights, beside three forward pipelines that draw the same picture; with light
-//! volumes and with scissor rectangles (L 4.2.1); by the number of shadow maps; and with and without a depth pre-pass.
+//! The cost of the deferred pipeline: by the number of lights, beside three forward pipelines that draw the same
+//! picture; with light volumes and with scissor rectangles (L 4.2.1); by the number of shadow maps; and with and
+//! without a depth pre-pass.
 //!
 //!     cargo bench -p drawloom-benches --bench deferred
 //!     cargo bench -p drawloom-benches --bench deferred -- --quick
 //!     cargo bench -p drawloom-benches --bench deferred -- --backend noop --workers 1,4
 //!
-//! A block is one table on one backend: wgpu's `noop`, which measures the CPU alone, or the machine's adapter. The settings of a block
-//! are interleaved, one frame each per round. The tables show medians. Without an adapter its blocks are left out. Pipelines of this crate
-//! run on each number of workers. The forward pipelines:
+//! A block is one table on one backend: wgpu's `noop`, which measures the CPU alone, or the machine's adapter. The
+//! settings of a block are interleaved, one frame each per round. The tables show medians. Without an adapter its
+//! blocks are left out. Pipelines of this crate run on each number of workers. The forward pipelines:
 //!
 //! - *loop per pixel* is a process of this crate, whose shader loops over all lights that reach the view.
-//! - *draw per light* is written in plain wgpu, on one thread: it draws all objects, and then adds each light to the objects that it reaches.
-//! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its cluster.
+//! - *draw per light* is written in plain wgpu, on one thread: it draws all objects, and then adds each light to the
+//!   objects that it reaches.
+//! - *clustered* is too: it sorts lights into clusters of the view on the CPU, and a pixel loops over those of its
+//!   cluster.
 //!
-//! Scissor rectangles take the place of light volumes in the deferred pipeline: a raw pass draws a triangle that covers the picture for
-//! each light, within the rectangle of what the light reaches. With the depth test, the triangle is as far away as that.
+//! Scissor rectangles take the place of light volumes in the deferred pipeline: a raw pass draws a triangle that covers
+//! the picture for each light, within the rectangle of what the light reaches. With the depth test, the triangle is as
+//! far away as that.
 //!
 //! `target/drawloom/deferred.json` has the same. The last line names the targets that were missed.
 

@@ -1,6 +1,6 @@
-//! A forward renderer in plain wgpu, on one thread: what an engine writes by hand. It culls objects and lights, draws all visible
-//! objects as instances of one mesh, and tone maps. How it lights them is a [`Lighting`]. It has the layouts and the shading of this
-//! crate, so that pictures are the same.
+//! A forward renderer in plain wgpu, on one thread: what an engine writes by hand. It culls objects and lights, draws
+//! all visible objects as instances of one mesh, and tone maps. How it lights them is a [`Lighting`]. It has the
+//! layouts and the shading of this crate, so that pictures are the same.
 
 mod clusters;
 mod device;

@@ -79,8 +79,8 @@ enum Order {
     BackToFront,
 }
 
-/// Thirty walls one behind the other. Each fills the picture. `order` is that of the objects in the scene. Commands of one
-/// mesh and state are sorted by depth, so both scenes are drawn front to back.
+/// Thirty walls one behind the other. Each fills the picture. `order` is that of the objects in the scene. Commands of
+/// one mesh and state are sorted by depth, so both scenes are drawn front to back.
 fn walls(extent: &Extent, order: Order) -> Result<Scene, SceneError> {
     const WALLS: usize = 30;
     let mut scene = Scene::new();

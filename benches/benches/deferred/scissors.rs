@@ -1,7 +1,8 @@
 //! Lights within scissor rectangles: what light volumes are better than according to L 4.2.1.
 //!
-//! These processes take the place of those with light volumes in the deferred pipeline, and run the same fragment shader. An engine's
-//! code finds the rectangle of each light, and a raw pass draws a triangle that covers the picture, a draw a light.
+//! These processes take the place of those with light volumes in the deferred pipeline, and run the same fragment
+//! shader. An engine's code finds the rectangle of each light, and a raw pass draws a triangle that covers the picture,
+//! a draw a light.
 
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};

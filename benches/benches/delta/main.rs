@@ -3,9 +3,9 @@
 //!     cargo bench -p drawloom-benches --bench delta
 //!     cargo bench -p drawloom-benches --bench delta -- --quick
 //!
-//! Each round runs all operations in the order of their data flow, on the same sorted commands; the table shows medians. They keep their
-//! memory from round to round, as they would from frame to frame. Copying the fixed form is the alternative to storing deltas;
-//! comparing it with the last frame's detects that nothing changed.
+//! Each round runs all operations in the order of their data flow, on the same sorted commands; the table shows
+//! medians. They keep their memory from round to round, as they would from frame to frame. Copying the fixed form is
+//! the alternative to storing deltas; comparing it with the last frame's detects that nothing changed.
 //!
 //! `target/drawloom/delta.json` has the same.
 

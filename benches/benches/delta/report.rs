@@ -29,8 +29,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// The bandwidth in GB/s at which transferring the saved bytes takes as long as delta commands cost: encoding, validating and
-    /// decoding, against a copy at either end.
+    /// The bandwidth in GB/s at which transferring the saved bytes takes as long as delta commands cost: encoding,
+    /// validating and decoding, against a copy at either end.
     fn break_even(&self) -> f64 {
         let saved = size_of::<RenderCommand>() as f64 - self.bytes;
         saved / (self.encode + self.check + self.decode - 2.0 * self.copy)

@@ -69,8 +69,8 @@ impl AcrossMeshes {
     }
 }
 
-/// A scene of these objects, each with a mesh of its own. Without an order by depth they are drawn in the order of the meshes' slots,
-/// which is that of `objects`.
+/// A scene of these objects, each with a mesh of its own. Without an order by depth they are drawn in the order of the
+/// meshes' slots, which is that of `objects`.
 fn with_a_mesh_each(source: &SceneRef<'_>, objects: &[usize]) -> Result<Scene, Box<dyn Error>> {
     let mut scene = Scene::new();
     let mut materials: Vec<(Handle<Material>, Handle<Material>)> = Vec::new();

@@ -3,21 +3,22 @@
 //!     cargo bench -p drawloom-benches --bench depth_order
 //!     cargo bench -p drawloom-benches --bench depth_order -- --quick
 //!
-//! - *Sorting error*: 10,000 random distances of two distributions between 0.1 m and 10 km are sorted by their depth codes. Equal
-//!   codes stay in random order, as equal keys are sorted by object index. The result is compared with the distances in sorted
-//!   order.
-//! - *Overdraw*: the number of shaded fragments divided by the number of covered pixels, and the instanced draws of a frame, by
-//!   `Quality::opaque_order` and scene. The software backend draws opaque objects with a fragment shader that counts its calls,
-//!   and does so only for fragments that pass the depth test. The sort key has the mesh above the depth, so it orders only objects
-//!   of one mesh. The orders *across meshes* show what an order of all objects of a draw state would reach; their draws are the
-//!   runs of objects with the same mesh. Two walls whose overdraw is known are drawn first, and the benchmark fails if it is
-//!   another one.
-//! - *Cost*: the CPU time of a frame from the hand-over of the scene to the return of submit, on wgpu's noop backend, per object and
-//!   camera. 4 cameras look at a cloud of 10,000 objects, of which each moves, and the engine says nothing about it. In *moving*
-//!   the same objects are seen in every frame, in *cameras turning* they are not. The figures are medians of interleaved rounds.
+//! - *Sorting error*: 10,000 random distances of two distributions between 0.1 m and 10 km are sorted by their depth
+//!   codes. Equal codes stay in random order, as equal keys are sorted by object index. The result is compared with the
+//!   distances in sorted order.
+//! - *Overdraw*: the number of shaded fragments divided by the number of covered pixels, and the instanced draws of a
+//!   frame, by `Quality::opaque_order` and scene. The software backend draws opaque objects with a fragment shader that
+//!   counts its calls, and does so only for fragments that pass the depth test. The sort key has the mesh above the
+//!   depth, so it orders only objects of one mesh. The orders *across meshes* show what an order of all objects of a
+//!   draw state would reach; their draws are the runs of objects with the same mesh. Two walls whose overdraw is known
+//!   are drawn first, and the benchmark fails if it is another one.
+//! - *Cost*: the CPU time of a frame from the hand-over of the scene to the return of submit, on wgpu's noop backend,
+//!   per object and camera. 4 cameras look at a cloud of 10,000 objects, of which each moves, and the engine says
+//!   nothing about it. In *moving* the same objects are seen in every frame, in *cameras turning* they are not. The
+//!   figures are medians of interleaved rounds.
 //!
-//! Only the cost is timed: the other figures are the same on every machine. `target/drawloom/depth_order.json` has overdraw and
-//! cost.
+//! Only the cost is timed: the other figures are the same on every machine. `target/drawloom/depth_order.json` has
+//! overdraw and cost.
 
 mod across_meshes;
 mod cost;

@@ -26,7 +26,7 @@ enum Frames<B: Backend>
 where
     B::Submission: Send,
 {
-    /// Everything on one thread, which waits until fewer than so many frames are in flight.
+    /// Everything on one thread, which waits until fewer than this number of frames are in flight.
     Plain {
         renderer: Renderer<B>,
         submitter: Submitter<B>,
@@ -38,7 +38,7 @@ where
 /// Which loop.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
-    /// All on one thread, with so many frames in flight.
+    /// All on one thread, with this number of frames in flight.
     Plain(usize),
     Loop(Buffering),
 }

@@ -3,17 +3,19 @@
 //!     cargo bench -p drawloom-benches --bench latency
 //!     cargo bench -p drawloom-benches --bench latency -- --quick --backend noop
 //!
-//! On wgpu's `noop` device a simulated device takes a given time for each frame; on an adapter the device draws. The engine's update is a
-//! loop that takes a given time. The contenders are the three schemes of `FrameLoop`, and two loops on one thread without it: one that waits
-//! for each frame, and one that waits for the frame before the last, as engines do by hand. They take turns, a few dozen frames each.
+//! On wgpu's `noop` device a simulated device takes a given time for each frame; on an adapter the device draws. The
+//! engine's update is a loop that takes a given time. The contenders are the three schemes of `FrameLoop`, and two
+//! loops on one thread without it: one that waits for each frame, and one that waits for the frame before the last, as
+//! engines do by hand. They take turns, a few dozen frames each.
 //!
-//! - *frame* is the time from the end of one frame to that of the next, *latency* that from the input to the end of the device's work.
+//! - *frame* is the time from the end of one frame to that of the next, *latency* that from the input to the end of the
+//!   device's work.
 //! - *CPU waits* and *device idles* are their shares of a frame.
 //! - *buffers* are those that the backend keeps for frames.
 //!
-//! The second table compares update, record and submit of the next frame and this one at once with one after the other. The third one has
-//! the cost of a fence that nobody waits for. `target/drawloom/latency.json` has the same, and `latency.svg` draws the first table. The last
-//! line names the targets that were missed.
+//! The second table compares update, record and submit of the next frame and this one at once with one after the other.
+//! The third one has the cost of a fence that nobody waits for. `target/drawloom/latency.json` has the same, and
+//! `latency.svg` draws the first table. The last line names the targets that were missed.
 
 mod charts;
 mod contender;

@@ -32,8 +32,8 @@ pub struct Row {
     pub ratio: f64,
 }
 
-/// The device thread encodes everything, so that it has as much to do as the engine's thread. The engine's update fills up what the
-/// encoding takes longer than recording. One worker, as the two threads are all that the machine has.
+/// The device thread encodes everything, so that it has as much to do as the engine's thread. The engine's update fills
+/// up what the encoding takes longer than recording. One worker, as the two threads are all that the machine has.
 pub fn measure(quick: bool, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
     let (boxes, turns) = if quick { (100, 1) } else { (20_000, 21) };
     let (_, record, submit) = parts(boxes, Duration::ZERO)?;

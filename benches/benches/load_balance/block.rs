@@ -127,8 +127,8 @@ impl Block<'_> {
         Ok(Runner { renderer, submitter, world: World::new(self.case), results, seen: [0; 2] })
     }
 
-    /// Draws as many frames as a sample takes, in whole periods, or one. Returns the mean seconds of a frame, and those of its
-    /// submission.
+    /// Draws as many frames as a sample takes, in whole periods, or one. Returns the mean seconds of a frame, and those
+    /// of its submission.
     fn sample(&self, runner: &mut Runner<'_>) -> Result<[f64; 2], Box<dyn Error>> {
         let sample = self.backend.of(self.extent.sample);
         // A sample of a single frame stays one.

@@ -17,8 +17,8 @@ pub const WORKERS: usize = 16;
 /// The least share of a frame that is shown.
 const MIN_SHARE: f64 = 0.02;
 
-/// The predicted times of frames on [`WORKERS`] workers, and what they would save without each part, in seconds. The parts do not
-/// add up, because others take the place of the one that is left out.
+/// The predicted times of frames on [`WORKERS`] workers, and what they would save without each part, in seconds. The
+/// parts do not add up, because others take the place of the one that is left out.
 #[derive(Clone, Default)]
 pub struct Bounds {
     frames: Vec<f64>,
@@ -53,8 +53,8 @@ impl Bounds {
         Ok(())
     }
 
-    /// The parts without which the frame would save at least [`MIN_SHARE`], the largest first: their names, seconds, and shares of
-    /// the frame. All are medians.
+    /// The parts without which the frame would save at least [`MIN_SHARE`], the largest first: their names, seconds,
+    /// and shares of the frame. All are medians.
     pub fn parts(&self) -> Vec<(&str, f64, f64)> {
         let frame = median(self.frames.iter().copied());
         let all = self.parts.iter().map(|(name, times)| (name.as_str(), median(times.iter().copied())));
@@ -78,8 +78,8 @@ fn span_of(log: &Log, frame: u64, name: &str) -> Option<Range<Duration>> {
     log.spans_of(frame).find(|span| span.name == name).map(|span| span.began..span.ended)
 }
 
-/// The log with the nodes of its runs grouped by stage. A label still tells the processes apart, because items of different
-/// processes differ in cost.
+/// The log with the nodes of its runs grouped by stage. A label still tells the processes apart, because items of
+/// different processes differ in cost.
 fn grouped_by_stage(log: &Log) -> Log {
     let mut log = log.clone();
     for run in &mut log.runs {

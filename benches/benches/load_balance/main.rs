@@ -1,27 +1,28 @@
-//! How finely should a frame be cut, and where should its commands be translated for the device? Compares a job a camera, a
-//! job a draw, jobs of fixed numbers of draws, the adaptive granularity, and translation on the device thread with one
-//! worker (M 10.2 and 10.5, "Better Load Balancing").
+//! How finely should a frame be cut, and where should its commands be translated for the device? Compares a job a
+//! camera, a job a draw, jobs of fixed numbers of draws, the adaptive granularity, and translation on the device thread
+//! with one worker (M 10.2 and 10.5, "Better Load Balancing").
 //!
 //!     cargo bench -p drawloom-benches --bench load_balance
 //!     cargo bench -p drawloom-benches --bench load_balance -- --quick
 //!     cargo bench -p drawloom-benches --bench load_balance -- --backend noop --scene uneven --scene interrupted
 //!     cargo bench -p drawloom-benches --bench load_balance -- --kind ordered --workers 4,8
 //!
-//! There are three kinds of scenes. In *moving* all objects move and all cameras turn, and nothing is said of it, so each
-//! frame makes its draw lists. In *ordered* the lists are also sorted by depth, and in one scene each object is a draw. In
-//! *still* nothing moves: lists are kept, and there is next to nothing to divide.
+//! There are three kinds of scenes. In *moving* all objects move and all cameras turn, and nothing is said of it, so
+//! each frame makes its draw lists. In *ordered* the lists are also sorted by depth, and in one scene each object is a
+//! draw. In *still* nothing moves: lists are kept, and there is next to nothing to divide.
 //!
-//! A block is one scene on one backend and one number of workers. Its modes are interleaved, and draw the same frames; a
-//! sample is as many frames as fill some milliseconds, from hand-over to the return of submit. The first half of the rounds
-//! determines the best fixed mode, and the second half gives the results: in the rounds that select it, the best of several
-//! modes is also the luckiest. A ratio is the median of the rounds' own ratios. Large scenes are measured on `noop` alone.
+//! A block is one scene on one backend and one number of workers. Its modes are interleaved, and draw the same frames;
+//! a sample is as many frames as fill some milliseconds, from hand-over to the return of submit. The first half of the
+//! rounds determines the best fixed mode, and the second half gives the results: in the rounds that select it, the best
+//! of several modes is also the luckiest. A ratio is the median of the rounds' own ratios. Large scenes are measured on
+//! `noop` alone.
 //!
 //! A timeline of frames between the samples gives the number of jobs, and the time in which each worker has none while
 //! jobs run.
 //!
-//! Results for more workers are predicted: measured frames are replayed. A replay for the actual number of workers shows
-//! the error of predictions. Frames of *adaptive* are cut for the predicted workers, and a table shows what bounds them. A
-//! replay does not model the other thread of `interrupted`.
+//! Results for more workers are predicted: measured frames are replayed. A replay for the actual number of workers
+//! shows the error of predictions. Frames of *adaptive* are cut for the predicted workers, and a table shows what
+//! bounds them. A replay does not model the other thread of `interrupted`.
 //!
 //! `target/drawloom/load_balance.json` and `.svg` have the same.
 
@@ -65,7 +66,8 @@ struct Arguments {
     kinds: Vec<Kind>,
 }
 
-/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
+/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the
+/// adapter.
 pub struct Extent {
     name: &'static str,
     /// Warm-up frames of each mode: tables grow, pipelines are created, and tuners measure costs in them.

@@ -9,8 +9,8 @@ pub struct Mode {
     pub granularity: Granularity,
     /// Whether it runs on one thread.
     pub is_serial: bool,
-    /// Whether commands are recorded in parallel, but translated for the device on its own thread, when the frame is submitted
-    /// (Scheib's design, M 10.2).
+    /// Whether commands are recorded in parallel, but translated for the device on its own thread, when the frame is
+    /// submitted (Scheib's design, M 10.2).
     pub translates_on_submit: bool,
 }
 

@@ -11,8 +11,8 @@ use crate::bounds::Bounds;
 /// More workers than most machines have.
 pub const PREDICTED: [usize; 5] = [4, 8, 16, 32, 64];
 
-/// Predicted seconds of each replayed frame, by number of workers. `measured` has the time of a frame before each, of the
-/// same content and with equally warm caches: the prediction for the actual number of workers is compared with it.
+/// Predicted seconds of each replayed frame, by number of workers. `measured` has the time of a frame before each, of
+/// the same content and with equally warm caches: the prediction for the actual number of workers is compared with it.
 #[derive(Clone)]
 pub struct Prediction {
     costs: SchedulerCosts,

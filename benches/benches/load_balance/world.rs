@@ -5,7 +5,8 @@ use drawloom::scene::{Camera, SceneRef};
 
 use crate::scenes::{Case, Kind};
 
-/// A case in motion, for one renderer. Its positions are an array of its own, which it lends. It says nothing of changes.
+/// A case in motion, for one renderer. Its positions are an array of its own, which it lends. It says nothing of
+/// changes.
 pub struct World<'a> {
     case: &'a Case,
     positions: Vec<DVec3>,
@@ -19,8 +20,8 @@ pub const PERIOD: usize = 8;
 /// How far an object moves in a frame, in metres.
 const STEP: DVec3 = DVec3::new(1e-3, 5e-4, 0.0);
 
-/// How far cameras are turned at least, and how much farther in each frame, in radians. The border of the picture cuts the
-/// clouds, so other objects are seen in each frame.
+/// How far cameras are turned at least, and how much farther in each frame, in radians. The border of the picture cuts
+/// the clouds, so other objects are seen in each frame.
 const MIN_TURN: f32 = 0.2;
 const TURN: f32 = 0.003;
 

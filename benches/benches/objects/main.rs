@@ -5,32 +5,34 @@
 //!     cargo bench -p drawloom-benches --bench objects -- --backend noop --workers 2,8
 //!     cargo bench -p drawloom-benches --bench objects -- --backend adapter --max-objects 10000
 //!
-//! L's scene holds 7 to 2,006 objects; further objects have the positions of existing ones, so that they cost the device little.
-//! All of them move a little in every frame. The deferred pipeline draws them with one hemispherical light that casts shadows, so
-//! each is drawn in two views.
+//! L's scene holds 7 to 2,006 objects; further objects have the positions of existing ones, so that they cost the
+//! device little. All of them move a little in every frame. The deferred pipeline draws them with one hemispherical
+//! light that casts shadows, so each is drawn in two views.
 //!
-//! - *single* is L's first scenario: the same processes on one thread, recorded directly into the passes, one draw per object.
+//! - *single* is L's first scenario: the same processes on one thread, recorded directly into the passes, one draw per
+//!   object.
 //! - *multi* is this crate on each number of workers, with instancing and without.
-//! - Two scenarios in between separate the effect of threads from that of bundles that are kept: *one worker, cached* is single with
-//!   cached bundles, and *direct* is single on as many workers as *multi*.
+//! - Two scenarios in between separate the effect of threads from that of bundles that are kept: *one worker, cached*
+//!   is single with cached bundles, and *direct* is single on as many workers as *multi*.
 //!
-//! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of submit, without
-//! the device's time. Frames per second are those of the median round, and a ratio is that of two medians.
-//! `ceiling.rs` explains the ceiling. On the adapter there are also frames per second that are *drawn*: with two in flight, so that the
-//! longer of the CPU's part and the device's says how many there are, as in L 6.
+//! They are interleaved; a sample is as many frames as fill some milliseconds, each from hand-over to the return of
+//! submit, without the device's time. Frames per second are those of the median round, and a ratio is that of two
+//! medians. `ceiling.rs` explains the ceiling. On the adapter there are also frames per second that are *drawn*: with
+//! two in flight, so that the longer of the CPU's part and the device's says how many there are, as in L 6.
 //!
-//! The second table says where the time of a frame goes. *Held* is how long the engine's world is borrowed (L 3): until recording ends.
-//! *Load* is how busy the calling thread is, and the mean of the other workers. *API* is the share of the work in calls of wgpu. Loads and
-//! shares are those of a frame after each sample that the timeline records. *CPU use* is the share of all cores' time that the process
-//! uses with two frames in flight: where it is small, the device says how many frames there are, and threads win nothing (L 6).
+//! The second table says where the time of a frame goes. *Held* is how long the engine's world is borrowed (L 3): until
+//! recording ends. *Load* is how busy the calling thread is, and the mean of the other workers. *API* is the share of
+//! the work in calls of wgpu. Loads and shares are those of a frame after each sample that the timeline records. *CPU
+//! use* is the share of all cores' time that the process uses with two frames in flight: where it is small, the device
+//! says how many frames there are, and threads win nothing (L 6).
 //!
-//! The third table has an engine's update, which takes 0.1 µs an object in all and runs on all workers: before recording; beside
-//! submission, when the world is no longer borrowed; or in a `FrameLoop`, where another thread submits, and two frames are in flight.
-//! These times have the device's in them.
+//! The third table has an engine's update, which takes 0.1 µs an object in all and runs on all workers: before
+//! recording; beside submission, when the world is no longer borrowed; or in a `FrameLoop`, where another thread
+//! submits, and two frames are in flight. These times have the device's in them.
 //!
-//! The fourth table has the splits of L 5. *By process* is a job for the geometry buffer and for each shadow map, each of which is
-//! recorded straight into its pass; *by material* also splits the geometry buffer, into as many processes as there are workers; *by draws*
-//! is this crate's division, into bundles that are not kept.
+//! The fourth table has the splits of L 5. *By process* is a job for the geometry buffer and for each shadow map, each
+//! of which is recorded straight into its pass; *by material* also splits the geometry buffer, into as many processes
+//! as there are workers; *by draws* is this crate's division, into bundles that are not kept.
 //!
 //! Growth is the cost of an object in scenes of many objects, without instancing.
 //!
@@ -76,7 +78,8 @@ impl Arguments {
     }
 }
 
-/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
+/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the
+/// adapter.
 pub struct Extent {
     name: &'static str,
     /// Warm-up frames of each scenario: tables grow, pipelines are created, and tuners measure costs in them.

@@ -48,8 +48,8 @@ pub struct Sample {
     pub until_drawn: f64,
 }
 
-/// Frames of which two are in flight, as drivers keep them by themselves (L 6): what takes longest, the CPU's part or the device's,
-/// says how many there are.
+/// Frames of which two are in flight, as drivers keep them by themselves (L 6): what takes longest, the CPU's part or
+/// the device's, says how many there are.
 #[derive(Clone, Copy, Debug)]
 pub struct InFlight {
     /// Mean time of a frame, in seconds.
@@ -71,8 +71,8 @@ pub struct Profile {
     pub api_share: f64,
 }
 
-/// The stages that consist of calls of wgpu. The uploads of objects as they are described are in a stage with other work, which is left
-/// out.
+/// The stages that consist of calls of wgpu. The uploads of objects as they are described are in a stage with other
+/// work, which is left out.
 const API_STAGES: [&str; 4] = ["upload", "prepare", "record", "finish"];
 
 impl Runner {

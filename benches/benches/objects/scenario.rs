@@ -45,8 +45,8 @@ pub struct Row {
     pub multi_held_share: f64,
     /// How busy each worker of *multi* is, as a share of the frame. The first is the calling thread.
     pub multi_loads: Vec<f64>,
-    /// The share of all cores' time that the process uses with two frames in flight, its driver included; `None` where that cannot be
-    /// measured.
+    /// The share of all cores' time that the process uses with two frames in flight, its driver included; `None` where
+    /// that cannot be measured.
     pub single_cpu_use: Option<f64>,
     pub multi_cpu_use: Option<f64>,
     /// The share of the work that is calls of wgpu.

@@ -1,5 +1,5 @@
-//! The splits of L 5, for more cores than there are processes: of the geometry buffer by material, and of the shadow maps by light;
-//! beside this crate's, by draws.
+//! The splits of L 5, for more cores than there are processes: of the geometry buffer by material, and of the shadow
+//! maps by light; beside this crate's, by draws.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -31,17 +31,18 @@ pub struct Row {
     pub single_fps: f64,
     /// To that: a job for the geometry buffer and for each shadow map.
     pub by_process_ratio: f64,
-    /// The same with the geometry buffer as a process for each worker, at most as many as there are materials, which they share.
+    /// The same with the geometry buffer as a process for each worker, at most as many as there are materials, which
+    /// they share.
     pub by_material_ratio: f64,
     /// As many jobs for each as its draws are worth.
     pub by_draws_ratio: f64,
-    /// What the device takes longer for a geometry buffer of several passes: how many times as many frames there are *by material* as
-    /// *by process*, if each waits until the device has drawn the one before. On the adapter only.
+    /// What the device takes longer for a geometry buffer of several passes: how many times as many frames there are
+    /// *by material* as *by process*, if each waits until the device has drawn the one before. On the adapter only.
     pub by_material_drawn_ratio: Option<f64>,
 }
 
-/// What is one job. Each frame records everything anew: with draws straight into the pass, as L's command buffers are, or into bundles, which several
-/// workers can record for one pass.
+/// What is one job. Each frame records everything anew: with draws straight into the pass, as L's command buffers are,
+/// or into bundles, which several workers can record for one pass.
 #[derive(Clone, Copy)]
 enum Split {
     Process,

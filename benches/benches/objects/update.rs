@@ -1,5 +1,5 @@
-//! An engine's update beside submission (L 3): the world is given back when recording ends, so all workers may update it for the next
-//! frame, while the calling thread or that of a `FrameLoop` submits this one.
+//! An engine's update beside submission (L 3): the world is given back when recording ends, so all workers may update
+//! it for the next frame, while the calling thread or that of a `FrameLoop` submits this one.
 
 use std::error::Error;
 use std::sync::Arc;

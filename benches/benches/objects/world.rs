@@ -7,8 +7,8 @@ use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, SceneE
 use drawloom_benches::moving::{Motion, Moving};
 use drawloom_testing::random::Random;
 
-/// Width and height of the picture and the shadow map. They are small, as the CPU part is measured and a software device would share
-/// the cores.
+/// Width and height of the picture and the shadow map. They are small, as the CPU part is measured and a software
+/// device would share the cores.
 pub const PICTURE: u32 = 64;
 
 /// The number of objects with positions, meshes and materials of their own.

@@ -3,12 +3,13 @@
 //!     cargo bench -p drawloom-benches --bench occlusion
 //!     cargo bench -p drawloom-benches --bench occlusion -- --quick
 //!
-//! Cameras in the streets, above the roofs and high above see a city of 20,000 boxes of all heights, some of them rotated. An
-//! oracle draws every triangle in f64 with 4 × 4 samples per pixel. An object is *hidden* if it would cover a sample alone, and
-//! covers none in the scene. A culled object that covers a sample is *false*: the benchmark fails if there is one.
+//! Cameras in the streets, above the roofs and high above see a city of 20,000 boxes of all heights, some of them
+//! rotated. An oracle draws every triangle in f64 with 4 × 4 samples per pixel. An object is *hidden* if it would cover
+//! a sample alone, and covers none in the scene. A culled object that covers a sample is *false*: the benchmark fails
+//! if there is one.
 //!
-//! *Naive* is the usual method: occluders are drawn with one sample in the centre of each tile, and objects are tested by a
-//! rectangle of tiles. `target/drawloom/occlusion.json` has the same.
+//! *Naive* is the usual method: occluders are drawn with one sample in the centre of each tile, and objects are tested
+//! by a rectangle of tiles. `target/drawloom/occlusion.json` has the same.
 
 mod measure;
 mod naive;

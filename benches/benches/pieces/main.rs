@@ -3,13 +3,15 @@
 //!     cargo bench -p drawloom-benches --bench pieces
 //!     cargo bench -p drawloom-benches --bench pieces -- --quick
 //!
-//! Measured is one frame on wgpu's `noop` device and on one worker, from the hand-over of the scene to the return of submit. Blocks of boxes of
-//! 16 meshes stand on a plain, and 1,000 boxes move in each frame. One process draws them. The contenders are drawn in turn, in an order of its own
-//! in each round:
+//! Measured is one frame on wgpu's `noop` device and on one worker, from the hand-over of the scene to the return of
+//! submit. Blocks of boxes of 16 meshes stand on a plain, and 1,000 boxes move in each frame. One process draws them.
+//! The contenders are drawn in turn, in an order of its own in each round:
 //!
 //! - *pieces*: each block is a piece;
-//! - *without*: the same scene without pieces. Its renderer keeps what it can, and caches bundles where it measures that this is cheaper;
-//! - *by hand*: a loop of wgpu calls that executes the ready bundles of the blocks in sight. It tests no other object, and draws all that move.
+//! - *without*: the same scene without pieces. Its renderer keeps what it can, and caches bundles where it measures
+//!   that this is cheaper;
+//! - *by hand*: a loop of wgpu calls that executes the ready bundles of the blocks in sight. It tests no other object,
+//!   and draws all that move.
 //!
 //! `target/drawloom/pieces.json` has the same.
 

@@ -56,7 +56,7 @@ impl World {
     /// Between boxes, in metres.
     const STEP: f64 = 2.0;
 
-    /// Blocks of so many boxes.
+    /// Blocks of this number of boxes.
     pub fn new(cameras: Cameras, blocks: usize, in_block: usize) -> Result<Self, SceneError> {
         let mut scene = Scene::new();
         let mut meshes: Vec<Handle<Mesh>> = Vec::new();

@@ -3,14 +3,15 @@
 //!     cargo bench -p drawloom-benches --bench precision
 //!     cargo bench -p drawloom-benches --bench precision -- --quick
 //!
-//! Compares two transforms with f64. *Relative* is this crate's: it subtracts the camera's position from the object's in fixed point,
-//! and then computes in f32 what its shaders do, in the same order. *Shader* is the same computed by the machine's adapter, with the WGSL of
-//! frames, for a tenth of the vertices. *Absolute* is that of most engines: f32 world positions and a matrix per step. Vertices are random,
-//! with a fixed seed: they belong to rotated and scaled objects at least as far from the camera as they are large, anywhere in the picture. A
-//! vertex that is lost counts as the picture's diagonal.
+//! Compares two transforms with f64. *Relative* is this crate's: it subtracts the camera's position from the object's
+//! in fixed point, and then computes in f32 what its shaders do, in the same order. *Shader* is the same computed by
+//! the machine's adapter, with the WGSL of frames, for a tenth of the vertices. *Absolute* is that of most engines: f32
+//! world positions and a matrix per step. Vertices are random, with a fixed seed: they belong to rotated and scaled
+//! objects at least as far from the camera as they are large, anywhere in the picture. A vertex that is lost counts as
+//! the picture's diagonal.
 //!
-//! Fails if a view exceeds its bound of 1e-3 pixels, or, of the views that magnify angles, the worst angle that f32 can lose.
-//! `target/drawloom/precision.json` and `.svg` have the same.
+//! Fails if a view exceeds its bound of 1e-3 pixels, or, of the views that magnify angles, the worst angle that f32 can
+//! lose. `target/drawloom/precision.json` and `.svg` have the same.
 
 mod report;
 

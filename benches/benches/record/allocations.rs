@@ -3,8 +3,8 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// The system's allocator, which counts allocations and reallocations of all threads inside [`requests_in`] only. Timed frames
-/// therefore share no counter.
+/// The system's allocator, which counts allocations and reallocations of all threads inside [`requests_in`] only. Timed
+/// frames therefore share no counter.
 pub struct Counting;
 
 static IS_COUNTING: AtomicBool = AtomicBool::new(false);
@@ -25,7 +25,8 @@ fn count() {
     }
 }
 
-// SAFETY: A `GlobalAlloc` must return valid memory and must not unwind: every method forwards to `System`, and counting cannot unwind.
+// SAFETY: A `GlobalAlloc` must return valid memory and must not unwind: every method forwards to `System`, and counting
+// cannot unwind.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
@@ -41,12 +42,14 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by `System`.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by
+        // `System`.
         unsafe { System.realloc(memory, layout, size) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by `System`.
+        // SAFETY: `System` has the same contract as this method, which the caller fulfils; all memory was allocated by
+        // `System`.
         unsafe { System.dealloc(memory, layout) }
     }
 }

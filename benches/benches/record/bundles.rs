@@ -9,7 +9,8 @@ use crate::spheres::{LANES, planes, visible_objects};
 use crate::technique::{Failure, Technique};
 use crate::threads::Threads;
 
-/// Groups of objects in a bundle, which are 256 objects: fewer make bundles costly, more leave threads without work at the end.
+/// Groups of objects in a bundle, which are 256 objects: fewer make bundles costly, more leave threads without work at
+/// the end.
 const GROUPS: usize = 256 / LANES;
 
 pub struct Bundles {

@@ -1,5 +1,5 @@
-//! Instancing by hand: threads cull the objects of cameras eight at a time, and count and scatter them by mesh. A camera is recorded as
-//! one instanced draw for each mesh. There is no scheduler, and no other order.
+//! Instancing by hand: threads cull the objects of cameras eight at a time, and count and scatter them by mesh. A
+//! camera is recorded as one instanced draw for each mesh. There is no scheduler, and no other order.
 
 use std::ops::Range;
 

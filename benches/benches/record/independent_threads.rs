@@ -1,4 +1,5 @@
-//! The maximum throughput of several threads on this machine: each draws frames of its own, and they share only the hardware.
+//! The maximum throughput of several threads on this machine: each draws frames of its own, and they share only the
+//! hardware.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;

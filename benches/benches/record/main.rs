@@ -1,40 +1,44 @@
-//! The cost of recording by technique: 4 cameras × 10,000 objects of 64 meshes and 16 materials, from visibility to submit.
+//! The cost of recording by technique: 4 cameras × 10,000 objects of 64 meshes and 16 materials, from visibility to
+//! submit.
 //!
 //!     cargo bench -p drawloom-benches --bench record
 //!     cargo bench -p drawloom-benches --bench record -- --quick
 //!     cargo bench -p drawloom-benches --bench record -- --backend noop
 //!     cargo bench -p drawloom-benches --bench record -- --workers 1,4
 //!
-//! In the scene *moving*, every object moves, and the engine says nothing about it. In *one percent moving*, *still* and *still, cameras
-//! moving* it says what moved. Techniques that issue 64 instanced draws a camera have a table of their own:
+//! In the scene *moving*, every object moves, and the engine says nothing about it. In *one percent moving*, *still*
+//! and *still, cameras moving* it says what moved. Techniques that issue 64 instanced draws a camera have a table of
+//! their own:
 //!
-//! - *by-mesh* instances by hand: threads cull cameras, count and scatter their objects by mesh, and record one draw a mesh. It
-//!   is the best plain code there is here.
+//! - *by-mesh* instances by hand: threads cull cameras, count and scatter their objects by mesh, and record one draw a
+//!   mesh. It is the best plain code there is here.
 //! - *drawloom* is this crate by default, and *drawloom-…* are its recording strategies, each alone.
 //!
 //! Techniques that issue 10,000 single draws a camera have another:
 //!
-//! - *naive* is a plain engine: the same culling, and then all state for each object, in the order of the scene, on one thread,
-//!   directly into the pass.
-//! - *bundles* splits the objects of each camera into chunks, and threads cull them and record a bundle of each; all meshes are in
-//!   one buffer and all objects in another, so no state is set between draws.
+//! - *naive* is a plain engine: the same culling, and then all state for each object, in the order of the scene, on one
+//!   thread, directly into the pass.
+//! - *bundles* splits the objects of each camera into chunks, and threads cull them and record a bundle of each; all
+//!   meshes are in one buffer and all objects in another, so no state is set between draws.
 //! - *encoders* has an encoder per camera, into which a thread culls and records directly, in the same form.
 //! - *drawloom-not-instanced* is this crate without instancing.
 //!
-//! What is written by hand runs on as many threads as this crate has workers, in three ways, and on one thread. The fastest of these
-//! is what targets compare with, in each scene:
+//! What is written by hand runs on as many threads as this crate has workers, in three ways, and on one thread. The
+//! fastest of these is what targets compare with, in each scene:
 //!
 //! - *rayon*: a pool of rayon's, which sleeps between frames, and splits work as it sees fit.
-//! - *spinning*: threads that spin between frames, as this crate's workers do, and claim one piece of work after the other.
+//! - *spinning*: threads that spin between frames, as this crate's workers do, and claim one piece of work after the
+//!   other.
 //! - *camera a thread*: such threads, each with its own cameras and its own share of the objects.
 //!
 //! All draw the same picture, which is checked first, upload what moved in every frame, and use wgpu alike. They are
-//! interleaved; a sample is as many frames as fill some milliseconds. The table shows medians, and how often a frame allocates
-//! memory, counted over the whole process in frames that are not timed. For Drawloom it also shows the renderer's own
-//! allocations, counted on a backend that does nothing. Ratios are those of the medians that the tables show.
+//! interleaved; a sample is as many frames as fill some milliseconds. The table shows medians, and how often a frame
+//! allocates memory, counted over the whole process in frames that are not timed. For Drawloom it also shows the
+//! renderer's own allocations, counted on a backend that does nothing. Ratios are those of the medians that the tables
+//! show.
 //!
-//! On noop a third table shows how frames of this crate grow with the number of objects and of cameras. The last line names the
-//! targets that were missed.
+//! On noop a third table shows how frames of this crate grow with the number of objects and of cameras. The last line
+//! names the targets that were missed.
 //!
 //! `target/drawloom/record.json` and `.svg`, and `record_extents.json`, have the same.
 
@@ -84,7 +88,8 @@ struct Arguments {
     workers: WorkersArguments,
 }
 
-/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the adapter.
+/// The size of the measurement. Of two values the first is for `noop`, where frames are short, the second for the
+/// adapter.
 pub struct Extent {
     name: &'static str,
     /// Warm-up frames of each technique: tables grow, pipelines are created, and tuners measure costs in them.

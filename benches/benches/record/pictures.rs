@@ -37,8 +37,8 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
     Ok(buffer.get_mapped_range(..)?.to_vec())
 }
 
-/// Has each contender draw a frame, and compares its pictures with those of the first. The hand-written techniques round positions
-/// to f32, so a pixel at an edge may differ.
+/// Has each contender draw a frame, and compares its pictures with those of the first. The hand-written techniques
+/// round positions to f32, so a pixel at an edge may differ.
 ///
 /// # Errors
 /// Returns an error if one does not draw all objects, or draws another picture.

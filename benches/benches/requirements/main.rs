@@ -3,14 +3,15 @@
 //!     cargo bench -p drawloom-benches --bench requirements
 //!     cargo bench -p drawloom-benches --bench requirements -- --quick --backend noop
 //!
-//! Boxes, panes, and a light of every class. Fifty times a class of lights, the glass or the mirror comes or goes, in a random order, and then
-//! twenty frames are drawn without a change. All cameras move in every frame. A frame is timed from the hand-over of the scene to the return
-//! of submit; on an adapter until the device is idle. *At rest* are the frames of one more contender in which nothing comes or goes: what is
-//! beyond the ratio of their longest frame to their median is due to the changes. Drivers keep what they have compiled on disk, so that only
-//! the first run on a machine shows what they take; Mesa's compile in each run with `MESA_SHADER_CACHE_DISABLE=true`.
+//! Boxes, panes, and a light of every class. Fifty times a class of lights, the glass or the mirror comes or goes, in a
+//! random order, and then twenty frames are drawn without a change. All cameras move in every frame. A frame is timed
+//! from the hand-over of the scene to the return of submit; on an adapter until the device is idle. *At rest* are the
+//! frames of one more contender in which nothing comes or goes: what is beyond the ratio of their longest frame to
+//! their median is due to the changes. Drivers keep what they have compiled on disk, so that only the first run on a
+//! machine shows what they take; Mesa's compile in each run with `MESA_SHADER_CACHE_DISABLE=true`.
 //!
-//! The second table has the colonnade drawn by a pipeline that keeps all of its processes, and by one that has what the scene requires.
-//! `target/drawloom/requirements.json` has the same. The last line names the targets that were missed.
+//! The second table has the colonnade drawn by a pipeline that keeps all of its processes, and by one that has what the
+//! scene requires. `target/drawloom/requirements.json` has the same. The last line names the targets that were missed.
 
 mod unneeded;
 mod world;

@@ -36,7 +36,7 @@ pub struct Row {
     milliseconds: f64,
 }
 
-/// Measures frames of a scene without lights, as it is, and with a mirror, each with both pipelines in turn.
+/// Measures frames of a scene without lights, unchanged, and with a mirror, each with both pipelines in turn.
 pub fn measure(
     backend: BackendName,
     scene: impl Fn() -> Result<Scene, SceneError>,

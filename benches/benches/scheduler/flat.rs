@@ -8,8 +8,8 @@ use drawloom_benches::work::Work;
 use crate::row::{Contender, Row};
 use crate::{Extent, pools};
 
-/// chili cannot spawn: it splits the range of jobs by joins, which is less work. `std threads` starts one thread per job, and only
-/// [`Extent::threads`] of them, as more would take long.
+/// chili cannot spawn: it splits the range of jobs by joins, which is less work. `std threads` starts one thread per
+/// job, and only [`Extent::threads`] of them, as more would take long.
 pub fn row(extent: &Extent, workers: &[usize]) -> Row {
     let jobs = extent.flat;
     let mut contenders = vec![Contender::plain_loop(jobs).per(jobs)];

@@ -18,8 +18,8 @@ const LAYER: usize = 64;
 
 /// All contenders run the same graph: layers of [`LAYER`] nodes. Each node depends on 1 to 4 nodes of the layer before.
 ///
-/// chili and std's threads have no dependencies between jobs. They run layer by layer, and the plain loop runs node by node:
-/// none of these has to find out which node is ready.
+/// chili and std's threads have no dependencies between jobs. They run layer by layer, and the plain loop runs node by
+/// node: none of these has to find out which node is ready.
 pub fn row(name: &'static str, nodes: usize, extent: &Extent, workers: &[usize]) -> Row {
     let graph = Arc::new(Graph::new(nodes));
     let mut contenders = vec![Contender::plain_loop(nodes)];

@@ -13,7 +13,8 @@ use crate::timer::Pace;
 
 const FRAME: Chain = Chain { nodes: 1, jobs: 64 };
 
-/// 60 frames per second of 64 empty jobs each. `sleep only` sleeps as often and runs no jobs: the cost of sleeping alone.
+/// 60 frames per second of 64 empty jobs each. `sleep only` sleeps as often and runs no jobs: the cost of sleeping
+/// alone.
 pub fn idle(extent: &Extent, workers: &[usize]) -> Row {
     let interval = Duration::from_secs(1) / 60;
     let pace = Pace::CpuTime { interval, frames: extent.idle_frames };

@@ -5,11 +5,11 @@
 //!     cargo bench -p drawloom-benches --bench scheduler -- --row frame --row fine
 //!     cargo bench -p drawloom-benches --bench scheduler -- --workers 2,8
 //!
-//! Contenders are interleaved: in each round those of one row run once in random order, then those of the next row. A run
-//! builds a pool, warms it up, measures, and drops it, so that pools do not disturb each other. Each contender is checked before it
-//! is measured. All contenders run on each number of workers, the calling thread included, and are compared with peers of at most as
-//! many. Each row's file explains the row. The table shows medians; `target/drawloom/scheduler.json` has the same. The last line names
-//! the targets that were missed.
+//! Contenders are interleaved: in each round those of one row run once in random order, then those of the next row. A
+//! run builds a pool, warms it up, measures, and drops it, so that pools do not disturb each other. Each contender is
+//! checked before it is measured. All contenders run on each number of workers, the calling thread included, and are
+//! compared with peers of at most as many. Each row's file explains the row. The table shows medians;
+//! `target/drawloom/scheduler.json` has the same. The last line names the targets that were missed.
 
 mod chains;
 mod flat;
@@ -151,7 +151,8 @@ fn run() -> Result<(), Failure> {
     rows.iter_mut().try_for_each(Row::check)?;
     let contenders = rows.iter().map(|row| row.contenders.len()).sum();
     let mut harness = Harness::new(Rounds { warm_up: 0, measured: extent.rounds }, &progress);
-    // Rounds are the outer loop: a disturbance of some seconds spoils one round of each row, rather than all of one row.
+    // Rounds are the outer loop: a disturbance of some seconds spoils one round of each row, rather than all of one
+    // row.
     for _ in harness.rounds(contenders) {
         rows.iter_mut().try_for_each(|row| row.round(&mut harness, &progress))?;
     }

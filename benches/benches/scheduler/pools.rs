@@ -25,7 +25,8 @@ pub fn chili(workers: usize) -> chili::ThreadPool {
     chili::ThreadPool::with_config(chili::Config { thread_count: NonZero::new(workers), ..chili::Config::default() })
 }
 
-/// Splits the range in halves down to single jobs, as join is all that chili offers. Every `TIMES`-th join checks for idle threads.
+/// Splits the range in halves down to single jobs, as join is all that chili offers. Every `TIMES`-th join checks for
+/// idle threads.
 pub fn join_halves<const TIMES: u8>(scope: &mut chili::Scope, jobs: Range<usize>, work: &Work) {
     match jobs.len() {
         0 => {}

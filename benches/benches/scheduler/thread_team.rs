@@ -41,7 +41,8 @@ impl Wait for SpinBarrier {
 }
 
 impl ThreadTeam<Barrier> {
-    /// Threads that sleep at a barrier. `ends` has the end of each node's jobs. They begin at the end of those of the node before.
+    /// Threads that sleep at a barrier. `ends` has the end of each node's jobs. They begin at the end of those of the
+    /// node before.
     pub fn sleeping(threads: usize, ends: Vec<usize>, jobs_per_ticket: usize) -> Self {
         Self::new(threads, ends, jobs_per_ticket, Barrier::new(threads))
     }

@@ -110,8 +110,8 @@ impl<'a> Timer<'a> {
         Ok(())
     }
 
-    /// Calls `submit` as often as the pace requires. It calls [`WakeLatency::mark_submitted`], submits one job that calls
-    /// [`WakeLatency::mark_begun`], and calls [`WakeLatency::wait`].
+    /// Calls `submit` as often as the pace requires. It calls [`WakeLatency::mark_submitted`], submits one job that
+    /// calls [`WakeLatency::mark_begun`], and calls [`WakeLatency::wait`].
     ///
     /// # Errors
     /// Returns an error if a job fails or does not begin on another thread.

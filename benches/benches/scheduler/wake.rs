@@ -1,7 +1,7 @@
 //! Row `wake`: the time from the submission of a job until a sleeping worker begins it, while the submitter is busy.
 //!
-//! Another thread is not always another core: a system may run the woken thread on the submitter's core, where it begins
-//! sooner than on a core that has to be woken too.
+//! Another thread is not always another core: a system may run the woken thread on the submitter's core, where it
+//! begins sooner than on a core that has to be woken too.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -14,8 +14,8 @@ use crate::shape::{CHUNKS, Shape};
 
 type Failure = Box<dyn Error + Send + Sync>;
 
-/// Counts are differences of two numbers of frames, so that start and end of the program cancel out. The lower number suffices for a
-/// schedule to have measured its nodes.
+/// Counts are differences of two numbers of frames, so that start and end of the program cancel out. The lower number
+/// suffices for a schedule to have measured its nodes.
 const FRAMES: [usize; 2] = [100, 300];
 
 /// Runs of each count, of which the minimum is taken: the size of tickets depends on the clock.
@@ -39,8 +39,8 @@ pub fn count(progress: &ProgressBar) -> Result<Vec<Counted>, Failure> {
     Ok(counted)
 }
 
-/// Builds this program with these flags, and returns its path. It is built as a single codegen unit, as the split into units affects
-/// inlining and would show in the difference.
+/// Builds this program with these flags, and returns its path. It is built as a single codegen unit, as the split into
+/// units affects inlining and would show in the difference.
 fn build(folder: &str, flag: &str) -> Result<PathBuf, Failure> {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
     let flags = env::var("RUSTFLAGS").unwrap_or_default() + " " + flag;

@@ -3,11 +3,11 @@
 //!     cargo bench -p drawloom-benches --bench timeline
 //!     cargo bench -p drawloom-benches --bench timeline -- --quick
 //!
-//! *Off* is counted rather than timed: instructions per chunk, under callgrind, of this build and of one without a recorder, built
-//! with `--cfg drawloom_without_timeline`. It requires valgrind and builds the crate twice more. *On* is timed: frames with the
-//! recorder off and on are interleaved, for the scheduler benchmark's row `frame` and for empty chunks. A *span* is the cost of a
-//! node's `tracing` span without a subscriber. `target/drawloom/timeline.json` has the same. The last line names the
-//! targets that were missed.
+//! *Off* is counted rather than timed: instructions per chunk, under callgrind, of this build and of one without a
+//! recorder, built with `--cfg drawloom_without_timeline`. It requires valgrind and builds the crate twice more. *On*
+//! is timed: frames with the recorder off and on are interleaved, for the scheduler benchmark's row `frame` and for
+//! empty chunks. A *span* is the cost of a node's `tracing` span without a subscriber. `target/drawloom/timeline.json`
+//! has the same. The last line names the targets that were missed.
 
 mod count;
 mod recording;

@@ -10,7 +10,8 @@ pub type Failure = Box<dyn Error>;
 /// The times of a frame, in seconds; of a pipelined contender, the means of a burst.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameTime {
-    /// From the motion of the objects until submit returns. If frames overlap, from the submit of one frame to that of the next.
+    /// From the motion of the objects until submit returns. If frames overlap, from the submit of one frame to that of
+    /// the next.
     pub submitted: f64,
     /// The three parts of `submitted`, see [`PARTS`]. `None` if they overlap.
     pub parts: Option<[f64; 3]>,

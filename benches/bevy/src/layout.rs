@@ -8,7 +8,8 @@ pub const MAX_OBJECTS: u32 = 1_000_000;
 pub const PICTURE: u32 = 256;
 /// Cube meshes. They are equal, but are assets of their own.
 pub const MESHES: usize = 4;
-/// The linear diffuse reflectance of each material. Each has a channel that is clearly the brightest, so that pictures tell them apart.
+/// The linear diffuse reflectance of each material. Each has a channel that is clearly the brightest, so that pictures
+/// tell them apart.
 pub const MATERIALS: [[f32; 3]; 4] = [[0.8, 0.2, 0.1], [0.2, 0.7, 0.2], [0.1, 0.3, 0.8], [0.7, 0.4, 0.1]];
 /// The direction of the light's rays, not normalized.
 pub const LIGHT: [f32; 3] = [-0.5, -1.0, -0.7];

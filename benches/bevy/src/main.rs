@@ -6,9 +6,10 @@
 //!     cargo run --release --ignore-rust-version -- --scene still --scene turn --objects 100000,1000000 --workers 2
 //!     cargo run --release --ignore-rust-version -- --backend adapter --picture 1024 --pictures pictures
 //!
-//! A scene is a grid of unit cubes. Each camera sees every cube, and has a picture of its own. There is one directional light, without
-//! shadows. A frame is timed from the motion of cubes or cameras until submit returns, and until the device has drawn it. Bevy's time is
-//! that of `App::update`: its engine's transforms, visibility and assets are in it, and Drawloom has no engine.
+//! A scene is a grid of unit cubes. Each camera sees every cube, and has a picture of its own. There is one directional
+//! light, without shadows. A frame is timed from the motion of cubes or cameras until submit returns, and until the
+//! device has drawn it. Bevy's time is that of `App::update`: its engine's transforms, visibility and assets are in it,
+//! and Drawloom has no engine.
 //!
 //! | scene | what happens in a frame |
 //! | --- | --- |
@@ -26,8 +27,9 @@
 //! of the no-op backend are as good for Bevy as those of a device that is infinitely fast. On the adapter, *drawn* has
 //! the device's time, measured alike for all: until it is idle.
 //!
-//! The contenders are interleaved, in bursts of frames. Before they are measured, each must hand every object of every camera to the
-//! device; on the adapter the pictures of a frame must cover the same pixels with the same brightest channel, but for a few.
+//! The contenders are interleaved, in bursts of frames. Before they are measured, each must hand every object of every
+//! camera to the device; on the adapter the pictures of a frame must cover the same pixels with the same brightest
+//! channel, but for a few.
 //!
 //! The last line names the scenes in which a mode of Bevy is faster. Files are written at the end of a run, each in one
 //! step.
@@ -58,7 +60,8 @@ use report::Report;
 /// Compares Bevy's renderer with Drawloom.
 #[derive(Parser)]
 struct Arguments {
-    /// `noop` measures the CPU's work alone, on wgpu's no-op backend; `adapter` is the machine's graphics card, or lavapipe.
+    /// `noop` measures the CPU's work alone, on wgpu's no-op backend; `adapter` is the machine's graphics card, or
+    /// lavapipe.
     #[arg(long, default_value = "noop")]
     backend: BackendName,
     /// Measures few frames of small scenes, to see that the comparison works.

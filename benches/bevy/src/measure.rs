@@ -25,8 +25,8 @@ pub struct Extent {
     requested: Option<u32>,
 }
 
-/// The modes of Bevy that are interleaved. A pipelined app has a thread that works for the task pool of all apps while it is idle, so it is
-/// measured when the others are gone.
+/// The modes of Bevy that are interleaved. A pipelined app has a thread that works for the task pool of all apps while
+/// it is idle, so it is measured when the others are gone.
 const GROUPS: [&[Mode]; 2] = [&[Mode::Default, Mode::SerialSchedules, Mode::DeviceCulling], &[Mode::Pipelined]];
 
 /// From this many objects on, over all cameras, a scene is measured in fewer bursts: its frames take long, and vary

@@ -47,7 +47,8 @@ pub fn read(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture)
     Ok(padded.chunks_exact(bytes_per_row as usize).flat_map(|padded| &padded[..row as usize]).copied().collect())
 }
 
-/// Compares the contenders' pictures of the same frame, camera by camera, and saves them into `folder`, if there is one.
+/// Compares the contenders' pictures of the same frame, camera by camera, and saves them into `folder`, if there is
+/// one.
 ///
 /// # Errors
 /// Returns an error if a contender draws nothing, or covers other pixels or with other colours than the first one.

@@ -18,12 +18,13 @@ const EVERY_KNOB: &str = "every-knob";
 #[derive(Parser)]
 #[command(name = "tradeoff")]
 pub struct Arguments {
-    /// An OBJ file, or a scene of the project's: `colonnade`, which is the default, or `every-knob`, a small one in which every knob has an
-    /// effect, with levels of detail, mirrors and an impostor. That is the default of a quick run.
+    /// An OBJ file, or a scene of the project's: `colonnade`, which is the default, or `every-knob`, a small one in
+    /// which every knob has an effect, with levels of detail, mirrors and an impostor. That is the default of a quick
+    /// run.
     pub scene: Option<PathBuf>,
 
-    /// The camera path: `sway` moves a little to the side, `orbit` around the scene; or a file with a line `x,y,z,tx,ty,tz` for each
-    /// position and the point the camera looks at, in metres.
+    /// The camera path: `sway` moves a little to the side, `orbit` around the scene; or a file with a line
+    /// `x,y,z,tx,ty,tz` for each position and the point the camera looks at, in metres.
     #[arg(long, value_name = "FILE|orbit|sway", default_value = "sway")]
     pub camera_path: String,
 
@@ -43,8 +44,9 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub rounds: u32,
 
-    /// A small scene unless one is named, small pictures from two positions of the path, or from the last one where no picture is kept from
-    /// the first, and no rounds. Errors are measured; times are those of cold frames, and inaccurate.
+    /// A small scene unless one is named, small pictures from two positions of the path, or from the last one where no
+    /// picture is kept from the first, and no rounds. Errors are measured; times are those of cold frames, and
+    /// inaccurate.
     #[arg(long)]
     pub quick: bool,
 }
@@ -73,7 +75,8 @@ impl Arguments {
         arguments
     }
 
-    /// Positions of a path that the program makes: a multiple of all shadow map intervals, unless the run is a quick one.
+    /// Positions of a path that the program makes: a multiple of all shadow map intervals, unless the run is a quick
+    /// one.
     pub fn path_positions(&self) -> usize {
         if self.quick { 2 } else { 4 }
     }

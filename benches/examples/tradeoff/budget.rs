@@ -11,9 +11,9 @@ use crate::results::Results;
 use crate::settings::{Knob, Setting};
 use crate::subject::Subject;
 
-/// Starts at the most accurate settings, and turns down the knob that saves most time per error until a frame fits. Then turns knobs
-/// back up, greatest error first, as long as the frame still fits. Prints the result. Combinations are measured, as their savings do
-/// not add up.
+/// Starts at the most accurate settings, and turns down the knob that saves most time per error until a frame fits.
+/// Then turns knobs back up, greatest error first, as long as the frame still fits. Prints the result. Combinations are
+/// measured, as their savings do not add up.
 ///
 /// # Errors
 /// Returns an error if a frame fails.

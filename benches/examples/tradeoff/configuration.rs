@@ -18,7 +18,8 @@ pub struct Configuration {
     pub mirrors: ViewForm,
     /// Whether the mirrors' views are drawn at all.
     pub draws_mirrors: bool,
-    /// The `max_angle` of [`Camera::impostor`](drawloom::scene::Camera::impostor), in degrees. `None` draws the original.
+    /// The `max_angle` of [`Camera::impostor`](drawloom::scene::Camera::impostor), in degrees. `None` draws the
+    /// original.
     pub impostor: Option<f64>,
 }
 

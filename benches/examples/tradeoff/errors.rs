@@ -90,7 +90,7 @@ pub fn of(
     }
 }
 
-/// The error of levels of detail, of at most so many pixels.
+/// The error of levels of detail with this limit, in pixels.
 fn of_levels(error: Option<f64>, pixels: f64) -> KnobError {
     KnobError { error, metric: "pixels", bound: Some(pixels), oracle: "the stated errors of the levels, in f64" }
 }

@@ -14,8 +14,8 @@ use crate::subject::{ImpostorSquare, MIRRORS, NO_CASTER, ORIGINAL, SQUARE, SQUAR
 /// The layer of what is neither a mirror's surface nor the impostor or its original.
 const WORLD: LayerMask = LayerMask::layer(0);
 
-/// Where the globes with levels of detail stand, and their radii: some before the wall, one behind it, others beside it up to 40 m away, and
-/// the last behind the camera, where the first mirror shows it.
+/// Where the globes with levels of detail stand, and their radii: some before the wall, one behind it, others beside it
+/// up to 40 m away, and the last behind the camera, where the first mirror shows it.
 const GLOBES: [[f64; 4]; 10] = [
     [-5.0, 1.0, -1.0, 1.0],
     [5.2, 1.0, -2.0, 1.0],
@@ -32,8 +32,8 @@ const GLOBES: [[f64; 4]; 10] = [
 /// The centre of the globes that the impostor stands for, and the radius around them.
 const CLUSTER: (DVec3, f64) = (DVec3::new(3.9, 1.2, 2.0), 1.0);
 
-/// The scene [`everything`], which has lights of all classes and objects of all blend modes, on wide ground, with globes that have levels of
-/// detail, two mirrors, and an impostor of a cluster of globes.
+/// The scene [`everything`], which has lights of all classes and objects of all blend modes, on wide ground, with
+/// globes that have levels of detail, two mirrors, and an impostor of a cluster of globes.
 ///
 /// # Errors
 /// If the scene has no room for an object.

@@ -6,8 +6,8 @@ use drawloom::scene::Camera;
 use crate::errors::worst_of;
 use crate::subject::{ORIGINAL, Subject};
 
-/// By how much the impostor displaces a vertex of the original, at most, along the path: in degrees as seen over the original's radius.
-/// `None` if the scene has no impostor, or if no camera of the path is outside of the original.
+/// By how much the impostor displaces a vertex of the original, at most, along the path: in degrees as seen over the
+/// original's radius. `None` if the scene has no impostor, or if no camera of the path is outside of the original.
 pub fn greatest_displacement(subject: &Subject, path: &[Camera], max_angle: f64) -> Option<f64> {
     let impostor = subject.impostor.as_ref()?;
     let objects = subject.scene.as_scene_ref();

@@ -6,8 +6,8 @@ use drawloom::scene::{Camera, Projection, Scene};
 
 use crate::errors::worst_of;
 
-/// By how many pixels the error of a drawn level moves a vertex in the picture, at most. `None` if no command draws a mesh that has levels,
-/// or if the camera has no perspective.
+/// By how many pixels the error of a drawn level moves a vertex in the picture, at most. `None` if no command draws a
+/// mesh that has levels, or if the camera has no perspective.
 pub fn greatest_error(scene: &Scene, camera: &Camera, commands: &[RenderCommand]) -> Option<f64> {
     let Projection::Perspective { field_of_view } = camera.projection else { return None };
     let focal = f64::from(camera.size[1]) * 0.5 / (f64::from(field_of_view) * 0.5).tan();
@@ -29,7 +29,8 @@ pub fn greatest_error(scene: &Scene, camera: &Camera, commands: &[RenderCommand]
             let local = (Vec3::from(vertex.position) * scale).as_dvec3();
             let in_camera = turn * (objects.positions[object] - camera.position + orientation * local);
             let depth = -in_camera.z;
-            // A step that turns the ray away from the axis moves the point most: by the secant of its angle more than one at the axis.
+            // A step that turns the ray away from the axis moves the point most: by the secant of its angle more than
+            // one at the axis.
             (depth > f64::from(camera.near)).then(|| moved_by * focal / depth * in_camera.length() / depth)
         });
         worst = pixels.chain(worst).reduce(worst_of);

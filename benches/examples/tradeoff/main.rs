@@ -1,7 +1,8 @@
 //! The cost of accuracy on a scene: measures the frame time and the error of every knob alone, and of the presets.
 //!
-//! Most knobs are fields of `Quality`. The pipeline's `ShadowMaps` have the number of cascades and how far they reach, a `Camera` how often
-//! it is drawn and the angle of an impostor that is kept, and a view of a `ViewBudget` the forms in which it is drawn.
+//! Most knobs are fields of `Quality`. The pipeline's `ShadowMaps` have the number of cascades and how far they reach,
+//! a `Camera` how often it is drawn and the angle of an impostor that is kept, and a view of a `ViewBudget` the forms
+//! in which it is drawn.
 //!
 //!     cargo run --release -p drawloom-benches --example tradeoff
 //!     cargo run --release -p drawloom-benches --example tradeoff -- scene.obj --camera-path orbit --budget-ms 8
@@ -79,7 +80,8 @@ fn print_culled_triangles(scene: &Scene, path: &[Camera]) {
     );
 }
 
-/// Returns whether every measured error is within its bound, and every knob has an effect in the scene that should have one for each.
+/// Returns whether every measured error is within its bound, and every knob has an effect in the scene that should have
+/// one for each.
 fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let mut subject = arguments.load_subject()?;
     let path = camera_path::of(&subject.scene, arguments)?;

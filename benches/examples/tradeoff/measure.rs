@@ -35,7 +35,8 @@ pub struct Measurement {
     pub from_exact: Distance,
     /// The distance from the reference's pictures.
     pub from_reference: Distance,
-    /// The largest share of pixels at one position that differ from those of exact: at all, and by more than [`VISIBLE`].
+    /// The largest share of pixels at one position that differ from those of exact: at all, and by more than
+    /// [`VISIBLE`].
     pub differing: [f64; 2],
     /// Objects that occlusion culling removed, in all pictures.
     pub occluded: usize,
@@ -83,8 +84,8 @@ impl FrameContents {
     }
 }
 
-/// Warm-up frames: pipelines are created, memory is allocated, and views decide whether occlusion culling is worth it, in four frames
-/// with it and four without.
+/// Warm-up frames: pipelines are created, memory is allocated, and views decide whether occlusion culling is worth it,
+/// in four frames with it and four without.
 const WARM_UP: usize = 8;
 
 impl Measurements {

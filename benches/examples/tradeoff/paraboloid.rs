@@ -6,8 +6,8 @@ use drawloom::scene::{Light, Scene};
 
 use crate::errors::worst_of;
 
-/// The greatest distance of a subdivided edge from its curve, in pixels of a map of 1024. `None` if no hemispherical light has a map with
-/// an edge in it.
+/// The greatest distance of a subdivided edge from its curve, in pixels of a map of 1024. `None` if no hemispherical
+/// light has a map with an edge in it.
 pub fn greatest_error(scene: &Scene, shadow_maps: &[(usize, Vec<RenderCommand>)]) -> Option<f64> {
     let view = scene.as_scene_ref();
     let mut worst: Option<f64> = None;

@@ -194,8 +194,8 @@ fn with_path(path: &Path, error: &dyn Error) -> Failure {
     format!("{}: {error}", path_text(path)).into()
 }
 
-/// Marks the Pareto front: `exact`, and then, by increasing distance from the reference, each entry that is at least an eighth faster
-/// than all marked before it. Smaller differences of times are noise.
+/// Marks the Pareto front: `exact`, and then, by increasing distance from the reference, each entry that is at least an
+/// eighth faster than all marked before it. Smaller differences of times are noise.
 fn mark_front(entries: &mut [Entry]) {
     let mut order: Vec<_> = (0..entries.len()).collect();
     let distance = |entry: usize| entries[entry].rmse_from_reference;

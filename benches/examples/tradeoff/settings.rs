@@ -147,7 +147,8 @@ fn add_of_mirrors(mut add: impl FnMut(Knob, &str, Configuration)) {
     add(Knob::ViewLeftOut, "left out", Configuration { draws_mirrors: false, ..exact });
 }
 
-/// The settings of the fields of [`Quality`]: those that `exact` has itself only where the error is not that against `exact`.
+/// The settings of the fields of [`Quality`]: those that `exact` has itself only where the error is not that against
+/// `exact`.
 fn add_of_quality(mut add: impl FnMut(Knob, &str, Quality)) {
     for (index, knob) in quality::Knob::ALL.iter().enumerate() {
         for (name, set) in knob.values.iter().filter(|(name, _)| !LEFT_OUT.contains(&(knob.field, name))) {

@@ -42,8 +42,8 @@ pub struct ImpostorSquare {
 }
 
 impl ImpostorSquare {
-    /// The camera of its picture for what `viewer` sees, which is that of the frame before while its error is at most so many degrees.
-    /// `None` if the viewer is inside of the sphere.
+    /// The camera of its picture for what `viewer` sees, which is that of the frame before while its error is within
+    /// the limit, in degrees. `None` if the viewer is inside of the sphere.
     pub fn camera(&self, viewer: &Camera, before: Option<&Camera>, degrees: f64) -> Option<Camera> {
         let sphere = (self.center, self.radius);
         let camera = viewer.impostor(IMPOSTOR, sphere, IMPOSTOR_SIDE, before, degrees.to_radians())?;
@@ -67,8 +67,8 @@ impl Subject {
         self.mirrors.iter().zip(&MIRRORS).map(reflected).collect()
     }
 
-    /// The cameras of a frame, and the impostor's among them. Turns the impostor's square towards that. `before` is the impostor's camera in
-    /// the frame before.
+    /// The cameras of a frame, and the impostor's among them. Turns the impostor's square towards that. `before` is the
+    /// impostor's camera in the frame before.
     ///
     /// # Errors
     /// If the scene lacks the impostor's square.

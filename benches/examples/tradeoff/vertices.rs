@@ -7,9 +7,9 @@ use drawloom::view::{FixedPosition, RenderView};
 
 use crate::errors::worst_of;
 
-/// The greatest error in pixels of a vertex in the picture that is at least its mesh's radius away from the camera. Positions are computed
-/// in f32, as shaders do, and compared with f64 from the camera's definition. `None` if there is no such vertex, or if the camera has no
-/// perspective.
+/// The greatest error in pixels of a vertex in the picture that is at least its mesh's radius away from the camera.
+/// Positions are computed in f32, as shaders do, and compared with f64 from the camera's definition. `None` if there is
+/// no such vertex, or if the camera has no perspective.
 pub fn greatest_error(scene: &Scene, camera: &Camera, precision: TransformPrecision) -> Option<f64> {
     let Projection::Perspective { field_of_view } = camera.projection else { return None };
     let view = RenderView::new(camera);

@@ -163,9 +163,9 @@ proptest! {
     fn typical_commands_are_short(commands in typical_commands(200)) {
         let coded = DeltaCommands::encode(&commands);
         let opaque = commands.iter().filter(|command| command.key < SortKey::blended(u32::MAX)).count();
-        // An opaque command takes up to 12 bytes: the first byte, 7 for the key, 2 for the object, the second byte, and 1 for the
-        // material. A blended one also has mesh and state. The first command of each of the three states has a key of 8 bytes, and
-        // so has the first blended one, which takes 17.
+        // An opaque command takes up to 12 bytes: the first byte, 7 for the key, 2 for the object, the second byte, and
+        // 1 for the material. A blended one also has mesh and state. The first command of each of the three states has
+        // a key of 8 bytes, and so has the first blended one, which takes 17.
         let firsts = 3 + 2;
         prop_assert!(coded.bytes().len() <= HEADER + opaque * 12 + (commands.len() - opaque) * 15 + firsts);
     }

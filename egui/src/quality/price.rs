@@ -67,7 +67,7 @@ impl Measurement {
     const TURNS: usize = 6;
     /// The first frames of a turn pay for the change, and choices by measurement settle.
     const WARM_UP: usize = 12;
-    /// So many that what happens in every 2nd, 4th or 8th frame has its share.
+    /// Enough for events of every 2nd, 4th or 8th frame to have their share.
     const MEASURED: usize = 16;
     const FRAMES: usize = Self::WARM_UP + Self::MEASURED;
 

@@ -39,7 +39,8 @@ enum Content<'a> {
     Chunk(&'a Run, &'a Chunk),
 }
 
-/// The tracks of a frame: threads with spans first, then all workers, with the spans of their threads behind their chunks.
+/// The tracks of a frame: threads with spans first, then all workers, with the spans of their threads behind their
+/// chunks.
 pub fn tracks(record: &FrameRecord) -> Vec<Track<'_>> {
     let log = &record.log;
     let mut threads: Vec<_> =

@@ -2,9 +2,9 @@
 //!
 //!     cargo run --release -p ecs
 //!
-//! Where one archetype holds all entities, Drawloom reads its columns in place. Where several do, what changed is gathered:
-//! see `scene_columns.rs`. Entities that the system moves to other rows, as when one is despawned, are found by their
-//! numbers. Prints medians of what each costs.
+//! Where one archetype holds all entities, Drawloom reads its columns in place. Where several do, what changed is
+//! gathered: see `scene_columns.rs`. Entities that the system moves to other rows, as when one is despawned, are found
+//! by their numbers. Prints medians of what each costs.
 
 mod bevy_world;
 mod components;

@@ -39,7 +39,7 @@ pub struct Looks {
 }
 
 impl Population {
-    /// All populations, of so many entities.
+    /// All populations, of this number of entities.
     pub fn all(entities: u32) -> [Self; 3] {
         use Kind::{Foe, Friend, Moving, MovingFoe, MovingFriend};
         let population = |name, kinds| Self { name, entities, kinds };

@@ -1,4 +1,5 @@
-//! From the columns of archetypes to those of a scene: in place where there is one archetype, gathered where there are several.
+//! From the columns of archetypes to those of a scene: in place where there is one archetype, gathered where there are
+//! several.
 
 use std::iter;
 use std::ops::Range;
@@ -43,7 +44,8 @@ pub struct LentScene<'a> {
 }
 
 impl SceneColumns {
-    /// The scene of archetypes, one after the other. Copies what changed if there are several, and nothing but numbers otherwise.
+    /// The scene of archetypes, one after the other. Copies what changed if there are several, and nothing but numbers
+    /// otherwise.
     pub fn update<'a>(&'a mut self, archetypes: &'a [ArchetypeColumns<'a>]) -> LentScene<'a> {
         self.changed.clear();
         self.bytes_copied = 0;

@@ -36,8 +36,8 @@ fn bits(position: DVec3, orientation: Quat, scale: Vec3, material: usize) -> Obj
     (position.to_array().map(f64::to_bits), orientation.to_array().map(f32::to_bits), scale.x.to_bits(), material)
 }
 
-/// Where the entity of a number is in a frame, if so many are replaced in each. Entities that stand still are where they were when
-/// they were spawned: in the frame after whose update that was.
+/// Where the entity of a number is in a frame, if this number is replaced in each. Entities that stand still are where
+/// they were when they were spawned: in the frame after whose update that was.
 fn expected(population: Population, frame: u64, replaced: u64) -> BTreeSet<ObjectBits> {
     let oldest = (frame + 1) * replaced;
     let numbers = oldest..oldest + u64::from(population.entities);

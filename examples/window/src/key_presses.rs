@@ -4,7 +4,8 @@ use std::collections::HashSet;
 
 use winit::keyboard::KeyCode;
 
-/// Which keys go down, whichever window has the focus: a key that is held repeats, and also in a window that gets the focus meanwhile.
+/// Which keys go down, whichever window has the focus: a key that is held repeats, and also in a window that gets the
+/// focus meanwhile.
 #[derive(Debug, Default)]
 pub struct KeyPresses {
     pressed: HashSet<KeyCode>,

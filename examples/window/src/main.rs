@@ -1,5 +1,5 @@
-//! An engine's loop in a window: the world is updated on all threads while the frame before is submitted, and its pictures
-//! are drawn straight into the textures of the windows' surfaces.
+//! An engine's loop in a window: the world is updated on all threads while the frame before is submitted, and its
+//! pictures are drawn straight into the textures of the windows' surfaces.
 //!
 //!     cargo run --release -p window
 //!

@@ -4,8 +4,8 @@ use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom_output::PictureFile;
 
-/// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F1 shows the inspector, F11 is full
-/// screen, V switches vertical synchronisation, N opens another window, Escape closes one.
+/// An engine's loop in a window. W, A, S, D, Q, E and Shift fly, a drag looks around, F1 shows the inspector, F11 is
+/// full screen, V switches vertical synchronisation, N opens another window, Escape closes one.
 #[derive(Debug, Parser)]
 pub struct Options {
     /// How many cubes move.
@@ -20,7 +20,7 @@ pub struct Options {
     /// Draws as fast as possible, instead of once for each refresh of the display.
     #[arg(long)]
     pub no_vsync: bool,
-    /// Ends after so many frames, of a 60th of a second each.
+    /// Ends after this number of frames, of a 60th of a second each.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
     /// Writes the first window's last picture.

@@ -16,7 +16,7 @@ pub(crate) struct SkinsAndMorphs {
 }
 
 impl SkinsAndMorphs {
-    /// For processes whose shader has so many bindings of materials between the columns and the resources.
+    /// For processes whose shader has this number of bindings of materials between the columns and the resources.
     pub(crate) fn new(palette: Arc<[u8]>, morphs: Arc<[u8]>, material_bindings: u32) -> Self {
         let shader = include_str!("deformation.wgsl");
         let shader = shader.replace("PALETTE", &(1 + material_bindings).to_string());

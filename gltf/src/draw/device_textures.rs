@@ -12,7 +12,7 @@ use crate::texture_arrays::{TextureArray, TextureArrays};
 /// samplers.
 ///
 /// # Errors
-/// If the device has not so many layers or pixels, or not the memory for them.
+/// If the device has too few layers or pixels, or too little memory for them.
 pub(crate) fn upload(
     device: &wgpu::Device,
     queue: &wgpu::Queue,

@@ -46,10 +46,11 @@ pub struct ControllerBounds {
     pub max_changes: usize,
 }
 
-/// Drives a controller through a step of its costs and back, each without noise, with noise, with outliers, and with both.
+/// Drives a controller through a step of its costs and back, each without noise, with noise, with outliers, and with
+/// both.
 ///
-/// `frame` runs one frame, in which costs are those after the step if the flag is set, measured by the signal, and returns the
-/// choice that the frame was run with. `is_right` says whether a choice is right before or after the step.
+/// `frame` runs one frame, in which costs are those after the step if the flag is set, measured by the signal, and
+/// returns the choice that the frame was run with. `is_right` says whether a choice is right before or after the step.
 pub fn check_controller<C, T: PartialEq + Debug>(
     bounds: &ControllerBounds,
     controller: impl Fn() -> C,

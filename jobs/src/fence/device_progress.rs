@@ -7,11 +7,11 @@ use crate::unwind::{JobPanic, catch};
 
 /// A device on its way to the place of a fence.
 pub trait DeviceProgress: Send + Sync + 'static {
-    /// Waits until the device has reached the place, at most as long as `limit`, and less if it likes, and has the device call back for all that
-    /// it has done.
+    /// Waits until the device has reached the place, at most as long as `limit`, and less if it likes, and has the
+    /// device call back for all that it has done.
     ///
     /// # Errors
-    /// Returns the device's message if it has failed, so that the fence will never be set. A panic counts as such a
+    /// Returns the device's message if it has failed, so that the fence will never be set. A panic counts as a
     /// failure.
     fn advance(&self, limit: Duration) -> Result<(), String>;
 }

@@ -17,7 +17,8 @@ pub enum FenceError {
         /// All who waited for a fence at that time, in this OS process, the longest wait first.
         waits: Vec<FenceWait>,
     },
-    /// The fence's setter was dropped: its thread returned or panicked, or its frame was dropped or refused by the device.
+    /// The fence's setter was dropped: its thread returned or panicked, or its frame was dropped or refused by the
+    /// device.
     #[error("fence {fence:?} was abandoned before it was set")]
     Abandoned {
         /// The fence's name.

@@ -11,8 +11,8 @@
 //! | both set one report: a race | does not compile: a fence has one setter, which cannot be cloned, and which setting consumes |
 //! | each waits for a report that the other would set next: a deadlock | every wait has a limit, and its [error](FenceError::TimedOut) names all who wait and what each waits for |
 //!
-//! Nobody waits in vain either for a fence that can no longer be set: it is [abandoned](FenceError::Abandoned) when its setter is dropped, also by
-//! a panic, or with the frame that would have set it.
+//! Nobody waits in vain either for a fence that can no longer be set: it is [abandoned](FenceError::Abandoned) when its
+//! setter is dropped, also by a panic, or with the frame that would have set it.
 
 mod device_progress;
 mod error;
@@ -73,14 +73,14 @@ impl Fence {
         self.state.name()
     }
 
-    /// Whether the fence is set. For a fence of a device this asks the device, and does not wait; other callbacks of that device may be called
-    /// meanwhile.
+    /// Whether the fence is set. For a fence of a device this asks the device, and does not wait; other callbacks of
+    /// that device may be called meanwhile.
     pub fn is_set(&self) -> bool {
         self.set_at().is_some()
     }
 
-    /// When the fence was set. For a fence of a device that is when the device was found to have reached its place: when something polled the
-    /// device, waited for it or submitted to it.
+    /// When the fence was set. For a fence of a device that is when the device was found to have reached its place:
+    /// when something polled the device, waited for it or submitted to it.
     pub fn set_at(&self) -> Option<Instant> {
         if self.state.outcome().is_none()
             && let Some(progress) = self.state.progress()
@@ -97,7 +97,8 @@ impl Fence {
     /// Waits until the fence is set, at most as long as `limit`.
     ///
     /// # Errors
-    /// - [`FenceError::TimedOut`] if the fence is not set within `limit`, with everyone in this OS process who waits for a fence.
+    /// - [`FenceError::TimedOut`] if the fence is not set within `limit`, with everyone in this OS process who waits
+    ///   for a fence.
     /// - [`FenceError::Abandoned`] if nothing can set the fence any more.
     /// - [`FenceError::Device`] if the device that would set it fails.
     pub fn wait(&self, limit: Duration) -> Result<(), FenceError> {
@@ -140,10 +141,11 @@ impl Fence {
         }
     }
 
-    /// Calls back when the fence is set or abandoned, or somebody who waits for it finds that its device has failed; at once, if that has
-    /// happened. The callback runs on the thread that finds out: the one that sets
-    /// a fence or drops its setter; for a fence of a device, one that polls the device, waits for it or submits to it. It should be
-    /// short, hold no lock that such a thread may hold, and not use the device: a submission may be under way. If it panics, the panic goes no further.
+    /// Calls back when the fence is set or abandoned, or somebody who waits for it finds that its device has failed; at
+    /// once, if that has happened. The callback runs on the thread that finds out: the one that sets a fence or drops
+    /// its setter; for a fence of a device, one that polls the device, waits for it or submits to it. It should be
+    /// short, hold no lock that this thread may hold, and not use the device: a submission may be under way. If it
+    /// panics, the panic goes no further.
     pub fn on_set(&self, callback: impl FnOnce(Result<(), FenceError>) + Send + 'static) {
         let fence = self.clone();
         self.state.call_back(Box::new(move |outcome| callback(fence.result(outcome))));

@@ -28,8 +28,8 @@ impl FenceSetter {
         self.state.finish(Outcome::Set(Instant::now()));
     }
 
-    /// From now on, whoever waits for the fence lets this device advance meanwhile: for backends whose device tells of finished work
-    /// only when it is asked. The first call counts.
+    /// From now on, whoever waits for the fence lets this device advance meanwhile: for backends whose device tells of
+    /// finished work only when it is asked. The first call counts.
     pub fn advance_by(&self, progress: impl DeviceProgress) {
         self.state.set_progress(Arc::new(progress));
     }

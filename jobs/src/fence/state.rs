@@ -76,7 +76,8 @@ impl FenceState {
         }
     }
 
-    /// Waits until the fence ends, or has a device and did not have one when the caller looked; at most as long as `limit`.
+    /// Waits until the fence ends, or has a device and did not have one when the caller looked; at most as long as
+    /// `limit`.
     pub(super) fn wait(&self, limit: Duration, had_device: bool) -> Option<Outcome> {
         let mut current = self.current.lock();
         let goes_on = |current: &mut Current| current.outcome.is_none() && self.progress.get().is_some() == had_device;

@@ -7,7 +7,8 @@ use crate::timeline::Labels;
 
 /// Nodes, the resources they read and write, and the order that follows from that.
 ///
-/// `P` is a node's payload: anything in a graph that is only put in order, a [`Node`](super::Node) in a graph that is run.
+/// `P` is a node's payload: anything in a graph that is only put in order, a [`Node`](super::Node) in a graph that is
+/// run.
 ///
 /// # Order
 ///
@@ -20,19 +21,19 @@ use crate::timeline::Labels;
 /// Two writers, or two modifiers, of a resource have no order by themselves. Something else must order them, such as
 /// [`order`](Self::order), or the graph does not compile.
 ///
-/// If [`order`](Self::order) puts a reader or modifier before a writer, directly or through other nodes, it stays there and
-/// sees the earlier version of the resource. A reader that is put before a writer also comes before the modifiers of that
-/// writer's version.
+/// If [`order`](Self::order) puts a reader or modifier before a writer, directly or through other nodes, it stays there
+/// and sees the earlier version of the resource. A reader that is put before a writer also comes before the modifiers
+/// of that writer's version.
 ///
 /// # Dropped nodes
 ///
-/// A node is kept if an output of the graph depends on it, directly or through other nodes, or if a node depends on it that was
-/// [kept](Self::keep) explicitly. A modifier also depends on the version it modifies, so the modifiers before it are kept
-/// with it. All other nodes are dropped, and [`Schedule::dropped`](super::Schedule::dropped) names them; a graph without
-/// an output and without a kept node drops all its nodes.
+/// A node is kept if an output of the graph depends on it, directly or through other nodes, or if a node depends on it
+/// that was [kept](Self::keep) explicitly. A modifier also depends on the version it modifies, so the modifiers before
+/// it are kept with it. All other nodes are dropped, and [`Schedule::dropped`](super::Schedule::dropped) names them; a
+/// graph without an output and without a kept node drops all its nodes.
 ///
-/// [`order`](Self::order) keeps no node. It does work through dropped nodes: if `a` comes before `b`, and `b` before `c`, then
-/// `a` comes before `c` even if `b` is dropped.
+/// [`order`](Self::order) keeps no node. It does work through dropped nodes: if `a` comes before `b`, and `b` before
+/// `c`, then `a` comes before `c` even if `b` is dropped.
 ///
 /// ```
 /// use drawloom_jobs::graph::FrameGraph;
@@ -87,7 +88,8 @@ impl<P> FrameGraph<P> {
         self.declarations.add(name.into())
     }
 
-    /// Removes a node with its accesses, orders and labels, and returns its payload. `None` if the graph does not contain it.
+    /// Removes a node with its accesses, orders and labels, and returns its payload. `None` if the graph does not
+    /// contain it.
     pub fn remove(&mut self, node: NodeId) -> Option<P> {
         self.declarations.remove(node).map(|index| self.payloads.remove(index))
     }

@@ -31,14 +31,15 @@ impl<P> FrameGraph<P> {
     /// Orders the nodes, drops those that lead to no output, and checks the rest.
     ///
     /// # Errors
-    /// Returns [`CompileError`] with the graph and its first [`GraphProblem`], in the order of the variants. Names and cycles are
-    /// checked in the whole graph. A missing producer and unordered writers are only reported if the nodes concerned are
-    /// kept.
+    /// Returns [`CompileError`] with the graph and its first [`GraphProblem`], in the order of the variants. Names and
+    /// cycles are checked in the whole graph. A missing producer and unordered writers are only reported if the nodes
+    /// concerned are kept.
     pub fn compile(self) -> Result<Schedule<P>, CompileError<P>> {
         self.compile_with_outputs_of(|_| Vec::new())
     }
 
-    /// Compiles the graph, where each node that is not dropped makes more resources outputs: those that `outputs_of` names for its payload.
+    /// Compiles the graph, where each node that is not dropped makes more resources outputs: those that `outputs_of`
+    /// names for its payload.
     ///
     /// # Errors
     /// As [`compile`](Self::compile).

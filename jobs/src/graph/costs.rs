@@ -35,7 +35,7 @@ impl NodeCosts {
         self.estimates[node].get().unwrap_or(0.0) as u64
     }
 
-    /// The node's estimated cost, if there is such a node and any run was measured.
+    /// The node's estimated cost; `None` if there is no such node or no run was measured.
     pub(super) fn of(&self, node: usize) -> Option<Duration> {
         let nanoseconds = self.estimates.get(node)?.get()?;
         Some(Duration::from_nanos(nanoseconds as u64))

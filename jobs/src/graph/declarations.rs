@@ -1,5 +1,5 @@
-//! What an engine declares of a graph: all but the payloads of its nodes, so that what works with it exists once, and not once for each type
-//! of payload.
+//! What an engine declares of a graph: all but the payloads of its nodes, so that what works with it exists once, and
+//! not once for each type of payload.
 
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::error::GraphProblem;
 use crate::timeline::Labels;
 
-/// The nodes, resources and orders of a [`FrameGraph`](super::FrameGraph), whose methods of the same names say what each call means.
+/// The nodes, resources and orders of a [`FrameGraph`](super::FrameGraph), whose methods of the same names say what
+/// each call means.
 pub(super) struct Declarations {
     /// Distinguishes this graph's ids from those of all others.
     identity: usize,

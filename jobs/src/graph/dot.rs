@@ -14,11 +14,11 @@ use super::order::{positions, topological_order};
 use super::schedule::Schedule;
 
 impl<P> FrameGraph<P> {
-    /// The graph in DOT: nodes as boxes, resources as ellipses, an arrow for each read and write, a dotted arrow for each explicit
-    /// order.
+    /// The graph in DOT: nodes as boxes, resources as ellipses, an arrow for each read and write, a dotted arrow for
+    /// each explicit order.
     ///
-    /// Outputs have a double border, imported resources are filled. What leads to no output is dashed. A graph that does not
-    /// compile can be drawn, too.
+    /// Outputs have a double border, imported resources are filled. What leads to no output is dashed. A graph that
+    /// does not compile can be drawn, too.
     pub fn to_dot(&self) -> String {
         self.declarations.to_dot()
     }
@@ -64,13 +64,14 @@ impl Declarations {
 }
 
 impl<P> Schedule<P> {
-    /// The schedule in DOT: a box for each node, an arrow from each node to its direct dependents (those that do not also depend on
-    /// it through another node), and the dropped nodes as dashed boxes without arrows.
+    /// The schedule in DOT: a box for each node, an arrow from each node to its direct dependents (those that do not
+    /// also depend on it through another node), and the dropped nodes as dashed boxes without arrows.
     pub fn to_dot(&self) -> String {
         self.to_labelled_dot(|_, _| String::new())
     }
 
-    /// As [`to_dot`](Self::to_dot), with `label(from, to)` on each arrow unless it is empty. `from` and `to` are indices of nodes.
+    /// As [`to_dot`](Self::to_dot), with `label(from, to)` on each arrow unless it is empty. `from` and `to` are
+    /// indices of nodes.
     #[doc(hidden)]
     pub fn to_labelled_dot(&self, label: impl Fn(usize, usize) -> String) -> String {
         let mut dot = Dot::new();

@@ -148,8 +148,8 @@ pub(super) fn add_versions(edges: &mut Edges, roles: &[Roles], position: &[usize
     }
 }
 
-/// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data. The resources that `outputs_of`
-/// names for the index of a needed node are outputs too.
+/// Per node, whether it is needed: it is kept, or makes an output, or a needed node depends on its data. The resources
+/// that `outputs_of` names for the index of a needed node are outputs too.
 pub(super) fn needed(
     graph: &Declarations,
     roles: &[Roles],

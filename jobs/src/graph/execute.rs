@@ -20,13 +20,14 @@ use crate::unwind::{JobPanic, catch, discard};
 impl<P> Schedule<P> {
     /// Runs every node after all its dependencies, and waits for the last one.
     ///
-    /// The calling thread works too, and runs the [pinned](Node::pinned) nodes. A schedule of little work, judging by its last
-    /// runs, is executed serially by the calling thread; any other in parallel by all workers. After the first few runs, a run
-    /// allocates no memory.
+    /// The calling thread works too, and runs the [pinned](Node::pinned) nodes. A schedule of little work, judging by
+    /// its last runs, is executed serially by the calling thread; any other in parallel by all workers. After the first
+    /// few runs, a run allocates no memory.
     ///
     /// # Errors
-    /// Returns [`RunError`] if a node failed or panicked. The rest of the run is cancelled: chunks that have begun are finished,
-    /// and no others start. The next run starts over. With `panic = "abort"`, a panic ends the program instead.
+    /// Returns [`RunError`] if a node failed or panicked. The rest of the run is cancelled: chunks that have begun are
+    /// finished, and no others start. The next run starts over. With `panic = "abort"`, a panic ends the program
+    /// instead.
     pub fn run<C>(&mut self, scheduler: &Scheduler, context: &C) -> Result<(), RunError>
     where
         C: Sync + ?Sized,
@@ -182,8 +183,8 @@ pub(super) struct Location {
 }
 
 impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
-    /// Calls user code, starting at this node. Returns `None` and stops the run if it fails. `call` keeps the location up to
-    /// date.
+    /// Calls user code, starting at this node. Returns `None` and stops the run if it fails. `call` keeps the location
+    /// up to date.
     #[inline]
     pub(super) fn attempt<R>(&self, node: u32, call: impl FnOnce(&mut Location) -> Result<R, NodeError>) -> Option<R> {
         let mut location = Location { node, item: 0 };

@@ -1,8 +1,8 @@
 //! The execution policy: whether a run is serial or parallel.
 //!
-//! Parallel execution costs wake-ups, and cache misses for every node that one worker makes ready and another runs. A frame of
-//! little work is faster on one thread. So each schedule keeps track of how long its serial and its parallel runs take, and
-//! chooses the shorter mode.
+//! Parallel execution costs wake-ups, and cache misses for every node that one worker makes ready and another runs. A
+//! frame of little work is faster on one thread. So each schedule keeps track of how long its serial and its parallel
+//! runs take, and chooses the shorter mode.
 
 use std::time::Duration;
 
@@ -43,22 +43,22 @@ pub struct ModeChoice {
     pub is_trial: bool,
     /// The estimated time of a serial run in nanoseconds, before the run; `None` if it was not measured yet.
     pub serial_nanoseconds: Option<f32>,
-    /// What the serial time is compared with, in nanoseconds: the estimated time of a parallel run, before the run, but at least
-    /// the wake-up cost; the wake-up cost alone if no parallel run was measured yet.
+    /// What the serial time is compared with, in nanoseconds: the estimated time of a parallel run, before the run, but
+    /// at least the wake-up cost; the wake-up cost alone if no parallel run was measured yet.
     pub parallel_nanoseconds: f32,
 }
 
-/// This many of the first parallel runs are measured, except for the very first, which warms the caches; and then one run in
-/// [`MEASURED_EVERY`].
+/// This many of the first parallel runs are measured, except for the very first, which warms the caches; and then one
+/// run in [`MEASURED_EVERY`].
 const FIRST_MEASURED: u32 = 4;
 const MEASURED_EVERY: u32 = 31;
 
-/// A serial schedule with more work than a wake-up runs in parallel once in this many runs, to check that serial execution is
-/// still faster. A trial that takes twice as long as a serial run costs less than a percent of the time.
+/// A serial schedule with more work than a wake-up runs in parallel once in this many runs, to check that serial
+/// execution is still faster. A trial that takes twice as long as a serial run costs less than a percent of the time.
 const PARALLEL_EVERY: u32 = 128;
 
-/// How many serial runs within their limit cancel one that exceeded it. Two that exceed it with fewer runs between them are a
-/// sign that the frame's work has changed.
+/// How many serial runs within their limit cancel one that exceeded it. Two that exceed it with fewer runs between them
+/// are a sign that the frame's work has changed.
 const EXCEEDED_RUNS: u32 = 8;
 
 const SERIAL_RUNS: Filter = Filter::limiting_outliers(8.0);
@@ -69,8 +69,8 @@ const MEASURED_RUNS: Filter = Filter::unlimited(4.0 / 3.0);
 const HYSTERESIS: Hysteresis = Hysteresis::new(1.25);
 
 impl ExecutionPolicy {
-    /// The policy of a schedule that takes the place of this one's, with work like its work: it begins with the same mode and times, and
-    /// measures its own first runs.
+    /// The policy of a schedule that takes the place of this one's, with work like its work: it begins with the same
+    /// mode and times, and measures its own first runs.
     pub(crate) fn of_successor(&self) -> Self {
         let Self { serial, parallel, is_serial, .. } = *self;
         Self { serial, parallel, is_serial, ..Self::default() }
@@ -129,7 +129,8 @@ impl ExecutionPolicy {
     pub(crate) fn report_exceeded(&mut self) {
         self.exceeded += EXCEEDED_RUNS;
         if self.exceeded > EXCEEDED_RUNS {
-            // Keeping `exceeded` makes the next runs parallel and measured; a policy that knows nothing would start serially.
+            // Keeping `exceeded` makes the next runs parallel and measured; a policy that knows nothing would start
+            // serially.
             *self = Self { exceeded: EXCEEDED_RUNS, latest: self.latest, ..Self::default() };
         }
     }
@@ -146,8 +147,8 @@ impl ExecutionPolicy {
             (self.serial, self.parallel) = (Estimate::default(), Estimate::default());
         }
         self.since_measured = 0;
-        // The same run estimates both modes: apart from the clock readings, a serial run takes as long as the work of all
-        // workers.
+        // The same run estimates both modes: apart from the clock readings, a serial run takes as long as the work of
+        // all workers.
         self.parallel.add(took.as_nanos() as f32, MEASURED_RUNS);
         self.serial.add(work.as_nanos() as f32, MEASURED_RUNS);
     }

@@ -1,8 +1,8 @@
 //! The frame graph: orders nodes by the resources they read and write, and runs them.
 //!
-//! An engine adds nodes, declares which resources each of them reads and writes, and which resources are the outputs of the
-//! frame. The graph is compiled once: this checks it, orders the nodes, and drops those that no output needs. The resulting
-//! [`Schedule`] is run every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
+//! An engine adds nodes, declares which resources each of them reads and writes, and which resources are the outputs of
+//! the frame. The graph is compiled once: this checks it, orders the nodes, and drops those that no output needs. The
+//! resulting [`Schedule`] is run every frame, on all workers of a [`Scheduler`](crate::task::Scheduler).
 //!
 //! ```text
 //!   FrameGraph                                  Schedule              a run: idle workers take the next chunks
@@ -16,17 +16,17 @@
 //!   debug lines ──► (overlay)                   dropped: debug lines
 //! ```
 //!
-//! A parallel run starts the nodes of the critical path first, by the costs that earlier runs measured. A schedule with so
-//! little work that parallel execution would cost more than it gains runs serially on the calling thread
+//! A parallel run starts the nodes of the critical path first, by the costs that earlier runs measured. A schedule with
+//! so little work that parallel execution would cost more than it gains runs serially on the calling thread
 //! ([`Schedule::run`]).
 //!
-//! The graph does not know what a node does. A node's payload can be anything if the graph is only ordered. To be run, it must
-//! be a [`Node`]: a number of items that workers process in chunks. The number of items is only asked for when all
-//! dependencies of the node are complete.
+//! The graph does not know what a node does. A node's payload can be anything if the graph is only ordered. To be run,
+//! it must be a [`Node`]: a number of items that workers process in chunks. The number of items is only asked for when
+//! all dependencies of the node are complete.
 //!
-//! In L 3.3 (Lorenzon & Clua), all work of a frame is *render processes*, which a manager assigns to free threads. In M 10.4
-//! (McAnlis), a fixed list of kinds of views defines their order. Here the order follows from what each node reads and
-//! writes, so a mirror in a mirror is not a special case.
+//! In L 3.3 (Lorenzon & Clua), all work of a frame is *render processes*, which a manager assigns to free threads. In M
+//! 10.4 (McAnlis), a fixed list of kinds of views defines their order. Here the order follows from what each node reads
+//! and writes, so a mirror in a mirror is not a special case.
 //!
 //! # A graph of closures
 //!
@@ -75,8 +75,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A context that borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, has a different type in every frame. The
-//! nodes of a schedule that is compiled once for all frames implement [`Node`] for every lifetime:
+//! A context that borrows, such as `struct World<'frame> { heights: &'frame [f32] }`, has a different type in every
+//! frame. The nodes of a schedule that is compiled once for all frames implement [`Node`] for every lifetime:
 //!
 //! ```
 //! use std::ops::Range;

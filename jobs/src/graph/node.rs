@@ -15,14 +15,14 @@ use crate::task::Worker;
 pub trait Node<C: ?Sized>: Send + Sync {
     /// The number of items.
     ///
-    /// It is called once per run, when all dependencies of the node are complete, so it may depend on their results. A node of
-    /// width 0 is complete at once.
+    /// It is called once per run, when all dependencies of the node are complete, so it may depend on their results. A
+    /// node of width 0 is complete at once.
     fn width(&self, context: &C) -> usize;
 
     /// The number of items for each call of [`run`](Self::run). 0 counts as 1.
     ///
-    /// It is called right after [`width`](Self::width), unless the width is 0. A width of more than half the range of `usize` is
-    /// split into chunks of at least 2 items.
+    /// It is called right after [`width`](Self::width), unless the width is 0. A width of more than half the range of
+    /// `usize` is split into chunks of at least 2 items.
     fn chunk(&self, context: &C) -> usize {
         let _ = context;
         1
@@ -38,21 +38,22 @@ pub trait Node<C: ?Sized>: Send + Sync {
         false
     }
 
-    /// Whether the node is pinned to the thread that called [`Schedule::run`](super::Schedule::run). All its calls are then made on
-    /// that thread, and its chunks run one after another, from first to last.
+    /// Whether the node is pinned to the thread that called [`Schedule::run`](super::Schedule::run). All its calls are
+    /// then made on that thread, and its chunks run one after another, from first to last.
     fn pinned(&self) -> bool {
         false
     }
 
-    /// Processes the items of `range`: one chunk, which starts at a multiple of the chunk size. The last chunk may be shorter.
+    /// Processes the items of `range`: one chunk, which starts at a multiple of the chunk size. The last chunk may be
+    /// shorter.
     ///
-    /// Every item is in exactly one range. Ranges run in any order, at the same time or one after another, each on the thread of
-    /// `worker`. A range must not wait for another one: the same thread may have to run both, which is a deadlock (but see
-    /// [`Schedule::always_parallel`](super::Schedule::always_parallel)).
+    /// Every item is in exactly one range. Ranges run in any order, at the same time or one after another, each on the
+    /// thread of `worker`. A range must not wait for another one: the same thread may have to run both, which is a
+    /// deadlock (but see [`Schedule::always_parallel`](super::Schedule::always_parallel)).
     ///
     /// # Errors
-    /// An error stops the run: no further chunk starts, no dependent of the node runs, and the run returns the error with the
-    /// node's name.
+    /// An error stops the run: no further chunk starts, no dependent of the node runs, and the run returns the error
+    /// with the node's name.
     fn run(&self, context: &C, range: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
 }
 

@@ -8,8 +8,9 @@ use petgraph::graph::{DiGraph, NodeIndex};
 
 /// The vertices in topological order. Vertices on a cycle, or behind one, are left out.
 ///
-/// The first `nodes` vertices are nodes, the rest are junctions. Where several vertices could be next, junctions come first,
-/// then the node with the lowest index, so the order of nodes is the same as with the edges that a junction stands for.
+/// The first `nodes` vertices are nodes, the rest are junctions. Where several vertices could be next, junctions come
+/// first, then the node with the lowest index, so the order of nodes is the same as with the edges that a junction
+/// stands for.
 pub(super) fn topological_order<E>(graph: &DiGraph<(), E>, nodes: usize) -> Vec<NodeIndex> {
     let priority = |vertex: NodeIndex| Reverse((vertex.index() < nodes, vertex));
     let mut pending: Vec<usize> =
@@ -38,8 +39,8 @@ pub(super) fn positions(vertices: usize, order: &[NodeIndex]) -> Vec<usize> {
     positions
 }
 
-/// The nodes of one cycle, starting at the lowest. The graph must have a cycle; its first `nodes` vertices are nodes, and
-/// `ordered` is its [`topological_order`].
+/// The nodes of one cycle, starting at the lowest. The graph must have a cycle; its first `nodes` vertices are nodes,
+/// and `ordered` is its [`topological_order`].
 pub(super) fn find_cycle<E>(graph: &DiGraph<(), E>, nodes: usize, ordered: &[NodeIndex]) -> Vec<NodeIndex> {
     let mut is_stuck = vec![true; graph.node_count()];
     for vertex in ordered {

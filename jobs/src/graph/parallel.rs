@@ -1,16 +1,16 @@
 //! Parallel execution: a run on all workers.
 //!
-//! No job ever waits. A node that is not ready exists only as a counter of pending dependencies. The worker that brings the
-//! counter to zero makes the node *ready*. When a worker completes a node, it continues with the first dependent that became
-//! ready, and pushes the others as a single token. A worker that takes such a token pushes half of its nodes, then half of the
-//! rest, until one node is left, so the largest part is where thieves steal first.
+//! No job ever waits. A node that is not ready exists only as a counter of pending dependencies. The worker that brings
+//! the counter to zero makes the node *ready*. When a worker completes a node, it continues with the first dependent
+//! that became ready, and pushes the others as a single token. A worker that takes this token pushes half of its nodes,
+//! then half of the rest, until one node is left, so the largest part is where thieves steal first.
 //!
-//! A node's width is asked for when the node starts. A node of more than one chunk becomes an *open node*: workers claim its
-//! chunks by ticket, and a token invites another worker to join. The worker that finishes the last chunk completes the
-//! node.
+//! A node's width is asked for when the node starts. A node of more than one chunk becomes an *open node*: workers
+//! claim its chunks by ticket, and a token invites another worker to join. The worker that finishes the last chunk
+//! completes the node.
 //!
-//! After a failure the run is *drained*: the remaining nodes are skipped. Skipped nodes still decrement counters, so that these
-//! are reset for the next run.
+//! After a failure the run is *drained*: the remaining nodes are skipped. Skipped nodes still decrement counters, so
+//! that these are reset for the next run.
 
 use std::ops::Range;
 
@@ -145,8 +145,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         }
     }
 
-    /// Runs a node that has just started. Returns true if this worker finished it and must complete it, and false if the worker
-    /// that finishes its last chunk will do so.
+    /// Runs a node that has just started. Returns true if this worker finished it and must complete it, and false if
+    /// the worker that finishes its last chunk will do so.
     fn run_node_parallel(&self, node: u32, is_pinned: bool, context: &TokenContext<'_>) -> bool {
         if self.is_stopped() {
             return true;
@@ -189,8 +189,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
 
     /// Claims and runs chunks until none is left, and returns how many. After a failure, chunks are only counted.
     ///
-    /// The worker's span begins at its first chunk: a worker that gets no chunk takes no part in the node, and may even come
-    /// after the node is complete.
+    /// The worker's span begins at its first chunk: a worker that gets no chunk takes no part in the node, and may even
+    /// come after the node is complete.
     fn take_chunks(
         &self,
         node: u32,
@@ -226,8 +226,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         }
     }
 
-    /// Counts down the dependents of a complete node. Pushes those that became ready, except for one that any worker can run,
-    /// and returns that one for this worker to run next.
+    /// Counts down the dependents of a complete node. Pushes those that became ready, except for one that any worker
+    /// can run, and returns that one for this worker to run next.
     fn complete(&self, node: u32, context: &TokenContext<'_>) -> Option<u32> {
         self.timer.end(node);
         let Schedule { graph: FlatGraph { adjacency, .. }, progress, .. } = self.schedule;
@@ -240,7 +240,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         ready.push_all_but_one()
     }
 
-    /// Whether only the calling thread may run the node. If the call fails, it does not matter which worker drains the node.
+    /// Whether only the calling thread may run the node. If the call fails, it does not matter which worker drains the
+    /// node.
     fn is_pinned(&self, node: u32) -> bool {
         self.attempt(node, |_location| Ok(self.node(node).pinned())).unwrap_or(false)
     }
@@ -303,8 +304,8 @@ impl<'run, P: Node<C>, C: Sync + ?Sized, I: Instrument> ReadyNodes<'run, P, C, I
         }
     }
 
-    /// Pushes all nodes but one, and returns that one. Returns `None` on the calling thread if one of the nodes is pinned, because
-    /// only that thread can run it.
+    /// Pushes all nodes but one, and returns that one. Returns `None` on the calling thread if one of the nodes is
+    /// pinned, because only that thread can run it.
     fn push_all_but_one(mut self) -> Option<u32> {
         if !self.slots.is_empty() {
             self.push();

@@ -11,12 +11,12 @@ use super::flat_graph::FlatGraph;
 use super::progress::Progress;
 use crate::timeline::Graph;
 
-/// A compiled graph: checked, in execution order, and stored in flat arrays. It is compiled once and [run](Self::run) every
-/// frame.
+/// A compiled graph: checked, in execution order, and stored in flat arrays. It is compiled once and [run](Self::run)
+/// every frame.
 ///
-/// Nodes have indices from 0 up to [`len`](Self::len), in topological order: a node's index is higher than those of all its
-/// dependencies. Where several nodes could be next, the one that was added first is, so the same graph always compiles to the
-/// same schedule.
+/// Nodes have indices from 0 up to [`len`](Self::len), in topological order: a node's index is higher than those of all
+/// its dependencies. Where several nodes could be next, the one that was added first is, so the same graph always
+/// compiles to the same schedule.
 pub struct Schedule<P> {
     pub(super) graph: FlatGraph,
     /// The payload of each node.
@@ -93,9 +93,9 @@ impl<P> Schedule<P> {
         self.graph.dependents.of(index)
     }
 
-    /// Executes every run in parallel, however little work it is. This is for nodes that wait for each other while they run, which
-    /// deadlock on one thread, and for measuring what parallel execution costs. Off by default; no effect with a single
-    /// worker.
+    /// Executes every run in parallel, however little work it is. This is for nodes that wait for each other while they
+    /// run, which deadlock on one thread, and for measuring what parallel execution costs. Off by default; no effect
+    /// with a single worker.
     pub fn always_parallel(&mut self, always: bool) {
         self.always_parallel = always;
     }
@@ -106,23 +106,23 @@ impl<P> Schedule<P> {
         self.policy = before.policy.of_successor();
     }
 
-    /// The time from a node's start to its end: an average over the latest measured runs. `None` if no run was measured, or if
-    /// there is no such node.
+    /// The time from a node's start to its end: an average over the latest measured runs. `None` if no run was
+    /// measured, or if there is no such node.
     ///
     /// Some of the parallel runs are measured: the first few, and later ones now and then.
     pub fn cost(&self, index: usize) -> Option<Duration> {
         self.costs.of(index)
     }
 
-    /// Whether a node is on a critical path, by the measured [costs](Self::cost): the longest path through the node is at most a
-    /// tenth shorter than the longest path of the graph. Idle workers take critical nodes first.
+    /// Whether a node is on a critical path, by the measured [costs](Self::cost): the longest path through the node is
+    /// at most a tenth shorter than the longest path of the graph. Idle workers take critical nodes first.
     pub fn is_critical(&self, index: usize) -> bool {
         index < self.len() && self.graph.adjacency.is_critical(index as u32)
     }
 
-    /// The mode of the latest run that had a choice, and the estimates by which it was chosen; `None` before the first one. There
-    /// is no choice with a single worker, for a schedule that is [always parallel](Self::always_parallel), and if the scheduler
-    /// [shuffles](crate::task::SchedulerBuilder::shuffle).
+    /// The mode of the latest run that had a choice, and the estimates by which it was chosen; `None` before the first
+    /// one. There is no choice with a single worker, for a schedule that is [always parallel](Self::always_parallel),
+    /// and if the scheduler [shuffles](crate::task::SchedulerBuilder::shuffle).
     pub fn run_mode(&self) -> Option<ModeChoice> {
         self.policy.latest()
     }

@@ -1,5 +1,5 @@
-//! Serial execution: the calling thread runs one node after another. No dependencies are counted, because the nodes are in
-//! topological order.
+//! Serial execution: the calling thread runs one node after another. No dependencies are counted, because the nodes are
+//! in topological order.
 
 use std::time::Duration;
 
@@ -43,8 +43,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         suspended.flatten()
     }
 
-    /// Runs one node. If the deadline passes, it returns the chunks and how many of them are complete. A pinned node is always
-    /// completed, because no other worker could.
+    /// Runs one node. If the deadline passes, it returns the chunks and how many of them are complete. A pinned node is
+    /// always completed, because no other worker could.
     #[inline]
     fn run_node_serial(
         &self,
@@ -54,7 +54,8 @@ impl<P: Node<C>, C: Sync + ?Sized, I: Instrument> Run<'_, P, C, I> {
         span: &mut impl NodeSpan,
     ) -> Result<Option<(Chunks, usize)>, NodeError> {
         let node = location.node;
-        // Only needed if the deadline passes, but always called, so that a panic in it fails serial runs as it fails parallel ones.
+        // Only needed if the deadline passes, but always called, so that a panic in it fails serial runs as it fails
+        // parallel ones.
         let is_pinned = self.node(node).pinned();
         let chunks = self.chunks(node, worker);
         if chunks.count() == 0 {
@@ -81,8 +82,8 @@ struct Deadline<'run> {
 }
 
 impl Deadline<'_> {
-    /// The largest number of chunks between two readings of the clock. A frame that suddenly takes longer than its limit
-    /// overruns it by at most this many chunks.
+    /// The largest number of chunks between two readings of the clock. A frame that suddenly takes longer than its
+    /// limit overruns it by at most this many chunks.
     const MAX_CHUNKS: u32 = 16;
 
     /// Counts a complete chunk, and returns whether the deadline is known to have passed.

@@ -14,8 +14,8 @@ use super::{FrameGraph, Node, NodeError, RunError, Schedule};
 use crate::sync::{AtomicUsize, Ordering, check, thread};
 use crate::task::{Scheduler, SchedulerBuilder, Worker};
 
-/// Between the usual and the longest duration of these schedules by shuttle's random clock, so that some serial runs stay within
-/// their limit and some exceed it.
+/// Between the usual and the longest duration of these schedules by shuttle's random clock, so that some serial runs
+/// stay within their limit and some exceed it.
 const WAKE_UP_COST: Duration = Duration::from_micros(2);
 
 /// The context of a run.
@@ -248,8 +248,8 @@ fn shuttle_a_failure_cancels_the_dependents_and_the_next_frame_is_complete() {
     }
 }
 
-/// A subscriber that panics when `left` more spans have been entered; 0 means never. All threads of a model run on one thread of
-/// the system, so it is the subscriber of all of them.
+/// A subscriber that panics when `left` more spans have been entered; 0 means never. All threads of a model run on one
+/// thread of the system, so it is the subscriber of all of them.
 struct PanickingSubscriber {
     left: std::sync::atomic::AtomicUsize,
 }

@@ -20,8 +20,8 @@ pub enum ReportError {
         /// The frame's number.
         frame: u64,
     },
-    /// One of its runs is inconsistent: a node waits for a later one, a chunk belongs to a node or a worker that does not
-    /// exist, or chunks have more items than a `usize` can count. No timeline records that.
+    /// One of its runs is inconsistent: a node waits for a later one, a chunk belongs to a node or a worker that does
+    /// not exist, or chunks have more items than a `usize` can count. No timeline records that.
     #[error("what the log says of frame {frame} contradicts itself")]
     Contradictory {
         /// The frame's number.

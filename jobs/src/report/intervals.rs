@@ -19,8 +19,9 @@ pub(super) fn outermost_runs(log: &Log, frame: u64) -> Vec<&Run> {
     runs
 }
 
-/// The gaps between the parallel runs of frames up to an outermost run, in order: from the end of all that began before one until
-/// that one began. There is none before the first of the log. Serial runs of several workers belong to the gaps around them.
+/// The gaps between the parallel runs of frames up to an outermost run, in order: from the end of all that began before
+/// one until that one began. There is none before the first of the log. Serial runs of several workers belong to the
+/// gaps around them.
 pub(super) fn gaps_up_to(log: &Log, run: &Run) -> Vec<Duration> {
     let start_of = |run: &Run| if run.workers == 1 { Some(run.began) } else { run.parallel_from };
     let Some(start) = start_of(run) else { return Vec::new() };
@@ -31,7 +32,8 @@ pub(super) fn gaps_up_to(log: &Log, run: &Run) -> Vec<Duration> {
     gaps_before.chain(gap).collect()
 }
 
-/// The intervals in which a frame is worked on: its outermost runs, and the spans of its threads. Ascending and disjoint.
+/// The intervals in which a frame is worked on: its outermost runs, and the spans of its threads. Ascending and
+/// disjoint.
 pub(super) fn frame_intervals(log: &Log, frame: u64, outermost: &[&Run]) -> Vec<Range<Duration>> {
     let spans = log.spans_of(frame).map(|span| span.began..span.ended);
     union(spans.chain(outermost.iter().map(|run| run.began..run.ended)))

@@ -1,9 +1,10 @@
 //! Why a frame took as long as it did, and how long it would take on a machine with more workers.
 //!
-//! The [timeline](crate::timeline) records how long each chunk of a frame took. A [`FrameReport`] computes from that which
-//! nodes are to blame for the frame's time. A [`Replay`] simulates the same work on any number of workers, by the rules of
-//! the scheduler and of `drawloom`'s renderer: into which chunks it is cut, which worker takes what, who is woken when, and what each
-//! of these operations [costs](SchedulerCosts). [`write_page`] and [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
+//! The [timeline](crate::timeline) records how long each chunk of a frame took. A [`FrameReport`] computes from these
+//! times which nodes are to blame for the frame's time. A [`Replay`] simulates the same work on any number of workers,
+//! by the rules of the scheduler and of `drawloom`'s renderer: into which chunks it is cut, which worker takes what,
+//! who is woken when, and what each of these operations [costs](SchedulerCosts). [`write_page`] and
+//! [`write_chrome_trace`] show all frames, for a browser and for Perfetto.
 //!
 //! ```
 //! use std::hint::black_box;
@@ -35,8 +36,8 @@
 //!
 //! # What a replay leaves out
 //!
-//! Workers share caches, memory bandwidth and clock rate, and nodes wait for each other's locks and counters. A replay knows
-//! none of that, so the more workers, the more its prediction is a lower bound.
+//! Workers share caches, memory bandwidth and clock rate, and nodes wait for each other's locks and counters. A replay
+//! knows none of that, so the more workers, the more its prediction is a lower bound.
 
 mod chrome_trace;
 mod consistency;

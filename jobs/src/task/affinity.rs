@@ -9,8 +9,8 @@ pub struct AffinityMask {
 }
 
 impl AffinityMask {
-    /// A set of these processors. The system ignores processors that do not exist or that the process may not use, but at least
-    /// one must remain.
+    /// A set of these processors. The system ignores processors that do not exist or that the process may not use, but
+    /// at least one must remain.
     pub fn new(processors: impl IntoIterator<Item = usize>) -> Self {
         let mut processors: Vec<usize> = processors.into_iter().collect();
         processors.sort_unstable();

@@ -15,8 +15,8 @@ pub(super) trait QueuedJob: Send + Sync {
 
 /// A queue behind a lock, and a count with which workers skip the lock if the queue is empty.
 ///
-/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to sleep
-/// finds a job that was put here. The lock orders the jobs themselves.
+/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which
+/// goes to sleep finds a job that was put here. The lock orders the jobs themselves.
 pub(super) struct BackgroundQueue {
     count: AtomicUsize,
     jobs: Mutex<NumberedJobs>,

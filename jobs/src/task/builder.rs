@@ -48,13 +48,13 @@ pub struct SchedulerBuilder {
 }
 
 impl Scheduler {
-    /// A scheduler with this number of workers, including the calling thread: 1 starts no thread. There may be more workers than
-    /// the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
+    /// A scheduler with this number of workers, including the calling thread: 1 starts no thread. There may be more
+    /// workers than the machine has cores (L 3.3). The threads are named `drawloom-1`, `drawloom-2` and so on.
     ///
     /// # Errors
     /// Returns [`SchedulerError::NoWorkers`] if `workers` is 0, and [`SchedulerError::TooManyWorkers`] if it exceeds
-    /// [`MAX_WORKERS`](Self::MAX_WORKERS). Returns [`SchedulerError::Spawn`] if the system does not start a thread; threads that
-    /// were started by then have ended.
+    /// [`MAX_WORKERS`](Self::MAX_WORKERS). Returns [`SchedulerError::Spawn`] if the system does not start a thread;
+    /// threads that were started by then have ended.
     pub fn new(workers: usize) -> Result<Self, SchedulerError> {
         Self::builder().workers(workers).build()
     }
@@ -62,8 +62,8 @@ impl Scheduler {
     /// A scheduler with as many workers as the process can run threads at once.
     ///
     /// # Errors
-    /// Returns [`SchedulerError::UnknownParallelism`] if the system does not report that number, and [`SchedulerError::Spawn`] as
-    /// [`new`](Self::new) does.
+    /// Returns [`SchedulerError::UnknownParallelism`] if the system does not report that number, and
+    /// [`SchedulerError::Spawn`] as [`new`](Self::new) does.
     pub fn with_available_parallelism() -> Result<Self, SchedulerError> {
         Self::builder().build()
     }
@@ -81,14 +81,15 @@ impl SchedulerBuilder {
     /// The smallest stack of a thread in bytes: 256 KiB, which the scheduler's own code and a few nested scopes need.
     pub const MIN_STACK_SIZE: usize = 256 << 10;
 
-    /// Sets the number of workers, including the calling thread: 1 starts no thread. There may be more workers than the machine has
-    /// cores (L 3.3). The default is the number of threads that the process can run at once.
+    /// Sets the number of workers, including the calling thread: 1 starts no thread. There may be more workers than the
+    /// machine has cores (L 3.3). The default is the number of threads that the process can run at once.
     pub fn workers(mut self, workers: usize) -> Self {
         self.workers = Some(workers);
         self
     }
 
-    /// Sets the names of the threads, by the index of the worker, 1 or more. The default is `drawloom-1`, `drawloom-2` and so on.
+    /// Sets the names of the threads, by the index of the worker, 1 or more. The default is `drawloom-1`, `drawloom-2`
+    /// and so on.
     pub fn name(mut self, name: impl Fn(usize) -> String + 'static) -> Self {
         self.name = Some(Contained::new(Box::new(name)));
         self
@@ -106,52 +107,53 @@ impl SchedulerBuilder {
         self
     }
 
-    /// Sets the processors that each thread may run on, by the index of the worker, 1 or more. Threads that call the scheduler are
-    /// not affected. This needs the feature `affinity`, which is on by default, and Linux or Android. Elsewhere
-    /// [`build`](Self::build) returns [`SchedulerError::Affinity`], and [`on_start`](Self::on_start) can restrict threads.
+    /// Sets the processors that each thread may run on, by the index of the worker, 1 or more. Threads that call the
+    /// scheduler are not affected. This needs the feature `affinity`, which is on by default, and Linux or Android.
+    /// Elsewhere [`build`](Self::build) returns [`SchedulerError::Affinity`], and [`on_start`](Self::on_start) can
+    /// restrict threads.
     ///
-    /// Without this the system chooses the processors. If it puts them on the processor of the thread that wakes them, as on some
-    /// virtual machines, they are kept off there (with that feature, on Linux and Android), except threads that
-    /// [`on_start`](Self::on_start) has placed.
+    /// Without this the system chooses the processors. If it puts them on the processor of the thread that wakes them,
+    /// as on some virtual machines, they are kept off there (with that feature, on Linux and Android), except threads
+    /// that [`on_start`](Self::on_start) has placed.
     pub fn affinity(mut self, affinity: impl Fn(usize) -> AffinityMask + 'static) -> Self {
         self.affinity = Some(Contained::new(Box::new(affinity)));
         self
     }
 
-    /// Sets a hook that runs first on each thread that the scheduler starts, with the index of its worker. The scheduler is built
-    /// when all hooks have returned.
+    /// Sets a hook that runs first on each thread that the scheduler starts, with the index of its worker. The
+    /// scheduler is built when all hooks have returned.
     pub fn on_start(mut self, hook: impl Fn(usize) + Send + Sync + 'static) -> Self {
         self.on_start = Some(Hook::new(Contained::new(Box::new(hook))));
         self
     }
 
-    /// Sets a hook that runs last on each thread that the scheduler has started, with the index of its worker. Its panic is
-    /// reported to [`tracing`] as an error.
+    /// Sets a hook that runs last on each thread that the scheduler has started, with the index of its worker. Its
+    /// panic is reported to [`tracing`] as an error.
     pub fn on_stop(mut self, hook: impl Fn(usize) + Send + Sync + 'static) -> Self {
         self.on_stop = Some(Hook::new(Contained::new(Box::new(hook))));
         self
     }
 
-    /// Runs jobs, and the chunks of loops and graphs, in a pseudo-random order instead of the fastest one. Small work is not run
-    /// serially then.
+    /// Runs jobs, and the chunks of loops and graphs, in a pseudo-random order instead of the fastest one. Small work
+    /// is not run serially then.
     ///
-    /// With one worker the seed alone decides the order of everything, so a failure can be repeated. With several workers,
-    /// results that depend on the order of jobs show up.
+    /// With one worker the seed alone decides the order of everything, so a failure can be repeated. With several
+    /// workers, results that depend on the order of jobs show up.
     pub fn shuffle(mut self, seed: u64) -> Self {
         self.shuffle = Some(seed);
         self
     }
 
-    /// Sets the cost of waking a worker, which is measured otherwise: see [`Scheduler::wake_up_cost`]. With a cost of 0 every loop
-    /// is parallel from its first chunk on.
+    /// Sets the cost of waking a worker, which is measured otherwise: see [`Scheduler::wake_up_cost`]. With a cost of 0
+    /// every loop is parallel from its first chunk on.
     pub fn wake_up_cost(mut self, cost: Duration) -> Self {
         self.wake_up_cost = Some(cost);
         self
     }
 
-    /// Sets how many chunks and idle times the [timeline](Scheduler::timeline) stores for each worker, at 48 bytes each. The
-    /// default is 65,536. The number is rounded up to a power of two, up to 16,777,216. The memory is allocated when the timeline
-    /// is started.
+    /// Sets how many chunks and idle times the [timeline](Scheduler::timeline) stores for each worker, at 48 bytes
+    /// each. The default is 65,536. The number is rounded up to a power of two, up to 16,777,216. The memory is
+    /// allocated when the timeline is started.
     pub fn timeline_capacity(mut self, events: usize) -> Self {
         self.timeline.capacity = Some(events);
         self
@@ -162,11 +164,12 @@ impl SchedulerBuilder {
     /// so a simulated clock makes what is chosen by these costs the same in each run, if the
     /// [wake-up cost](Self::wake_up_cost) is set. Backends measure what recording costs by the system's clock.
     ///
-    /// If the clock panics, it is not called again: time stands still at its latest reading. That is reported to [`tracing`] as an
-    /// error, and in [`clock_panic`](crate::timeline::Log::clock_panic) of every log from then on. Jobs are not affected.
+    /// If the clock panics, it is not called again: time stands still at its latest reading. That is reported to
+    /// [`tracing`] as an error, and in [`clock_panic`](crate::timeline::Log::clock_panic) of every log from then on.
+    /// Jobs are not affected.
     ///
-    /// A worker may call the clock between taking a job and running it. So the clock must not wait for anything that a job may hold
-    /// while it waits, such as a lock.
+    /// A worker may call the clock between taking a job and running it. So the clock must not wait for anything that a
+    /// job may hold while it waits, such as a lock.
     pub fn timeline_clock(mut self, clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
         self.timeline.clock = Some(Contained::new(Box::new(clock)));
         self

@@ -1,7 +1,7 @@
 //! A closure whose type and lifetime are erased.
 //!
-//! A closure that captures little lives in the job itself. So ten thousand small jobs a frame cost no allocations, each of
-//! which one worker would make and another free. That more than halves the cost of a small job.
+//! A closure that captures little lives in the job itself. So ten thousand small jobs a frame cost no allocations, each
+//! of which one worker would make and another free. That more than halves the cost of a small job.
 
 use std::fmt;
 use std::mem::{ManuallyDrop, MaybeUninit};
@@ -36,9 +36,9 @@ impl<Region: 'static, Worker> Closure<Region, Worker> {
     /// Calls the closure. When this returns or unwinds, the closure and its captures have been dropped.
     pub(super) fn call(self, region: &'static Region, worker: &Worker) {
         let mut this = ManuallyDrop::new(self);
-        // SAFETY: `call` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made `call` for the
-        // type that it stored. This takes `self`, and `ManuallyDrop` keeps `drop` from running. The caller of `new` guarantees
-        // that what the closure borrows is still valid.
+        // SAFETY: `call` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made
+        // `call` for the type that it stored. This takes `self`, and `ManuallyDrop` keeps `drop` from running. The
+        // caller of `new` guarantees that what the closure borrows is still valid.
         unsafe { (this.call)(&raw mut this.storage, region, worker) }
     }
 
@@ -49,8 +49,8 @@ impl<Region: 'static, Worker> Closure<Region, Worker> {
     {
         assert!(fits::<F>(), "a closure that does not fit is boxed");
         let mut storage = Storage::uninit();
-        // SAFETY: The pointer must be valid for writes of an `F` and aligned. The assertion checks size and alignment, and the
-        // storage is a local that holds nothing yet.
+        // SAFETY: The pointer must be valid for writes of an `F` and aligned. The assertion checks size and alignment,
+        // and the storage is a local that holds nothing yet.
         unsafe { storage.as_mut_ptr().cast::<F>().write(closure) };
         Self { storage, call: call::<F, Region, Worker>, discard: discard::<F> }
     }
@@ -58,8 +58,8 @@ impl<Region: 'static, Worker> Closure<Region, Worker> {
 
 impl<Region: 'static, Worker> Drop for Closure<Region, Worker> {
     fn drop(&mut self) {
-        // SAFETY: `discard` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made `discard`
-        // for the type that it stored. Only `call` takes the closure out, and it keeps this from running.
+        // SAFETY: `discard` needs a closure of its type in the storage, and nobody may use it afterwards. `store` made
+        // `discard` for the type that it stored. Only `call` takes the closure out, and it keeps this from running.
         unsafe { (self.discard)(&raw mut self.storage) }
     }
 }

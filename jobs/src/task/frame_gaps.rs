@@ -1,12 +1,13 @@
 //! How long workers look for jobs between frames.
 //!
-//! A worker that looks for jobs costs processor time. One that sleeps must be woken, which costs the time of its waker beside its
-//! own, and delays the next frame: [`max_spin_between_frames`] is the price of that in processor time. So a worker looks for
-//! that long at most, and only while this costs less than a wake-up in gaps like the recent ones. This is the rent-or-buy problem
-//! with the gaps before as a forecast (Karlin, Manasse, McGeoch and Owicki, "Competitive randomized algorithms for nonuniform
-//! problems", 1994).
+//! A worker that looks for jobs costs processor time. One that sleeps must be woken, which costs the time of its waker
+//! beside its own, and delays the next frame: [`max_spin_between_frames`] is the price of that in processor time. So a
+//! worker looks for that long at most, and only while this costs less than a wake-up in gaps like the recent ones. This
+//! is the rent-or-buy problem with the gaps before as a forecast (Karlin, Manasse, McGeoch and Owicki, "Competitive
+//! randomized algorithms for nonuniform problems", 1994).
 //!
-//! So an engine that draws frame after frame finds its workers awake, and one that draws 60 frames a second lets them sleep.
+//! So an engine that draws frame after frame finds its workers awake, and one that draws 60 frames a second lets them
+//! sleep.
 
 use std::time::Duration;
 
@@ -16,12 +17,12 @@ use crate::tuning::{Estimate, Filter};
 /// The longest time that workers look for jobs between frames, whatever wake-ups cost.
 pub(crate) const MAX_SPIN_BETWEEN_FRAMES: Duration = Duration::from_micros(500);
 
-/// An engine may call the scheduler several times a frame, so that short gaps and long ones alternate. A long gap is no outlier, and
-/// its cost is limited as it is.
+/// An engine may call the scheduler several times a frame, so that short gaps and long ones alternate. A long gap is no
+/// outlier, and its cost is limited anyway.
 const GAPS: Filter = Filter::unlimited(8.0);
 
-/// The gaps between recent frames, and what follows from them. A frame is whatever a thread from outside waits for while others work: a
-/// parallel run, a loop or a scope.
+/// The gaps between recent frames, and what follows from them. A frame is whatever a thread from outside waits for
+/// while others work: a parallel run, a loop or a scope.
 pub(super) struct FrameGaps {
     history: Mutex<History>,
     /// How long workers look for jobs after a frame, in nanoseconds.
@@ -50,7 +51,7 @@ impl FrameGaps {
         Duration::from_nanos(self.spin.load(Ordering::Relaxed) as u64)
     }
 
-    /// A frame begins, on so many workers with this wake-up cost.
+    /// A frame begins, on `workers` workers with this wake-up cost.
     pub(super) fn begin_frame(&self, now: Instant, workers: usize, wake_up_cost: Duration) {
         let (mut history, max_spin) = (self.history.lock(), max_spin_between_frames(workers, wake_up_cost));
         // While the wake-up cost is measured, it is 0.
@@ -76,10 +77,12 @@ impl GapCost {
     }
 }
 
-/// The longest gap in which workers should look for jobs: 2 × `workers` × `wake_up_cost`, up to [`MAX_SPIN_BETWEEN_FRAMES`].
+/// The longest gap in which workers should look for jobs: 2 × `workers` × `wake_up_cost`, up to
+/// [`MAX_SPIN_BETWEEN_FRAMES`].
 ///
-/// Workers are woken one after the other (`sleep.rs`), so the average one begins ½ × `workers` wake-ups late. That counts twice,
-/// because a wake-up occupies the processors of the waker and of the worker; and twice again, because the frame is late as well.
+/// Workers are woken one after the other (`sleep.rs`), so the average one begins ½ × `workers` wake-ups late. That
+/// counts twice, because a wake-up occupies the processors of the waker and of the worker; and twice again, because the
+/// frame is late as well.
 pub(crate) fn max_spin_between_frames(workers: usize, wake_up_cost: Duration) -> Duration {
     let wake_ups = u32::try_from(2 * workers).unwrap_or(u32::MAX);
     wake_up_cost.saturating_mul(wake_ups).min(MAX_SPIN_BETWEEN_FRAMES)

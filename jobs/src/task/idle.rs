@@ -1,8 +1,8 @@
 //! What a worker without jobs does: it looks for jobs for a while, and then sleeps.
 //!
-//! Looking costs processor time, sleeping costs a wake-up. Within a frame more jobs are likely, so a worker looks for as long as a
-//! wake-up takes, which at worst doubles the cost of waiting. After a frame it looks for as long as `frame_gaps.rs` says. Then it
-//! sleeps.
+//! Looking costs processor time, sleeping costs a wake-up. Within a frame more jobs are likely, so a worker looks for
+//! as long as a wake-up takes, which at worst doubles the cost of waiting. After a frame it looks for as long as
+//! `frame_gaps.rs` says. Then it sleeps.
 
 use std::time::Duration;
 
@@ -19,12 +19,12 @@ pub(crate) const MAX_SPIN: Duration = Duration::from_micros(100);
 /// The most pause instructions between two looks.
 const MAX_PAUSES: u32 = 8;
 
-/// How often a worker looks before it reads the clock and counts as a searcher. Most gaps between the nodes of a frame are over by
-/// then.
+/// How often a worker looks before it reads the clock and counts as a searcher. Most gaps between the nodes of a frame
+/// are over by then.
 const UNCOUNTED_LOOKS: u32 = 16;
 
-/// Under a model checker workers sleep at once, because each look would be one more branch. Under Miri too, because a look takes
-/// as long as a job.
+/// Under a model checker workers sleep at once, because each look would be one more branch. Under Miri too, because a
+/// look takes as long as a job.
 const SLEEP_AT_ONCE: bool = cfg!(any(drawloom_model_check, miri));
 
 /// A worker's time without jobs.
@@ -62,7 +62,8 @@ impl Idle {
         }
     }
 
-    /// Ends the idle time, if there was any: the worker has found a job, or exits. `sees_more_work` looks for further jobs.
+    /// Ends the idle time, if there was any: the worker has found a job, or exits. `sees_more_work` looks for further
+    /// jobs.
     #[inline]
     pub(super) fn end<W: JobContext>(
         &mut self,

@@ -12,7 +12,8 @@ pub(super) enum Work<W: JobContext> {
     Token(u64),
 }
 
-/// Work for some worker, and the region that waits for it. The region counts the job from before its creation until it has run.
+/// Work for some worker, and the region that waits for it. The region counts the job from before its creation until it
+/// has run.
 pub(super) struct Job<W: JobContext> {
     pub(super) work: Work<W>,
     pub(super) region: &'static Region<W>,

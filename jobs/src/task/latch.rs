@@ -2,17 +2,17 @@
 //!
 //! # Memory ordering
 //!
-//! - `add` is relaxed. Its caller is counted itself, so the count is at least one before and after, and nobody can take the
-//!   addition for a release of the latch. A deque or a lock orders the added job before the worker that runs it.
+//! - `add` is relaxed. Its caller is counted itself, so the count is at least one before and after, and nobody can take
+//!   the addition for a release of the latch. A deque or a lock orders the added job before the worker that runs it.
 //! - `finish` is a release: what the jobs did happens before their decrement. Every change of the count is a
-//!   read-modify-write, so all decrements are in one release sequence, and the load that reads zero synchronises with each of
-//!   them, not only with the last.
-//! - `is_released` is the acquire that pairs with them. When it has returned true, the waiter sees the effects of all jobs,
-//!   including the drops of their captures. `finish` acquires nothing: a worker for which it returned true must not read what
-//!   the jobs wrote.
+//!   read-modify-write, so all decrements are in one release sequence, and the load that reads zero synchronises with
+//!   each of them, not only with the last.
+//! - `is_released` is the acquire that pairs with them. When it has returned true, the waiter sees the effects of all
+//!   jobs, including the drops of their captures. `finish` acquires nothing: a worker for which it returned true must
+//!   not read what the jobs wrote.
 //!
-//! The latch wakes nobody. The worker for which `finish` returned true does, through [`Sleep`](super::sleep::Sleep). After its
-//! decrement the region, and the latch in it, may end at any moment, so that worker touches neither.
+//! The latch wakes nobody. The worker for which `finish` returned true does, through [`Sleep`](super::sleep::Sleep).
+//! After its decrement the region, and the latch in it, may end at any moment, so that worker touches neither.
 
 use crate::sync::{AtomicUsize, Ordering};
 
@@ -28,7 +28,8 @@ impl Latch {
         Self { outstanding: AtomicUsize::new(outstanding) }
     }
 
-    /// Adds `jobs` to the number that the latch waits for. The caller must be counted itself, and must not have finished.
+    /// Adds `jobs` to the number that the latch waits for. The caller must be counted itself, and must not have
+    /// finished.
     #[inline]
     pub(super) fn add(&self, jobs: usize) {
         self.outstanding.fetch_add(jobs, Ordering::Relaxed);
@@ -81,14 +82,16 @@ mod loom_tests {
                 state.0.add(1);
                 let state = Arc::clone(&state);
                 thread::spawn(move || {
-                    // SAFETY: The access must be exclusive. Only this job uses the cell until it has finished, which loom checks.
+                    // SAFETY: The access must be exclusive. Only this job uses the cell until it has finished, which
+                    // loom checks.
                     state.1.0[job].with_mut(|cell| unsafe { *cell = 1 });
                     state.0.finish(1)
                 })
             });
             let last_here = state.0.finish(1);
             if state.0.is_released() {
-                // SAFETY: Nobody may write at the same time. All jobs have finished, and loom checks that this thread sees it.
+                // SAFETY: Nobody may write at the same time. All jobs have finished, and loom checks that this thread
+                // sees it.
                 let sum: usize = state.1.0.iter().map(|cell| cell.with(|cell| unsafe { *cell })).sum();
                 assert_eq!(sum, 2);
             }
@@ -109,8 +112,8 @@ mod loom_tests {
                 first.0.add(1);
                 let second = Arc::clone(&first);
                 let child = thread::spawn(move || {
-                    // SAFETY: The access must be exclusive. Nobody else writes, and the reader waits for the latch, which loom
-                    // checks.
+                    // SAFETY: The access must be exclusive. Nobody else writes, and the reader waits for the latch,
+                    // which loom checks.
                     second.1.with_mut(|cell| unsafe { *cell = 1 });
                     second.0.finish(1);
                 });
@@ -119,7 +122,8 @@ mod loom_tests {
             });
             state.0.finish(1);
             if state.0.is_released() {
-                // SAFETY: Nobody may write at the same time. Both jobs have finished, and loom checks that this thread sees it.
+                // SAFETY: Nobody may write at the same time. Both jobs have finished, and loom checks that this thread
+                // sees it.
                 assert_eq!(state.1.with(|cell| unsafe { *cell }), 1);
             }
             job.join().unwrap();

@@ -1,7 +1,7 @@
 //! A queue behind a lock, and a count with which workers skip the lock if the queue is empty.
 //!
-//! The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to
-//! sleep finds an item that was pushed here. The lock orders the items themselves.
+//! The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which
+//! goes to sleep finds an item that was pushed here. The lock orders the items themselves.
 
 use std::collections::VecDeque;
 

@@ -1,13 +1,14 @@
-//! The jobs that other workers hand to the owner of their region: pinned ones, which only the owner may run, and those that the
-//! worker which spawned them must not keep.
+//! The jobs that other workers hand to the owner of their region: pinned ones, which only the owner may run, and those
+//! that the worker which spawned them must not keep.
 //!
-//! An owner that waits inside a job does not steal, so it cannot reach jobs in another worker's queues. Therefore only the owner
-//! keeps jobs of such a region in its queues. Other workers put them into the owner's mailbox, where the owner finds them, and so
-//! does every worker that looks for work. So no job has to wait until the worker that spawned it looks into its queues again.
+//! An owner that waits inside a job does not steal, so it cannot reach jobs in another worker's queues. Therefore only
+//! the owner keeps jobs of that region in its queues. Other workers put them into the owner's mailbox, where the owner
+//! finds them, and so does every worker that looks for work. So no job has to wait until the worker that spawned it
+//! looks into its queues again.
 //!
-//! The regions of a worker lie on its stack, so an open region is identified by its level there. Each level has a queue, which
-//! the regions of that level use one after another. A region finds it empty, because the region before ended when all of its jobs
-//! had run.
+//! The regions of a worker lie on its stack, so an open region is identified by its level there. Each level has a
+//! queue, which the regions of that level use one after another. A region finds it empty, because the region before
+//! ended when all of its jobs had run.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -50,8 +51,8 @@ impl<W: JobContext> Mailbox<W> {
         self.shared(job.region.is_background()).put(job);
     }
 
-    /// Takes the newest shared job of the region. Only its owner may call this. The newest comes first, as in a worker's queues,
-    /// so that a tree of jobs is run depth first.
+    /// Takes the newest shared job of the region. Only its owner may call this. The newest comes first, as in a
+    /// worker's queues, so that a tree of jobs is run depth first.
     pub(super) fn take_shared(&self, region: &Region<W>) -> Option<Job<W>> {
         self.shared(region.is_background()).take_from(region.level(), VecDeque::pop_back)
     }
@@ -85,11 +86,11 @@ impl<W: JobContext> fmt::Debug for Mailbox<W> {
     }
 }
 
-/// A queue for each level of nesting behind one lock, and a count with which workers skip the lock if all queues are empty. Its
-/// memory grows and is kept.
+/// A queue for each level of nesting behind one lock, and a count with which workers skip the lock if all queues are
+/// empty. Its memory grows and is kept.
 ///
-/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which goes to sleep
-/// finds a job that was put here. The lock orders the jobs themselves.
+/// The count is a hint, so it is relaxed. The fences of [`Sleep`](super::sleep::Sleep) make sure that a worker which
+/// goes to sleep finds a job that was put here. The lock orders the jobs themselves.
 struct LevelQueues<W: JobContext> {
     count: AtomicUsize,
     levels: Mutex<Vec<VecDeque<Job<W>>>>,

@@ -1,7 +1,7 @@
 //! The job system: a call runs on all cores and returns like any other call.
 //!
-//! The graph runs its nodes on it. An engine can run its own loops on the same workers, before and between frames, so it needs no
-//! second pool that competes for the same cores.
+//! The graph runs its nodes on it. An engine can run its own loops on the same workers, before and between frames, so
+//! it needs no second pool that competes for the same cores.
 //!
 //! ```text
 //!   the calling thread = worker 0                worker 1            worker 2
@@ -15,9 +15,9 @@
 //! ```
 //!
 //! A [`Scheduler`] owns the threads. Jobs in a [`Scope`] borrow from the caller, and can spawn more jobs.
-//! [`Scheduler::parallel_for`] runs a loop over a range, and [`Scheduler::parallel_for_each`] one over chunks that it may change. Every
-//! job gets the [`Worker`] that it runs on, whose index an engine can use for data that it keeps for each worker. A graph of jobs with
-//! an order between them is a [`Schedule`](crate::graph::Schedule).
+//! [`Scheduler::parallel_for`] runs a loop over a range, and [`Scheduler::parallel_for_each`] one over chunks that it
+//! may change. Every job gets the [`Worker`] that it runs on, whose index an engine can use for data that it keeps for
+//! each worker. A graph of jobs with an order between them is a [`Schedule`](crate::graph::Schedule).
 //!
 //! # A loop
 //!
@@ -109,14 +109,14 @@
 //!
 //! # Repeating a failure
 //!
-//! With one worker and a [seed](SchedulerBuilder::shuffle), all jobs run on one thread in an order that the seed decides, the same
-//! every time. With several workers and a seed, results that depend on the order of jobs show up.
+//! With one worker and a [seed](SchedulerBuilder::shuffle), all jobs run on one thread in an order that the seed
+//! decides, the same every time. With several workers and a seed, results that depend on the order of jobs show up.
 //!
 //! # Panics
 //!
-//! The panic of a job, of a loop's body or of a scope's body is caught. All workers go on, and the call returns the panic as a
-//! [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be caught: the program ends at
-//! once, without an error.
+//! The panic of a job, of a loop's body or of a scope's body is caught. All workers go on, and the call returns the
+//! panic as a [`JobPanic`] when all other jobs have run. In a program built with `panic = "abort"` nothing can be
+//! caught: the program ends at once, without an error.
 //!
 //! Other code of the engine may panic too. The hooks that name, place or start threads fail the
 //! [build](SchedulerBuilder::build). The panic of the hook that stops a thread is reported to [`tracing`]. A
@@ -126,23 +126,24 @@
 //!
 //! # What a thread does while it waits
 //!
-//! A thread that calls the scheduler from outside runs all jobs of the frame until its call returns. A job that waits for a scope,
-//! a loop or a graph of its own runs only jobs of that, on top of its stack. So no foreign job delays it, and no job on top of
-//! it finds a value borrowed that the waiting job did not borrow itself. If scopes nest without bound, the stack grows without
-//! bound, as with any recursion: [`SchedulerBuilder::stack_size`] says how deep they may.
+//! A thread that calls the scheduler from outside runs all jobs of the frame until its call returns. A job that waits
+//! for a scope, a loop or a graph of its own runs only jobs of that, on top of its stack. So no foreign job delays it,
+//! and no job on top of it finds a value borrowed that the waiting job did not borrow itself. If scopes nest without
+//! bound, the stack grows without bound, as with any recursion: [`SchedulerBuilder::stack_size`] says how deep they
+//! may.
 //!
-//! No thread keeps a job that another thread waits for: a thread that waits for a scope, a loop or a graph finds all of its jobs
-//! that have not begun. So a program waits for ever only if a *running* job waits for itself, by way of other running jobs. These
-//! programs do:
+//! No thread keeps a job that another thread waits for: a thread that waits for a scope, a loop or a graph finds all of
+//! its jobs that have not begun. So a program waits for ever only if a *running* job waits for itself, by way of other
+//! running jobs. These programs do:
 //!
 //! - A job waits for a background job that waits for something that the first job is part of.
 //! - A job holds a lock while it waits for a scope or a background job that needs the lock.
 //! - A job waits for a thread that calls the same scheduler from outside, or two threads call two schedulers crosswise
 //!   (see [`Scheduler`]).
-//! - Jobs that are ready wait for each other to run at the same time: one thread may have both, and background jobs beyond the
-//!   [limit](Scheduler::set_background_workers) wait until others have run.
-//! - A job calls [`Scheduler::run_background`], which runs the oldest background job on top of it, and that waits for something
-//!   that the first job is part of.
+//! - Jobs that are ready wait for each other to run at the same time: one thread may have both, and background jobs
+//!   beyond the [limit](Scheduler::set_background_workers) wait until others have run.
+//! - A job calls [`Scheduler::run_background`], which runs the oldest background job on top of it, and that waits for
+//!   something that the first job is part of.
 //!
 //! # Which calls may block
 //!
@@ -163,23 +164,26 @@
 //!
 //! A job costs the same however many there are, with these exceptions:
 //!
-//! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all jobs of a queue, so time grows with their square.
-//! - A worker that finds nothing in its own queues looks into those of all others, so the cost of being idle grows with the number
-//!   of workers.
-//! - Where scopes nest deeply, a worker that takes a job from another worker's mailbox searches the levels of that worker.
-//! - A [graph](crate::graph::FrameGraph::compile) has an edge or two for each access of a resource. But readers that are ordered
-//!   before some of a resource's makers have an edge from each maker before them. And for each resource with makers and readers,
-//!   and each modifier of one with several, compiling walks back the orders that lead there.
-//! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out edges that follow from others, in time that grows with the
-//!   product of nodes and edges.
+//! - With a [seed](SchedulerBuilder::shuffle), a job is drawn from all jobs of a queue, so time grows with their
+//!   square.
+//! - A worker that finds nothing in its own queues looks into those of all others, so the cost of being idle grows with
+//!   the number of workers.
+//! - Where scopes nest deeply, a worker that takes a job from another worker's mailbox searches the levels of that
+//!   worker.
+//! - A [graph](crate::graph::FrameGraph::compile) has an edge or two for each access of a resource. But readers that
+//!   are ordered before some of a resource's makers have an edge from each maker before them. And for each resource
+//!   with makers and readers, and each modifier of one with several, compiling walks back the orders that lead there.
+//! - [`Schedule::to_dot`](crate::graph::Schedule::to_dot) leaves out edges that follow from others, in time that grows
+//!   with the product of nodes and edges.
 //!
 //! # What it costs
 //!
-//! A job that captures up to four words is spawned without an allocation; others need one each. A loop allocates nothing. Within a
-//! frame, workers look for work for as long as a wake-up takes. After it they look for up to two wake-ups for each worker of the
-//! scheduler, and half a millisecond at most, if recent frames followed each other that soon, and not at all otherwise. Then they
-//! sleep and use no processor time. [The cost of a wake-up](Scheduler::wake_up_cost) is measured when the scheduler is built. A
-//! loop should be worth more than that, and a graph that is not runs on the calling thread alone.
+//! A job that captures up to four words is spawned without an allocation; others need one each. A loop allocates
+//! nothing. Within a frame, workers look for work for as long as a wake-up takes. After it they look for up to two
+//! wake-ups for each worker of the scheduler, and half a millisecond at most, if recent frames followed each other that
+//! soon, and not at all otherwise. Then they sleep and use no processor time. [The cost of a
+//! wake-up](Scheduler::wake_up_cost) is measured when the scheduler is built. A loop should be worth more than that,
+//! and a graph that is not runs on the calling thread alone.
 
 // Each group uses only the groups above it, and no two files import each other in a circle.
 

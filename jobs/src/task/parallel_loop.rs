@@ -1,14 +1,14 @@
 //! A loop that several workers run together.
 //!
-//! A loop of a thousand chunks is not a thousand jobs. It is a counter of claimed chunks and one token in some queue. A worker that
-//! takes the token joins the loop: it claims chunks until there are none, and queues the token again for the next worker as long
-//! as not all workers have joined. So workers join one after another, as long as there is work.
+//! A loop of a thousand chunks is not a thousand jobs. It is a counter of claimed chunks and one token in some queue. A
+//! worker that takes the token joins the loop: it claims chunks until there are none, and queues the token again for
+//! the next worker as long as not all workers have joined. So workers join one after another, as long as there is work.
 //!
-//! If a worker would have to be woken, the caller begins a loop of many chunks serially. A few chunks show whether the loop is
-//! worth a wake-up.
+//! If a worker would have to be woken, the caller begins a loop of many chunks serially. A few chunks show whether the
+//! loop is worth a wake-up.
 //!
-//! A worker that waits inside a chunk, for a scope or a loop nested in it, runs only jobs of that. So no second chunk begins on top
-//! of the first, and the body of the loop is never entered again on a worker that is inside it.
+//! A worker that waits inside a chunk, for a scope or a loop nested in it, runs only jobs of that. So no second chunk
+//! begins on top of the first, and the body of the loop is never entered again on a worker that is inside it.
 
 use std::ops::Range;
 
@@ -22,8 +22,8 @@ use super::worker::Worker;
 use crate::sync::Instant;
 use crate::unwind::{JobPanic, catch};
 
-/// A loop with this many chunks for each worker may begin serially: running one chunk before the other workers join makes the loop
-/// longer by no more than this fraction.
+/// A loop with this many chunks for each worker may begin serially: running one chunk before the other workers join
+/// makes the loop longer by no more than this fraction.
 const SERIAL_START_CHUNKS: usize = 16;
 
 /// A loop that is being run.

@@ -1,7 +1,7 @@
 //! How urgent a job is.
 
-/// The priority of a job. There is a queue for each; a worker takes urgent jobs first, from its own queues and from those of
-/// others.
+/// The priority of a job. There is a queue for each; a worker takes urgent jobs first, from its own queues and from
+/// those of others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Priority {
     /// On the critical path of the frame.

@@ -1,13 +1,14 @@
 //! The job queues of a worker: the owner's end, and the end that other workers steal from.
 //!
-//! A queue is crossbeam's deque as long as it holds few jobs. That deque allocates when it grows and again when it shrinks, so it
-//! is never filled so far that it grows. Further jobs go to an *overflow* behind a lock, which keeps its memory. The overflow
-//! holds the newest jobs, so the owner takes from it first and thieves take from it last.
+//! A queue is crossbeam's deque as long as it holds few jobs. That deque allocates when it grows and again when it
+//! shrinks, so it is never filled so far that it grows. Further jobs go to an *overflow* behind a lock, which keeps its
+//! memory. The overflow holds the newest jobs, so the owner takes from it first and thieves take from it last.
 //!
 //! # Memory ordering
 //!
-//! The count of the overflow is a hint, so it is relaxed. For the owner it is exact unless thieves took something. A thief that
-//! misses a job finds it when it looks once more before it sleeps, after a fence. The deque and the lock order the jobs.
+//! The count of the overflow is a hint, so it is relaxed. For the owner it is exact unless thieves took something. A
+//! thief that misses a job finds it when it looks once more before it sleeps, after a fence. The deque and the lock
+//! order the jobs.
 
 use std::array;
 use std::cell::Cell;
@@ -259,8 +260,9 @@ impl<W: JobContext> Overflow<W> {
         self.jobs.update(VecDeque::pop_back)
     }
 
-    /// Takes the oldest jobs together, so that others need the lock less often. Returns the first, and passes the rest to `keep`.
-    /// The rest belong to an outermost region: a thief must not keep jobs of other regions (see `Worker::push`).
+    /// Takes the oldest jobs together, so that others need the lock less often. Returns the first, and passes the rest
+    /// to `keep`. The rest belong to an outermost region: a thief must not keep jobs of other regions (see
+    /// `Worker::push`).
     fn take_oldest(&self, keep: impl FnMut(Job<W>)) -> Option<Job<W>> {
         let (first, rest) = self.jobs.update(|jobs| {
             let count = (jobs.len() / 2).min(MAX_EXTRA_STOLEN);
@@ -313,8 +315,8 @@ mod loom_tests {
         })
     }
 
-    /// The owner pushes `jobs` jobs, pops one after `early` of them, and the rest at the end, while a thief steals. Returns the
-    /// job that the owner popped early, those that it popped at the end, and those that the thief took.
+    /// The owner pushes `jobs` jobs, pops one after `early` of them, and the rest at the end, while a thief steals.
+    /// Returns the job that the owner popped early, those that it popped at the end, and those that the thief took.
     fn push_and_steal(region: &'static Region, jobs: u64, early: u64) -> (Option<u64>, Vec<u64>, Vec<u64>) {
         let queues = Queues::new(None);
         let stealers = queues.stealers();

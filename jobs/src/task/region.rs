@@ -3,8 +3,8 @@
 //! A region lies on the stack of the thread that opened it, its *owner*, and its jobs refer to it there, so opening one
 //! allocates nothing. The owner waits until the latch is released, which is when every counted job has run.
 //!
-//! There are two kinds of jobs. A [`Scope`](super::Scope) takes any closures. A loop or a graph repeats one kind of work, and
-//! describes each piece by a number, a *token*, which needs no memory of its own.
+//! There are two kinds of jobs. A [`Scope`](super::Scope) takes any closures. A loop or a graph repeats one kind of
+//! work, and describes each piece by a number, a *token*, which needs no memory of its own.
 
 use std::ptr;
 
@@ -14,8 +14,8 @@ use super::latch::Latch;
 use crate::sync::{Arc, Mutex};
 use crate::unwind::JobPanic;
 
-/// The worker that runs a job, as far as jobs, regions and queues know it: they only pass it on. So they depend on nothing above
-/// them.
+/// The worker that runs a job, as far as jobs, regions and queues know it: they only pass it on. So they depend on
+/// nothing above them.
 pub(super) trait JobContext: Sized + 'static {
     /// What all workers of a scheduler share.
     type Shared: Send + Sync;
@@ -42,16 +42,16 @@ pub(super) struct Region<W: JobContext> {
 /// What a region is part of.
 #[derive(Clone, Copy)]
 pub(super) struct RegionKind {
-    /// Whether a thread that called the scheduler from outside opened it, for a frame. While its owner waits, it runs any job of
-    /// the frame.
+    /// Whether a thread that called the scheduler from outside opened it, for a frame. While its owner waits, it runs
+    /// any job of the frame.
     pub(super) is_outermost: bool,
     /// Whether it is part of a background job, so that its jobs are background jobs too.
     pub(super) is_background: bool,
 }
 
 impl<W: JobContext> Region<W> {
-    /// A region with a count of one, that of its body. `owner` is the worker that opens it, and `level` the number of regions that
-    /// the worker has open already.
+    /// A region with a count of one, that of its body. `owner` is the worker that opens it, and `level` the number of
+    /// regions that the worker has open already.
     #[inline]
     pub(super) fn new(
         owner: usize,

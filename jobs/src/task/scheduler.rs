@@ -108,11 +108,11 @@ impl Scheduler {
         self.with_worker(|worker| parallel_loop.run(worker))
     }
 
-    /// Calls `body` with each item of an iterator once, on as many workers as there is work for: with chunks of a slice that it may
-    /// change, or with those of several slices at once. Returns when all calls have returned.
+    /// Calls `body` with each item of an iterator once, on as many workers as there is work for: with chunks of a slice
+    /// that it may change, or with those of several slices at once. Returns when all calls have returned.
     ///
-    /// Workers take the items one after the other, in the iterator's order, and one at a time takes: give an item some microseconds of
-    /// work. Apart from that it is as [`parallel_for`](Self::parallel_for) with a chunk of 1.
+    /// Workers take the items one after the other, in the iterator's order, and one at a time takes: give an item some
+    /// microseconds of work. Apart from that it is as [`parallel_for`](Self::parallel_for) with a chunk of 1.
     ///
     /// ```
     /// # use drawloom_jobs::task::Scheduler;
@@ -127,7 +127,8 @@ impl Scheduler {
     /// ```
     ///
     /// # Errors
-    /// Returns the first [`JobPanic`] if `body` or the iterator panicked. Items that had not been taken by then are skipped.
+    /// Returns the first [`JobPanic`] if `body` or the iterator panicked. Items that had not been taken by then are
+    /// skipped.
     pub fn parallel_for_each<I: ExactSizeIterator + Send>(
         &self,
         items: I,
@@ -166,8 +167,8 @@ impl Scheduler {
     /// [`BackgroundJob::wait`], which this does not limit. A scheduler of two workers has one thread beside its caller,
     /// which a background job occupies as long as it runs.
     ///
-    /// What Drawloom does in the background is among them: streaming, asynchronous post-processing, and pipelines that are
-    /// prepared. So a load of ten seconds, on a scheduler with one such worker, holds them up for as long.
+    /// What Drawloom does in the background is among them: streaming, asynchronous post-processing, and pipelines that
+    /// are prepared. So a load of ten seconds, on a scheduler with one such worker, holds them up for as long.
     ///
     /// An engine that shows a loading screen raises it to [`workers`](Self::workers), and lowers it again when frames
     /// count. Jobs that have begun then go on.

@@ -14,8 +14,8 @@ use crate::unwind::JobPanic;
 
 /// Spawns jobs that may borrow anything that outlives the call of [`Scheduler::scope`](super::Scheduler::scope).
 ///
-/// Every job gets the scope, to spawn more jobs, and the [`Worker`] that it runs on. Jobs cannot borrow what the body of the scope
-/// owns, because they may outlive the body:
+/// Every job gets the scope, to spawn more jobs, and the [`Worker`] that it runs on. Jobs cannot borrow what the body
+/// of the scope owns, because they may outlive the body:
 ///
 /// ```compile_fail,E0597
 /// # let scheduler = drawloom_jobs::task::Scheduler::new(2)?;
@@ -27,8 +27,8 @@ use crate::unwind::JobPanic;
 /// ```
 pub struct Scope<'scope> {
     region: &'static Region<Worker>,
-    /// Makes the lifetime invariant. If a scope could pass for one with a shorter lifetime, it would accept jobs that borrow what
-    /// does not live long enough.
+    /// Makes the lifetime invariant. If a scope could pass for one with a shorter lifetime, it would accept jobs that
+    /// borrow what does not live long enough.
     lifetime: PhantomData<&'scope mut &'scope ()>,
 }
 
@@ -40,10 +40,11 @@ impl<'scope> Scope<'scope> {
 
     /// Spawns a job that any worker may run, in no particular order.
     ///
-    /// The job goes to the queues of the calling worker if that worker waits for the scope, or if the scope was opened outside of
-    /// all jobs. A worker runs the newest job of its queues first, while others steal the oldest. Otherwise the job goes to the
-    /// thread that opened the scope, where workers that look for jobs find it too. On a thread that is not a worker of the
-    /// scheduler, to which the body or a job has lent the scope, the job goes to the thread that opened the scope.
+    /// The job goes to the queues of the calling worker if that worker waits for the scope, or if the scope was opened
+    /// outside of all jobs. A worker runs the newest job of its queues first, while others steal the oldest. Otherwise
+    /// the job goes to the thread that opened the scope, where workers that look for jobs find it too. On a thread that
+    /// is not a worker of the scheduler, to which the body or a job has lent the scope, the job goes to the thread that
+    /// opened the scope.
     pub fn spawn(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
         let work = Self::work(job);
         current_worker::with_current(self.region.shared(), |current| match current {
@@ -52,7 +53,8 @@ impl<'scope> Scope<'scope> {
         });
     }
 
-    /// Spawns a job that only the thread that opened the scope runs. That thread runs pinned jobs in the order of the calls.
+    /// Spawns a job that only the thread that opened the scope runs. That thread runs pinned jobs in the order of the
+    /// calls.
     ///
     /// It runs them when it waits for the scope, at the latest, and before any other jobs, because no other thread can.
     pub fn spawn_pinned(&self, job: impl FnOnce(&Scope<'scope>, &Worker) + Send + 'scope) {
@@ -63,8 +65,8 @@ impl<'scope> Scope<'scope> {
         });
     }
 
-    /// Hands a job to the owner of the region, from a thread that is no worker. The body or a job has lent it the scope, and that
-    /// is counted, so the latch is not released yet.
+    /// Hands a job to the owner of the region, from a thread that is no worker. The body or a job has lent it the
+    /// scope, and that is counted, so the latch is not released yet.
     fn push_from_outside(&self, work: Work<Worker>) {
         let Self { region, .. } = *self;
         region.latch().add(1);
@@ -78,12 +80,13 @@ impl<'scope> Scope<'scope> {
         let closure =
             move |region: &'static Region<Worker>, worker: &Worker| job(&Scope::<'scope>::new(region), worker);
         // SAFETY: The closure must be called or dropped before `'scope` ends.
-        // - `'scope` outlives the call of `Worker::open_region` that opened the region, because it is a parameter of the function
-        //   that makes that call.
+        // - `'scope` outlives the call of `Worker::open_region` that opened the region, because it is a parameter of
+        //   the function that makes that call.
         // - `Worker::open_region` returns only when the latch is released, and a guard in it aborts if it unwinds.
         // - The job is counted when it is queued, and counted off after its closure has been called and dropped.
-        // - The latch is not released before the job is queued, because the spawning code is counted too: the body until it
-        //   returns, a job until it has run. Neither can keep the scope longer, as each borrows it for a lifetime of its own.
+        // - The latch is not released before the job is queued, because the spawning code is counted too: the body
+        //   until it returns, a job until it has run. Neither can keep the scope longer, as each borrows it for a
+        //   lifetime of its own.
         // - A lost job would make `Worker::open_region` wait for ever, not return.
         Work::Closure(unsafe { Closure::new(closure) })
     }

@@ -21,7 +21,8 @@ use crate::timeline::Timeline;
 pub(super) struct Shared<W: JobContext> {
     stealers: Box<[Stealers<W>]>,
     mailboxes: Box<[CachePadded<Mailbox<W>>]>,
-    /// Not the model checker's `Arc`, which has no weak references: a thread that waits for a job may outlive the scheduler.
+    /// Not the model checker's `Arc`, which has no weak references: a thread that waits for a job may outlive the
+    /// scheduler.
     background: std::sync::Arc<BackgroundQueue>,
     background_slots: BackgroundSlots,
     sleep: Sleep,
@@ -135,8 +136,8 @@ impl<W: JobContext> Shared<W> {
         self.is_shuffled
     }
 
-    // The atomics below are hints and a flag that hand no data over, so relaxed is enough. The lock that `Sleep::wake_all` takes
-    // makes sure that sleepers see the flag.
+    // The atomics below are hints and a flag that hand no data over, so relaxed is enough. The lock that
+    // `Sleep::wake_all` takes makes sure that sleepers see the flag.
 
     #[inline]
     pub(super) fn wake_up_cost(&self) -> Duration {

@@ -1,7 +1,7 @@
 //! Scopes, loops and background jobs on a whole scheduler, in random interleavings of shuttle's.
 //!
-//! The tests assert that each job runs once, on a worker that may run it. Shuttle asserts that no wake-up is lost: if a call never
-//! returns, all threads sleep, which shuttle reports as a failure.
+//! The tests assert that each job runs once, on a worker that may run it. Shuttle asserts that no wake-up is lost: if a
+//! call never returns, all threads sleep, which shuttle reports as a failure.
 
 use std::iter;
 use std::panic::resume_unwind;
@@ -253,8 +253,8 @@ fn shuttle_a_scheduler_can_be_dropped_while_its_workers_are_busy() {
     });
 }
 
-/// A worker runs a job of the background job's scope, spawns another one, and goes on to a frame's job. That waits for a scope, a
-/// job of which waits for the background job. So no worker may keep a job that another one waits for.
+/// A worker runs a job of the background job's scope, spawns another one, and goes on to a frame's job. That waits for
+/// a scope, a job of which waits for the background job. So no worker may keep a job that another one waits for.
 #[test]
 fn shuttle_a_frames_nested_job_waits_for_a_background_job() {
     check(|| {

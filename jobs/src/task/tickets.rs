@@ -7,14 +7,14 @@ use crate::sync::{AtomicBool, AtomicUsize, Instant, Ordering};
 
 /// Hands out the chunks of a loop or a node to the workers that have joined it. A ticket is a claim on some chunks.
 ///
-/// A worker claims several chunks at a time, so that workers seldom contend, and fewer towards the end, so that they finish
-/// together (guided self-scheduling: Polychronopoulos & Kuck, 1987). Claimed chunks cannot be stolen, so [`TicketSize`] limits how
-/// long the chunks of one ticket take.
+/// A worker claims several chunks at a time, so that workers seldom contend, and fewer towards the end, so that they
+/// finish together (guided self-scheduling: Polychronopoulos & Kuck, 1987). Claimed chunks cannot be stolen, so
+/// [`TicketSize`] limits how long the chunks of one ticket take.
 ///
 /// # Memory ordering
 ///
-/// All accesses are relaxed. A ticket only decides who runs a chunk. The data that the chunk reads came with the job through
-/// which the worker joined; the counter of finished chunks orders the data that it writes.
+/// All accesses are relaxed. A ticket only decides who runs a chunk. The data that the chunk reads came with the job
+/// through which the worker joined; the counter of finished chunks orders the data that it writes.
 #[derive(Debug)]
 pub(crate) struct Tickets {
     /// How many chunks are claimed: the position of the next one.
@@ -54,15 +54,15 @@ impl Tickets {
         TicketSize::new(self.initial_size.load(Ordering::Relaxed))
     }
 
-    /// Counts out a worker that leaves before all chunks are claimed. Returns true if it should queue a job through which another
-    /// worker can join.
+    /// Counts out a worker that leaves before all chunks are claimed. Returns true if it should queue a job through
+    /// which another worker can join.
     pub(crate) fn leave(&self, chunks: &Chunks) -> bool {
         self.joined.fetch_sub(1, Ordering::Relaxed);
         self.claimed.load(Ordering::Relaxed) < chunks.count() && !self.has_invitation.swap(true, Ordering::Relaxed)
     }
 
-    /// Claims the next chunks for one of `workers` workers: their positions in the order, empty if none are left. `now` reads the
-    /// clock, which not every ticket does.
+    /// Claims the next chunks for one of `workers` workers: their positions in the order, empty if none are left. `now`
+    /// reads the clock, which not every ticket does.
     pub(crate) fn take(
         &self,
         chunks: &Chunks,
@@ -100,8 +100,8 @@ impl Tickets {
         claimed.min(chunks.count())..chunks.count()
     }
 
-    /// Whether one of `workers` workers, which has claimed the chunks up to `end`, should queue a job through which another
-    /// worker can join.
+    /// Whether one of `workers` workers, which has claimed the chunks up to `end`, should queue a job through which
+    /// another worker can join.
     pub(crate) fn should_invite(&self, end: usize, chunks: &Chunks, workers: usize) -> bool {
         // The loads before the swap keep the cache line shared.
         end < chunks.count()
@@ -133,8 +133,8 @@ pub(crate) struct TicketSize {
 }
 
 impl TicketSize {
-    /// How many nanoseconds the chunks of one ticket may take: long enough that the ticket itself costs nothing beside them, and
-    /// short enough that it does not matter who runs them.
+    /// How many nanoseconds the chunks of one ticket may take: long enough that the ticket itself costs nothing beside
+    /// them, and short enough that it does not matter who runs them.
     const TARGET_NANOSECONDS: usize = 8_000;
     /// The smallest ticket is the largest divided by this, even if less is left for each worker.
     const MIN_SIZE_DIVISOR: usize = 16;

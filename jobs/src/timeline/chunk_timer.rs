@@ -6,8 +6,8 @@ use super::clock::ClockReader;
 use super::track::{ChunkKind, Track};
 use crate::sync::{AtomicU64, Ordering};
 
-/// Writes an event for each chunk that a worker runs of a node. The end of a chunk is the beginning of the next, so each chunk
-/// takes one reading of the clock.
+/// Writes an event for each chunk that a worker runs of a node. The end of a chunk is the beginning of the next, so
+/// each chunk takes one reading of the clock.
 pub(crate) struct ChunkTimer<'run> {
     track: &'run Track,
     reader: ClockReader<'run>,
@@ -21,7 +21,8 @@ pub(crate) struct ChunkTimer<'run> {
 }
 
 impl<'run> ChunkTimer<'run> {
-    /// A worker begins to run chunks of a node. Without a timestamp of when the node was opened, this worker opens it now.
+    /// A worker begins to run chunks of a node. Without a timestamp of when the node was opened, this worker opens it
+    /// now.
     #[inline]
     pub(super) fn new(
         track: &'run Track,

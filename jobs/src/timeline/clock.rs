@@ -20,7 +20,8 @@ pub(super) enum Clock {
 pub(super) struct MachineClock {
     /// When the scheduler was built.
     built: Reading,
-    /// The nanoseconds in a tick of the processor's counter, times 2³²; 0 if the counter cannot be used. Measured on first use.
+    /// The nanoseconds in a tick of the processor's counter, times 2³²; 0 if the counter cannot be used. Measured on
+    /// first use.
     tick: OnceLock<u64>,
 }
 
@@ -72,7 +73,8 @@ impl Clock {
 }
 
 impl MachineClock {
-    /// The counter is compared with the system's clock over at least this time. The error is then a few parts per million.
+    /// The counter is compared with the system's clock over at least this time. The error is then a few parts per
+    /// million.
     const MIN_COMPARISON: Duration = Duration::from_millis(10);
 
     #[inline]

@@ -66,7 +66,8 @@ impl EventStore {
         }
     }
 
-    /// The number of the current frame. Events between the timeline's start and the first mark have a frame of their own.
+    /// The number of the current frame. Events between the timeline's start and the first mark have a frame of their
+    /// own.
     pub(super) fn current_frame(&mut self) -> u64 {
         *self.frame.get_or_insert_with(|| {
             let number = self.next_frame;

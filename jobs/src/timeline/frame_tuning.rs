@@ -9,10 +9,11 @@ use super::labels::Labels;
 /// What was chosen by measurement in a frame, and the costs by which it was chosen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTuning {
-    /// The choices among alternatives. Choices that the engine fixed are left out, and so are views and passes without a choice.
+    /// The choices among alternatives. Choices that the engine fixed are left out, and so are views and passes without
+    /// a choice.
     pub choices: Vec<TuningChoice>,
-    /// The job sizes of the nodes of the frame's stage graph whose items are divided by cost: which these are depends on the
-    /// granularity.
+    /// The job sizes of the nodes of the frame's stage graph whose items are divided by cost: which these are depends
+    /// on the granularity.
     pub job_sizes: Vec<JobSize>,
 }
 
@@ -73,8 +74,8 @@ impl TuningSubject {
 pub struct TuningAlternative {
     /// Its name: `serial`, `cached bundles`, `every 2 frames`.
     pub name: Cow<'static, str>,
-    /// Its estimated cost in nanoseconds per [unit](TuningSubject::unit) when the frame was recorded. `None` if it was not
-    /// measured yet, or not since the work has changed; a trial begins without an estimate too.
+    /// Its estimated cost in nanoseconds per [unit](TuningSubject::unit) when the frame was recorded. `None` if it was
+    /// not measured yet, or not since the work has changed; a trial begins without an estimate too.
     pub nanoseconds: Option<f32>,
 }
 

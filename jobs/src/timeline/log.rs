@@ -27,7 +27,8 @@ pub struct Log {
     pub tuning: Vec<(u64, FrameTuning)>,
     /// What the device did, if the engine added it.
     pub device: Option<DeviceLog>,
-    /// How many frames, runs, spans, readings and entries of [tuning](Self::tuning) were dropped because there was no room.
+    /// How many frames, runs, spans, readings and entries of [tuning](Self::tuning) were dropped because there was no
+    /// room.
     pub dropped: u64,
     /// The message with which the engine's [clock](crate::task::SchedulerBuilder::timeline_clock) panicked, if it did.
     /// All later times are its last reading.

@@ -2,8 +2,8 @@
 //!
 //! A [`Timeline`] belongs to a [`Scheduler`](crate::task::Scheduler), and can be switched on and off while the
 //! scheduler runs. Each worker writes to its own ring buffer, so no worker waits for another. [`Timeline::take`] takes
-//! out what was recorded, as a [`Log`]: plain data: frames, runs of schedules, every chunk of each run, and what was chosen
-//! by measurement.
+//! out what was recorded, as a [`Log`]: plain data: frames, runs of schedules, every chunk of each run, and what was
+//! chosen by measurement.
 //!
 //! ```
 //! use drawloom_jobs::graph::{Closure, FrameGraph};

@@ -18,14 +18,14 @@ use super::stopwatch::Stopwatch;
 use super::track::{Entry, Track};
 use crate::sync::{AtomicBool, AtomicU64, Mutex, Ordering};
 
-/// Whether the build can record at all. It cannot under loom, which has enough state to explore without recording, and in the
-/// build that the cost of a switched-off timeline is measured against.
+/// Whether the build can record at all. It cannot under loom, which has enough state to explore without recording, and
+/// in the build that the cost of a switched-off timeline is measured against.
 const CAN_RECORD: bool = !cfg!(any(drawloom_loom, drawloom_without_timeline));
 
 /// Records what the workers of a [`Scheduler`](crate::task::Scheduler) do.
 ///
-/// It is off by default. [`start`](Self::start) and [`stop`](Self::stop) may be called at any time from any thread. A run of a
-/// schedule is recorded either from beginning to end or not at all.
+/// It is off by default. [`start`](Self::start) and [`stop`](Self::stop) may be called at any time from any thread. A
+/// run of a schedule is recorded either from beginning to end or not at all.
 pub struct Timeline {
     is_on: AtomicBool,
     /// The timestamp of when it was last switched on.
@@ -71,8 +71,8 @@ impl Timeline {
         }
     }
 
-    /// Switches the timeline on. The first call allocates the memory for all workers, and waits until the scheduler is 10 ms old,
-    /// because it calibrates the processor's counter over that time.
+    /// Switches the timeline on. The first call allocates the memory for all workers, and waits until the scheduler is
+    /// 10 ms old, because it calibrates the processor's counter over that time.
     pub fn start(&self) {
         // Calibrates the counter on first use, which takes too long to be done during a run.
         let reader = self.clock.reader();
@@ -96,7 +96,8 @@ impl Timeline {
         CAN_RECORD && self.is_on.load(Ordering::Relaxed)
     }
 
-    /// The size of the workers' ring buffers in bytes: 0 before the first [`start`](Self::start), and constant after it.
+    /// The size of the workers' ring buffers in bytes: 0 before the first [`start`](Self::start), and constant after
+    /// it.
     pub fn bytes(&self) -> usize {
         self.tracks.iter().map(|track| track.bytes()).sum()
     }
@@ -109,16 +110,17 @@ impl Timeline {
 
     /// Begins a frame. What is recorded until the next frame belongs to it.
     ///
-    /// Calling this is optional. If an engine never calls it, every `Renderer::record` begins a frame;
-    /// without a renderer, every run of a schedule does that begins while no other run is in progress. After the first call,
-    /// even one while the timeline is off, only these calls begin frames, and a frame can contain any number of records and
+    /// Calling this is optional. If an engine never calls it, every `Renderer::record` begins a frame; without a
+    /// renderer, every run of a schedule does that begins while no other run is in progress. After the first call, even
+    /// one while the timeline is off, only these calls begin frames, and a frame can contain any number of records and
     /// runs.
     pub fn mark_frame(&self) {
         let now = self.is_on().then(|| self.now());
         self.store.lock().mark_frame(FrameSource::Engine, now);
     }
 
-    /// Begins a span of the calling thread, which ends when the guard is dropped. It belongs to the frame in which it ends.
+    /// Begins a span of the calling thread, which ends when the guard is dropped. It belongs to the frame in which it
+    /// ends.
     ///
     /// ```
     /// # let scheduler = drawloom_jobs::task::Scheduler::new(1)?;
@@ -169,8 +171,8 @@ impl Timeline {
 
     /// Takes out what was recorded since the last call.
     ///
-    /// This may be called at any time, and blocks no worker. It is best called between two frames: chunks of a run in progress are
-    /// lost and counted as dropped, and that run is not [complete](Run::complete).
+    /// This may be called at any time, and blocks no worker. It is best called between two frames: chunks of a run in
+    /// progress are lost and counted as dropped, and that run is not [complete](Run::complete).
     pub fn take(&self) -> Log {
         // The clock is the engine's code, so it is not called under a lock.
         let now = self.now();
@@ -249,7 +251,8 @@ impl Timeline {
         log
     }
 
-    /// Begins a frame, unless the engine marks frames, and returns the current frame's number. `None` if the timeline is off.
+    /// Begins a frame, unless the engine marks frames, and returns the current frame's number. `None` if the timeline
+    /// is off.
     #[doc(hidden)]
     pub fn begin_frame(&self) -> Option<u64> {
         self.is_on().then(|| {
@@ -283,7 +286,8 @@ impl Timeline {
 
     /// The worker becomes idle.
     ///
-    /// That it falls asleep is noted even while the timeline is off, because it may still be asleep when the timeline is on.
+    /// That it falls asleep is noted even while the timeline is off, because it may still be asleep when the timeline
+    /// is on.
     pub(crate) fn start_idle(&self, worker: usize, kind: IdleKind) {
         let now = self.timestamp_if_on();
         if now.is_some() || (CAN_RECORD && kind == IdleKind::Asleep) {

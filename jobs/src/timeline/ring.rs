@@ -1,13 +1,13 @@
 //! A single-producer, single-consumer ring buffer of events.
 //!
-//! It never waits and never grows: if it is full, an event is dropped and counted. Its memory is allocated when the timeline is
-//! first switched on.
+//! It never waits and never grows: if it is full, an event is dropped and counted. Its memory is allocated when the
+//! timeline is first switched on.
 //!
 //! # Memory ordering
 //!
-//! The writer stores an event's words relaxed, and then `written` with release. The reader acquires `written` before it reads the
-//! words. After reading, the reader stores `taken` with release, and the writer acquires `taken` before it overwrites the
-//! words. So no word is read while it is written, and the writer only needs loads and stores.
+//! The writer stores an event's words relaxed, and then `written` with release. The reader acquires `written` before it
+//! reads the words. After reading, the reader stores `taken` with release, and the writer acquires `taken` before it
+//! overwrites the words. So no word is read while it is written, and the writer only needs loads and stores.
 
 use std::sync::OnceLock;
 
@@ -54,7 +54,8 @@ impl Ring {
         self.words.get().map_or(0, |words| size_of_val(&**words))
     }
 
-    /// Writes an event, and returns whether there was room. Calls must not overlap, and each must be ordered after the last.
+    /// Writes an event, and returns whether there was room. Calls must not overlap, and each must be ordered after the
+    /// last.
     #[inline]
     pub(super) fn push(&self, event: Event) -> bool {
         // Relaxed: only the writer changes it.
@@ -72,7 +73,8 @@ impl Ring {
         true
     }
 
-    /// Takes out all events, the oldest first, and returns how many were dropped since the last call. Calls must not overlap.
+    /// Takes out all events, the oldest first, and returns how many were dropped since the last call. Calls must not
+    /// overlap.
     pub(super) fn drain(&self, mut take: impl FnMut(Event)) -> u64 {
         let dropped = self.dropped.swap(0, Ordering::Relaxed);
         let Some(words) = self.words.get() else { return dropped };
@@ -167,8 +169,8 @@ mod loom_tests {
         });
     }
 
-    /// Any thread that calls the scheduler writes to the ring of worker 0: one thread at a time, ordered by the lock of the caller
-    /// slot, while another thread reads.
+    /// Any thread that calls the scheduler writes to the ring of worker 0: one thread at a time, ordered by the lock of
+    /// the caller slot, while another thread reads.
     #[test]
     fn one_thread_continues_to_write_where_another_stopped() {
         model(|| {

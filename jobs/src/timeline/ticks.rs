@@ -1,5 +1,5 @@
-//! The processor's time-stamp counter, where it has a reliable one. Reading it takes half as long as reading the system's
-//! clock, which is the most expensive part of recording a chunk.
+//! The processor's time-stamp counter, where it has a reliable one. Reading it takes half as long as reading the
+//! system's clock, which is the most expensive part of recording a chunk.
 
 #[cfg(all(target_arch = "x86_64", not(any(drawloom_model_check, miri))))]
 mod counter {
@@ -24,13 +24,13 @@ mod counter {
     /// Reads the counter. Earlier instructions may not have completed.
     #[inline]
     pub(in crate::timeline) fn read() -> u64 {
-        // SAFETY: The processor must have the instruction, and the system must allow it: every x86-64 processor has it, and
-        // where the system forbids it, `is_reliable` is false and the counter is not read.
+        // SAFETY: The processor must have the instruction, and the system must allow it: every x86-64 processor has it,
+        // and where the system forbids it, `is_reliable` is false and the counter is not read.
         unsafe { _rdtsc() }
     }
 
-    /// Reads the counter after all earlier instructions have completed, so the value is not less than what another thread read
-    /// before this thread saw that thread's work.
+    /// Reads the counter after all earlier instructions have completed, so the value is not less than what another
+    /// thread read before this thread saw that thread's work.
     #[inline]
     pub(in crate::timeline) fn read_ordered() -> u64 {
         // SAFETY: The processor must have SSE2, which is part of x86-64.

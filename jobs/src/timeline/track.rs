@@ -15,7 +15,8 @@ pub(super) struct Track {
     idle: AtomicU64,
 }
 
-/// An event's tag is in the lowest bits of one of its words. The other bits are the timestamp of when the node was opened.
+/// An event's tag is in the lowest bits of one of its words. The other bits are the timestamp of when the node was
+/// opened.
 const TAG_BITS: u32 = 3;
 const TAG_MASK: u64 = (1 << TAG_BITS) - 1;
 const SEARCHING: u64 = 3;
@@ -54,8 +55,8 @@ impl Track {
         self.ring.bytes()
     }
 
-    /// Writes a chunk, with the timestamps of when its node was opened, when it started and when it ended. Returns whether there
-    /// was room.
+    /// Writes a chunk, with the timestamps of when its node was opened, when it started and when it ended. Returns
+    /// whether there was room.
     #[inline]
     pub(super) fn push_chunk(
         &self,
@@ -68,8 +69,8 @@ impl Track {
         self.ring.push([run_and_node, start, length, opened << TAG_BITS | kind as u64, started, ended])
     }
 
-    /// The worker becomes idle, or idle in another way. `now` is a timestamp if the timeline is on. Without one, the interval is
-    /// only recorded if it is still open when the timeline is on.
+    /// The worker becomes idle, or idle in another way. `now` is a timestamp if the timeline is on. Without one, the
+    /// interval is only recorded if it is still open when the timeline is on.
     pub(super) fn start_idle(&self, kind: IdleKind, now: Option<u64>) {
         self.end_idle(now);
         // Release: a thread that reads this interval finds the one before it in the ring.

@@ -25,20 +25,20 @@ impl Filter {
         Self { time_constant, limits_outliers: true }
     }
 
-    /// A filter that counts each sample as it is: for samples that are too rare to tell an outlier from a change, or that have a
-    /// limit of their own.
+    /// A filter that counts each sample unchanged: for samples that are too rare to tell an outlier from a change, or
+    /// that have a limit of their own.
     pub const fn unlimited(time_constant: f32) -> Self {
         Self { time_constant, limits_outliers: false }
     }
 }
 
 impl Estimate {
-    /// A sample counts as at most this multiple of the average: now and then the operating system preempts a worker, which says
-    /// nothing about the next sample.
+    /// A sample counts as at most this multiple of the average: now and then the operating system preempts a worker,
+    /// which says nothing about the next sample.
     pub const OUTLIER_LIMIT: f32 = 1.6;
 
-    /// This many outliers in a row are no outliers but a step. Another program may take a processor for a few frames in a row;
-    /// this is more.
+    /// This many outliers in a row are no outliers but a step. Another program may take a processor for a few frames in
+    /// a row; this is more.
     pub const STEP_SAMPLES: u32 = 8;
 
     /// The samples of which the average begins as the median: enough to tolerate one outlier.

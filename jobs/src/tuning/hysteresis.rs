@@ -15,7 +15,8 @@ impl Hysteresis {
         self.0
     }
 
-    /// Whether an alternative that costs `other` replaces the current choice, which costs `current`. One of equal cost never does.
+    /// Whether an alternative that costs `other` replaces the current choice, which costs `current`. One of equal cost
+    /// never does.
     pub fn replaces(self, other: f32, current: f32) -> bool {
         other < current && current >= other * self.0
     }
@@ -25,8 +26,8 @@ impl Hysteresis {
         !self.replaces(best, size) && !self.replaces(size, best)
     }
 
-    /// Whether a value counts as above a threshold: it rises above at the threshold times the factor, and falls below at the
-    /// threshold.
+    /// Whether a value counts as above a threshold: it rises above at the threshold times the factor, and falls below
+    /// at the threshold.
     pub fn is_above(self, value: f32, threshold: f32, was_above: bool) -> bool {
         value >= if was_above { threshold } else { threshold * self.0 }
     }

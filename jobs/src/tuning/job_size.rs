@@ -1,13 +1,13 @@
-//! The size of jobs that follows from the cost of an item and the number of workers. Frames are divided by it, and replays
-//! of frames on other numbers of workers.
+//! The size of jobs that follows from the cost of an item and the number of workers. Frames are divided by it, and
+//! replays of frames on other numbers of workers.
 
 use std::time::Duration;
 
 use super::Hysteresis;
 use crate::chunked_array::BLOCK_SIZE;
 
-/// Work that is worth a second job: more than it costs another worker to take the job and to fetch what the job reads into its
-/// caches.
+/// Work that is worth a second job: more than it costs another worker to take the job and to fetch what the job reads
+/// into its caches.
 pub const PARALLEL_THRESHOLD: Duration = Duration::from_micros(12);
 
 /// Jobs per worker: with several, workers do not wait long for the last one to end.
@@ -22,12 +22,12 @@ pub const MAX_JOB: Duration = Duration::from_micros(60);
 /// A job that is too long or too short by less costs next to nothing.
 const HYSTERESIS: Hysteresis = Hysteresis::new(1.6);
 
-/// The number of items that make a job, of `width` items that take `per_item` nanoseconds each; `usize::MAX` for a single job.
-/// `previous` is the latest choice; `None` if that was a single job, or if there was none.
+/// The number of items that make a job, of `width` items that take `per_item` nanoseconds each; `usize::MAX` for a
+/// single job. `previous` is the latest choice; `None` if that was a single job, or if there was none.
 ///
 /// One job is best for little work, and for a single worker. Otherwise each worker gets several jobs, none shorter than
-/// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping. For equal choices before, which this function made,
-/// more workers never get larger jobs.
+/// [`MIN_JOB`]. Hysteresis around the latest choice keeps it from flapping. For equal choices before, which this
+/// function made, more workers never get larger jobs.
 pub fn job_size(per_item: f32, width: usize, workers: usize, previous: Option<usize>) -> usize {
     let nanoseconds = |time: Duration| time.as_nanos() as f32;
     let work = per_item * width as f32;
@@ -55,7 +55,8 @@ mod tests {
 
     #[test]
     fn work_is_divided_among_workers_within_the_bounds_of_a_job() {
-        // 1 ms: on four workers sixteen jobs of 62.5 µs would be too long, and on 64 workers 256 jobs of 3.9 µs too short.
+        // 1 ms: on four workers sixteen jobs of 62.5 µs would be too long, and on 64 workers 256 jobs of 3.9 µs too
+        // short.
         let sizes = [1, 2, 4, 8, 16, 32, 64].map(|workers| job_size(1000.0, 1000, workers, None));
         assert_eq!(sizes, [usize::MAX, 60, 60, 31, 15, 7, 6]);
         // 19 µs are one job, unless they were several before; then 12 µs are.

@@ -4,10 +4,10 @@ use super::{Estimate, Filter, Hysteresis};
 
 /// Chooses one of several alternatives from frame to frame.
 ///
-/// Every frame measures the alternative in use. At first, and when the cost or the amount of work changes much, the tuner learns:
-/// it tries each other alternative for a few frames, and takes the cheapest. Later it tries one of them for a single frame now and
-/// then; the pause before its next trial doubles each time it loses. The tuner switches only to an alternative that is cheaper by a
-/// margin in several frames.
+/// Every frame measures the alternative in use. At first, and when the cost or the amount of work changes much, the
+/// tuner learns: it tries each other alternative for a few frames, and takes the cheapest. Later it tries one of them
+/// for a single frame now and then; the pause before its next trial doubles each time it loses. The tuner switches only
+/// to an alternative that is cheaper by a margin in several frames.
 #[derive(Clone, Debug)]
 pub struct Tuner {
     candidates: Vec<Candidate>,
@@ -74,8 +74,8 @@ const MAX_TRIAL_FRAMES: u64 = 16;
 const UNITS_THRESHOLD: usize = 64;
 
 impl Tuner {
-    /// A tuner that begins with the first alternative. `max_pauses` has, for each, the longest pause between two trials in frames:
-    /// longer where its trials are expensive.
+    /// A tuner that begins with the first alternative. `max_pauses` has, for each, the longest pause between two trials
+    /// in frames: longer where its trials are expensive.
     pub fn new(max_pauses: impl IntoIterator<Item = u64>) -> Self {
         let candidate = |max_pause| Candidate { cost: Estimate::default(), due: 0, pause: MIN_PAUSE, max_pause };
         Self {
@@ -92,9 +92,9 @@ impl Tuner {
         }
     }
 
-    /// Chooses a frame's alternative: its index, and whether this is a trial. The tuners of a frame share `may_try`: the first that
-    /// begins a trial outside of learning clears it. `is_distinct` says whether an alternative, by index, differs from the others
-    /// at this number of units.
+    /// Chooses a frame's alternative: its index, and whether this is a trial. The tuners of a frame share `may_try`:
+    /// the first that begins a trial outside of learning clears it. `is_distinct` says whether an alternative, by
+    /// index, differs from the others at this number of units.
     pub fn choose(
         &mut self,
         frame: u64,
@@ -157,7 +157,8 @@ impl Tuner {
         }
     }
 
-    /// The estimated cost of each alternative in nanoseconds per unit: `None` for those that were not tried since learning started.
+    /// The estimated cost of each alternative in nanoseconds per unit: `None` for those that were not tried since
+    /// learning started.
     pub fn costs(&self) -> impl Iterator<Item = Option<f32>> {
         self.candidates.iter().map(|candidate| candidate.cost.get())
     }

@@ -1,5 +1,5 @@
-//! The boundary to code of the engine's, which may panic: its jobs, nodes, hooks, destructors, clocks, and subscriber of
-//! `tracing`.
+//! The boundary to code of the engine's, which may panic: its jobs, nodes, hooks, destructors, clocks, and subscriber
+//! of `tracing`.
 //!
 //! A panic is caught where the engine's code is called, and becomes an error that names the call. Behind these catches
 //! stand others around the work of each thread, for a call that was forgotten. Where an unwind would free memory that

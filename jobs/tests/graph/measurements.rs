@@ -1,4 +1,5 @@
-//! What a schedule measures of its runs, and what follows from that: costs, critical paths, and the mode of the next run.
+//! What a schedule measures of its runs, and what follows from that: costs, critical paths, and the mode of the next
+//! run.
 
 use std::cell::Cell;
 use std::collections::HashSet;
@@ -62,7 +63,8 @@ fn costs_count_from_each_nodes_own_start_and_decide_the_critical_path() {
         assert_eq!(schedule.cost(node), None);
         assert!(!schedule.is_critical(node));
     }
-    // The last node starts later than `SLEEP / 2`. So if costs counted from the start of the run, this would never hold.
+    // The last node starts later than `SLEEP / 2`. So if costs counted from the start of the run, this would never
+    // hold.
     run_until(&mut schedule, |schedule| {
         let costs_less = |node| schedule.cost(node).is_some_and(|cost| cost < SLEEP / 2);
         [first, quick, last].into_iter().all(costs_less) && !schedule.is_critical(quick)
@@ -148,7 +150,8 @@ fn the_work_of_failed_runs_does_not_count_for_the_next_measured_one() {
     assert!((0..100).any(|_| serial_nanoseconds() < SLEEP.as_nanos() as f32));
 }
 
-/// A node of 32 chunks, which take far longer than a wake-up, the limit of a schedule's first run. It keeps the threads that run them.
+/// A node of 32 chunks, which take far longer than a wake-up, the limit of a schedule's first run. It keeps the threads
+/// that run them.
 fn long_node(threads: &Mutex<HashSet<ThreadId>>) -> Closure<'_, ()> {
     let body = |_: &(), _, _: &Worker| {
         threads.lock().expect("no thread panics").insert(thread::current().id());

@@ -235,8 +235,9 @@ fn the_context_may_be_unsized() {
 /// The number of chunks of [`a_pinned_node_does_not_wait_for_the_end_of_a_wide_one`]'s wide node.
 const WIDE: usize = 64;
 
-/// How many chunks of a wide node are complete when a pinned node runs that another worker makes ready while the calling thread runs such chunks.
-/// `None` if it was the calling thread that made it ready, as the scheduler may decide.
+/// How many chunks of a wide node are complete when a pinned node runs that another worker makes ready while the
+/// calling thread runs such chunks. `None` if it was the calling thread that made it ready, as the scheduler may
+/// decide.
 fn chunks_before_pinned() -> Option<usize> {
     let caller = thread::current().id();
     let (caller_has_run_wide, caller_has_run_before) = (AtomicBool::new(false), AtomicBool::new(false));

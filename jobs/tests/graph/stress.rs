@@ -1,7 +1,7 @@
 //! Runs random graphs on different numbers of workers, and compares the results with a serial loop over the nodes.
 //!
-//! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release -p drawloom-jobs --test graph stress` tests further seeds
-//! for that many seconds.
+//! `cargo test` runs a short form. `DRAWLOOM_STRESS_SECONDS=60 cargo test --release -p drawloom-jobs --test graph
+//! stress` tests further seeds for that many seconds.
 
 use std::ops::Range;
 use std::sync::Mutex;

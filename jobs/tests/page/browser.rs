@@ -44,13 +44,15 @@ impl Browser {
         self.load_until(name, log, "", |page| page.value("ready") == "true")
     }
 
-    /// Opens the log's page with a script added to it, which writes the body's data attribute `outcome` when it is done.
+    /// Opens the log's page with a script added to it, which writes the body's data attribute `outcome` when it is
+    /// done.
     pub fn open_with(&self, name: &str, log: &Log, script: &str) -> Result<LoadedPage, Failed> {
         self.load_until(name, log, script, |page| !page.value("outcome").is_empty())
     }
 
-    /// The browser runs on virtual time, which advances while nothing happens: its budget may be spent before the compositor has drawn
-    /// anything. So the browser is told to finish each drawing first, and a page that is not ready is loaded again, with twice the budget.
+    /// The browser runs on virtual time, which advances while nothing happens: its budget may be spent before the
+    /// compositor has drawn anything. So the browser is told to finish each drawing first, and a page that is not ready
+    /// is loaded again, with twice the budget.
     fn load_until(
         &self,
         name: &str,

@@ -87,7 +87,8 @@ pub fn many_chunks(count: usize, frames: usize) -> Log {
 }
 
 /// Three frames with a diamond of nodes each: `left` and `right` depend on the root, `right` ends later, and the end
-/// depends on both, in two chunks. A thread works before and after them. The second frame is twice as long as the others.
+/// depends on both, in two chunks. A thread works before and after them. The second frame is twice as long as the
+/// others.
 pub fn diamonds() -> Log {
     let node = |name: &str, dependencies: &[usize]| NodeInfo {
         name: name.to_owned(),

@@ -16,7 +16,8 @@ thread_local! {
     static WITHIN: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Calls `job` as a job of a family. It may run only on top of jobs of the same family; other jobs are counted as foreign.
+/// Calls `job` as a job of a family. It may run only on top of jobs of the same family; other jobs are counted as
+/// foreign.
 fn run_in_family(family: usize, foreign: &AtomicUsize, job: impl FnOnce()) {
     WITHIN.with_borrow_mut(|within| {
         if within.iter().any(|&other| other != family) {

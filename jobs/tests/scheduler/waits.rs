@@ -1,5 +1,5 @@
-//! Jobs that wait for their own scopes, for background jobs and for locks. No job waits for ever, and no foreign job runs on top of
-//! one that waits.
+//! Jobs that wait for their own scopes, for background jobs and for locks. No job waits for ever, and no foreign job
+//! runs on top of one that waits.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -38,8 +38,8 @@ impl Flag {
     }
 }
 
-/// Waits for the background job in a frame's job, and lets the worker that helps with the background job continue. That worker
-/// may find the frame's job.
+/// Waits for the background job in a frame's job, and lets the worker that helps with the background job continue. That
+/// worker may find the frame's job.
 fn wait_in_a_frame(scheduler: &Scheduler, background: BackgroundJob<()>, may_go_on: &Flag) {
     let waits = Flag::default();
     let outcome = scheduler.scope(|scope| {
@@ -85,8 +85,8 @@ fn a_worker_that_has_helped_a_background_job_may_wait_for_it() {
     });
 }
 
-/// As above, but the token that the background job still waits for is in the queues of the worker that waits for the background
-/// job.
+/// As above, but the token that the background job still waits for is in the queues of the worker that waits for the
+/// background job.
 #[test]
 fn a_worker_that_holds_a_background_loops_token_may_wait_for_that_loop() {
     assert_ends(|| {
@@ -114,7 +114,8 @@ fn a_worker_that_holds_a_background_loops_token_may_wait_for_that_loop() {
     });
 }
 
-/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, and then a job that needs the lock.
+/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, and then a job that needs
+/// the lock.
 #[test]
 fn a_lock_may_be_held_over_a_wait() {
     assert_ends(|| {
@@ -140,8 +141,8 @@ fn a_lock_may_be_held_over_a_wait() {
     });
 }
 
-/// A worker spawns a job into a background job's scope, and begins a frame's job that waits for a scope. A job of that scope waits
-/// for the background job. The owner of the background job's scope must find the spawned job.
+/// A worker spawns a job into a background job's scope, and begins a frame's job that waits for a scope. A job of that
+/// scope waits for the background job. The owner of the background job's scope must find the spawned job.
 #[test]
 fn a_worker_that_has_helped_a_background_job_may_wait_for_a_job_that_waits_for_it() {
     assert_ends(|| {
@@ -187,8 +188,8 @@ fn a_worker_that_has_helped_a_background_job_may_wait_for_a_job_that_waits_for_i
     });
 }
 
-/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, spawns another job into it, and then
-/// finds a job first that needs the lock.
+/// A job holds a lock while it waits for its own scope. A worker runs a job of that scope, spawns another job into it,
+/// and then finds a job first that needs the lock.
 #[test]
 fn a_job_spawned_into_a_scope_does_not_wait_for_the_next_job_of_the_spawning_worker() {
     assert_ends(|| {
@@ -272,7 +273,8 @@ fn extra_stolen_jobs_are_visible_to_other_workers() {
     });
 }
 
-/// The owner of a scope waits inside a job and is idle. Jobs that are spawned into the scope then also run on other workers.
+/// The owner of a scope waits inside a job and is idle. Jobs that are spawned into the scope then also run on other
+/// workers.
 #[test]
 fn an_idle_owner_does_not_run_all_jobs_of_its_scope() {
     let scheduler = &Scheduler::new(5).unwrap();

@@ -1,8 +1,9 @@
-//! Random programs on one scheduler, for a given time: scopes in scopes, loops, graphs, background jobs and jobs that wait
-//! for them, locks held over waits, panics, threads that are not workers, and a timeline that is started and stopped. Their
-//! results are compared with a plain recursion. A hang aborts with a list of what each thread is doing.
+//! Random programs on one scheduler, for a given time: scopes in scopes, loops, graphs, background jobs and jobs that
+//! wait for them, locks held over waits, panics, threads that are not workers, and a timeline that is started and
+//! stopped. Their results are compared with a plain recursion. A hang aborts with a list of what each thread is doing.
 //!
-//! `cargo test` runs it for a second. This runs it for an hour, and shows the progress and the seed that repeats a failure:
+//! `cargo test` runs it for a second. This runs it for an hour, and shows the progress and the seed that repeats a
+//! failure:
 //!
 //! ```sh
 //! DRAWLOOM_SOAK_SECONDS=3600 DRAWLOOM_SOAK_SEED=7 cargo test --release -p drawloom-jobs --test soak -- --nocapture
@@ -33,7 +34,8 @@ const SEEDS_UNDER_MIRI: u64 = 6;
 /// The number of unplanned panics. Planned panics do not call the panic hook.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
-/// Counts unplanned panics. Without this some would be missed: a panic of a job is caught, and no thread may wait for the job.
+/// Counts unplanned panics. Without this some would be missed: a panic of a job is caught, and no thread may wait for
+/// the job.
 fn count_panics() {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(move |info| {

@@ -1,8 +1,8 @@
 //! Random programs: the value of a seed and a height, computed by a plain recursion and by jobs.
 //!
-//! A program adds numbers, so its value does not depend on their order. A part of one height consists of parts of lower heights. A
-//! part waits for a background job, or holds a lock, only for parts of lower height, which take only the locks of lower
-//! heights. So no program can deadlock.
+//! A program adds numbers, so its value does not depend on their order. A part of one height consists of parts of lower
+//! heights. A part waits for a background job, or holds a lock, only for parts of lower height, which take only the
+//! locks of lower heights. So no program can deadlock.
 
 use std::ops::Range;
 use std::panic::resume_unwind;

@@ -9,8 +9,8 @@ use drawloom_jobs::task::Scheduler;
 /// A number without synchronization.
 struct Unprotected(UnsafeCell<u64>);
 
-// SAFETY: Unsound on purpose. Two threads change the number at once, in a test that only the thread sanitizer runs, to report
-// this.
+// SAFETY: Unsound on purpose. Two threads change the number at once, in a test that only the thread sanitizer runs, to
+// report this.
 unsafe impl Sync for Unprotected {}
 
 impl Unprotected {
@@ -20,8 +20,8 @@ impl Unprotected {
     }
 }
 
-/// Two chunks of one loop change the same number, and nothing orders them. If the scheduler did, it would hide races of its jobs
-/// from the sanitizer.
+/// Two chunks of one loop change the same number, and nothing orders them. If the scheduler did, it would hide races of
+/// its jobs from the sanitizer.
 #[test]
 #[ignore = "a data race for the thread sanitizer to find"]
 fn two_chunks_race_deliberately() {

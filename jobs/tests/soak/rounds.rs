@@ -93,8 +93,8 @@ pub fn run(seed: u64) -> Totals {
     Totals { parts: watchdog::done() - done_before, ..totals }
 }
 
-/// Runs the background jobs that no part has waited for, and drops the scheduler. The jobs hold references to the world, so it is
-/// not dropped before they have run.
+/// Runs the background jobs that no part has waited for, and drops the scheduler. The jobs hold references to the
+/// world, so it is not dropped before they have run.
 fn finish(mut world: Arc<World>) {
     during(Activity::Finish, 0, || {
         while let Err(shared) = Arc::try_unwrap(world) {
@@ -114,7 +114,8 @@ fn clock(readings: u64) -> impl Fn() -> Duration + Send + Sync {
     }
 }
 
-/// Runs programs one after another, as an engine runs frames, and uses the timeline and runs background jobs in between.
+/// Runs programs one after another, as an engine runs frames, and uses the timeline and runs background jobs in
+/// between.
 fn run_thread(world: &Arc<World>, seed: u64) -> Totals {
     let mut random = Rng::with_seed(seed);
     let mut totals = Totals::default();

@@ -1,7 +1,7 @@
 //! Aborts a program that hangs, with a list of each thread's activities.
 //!
-//! Every thread keeps a stack of its current activities in relaxed atomics. These order nothing, so they hide no race from a
-//! sanitizer.
+//! Every thread keeps a stack of its current activities in relaxed atomics. These order nothing, so they hide no race
+//! from a sanitizer.
 
 use std::cell::OnceCell;
 use std::fmt::Write;

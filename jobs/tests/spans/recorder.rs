@@ -67,7 +67,8 @@ impl Record {
         self.changes.iter().copied().enumerate().filter(move |(_, change)| change.span == span)
     }
 
-    /// Checks that each thread exits the span it entered last, never enters a span twice, and that all spans are closed at the end.
+    /// Checks that each thread exits the span it entered last, never enters a span twice, and that all spans are closed
+    /// at the end.
     pub fn check_nesting(&self) {
         let mut inside: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         let mut open = vec![false; self.spans.len()];

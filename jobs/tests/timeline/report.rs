@@ -27,8 +27,9 @@ fn span(name: &str, times: Range<u64>) -> Span {
     Span { name: name.to_owned(), thread: 0, frame: 12, began, ended }
 }
 
-/// A frame of two workers, from 1,000 µs on: `record` with a run in it, and `submit` after a pause. `lighting` is ready at the
-/// same time as `shadows`, but the caller begins with `shadows`, and the other worker wakes up for these as well.
+/// A frame of two workers, from 1,000 µs on: `record` with a run in it, and `submit` after a pause. `lighting` is ready
+/// at the same time as `shadows`, but the caller begins with `shadows`, and the other worker wakes up for these as
+/// well.
 ///
 /// ```text
 /// caller    | record 100 | cull 200 | . shadows 290 | lighting 200 | end 20, record 80 |   | submit 100 |
@@ -133,8 +134,8 @@ fn the_report_of_a_hand_made_frame_equals_the_calculation() {
     assert_eq!((wait.name.as_str(), wait.waited()), ("lighting, record", micros(300)));
     assert_eq!(wait.meanwhile, [("shadows".to_owned(), micros(290 + 250))]);
     assert_eq!((short.name.as_str(), short.waited()), ("shadows, record", micros(10)));
-    // Without scheduler costs: 280 µs outside of the run, the two chunks of cull in parallel, then lighting and a chunk of shadows
-    // in parallel with the other chunk of shadows, then bloom.
+    // Without scheduler costs: 280 µs outside of the run, the two chunks of cull in parallel, then lighting and a chunk
+    // of shadows in parallel with the other chunk of shadows, then bloom.
     assert_eq!(report.replayed, micros(280 + 100 + 200 + 270 + 80));
     let what_if: Vec<_> = report.what_if.iter().map(|what_if| (what_if.group.as_str(), what_if.saved)).collect();
     // Without shadows only lighting is left after cull. Without lighting both chunks of shadows run in parallel.

@@ -137,7 +137,8 @@ fn spans_and_edges(run: &Run) -> (Vec<WorkerSpan>, Vec<[usize; 2]>) {
     (spans, edges)
 }
 
-/// The end of each span if it begins as early as possible, takes as long as its weight, and ends no earlier than `at_least`.
+/// The end of each span if it begins as early as possible, takes as long as its weight, and ends no earlier than
+/// `at_least`.
 fn ends(run: &Run, weights: &[Duration], edges: &[[usize; 2]], at_least: impl Fn(usize) -> Duration) -> Vec<Duration> {
     let mut ends: Vec<_> = (0..weights.len()).map(|span| at_least(span).max(run.began + weights[span])).collect();
     loop {

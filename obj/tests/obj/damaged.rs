@@ -238,7 +238,7 @@ fn control_characters_do_not_reach_messages() {
     assert!(!error.to_string().contains(is_forbidden), "{error}");
 }
 
-/// Windows puts such a mark in front of paths that are copied from its dialogs.
+/// Windows puts this mark in front of paths that are copied from its dialogs.
 fn a_file_whose_name_turns_text_is_found() {
     let text = format!("mtllib \u{202a}a.mtl\nusemtl one\n{TRIANGLE}");
     let imported = Folder::new().with("a.obj", text).with("\u{202a}a.mtl", "newmtl one\nKd 1 0 0\n").load().unwrap();

@@ -191,8 +191,8 @@ fn textures_share_a_limit() {
 }
 
 /// Loads ten materials with these statements, in which `{}` is the number of the material and of a copy of
-/// `picture.png`. All that is decoded may take so many bytes. Returns the number of the first material whose texture
-/// lacks because of that.
+/// `picture.png`. All that is decoded may take this number of bytes. Returns the number of the first material whose
+/// texture lacks because of that.
 fn first_over_limit(statements: &str, picture: &[u8], decoded_bytes: usize) -> Option<usize> {
     let (mut text, mut library) = (format!("mtllib a.mtl\n{TRIANGLE}"), String::new());
     let mut folder = Folder::new().with_image("a.png", &RgbaImage::from_pixel(10, 10, Rgba([255; 4])));

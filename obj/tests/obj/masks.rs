@@ -68,7 +68,7 @@ fn kind(image: &GrayImage) -> Kind {
     kind_of(&material(&loaded(image)))
 }
 
-/// A leaf with teeth, whose edge is so many texels wide; `hole` and `solid` are its values.
+/// A leaf with teeth, whose edge is `width` texels wide; `hole` and `solid` are its values.
 fn leaf(side: u32, width: f64, [hole, solid]: [f64; 2]) -> GrayImage {
     GrayImage::from_fn(side, side, |x, y| {
         let [x, y] = [x, y].map(|texel| f64::from(texel) + 0.5 - f64::from(side) / 2.0);

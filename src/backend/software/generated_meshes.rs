@@ -58,8 +58,8 @@ impl GeneratedMeshes {
     }
 }
 
-/// The meshes, by slot, that nodes have filled with what is no mesh in the latest frame that was drawn. Frames count their
-/// objects when they begin: only the drawing of a frame finds such meshes.
+/// The meshes, by slot, that nodes have filled with what is no mesh in the latest frame that was drawn. Frames count
+/// their objects when they begin: only the drawing of a frame finds such meshes.
 #[derive(Default)]
 pub(super) struct UndrawableMeshes(Mutex<HashMap<usize, Arc<Mesh>>>);
 

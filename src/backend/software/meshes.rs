@@ -12,7 +12,8 @@ pub(super) type Meshes = Arc<[Option<Arc<Mesh>>]>;
 /// Keeps the meshes that a scene's objects use: a frame that is drawn later needs them after the scene has changed.
 #[derive(Default)]
 pub(super) struct MeshCache {
-    /// The identity and revision of the collection that the meshes are of, the revision of the used ones, and the format of their vertices.
+    /// The identity and revision of the collection that the meshes are of, the revision of the used ones, and the
+    /// format of their vertices.
     version: (u64, u64, u64, VertexFormat),
     /// By slot, with the revision of each.
     kept: Vec<Option<(u64, Arc<Mesh>)>>,

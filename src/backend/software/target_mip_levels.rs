@@ -38,7 +38,8 @@ impl<R: Precision> MipLevel<R> {
         &self.numbers[(y * self.size[0] + x) * channels..][..channels]
     }
 
-    /// Makes each pixel the mean of those of the finer level that it covers, weighted by area, and rounded to the format.
+    /// Makes each pixel the mean of those of the finer level that it covers, weighted by area, and rounded to the
+    /// format.
     fn update<'a>(
         &mut self,
         executor: &Executor,
@@ -117,7 +118,8 @@ mod tests {
 
     use super::*;
 
-    /// The mean of all pixels of the finer level, each weighted by the area of it that lies within a pixel of the coarser one.
+    /// The mean of all pixels of the finer level, each weighted by the area of it that lies within a pixel of the
+    /// coarser one.
     fn mean(pixel: [usize; 2], size: [usize; 2], finer_size: [usize; 2], finer: impl Fn([usize; 2]) -> f64) -> f64 {
         let extent = [0, 1].map(|axis| finer_size[axis] as f64 / size[axis] as f64);
         let within = |axis: usize, index: usize| {

@@ -239,7 +239,7 @@ impl<R: Precision> SoftwareTarget<R> {
         Picture { width: size[0] as u32, height: size[1] as u32, format, bytes }
     }
 
-    /// Its pixels as they are stored, rows from top to bottom.
+    /// Its stored pixels, rows from top to bottom.
     pub(super) fn numbers(&self) -> Vec<[f64; 4]> {
         let mut numbers = Vec::new();
         self.visit(|pixel| numbers.push(pixel.0.map(Real::as_f64)));
@@ -280,7 +280,8 @@ pub(super) struct TargetReader<'a, R> {
 }
 
 impl<'a, R> TargetReader<'a, R> {
-    /// The reader of these layers, at least one. Those of views that the frame does not have are pixels of zeros; all others have one size.
+    /// The reader of these layers, at least one. Those of views that the frame does not have are pixels of zeros; all
+    /// others have one size.
     pub(super) fn new(layers: Vec<LayerReader<'a, R>>) -> Self {
         let larger = |one: [usize; 2], other: [usize; 2]| [one[0].max(other[0]), one[1].max(other[1])];
         let size = layers.iter().map(|layer| layer.tiling.size()).fold([1, 1], larger);

@@ -23,16 +23,17 @@ use crate::timeline::Timeline;
 
 /// Draws with wgpu, on the engine's device.
 ///
-/// Drawloom builds wgpu with WGSL, and with what the features `vulkan`, `metal`, `dx12` and `noop` name; all but the last are on by
-/// default. An engine that depends on wgpu 30 itself can enable more of it.
+/// Drawloom builds wgpu with WGSL, and with what the features `vulkan`, `metal`, `dx12` and `noop` name; all but the
+/// last are on by default. An engine that depends on wgpu 30 itself can enable more of it.
 ///
-/// Errors in what Drawloom records and submits are returned. Other device errors are not: for those an engine sets its own
-/// `Device::set_device_lost_callback` and `Device::on_uncaptured_error`.
+/// Errors in what Drawloom records and submits are returned. Other device errors are not: for those an engine sets its
+/// own `Device::set_device_lost_callback` and `Device::on_uncaptured_error`.
 ///
-/// If the device is lost, the frame that is being recorded or submitted returns [`BackendError::DeviceLost`], and so does every later one.
-/// Of the frames in flight, [`WgpuSubmission::wait`](super::WgpuSubmission::wait) and
-/// [`WgpuSubmission::read`](super::WgpuSubmission::read) return it where the device has not drawn the frame; what it has drawn is lost too,
-/// so `read` returns it for all of them. [`Renderer::replace_backend`](crate::Renderer::replace_backend) goes on with a new device.
+/// If the device is lost, the frame that is being recorded or submitted returns [`BackendError::DeviceLost`], and so
+/// does every later one. Of the frames in flight, [`WgpuSubmission::wait`](super::WgpuSubmission::wait) and
+/// [`WgpuSubmission::read`](super::WgpuSubmission::read) return it where the device has not drawn the frame; what it
+/// has drawn is lost too, so `read` returns it for all of them.
+/// [`Renderer::replace_backend`](crate::Renderer::replace_backend) goes on with a new device.
 pub struct WgpuBackend {
     pub(super) device: wgpu::Device,
     pub(super) uploads: UploadQueue,
@@ -84,8 +85,8 @@ impl WgpuBackend {
     /// [`clamped_fragment`](crate::process::CommandDraws::clamped_fragment).
     pub const DEPTH_CLIP_FEATURES: wgpu::Features = wgpu::Features::DEPTH_CLIP_CONTROL;
 
-    /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it only for such
-    /// devices: see [`WgpuBackend::optional_features`].
+    /// The feature with which jobs write objects straight into the memory that a device shares with the CPU. Request it
+    /// only for such devices: see [`WgpuBackend::optional_features`].
     pub const MAPPING_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
     /// The optional features that an adapter has and that pay on it: request them with
@@ -158,53 +159,59 @@ impl WgpuBackend {
         Self { strategies: self.strategies.with_encoding(encoding), ..self }
     }
 
-    /// Draws a process whose new shader does not compile with the shader that it had, instead of failing the frame: for shaders that
-    /// change while the engine runs, such as those that it reads again from a file. The error goes through `tracing` once, and is
-    /// among [`WgpuBackend::shader_errors`] until the shader compiles.
+    /// Draws a process whose new shader does not compile with the shader that it had, instead of failing the frame: for
+    /// shaders that change while the engine runs, such as those that it reads again from a file. The error goes through
+    /// `tracing` once, and is among [`WgpuBackend::shader_errors`] until the shader compiles.
     pub fn keep_working_shaders(self) -> Self {
         Self { pipelines: Mutex::new(PipelineCache::new(true)), ..self }
     }
 
-    /// Lets the targets of a frame share textures. A target's life begins with the first pass that uses it and ends with the last one, of
-    /// any view. Targets whose lives do not overlap and that are alike in format, size, samples, mip levels and use share one texture. Other targets
-    /// of up to 64 × 64 pixels are layers of shared textures, so that thousands of views need few. Pictures stay the
-    /// same; what the targets of all views need is often little more than what one view needs.
-    /// [`WgpuBackend::resources`] and [`FrameStatistics::targets`](crate::FrameStatistics::targets) tell how much is saved.
+    /// Lets the targets of a frame share textures. A target's life begins with the first pass that uses it and ends
+    /// with the last one, of any view. Targets whose lives do not overlap and that are alike in format, size, samples,
+    /// mip levels and use share one texture. Other targets of up to 64 × 64 pixels are layers of shared textures, so
+    /// that thousands of views need few. Pictures stay the same; what the targets of all views need is often little
+    /// more than what one view needs. [`WgpuBackend::resources`] and
+    /// [`FrameStatistics::targets`](crate::FrameStatistics::targets) tell how much is saved.
     ///
-    /// When the frame is drawn, the texture of such a target may hold another one. So reading it back returns
-    /// [`BackendError::TransientTarget`], and [`WgpuSubmission::texture`](super::WgpuSubmission::texture) returns `None`. These targets
-    /// have textures of their own, and stay readable:
+    /// When the frame is drawn, the texture of a transient target may hold another one. So reading it back returns
+    /// [`BackendError::TransientTarget`], and [`WgpuSubmission::texture`](super::WgpuSubmission::texture) returns
+    /// `None`. These targets have textures of their own, and stay readable:
     ///
     /// - outputs: name what is read back with [`RendererBuilder::output`](crate::RendererBuilder::output),
     /// - imported ones, and those whose history a process reads,
     /// - those that are drawn in layers, and all of views that [not every frame draws](crate::scene::Redraw).
     ///
-    /// What a target holds before it is first drawn into is undefined. So a raw pass that [writes](crate::process::Declare::writes) a target
-    /// must write each of its pixels, and it must not keep the texture for later frames.
+    /// What a target holds before it is first drawn into is undefined. So a raw pass that
+    /// [writes](crate::process::Declare::writes) a target must write each of its pixels, and it must not keep the
+    /// texture for later frames.
     ///
-    /// Which targets share a texture is decided when the plan, the cameras or the imports change, and costs nothing in other frames.
+    /// Which targets share a texture is decided when the plan, the cameras or the imports change, and costs nothing in
+    /// other frames.
     pub fn transient_targets(self) -> Self {
         Self { transient_targets: true, ..self }
     }
 
-    /// Streams meshes and textures: background jobs bring them to the device, and frames draw what is there (L 3.1, M 10.3).
+    /// Streams meshes and textures: background jobs bring them to the device, and frames draw what is there (L 3.1, M
+    /// 10.3).
     ///
-    /// Without it, a frame uploads all that it needs when it begins, however long that takes. With it, a frame takes over what jobs have
-    /// uploaded since the frame before. Objects whose mesh is not on the device are not drawn, and counted as
-    /// [`NotResident`](crate::view::RejectionReason::NotResident); materials whose texture is not are drawn without it, and counted as
-    /// [`TextureNotResident`](crate::view::RejectionReason::TextureNotResident).
+    /// Without it, a frame uploads all that it needs when it begins, however long that takes. With it, a frame takes
+    /// over what jobs have uploaded since the frame before. Objects whose mesh is not on the device are not drawn, and
+    /// counted as [`NotResident`](crate::view::RejectionReason::NotResident); materials whose texture is not are drawn
+    /// without it, and counted as [`TextureNotResident`](crate::view::RejectionReason::TextureNotResident).
     ///
-    /// First comes what the latest frame would have drawn, then all else that objects use, so that it is there before it comes into sight; in
-    /// both the [priority](crate::scene::Assets::set_priority) decides. If the budget is spent, what was drawn longest ago makes room. What is
-    /// in sight makes room only for what is in sight and has a higher priority: if frames draw more than the budget, a part of it is left out,
-    /// counted in [`WgpuBackend::streaming_statistics`], and warned of.
+    /// First comes what the latest frame would have drawn, then all else that objects use, so that it is there before
+    /// it comes into sight; in both the [priority](crate::scene::Assets::set_priority) decides. If the budget is spent,
+    /// what was drawn longest ago makes room. What is in sight makes room only for what is in sight and has a higher
+    /// priority: if frames draw more than the budget, a part of it is left out, counted in
+    /// [`WgpuBackend::streaming_statistics`], and warned of.
     ///
-    /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the device, if the budget has
-    /// room for both, and meshes that are subdivided for paraboloids. Otherwise a mesh or texture that is replaced is drawn until the new one
-    /// has arrived, or left out if not even evictions make room for both. What is larger than the budget of its kind is
-    /// left out, counted, and warned of by name. When the format of vertices changes, or a plan first reads a vertex
-    /// attribute, all meshes come anew. Scenes at rest, once everything is there, have the pictures that they have without streaming. Views that [not every
-    /// frame draws](crate::scene::Redraw) are not drawn anew because something arrived: they need a frame of
+    /// Two things are uploaded by the frame itself: a mesh that [replaces](crate::scene::Assets::replace) one on the
+    /// device, if the budget has room for both, and meshes that are subdivided for paraboloids. Otherwise a mesh or
+    /// texture that is replaced is drawn until the new one has arrived, or left out if not even evictions make room for
+    /// both. What is larger than the budget of its kind is left out, counted, and warned of by name. When the format of
+    /// vertices changes, or a plan first reads a vertex attribute, all meshes come anew. Scenes at rest, once
+    /// everything is there, have the pictures that they have without streaming. Views that [not every frame
+    /// draws](crate::scene::Redraw) are not drawn anew because something arrived: they need a frame of
     /// [`Redraw::EveryFrame`](crate::scene::Redraw::EveryFrame) then.
     ///
     /// ```no_run
@@ -228,17 +235,19 @@ impl WgpuBackend {
         self.streamer.as_ref().map(Streamer::statistics)
     }
 
-    /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for example into a
-    /// surface's texture instead of `"picture"`. Of several cameras of that name, it is the first one that has such a target.
+    /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for
+    /// example into a surface's texture instead of `"picture"`. Of several cameras of that name, it is the first one
+    /// that has this target.
     ///
-    /// The texture must be a 2D texture with one layer and one sample per pixel, of the target's size. Its format must be the target's,
-    /// or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must contain the target's. Its usages
-    /// must include `RENDER_ATTACHMENT` if processes draw into it, `TEXTURE_BINDING` if they sample it, and `COPY_SRC` if they read its
-    /// history or it is read back. Targets that are multisampled, have mip levels, are drawn in layers or are the history of another one cannot be imported. If
-    /// something does not fit, the frame returns [`BackendError::InvalidImport`].
+    /// The texture must be a 2D texture with one layer and one sample per pixel, of the target's size. Its format must
+    /// be the target's, or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must
+    /// contain the target's. Its usages must include `RENDER_ATTACHMENT` if processes draw into it, `TEXTURE_BINDING`
+    /// if they sample it, and `COPY_SRC` if they read its history or it is read back. Targets that are multisampled,
+    /// have mip levels, are drawn in layers or are the history of another one cannot be imported. If something does not
+    /// fit, the frame returns [`BackendError::InvalidImport`].
     ///
-    /// A second import of the same target replaces the first. Frames after the next one draw into the crate's own target again, also if
-    /// that one fails.
+    /// A second import of the same target replaces the first. Frames after the next one draw into the crate's own
+    /// target again, also if that one fails.
     ///
     /// ```no_run
     /// # use drawloom::{Renderer, Submitter, backend::WgpuBackend, scene::SceneRef, wgpu};
@@ -259,14 +268,16 @@ impl WgpuBackend {
         imports.push(import);
     }
 
-    /// The errors of processes that are still drawn with the [shader before](WgpuBackend::keep_working_shaders), in any order.
+    /// The errors of processes that are still drawn with the [shader before](WgpuBackend::keep_working_shaders), in any
+    /// order.
     pub fn shader_errors(&self) -> Vec<String> {
         self.pipelines.lock().shader_errors()
     }
 
     /// Has the device write timestamps at the begin and end of each pass: see
     /// [`WgpuSubmission::pass_times`](super::WgpuSubmission::pass_times), and [`DeviceClock`] for how they get into a
-    /// timeline's log. The [mip levels](crate::process::Declare::mipmapped) that are generated after a pass are not part of its time. [Raw passes](crate::process::RawPass) are timed only if the device has
+    /// timeline's log. The [mip levels](crate::process::Declare::mipmapped) that are generated after a pass are not
+    /// part of its time. [Raw passes](crate::process::RawPass) are timed only if the device has
     /// `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
     ///
     /// # Errors
@@ -327,8 +338,8 @@ impl WgpuBackend {
         DeviceClock::read(&self.device, self.queue(), self.adapter_name(), timeline)
     }
 
-    /// Drops all cached resources but pipelines and the buffers that processes share, because a device error may have left some unusable. The next frame
-    /// creates them again.
+    /// Drops all cached resources but pipelines and the buffers that processes share, because a device error may have
+    /// left some unusable. The next frame creates them again.
     pub(super) fn clear(&self) {
         *self.meshes.lock() = MeshCache::default();
         *self.materials.lock() = MaterialCache::default();
@@ -381,8 +392,8 @@ pub struct WgpuResources {
     pub target_bytes: u64,
     /// What their size would be without [transient targets](WgpuBackend::transient_targets).
     pub dedicated_target_bytes: u64,
-    /// The number of all buffers that processes share, and of those for objects, views, lights, parameters and triangles that no frame in
-    /// flight uses.
+    /// The number of all buffers that processes share, and of those for objects, views, lights, parameters and
+    /// triangles that no frame in flight uses.
     pub buffers: usize,
     /// The size of these buffers in bytes.
     pub buffer_bytes: u64,

@@ -95,8 +95,8 @@ impl Backend for WgpuBackend {
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let imports = mem::take(&mut *self.imports.lock());
-        // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that does not compile leave
-        // everything as it is.
+        // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that
+        // does not compile leave everything as it is.
         request.check_reach()?;
         let imports: Result<Vec<_>, _> =
             imports.iter().map(|import| import.resolve(request.plan, request.views)).collect();
@@ -396,9 +396,9 @@ fn is_split(parts: &[WgpuPart]) -> bool {
     matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_))))
 }
 
-/// Divides the time that one encoder of several passes took among them, by their batches: wgpu encodes all of them when the encoder is
-/// finished, so none can be timed alone. A trial of a recording strategy is measured with its neighbours, which blurs it; such a pass has few
-/// batches, so there is little to choose.
+/// Divides the time that one encoder of several passes took among them, by their batches: wgpu encodes all of them when
+/// the encoder is finished, so none can be timed alone. A trial of a recording strategy is measured with its
+/// neighbours, which blurs it; a small pass has few batches, so there is little to choose.
 fn divide_time(frame: &WgpuFrame, passes: &[PassRequest<'_>], time: Duration) {
     let all: u64 = passes.iter().map(PassRequest::relative_cost).sum();
     for pass in passes {

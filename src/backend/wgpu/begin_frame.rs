@@ -87,7 +87,8 @@ impl WgpuBackend {
         with_error_scope(&self.device, "meshes, materials and textures", update).flatten()
     }
 
-    /// The meshes, materials and textures of a frame: uploads what is missing or, if they are streamed, takes over what jobs have uploaded.
+    /// The meshes, materials and textures of a frame: uploads what is missing or, if they are streamed, takes over what
+    /// jobs have uploaded.
     ///
     /// # Errors
     /// If the device has no room.
@@ -106,7 +107,8 @@ impl WgpuBackend {
         Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
     }
 
-    /// The buffers that a plan's processes share. If creation fails, existing buffers keep their content, and the next frame tries again.
+    /// The buffers that a plan's processes share. If creation fails, existing buffers keep their content, and the next
+    /// frame tries again.
     ///
     /// # Errors
     /// If the device lacks room.
@@ -220,10 +222,10 @@ impl WgpuBackend {
     }
 }
 
-/// Decides which passes continue the encoder of the pass before: those of one view that can share one, and in frames of many small views
-/// those of several.
+/// Decides which passes continue the encoder of the pass before: those of one view that can share one, and in frames of
+/// many small views those of several.
 fn share_encoders(passes: &mut [WgpuPassState]) {
-    /// A frame of many small views has at least so many encoders, for workers to share.
+    /// The fewest encoders of a frame of many small views, for workers to share.
     const MIN_ENCODERS: usize = 16;
     let max_across_views = passes.iter().filter(|pass| pass.can_share_encoder).count() / MIN_ENCODERS;
     // The passes in the run so far; 0 if the next pass cannot continue it.

@@ -36,7 +36,8 @@ pub(crate) fn loss_or(device: &wgpu::Device, error: BackendError) -> BackendErro
     check_device(device).err().unwrap_or(error)
 }
 
-/// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have none.
+/// Checks that the device is not lost. A lost device reports that only when a bundle is finished, and a frame may have
+/// none.
 ///
 /// # Errors
 /// If the device is lost.
@@ -75,7 +76,8 @@ pub(crate) fn poll(device: &wgpu::Device, poll: wgpu::PollType) -> Result<(), Ba
         other => BackendError::DeviceLost { message: other.to_string() },
     };
     match catch_wgpu_panic("the device", || device.poll(poll).map(|_| ())) {
-        // A wait that times out at the moment when another thread finds all work done: wgpu takes that for a contradiction.
+        // A wait that times out at the moment when another thread finds all work done: wgpu takes that for a
+        // contradiction.
         Err(BackendError::Validation { message, .. }) if message.starts_with("If the queue is empty") => Ok(()),
         polled => polled?.map_err(refused),
     }

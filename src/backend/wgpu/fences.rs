@@ -17,8 +17,9 @@ struct SubmissionProgress {
 }
 
 impl DeviceProgress for SubmissionProgress {
-    /// Polls and does not wait, so whoever waits for the fence calls this again and again. A wait of wgpu holds a lock that presenting and
-    /// destroying resources need. And wgpu panics in a wait that times out at the moment when another thread finds all work done.
+    /// Polls and does not wait, so whoever waits for the fence calls this again and again. A wait of wgpu holds a lock
+    /// that presenting and destroying resources need. And wgpu panics in a wait that times out at the moment when
+    /// another thread finds all work done.
     fn advance(&self, _limit: Duration) -> Result<(), String> {
         // wgpu panics if the device is lost.
         match catch_wgpu_panic("the device", || self.device.poll(wgpu::PollType::Poll)) {

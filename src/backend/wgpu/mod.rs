@@ -1,8 +1,8 @@
 //! The wgpu backend.
 //!
-//! Vertices and indices lie in pages that many meshes share, all objects lie in one storage buffer, and state is set once per run of
-//! batches that share it.
-//! Measurements chose this layout: recording it is cheap and scales with threads.
+//! Vertices and indices lie in pages that many meshes share, all objects lie in one storage buffer, and state is set
+//! once per run of batches that share it. Measurements chose this layout: recording it is cheap and scales with
+//! threads.
 //!
 //! A pass can be recorded and encoded in several ways: see [`RecordingStrategy`] and [`EncodingStrategy`]. A wgpu
 //! bundle is not a device object: wgpu replays and encodes it inside `CommandEncoder::finish`. So a bundle that is

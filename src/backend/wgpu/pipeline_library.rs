@@ -4,14 +4,15 @@ use super::backend::WgpuBackend;
 use super::pipelines::SharedPipelines;
 use crate::backend::BackendError;
 
-/// Makes backends on one device that share their compiled shaders and pipelines: for an engine that opens renderers while it runs, such as
-/// one for thumbnails, or for the preview of a material.
+/// Makes backends on one device that share their compiled shaders and pipelines: for an engine that opens renderers
+/// while it runs, such as one for thumbnails, or for the preview of a material.
 ///
-/// A renderer compiles in its first frame what its processes need, which takes tenths of a second. A renderer on a backend of a library
-/// compiles only what no other backend of the library has compiled before. They share nothing else: each tunes its own strategies, and
-/// counts the [pipelines](super::WgpuResources::pipelines) that it uses.
+/// A renderer compiles in its first frame what its processes need, which takes tenths of a second. A renderer on a
+/// backend of a library compiles only what no other backend of the library has compiled before. They share nothing
+/// else: each tunes its own strategies, and counts the [pipelines](super::WgpuResources::pipelines) that it uses.
 ///
-/// The library keeps all that was compiled, until it and its backends are dropped or until it is [cleared](Self::clear). Clones are the same library.
+/// The library keeps all that was compiled, until it and its backends are dropped or until it is
+/// [cleared](Self::clear). Clones are the same library.
 ///
 /// ```no_run
 /// # use drawloom::{Renderer, backend::PipelineLibrary, process::Deferred, task::Scheduler, wgpu};
@@ -46,7 +47,8 @@ impl PipelineLibrary {
         Ok(WgpuBackend { library: Some(self.shared.clone()), ..backend })
     }
 
-    /// Drops all that was compiled, for example after many versions of a shader that is being edited. Renderers keep what they use.
+    /// Drops all that was compiled, for example after many versions of a shader that is being edited. Renderers keep
+    /// what they use.
     pub fn clear(&self) {
         self.shared.clear();
     }

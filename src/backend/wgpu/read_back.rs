@@ -42,7 +42,8 @@ impl WgpuReadBack {
     /// A thread that is about to run a callback does so much sooner, however busy the machine is.
     const MAX_CALLBACK_DELAY: Duration = Duration::from_secs(30);
 
-    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It does not wait.
+    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It
+    /// does not wait.
     ///
     /// # Errors
     /// If the frame was dropped, or the device is lost.
@@ -154,8 +155,8 @@ impl ReadBackCopy {
             progress.ended.notify_all();
             return;
         }
-        // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped. Another thread may
-        // have polled already.
+        // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped.
+        // Another thread may have polled already.
         let mut state = progress.state.lock();
         if matches!(*state, State::Recorded) {
             *state = State::Submitted(index.clone());
@@ -166,7 +167,8 @@ impl ReadBackCopy {
 /// A read-back of a rectangle of a view's target, and the copy that its frame makes for it.
 ///
 /// # Errors
-/// If there is no such target, it is transient, it cannot be copied from, or the rectangle is empty, not in it, or a part of a depth target.
+/// If there is no such target, it is transient, it cannot be copied from, or the rectangle is empty, not in it, or a
+/// part of a depth target.
 pub(crate) fn new_read_back(
     device: &wgpu::Device,
     targets: &WgpuTargets,

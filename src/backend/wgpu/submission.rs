@@ -40,9 +40,9 @@ impl WgpuSubmission {
         timestamps.read(&self.device)
     }
 
-    /// The texture of a view's target, to present or to copy, and the layer that is the target's: 0 but where views have targets that are
-    /// layers of one texture. The next frame draws into the same texture. `None` if there is no such target, or it is
-    /// [transient](super::WgpuBackend::transient_targets).
+    /// The texture of a view's target, to present or to copy, and the layer that is the target's: 0 but where views
+    /// have targets that are layers of one texture. The next frame draws into the same texture. `None` if there is no
+    /// such target, or it is [transient](super::WgpuBackend::transient_targets).
     pub fn texture(&self, view: usize, target: &str) -> Option<(&wgpu::Texture, u32)> {
         let found = self.targets.find(view, target).filter(|target| !target.is_transient())?;
         Some((&found.texture, found.layer))
@@ -56,7 +56,8 @@ impl WgpuSubmission {
         self.poll(None)
     }
 
-    /// Waits until the device has drawn the frame, but no longer than this time: for engines that notice a device which hangs.
+    /// Waits until the device has drawn the frame, but no longer than this time: for engines that notice a device which
+    /// hangs.
     ///
     /// # Errors
     /// - [`BackendError::Timeout`] if the time is over. The frame may still be drawn, and may be waited for again.
@@ -72,7 +73,8 @@ impl WgpuSubmission {
     /// Waits until the device has drawn the frame, and reads back a view's target.
     ///
     /// # Errors
-    /// If there is no such target, it is [transient](super::WgpuBackend::transient_targets), or the device refuses or is lost.
+    /// If there is no such target, it is [transient](super::WgpuBackend::transient_targets), or the device refuses or
+    /// is lost.
     pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
         self.wait()?;
         // The calls below do not report it, and the wait does not if the frame was drawn before.

@@ -88,8 +88,8 @@ impl WgpuBackend {
         Ok(submission)
     }
 
-    /// Submits the command buffers before the place of each of these fences, and has the device set the fence after them. A fence has the
-    /// number of command buffers before its place.
+    /// Submits the command buffers before the place of each of these fences, and has the device set the fence after
+    /// them. A fence has the number of command buffers before its place.
     ///
     /// # Errors
     /// If the device refuses one of the command buffers. Its fence and those behind it are abandoned.

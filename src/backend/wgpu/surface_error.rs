@@ -26,7 +26,8 @@ pub enum SurfaceError {
     /// The surface is lost again as soon as it is made.
     #[error("the window's surface stays lost")]
     StaysLost,
-    /// The device of the surface is lost. The surface is of no use any more: the engine drops it, and opens another device and surface.
+    /// The device of the surface is lost. The surface is of no use any more: the engine drops it, and opens another
+    /// device and surface.
     #[error("the device of the window's surface was lost: {message}")]
     DeviceLost {
         /// What wgpu says.

@@ -13,7 +13,8 @@ use super::surface_formats::{SurfaceFormats, picture_format};
 use crate::backend::BackendError;
 use crate::process::Format;
 
-/// A device that presents in windows, and what else of wgpu another window needs. All of them are handles, and clones are cheap.
+/// A device that presents in windows, and what else of wgpu another window needs. All of them are handles, and clones
+/// are cheap.
 ///
 /// An engine that opens its device itself makes one of its handles.
 #[derive(Clone, Debug)]
@@ -30,8 +31,8 @@ pub struct WindowDevice {
 
 /// The surface of a window, into whose textures pictures are drawn.
 ///
-/// The renderer draws straight into the surface's texture, in the place of a target of its own. Where the texture's format does not
-/// allow that, it draws into another texture, which [`SurfaceFrame::present`] converts.
+/// The renderer draws straight into the surface's texture, in the place of a target of its own. Where the texture's
+/// format does not allow that, it draws into another texture, which [`SurfaceFrame::present`] converts.
 ///
 /// ```no_run
 /// use std::error::Error;
@@ -99,8 +100,8 @@ pub struct SurfaceFrame {
 }
 
 impl WindowDevice {
-    /// Opens the best device that presents in a window, with all that Drawloom makes use of, and the window's surface. `WGPU_BACKEND`
-    /// in the environment chooses among Vulkan, Metal and DX12.
+    /// Opens the best device that presents in a window, with all that Drawloom makes use of, and the window's surface.
+    /// `WGPU_BACKEND` in the environment chooses among Vulkan, Metal and DX12.
     ///
     /// An engine that wants another adapter, features or limits makes a `WindowDevice` of its own.
     ///
@@ -160,8 +161,8 @@ impl WindowDevice {
 }
 
 impl WindowSurface {
-    /// A surface that the engine made, and how it makes another one when that is lost: for engines that choose their adapter by the
-    /// surface, and for windows that wgpu accepts only as raw handles.
+    /// A surface that the engine made, and how it makes another one when that is lost: for engines that choose their
+    /// adapter by the surface, and for windows that wgpu accepts only as raw handles.
     ///
     /// # Errors
     /// If the device does not present in it.
@@ -200,8 +201,8 @@ impl WindowSurface {
         Ok(surface)
     }
 
-    /// The same surface for pictures of another format than the one that it prefers: that of a renderer which draws into several
-    /// windows.
+    /// The same surface for pictures of another format than the one that it prefers: that of a renderer which draws
+    /// into several windows.
     ///
     /// # Errors
     /// If the format is neither [`Format::Rgba8Srgb`] nor [`Format::Bgra8Srgb`].
@@ -214,8 +215,8 @@ impl WindowSurface {
         Ok(self)
     }
 
-    /// The same surface, whose pictures are converted even where they could be drawn straight into its textures: to see, on any
-    /// system, what an engine does on one where they must be.
+    /// The same surface, whose pictures are converted even where they could be drawn straight into its textures: to
+    /// see, on any system, what an engine does on one where they must be.
     ///
     /// # Errors
     /// If the device does not present in the window.
@@ -231,8 +232,8 @@ impl WindowSurface {
         self.picture
     }
 
-    /// The format of the views in which an overlay is drawn over the picture: egui wants one without sRGB, and has it where the device
-    /// allows.
+    /// The format of the views in which an overlay is drawn over the picture: egui wants one without sRGB, and has it
+    /// where the device allows.
     pub fn overlay_format(&self) -> wgpu::TextureFormat {
         self.overlay
     }
@@ -246,11 +247,11 @@ impl WindowSurface {
         }
     }
 
-    /// The next texture, of the window's size in pixels, as far as the device has textures of that size. It waits until the display
-    /// has one: up to a second, in which other windows wait too.
+    /// The next texture, of the window's size in pixels, as far as the device has textures of that size. It waits until
+    /// the display has one: up to a second, in which other windows wait too.
     ///
-    /// `None` if there is none this time: the window is minimised or hidden, or changes its size right now. A surface that is outdated
-    /// or lost is made anew.
+    /// `None` if there is none this time: the window is minimised or hidden, or changes its size right now. A surface
+    /// that is outdated or lost is made anew.
     ///
     /// # Errors
     /// If the device refuses or is lost, or the surface stays lost.
@@ -309,7 +310,8 @@ impl WindowSurface {
     }
 
     /// # Errors
-    /// If the device refuses the settings. Without the scope its error would go to a handler that the engine may not have.
+    /// If the device refuses the settings. Without the scope its error would go to a handler that the engine may not
+    /// have.
     fn configure(&mut self) -> Result<(), SurfaceError> {
         let device = &self.graphics.device;
         with_error_scope(device, "the window's surface", || self.surface.configure(device, &self.configuration))
@@ -368,8 +370,8 @@ impl SurfaceFrame {
         [self.target().width(), self.target().height()]
     }
 
-    /// Presents a picture that was submitted. `draw_over` draws over it before it is shown, into a view of the window's texture in the
-    /// [format of overlays](WindowSurface::overlay_format).
+    /// Presents a picture that was submitted. `draw_over` draws over it before it is shown, into a view of the window's
+    /// texture in the [format of overlays](WindowSurface::overlay_format).
     pub fn present(self, draw_over: impl FnOnce(&wgpu::Texture)) {
         let Self { device, queue, surface_texture, conversion } = self;
         if let Some((conversion, picture)) = conversion {

@@ -10,9 +10,9 @@ use crate::process::{Draws, FramePlan, Pass};
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::view::RenderView;
 
-/// Whether a view tests for occlusion, and what may occlude there. The view tries frames with the test and frames without it, and
-/// keeps what is cheaper. The measure is the thread time of the test and of drawing what is left, divided by the number of objects
-/// in the frustum. The picture is the same either way.
+/// Whether a view tests for occlusion, and what may occlude there. The view tries frames with the test and frames
+/// without it, and keeps what is cheaper. The measure is the thread time of the test and of drawing what is left,
+/// divided by the number of objects in the frustum. The picture is the same either way.
 #[derive(Clone, Debug)]
 pub(super) struct OcclusionControl {
     /// The objects that may occlude others; `None` where the view cannot test for occlusion.
@@ -30,8 +30,8 @@ pub(super) struct OcclusionControl {
 const WITH_TEST: usize = 0;
 const WITHOUT_TEST: usize = 1;
 
-/// The longest pauses between two trials in frames. A trial without the test is the slow one where the test is worth its time, so
-/// it is rare. A trial with it is cheap, and comes soon after the camera has moved behind a wall.
+/// The longest pauses between two trials in frames. A trial without the test is the slow one where the test is worth
+/// its time, so it is rare. A trial with it is cheap, and comes soon after the camera has moved behind a wall.
 const MAX_PAUSES: [u64; 2] = [64, 512];
 
 impl OcclusionControl {
@@ -74,8 +74,8 @@ impl OcclusionControl {
         self.is_possible() && self.chosen == WITH_TEST
     }
 
-    /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None` where the view
-    /// cannot test for occlusion, or did not though it was chosen, because its picture is too large.
+    /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None`
+    /// where the view cannot test for occlusion, or did not though it was chosen, because its picture is too large.
     pub(super) fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let alternative = |(name, nanoseconds): (&'static str, _)| TuningAlternative { name: name.into(), nanoseconds };
         (self.is_possible() && has_tested == self.is_on()).then(|| TuningChoice {
@@ -87,8 +87,8 @@ impl OcclusionControl {
         })
     }
 
-    /// Reports the thread time of the frame, which had `objects` in the view's frustum and tested them or not, and chooses for the
-    /// next frame.
+    /// Reports the thread time of the frame, which had `objects` in the view's frustum and tested them or not, and
+    /// chooses for the next frame.
     pub(super) fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
         if objects == 0 {
             return;

@@ -83,7 +83,8 @@ impl OcclusionControls {
 
     /// Updates the control of each view with the times of a frame that was recorded.
     pub(in crate::frame) fn update(&mut self, tables: &FrameTables) {
-        // Of all views at most one begins a trial in a frame. Another one is first in each frame, so that none waits forever.
+        // Of all views at most one begins a trial in a frame. Another one is first in each frame, so that none waits
+        // forever.
         let (count, mut may_try) = (self.of_views.len().max(1), true);
         let first = self.of_views.iter().map(|control| control.frames() as usize).max().unwrap_or(0) % count;
         let (before, after) = self.of_views.split_at_mut(first);

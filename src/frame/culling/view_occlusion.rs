@@ -59,8 +59,8 @@ impl ViewOcclusion {
     }
 }
 
-/// Whether the coarse depth buffer is of a reasonable size: no backend draws a picture of more than 2²⁴ tiles of 16 pixels, and
-/// finer tiles would take more memory than the picture.
+/// Whether the coarse depth buffer is of a reasonable size: no backend draws a picture of more than 2²⁴ tiles of 16
+/// pixels, and finer tiles would take more memory than the picture.
 fn has_room(view: &RenderView, side: u32) -> bool {
     let [columns, rows] = view.camera.size.map(|pixels| u64::from(pixels.div_ceil(side.max(1))));
     columns * rows <= 1 << 24

@@ -2,8 +2,8 @@
 
 /// How far the engine may run ahead of the device: a trade of throughput against latency and memory (S 9.0).
 ///
-/// With `cpu` as the time of updating and recording a frame, and `device` as that of drawing it, a frame takes about this long, and its
-/// picture shows the input of about that long ago when it is drawn:
+/// With `cpu` as the time of updating and recording a frame, and `device` as that of drawing it, a frame takes about
+/// this long, and its picture shows the input of about that long ago when it is drawn:
 ///
 /// | | a frame every | latency | buffers of |
 /// | --- | --- | --- | --- |
@@ -12,7 +12,8 @@
 /// | `Triple` | the longer of both, also where single frames take longer | up to three times the longer | 3 frames |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Buffering {
-    /// The device draws a frame before the engine begins the next one (S figure 9.2): the least latency and memory. While one works the other waits.
+    /// The device draws a frame before the engine begins the next one (S figure 9.2): the least latency and memory.
+    /// While one works the other waits.
     SameFrame,
     /// The engine makes a frame while the device draws the one before (S figure 9.1).
     #[default]

@@ -40,7 +40,8 @@ impl FrameTimes {
         self.finished.saturating_duration_since(self.begun)
     }
 
-    /// How long the device had nothing to do before this frame, which follows `previous`: 0 if that was not finished yet.
+    /// How long the device had nothing to do before this frame, which follows `previous`: 0 if that was not finished
+    /// yet.
     pub fn device_idle_since(&self, previous: &Self) -> Duration {
         self.submitted.saturating_duration_since(previous.finished)
     }
@@ -70,7 +71,8 @@ pub enum FrameLoopError {
     /// The device took longer for the frame than its [limit](super::FrameLoop::set_device_limit).
     #[error("the device did not finish the frame: {0}")]
     Unfinished(#[from] FenceError),
-    /// What the engine does [after the submission](super::FrameSlot::submit_then) panicked, or the backend while the device drew.
+    /// What the engine does [after the submission](super::FrameSlot::submit_then) panicked, or the backend while the
+    /// device drew.
     #[error("the engine's code or the backend panicked after the submission of the frame: {message}")]
     Panicked {
         /// What the panic said.
@@ -79,8 +81,8 @@ pub enum FrameLoopError {
 }
 
 impl FrameLoopError {
-    /// What the backend or its device says, if that is why the frame is lost: after [`BackendError::DeviceLost`] the engine
-    /// [replaces the backend](super::FrameLoop::replace_backend).
+    /// What the backend or its device says, if that is why the frame is lost: after [`BackendError::DeviceLost`] the
+    /// engine [replaces the backend](super::FrameLoop::replace_backend).
     pub fn backend_error(&self) -> Option<&BackendError> {
         match self {
             Self::Submit(error) => error.backend_error(),

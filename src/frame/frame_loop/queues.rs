@@ -9,8 +9,8 @@ use parking_lot::{Condvar, Mutex};
 use super::Buffering;
 use crate::unwind::discard_all;
 
-/// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may begin another one.
-/// `Task` is what the device thread does.
+/// The frames of a loop on their way from recording to submission, to the device, and back to the engine, and who may
+/// begin another one. `Task` is what the device thread does.
 pub(super) struct LoopQueues<Task, Awaited, Finished> {
     state: Mutex<State<Task, Awaited, Finished>>,
     /// Notified at each change: no more than three threads wait.

@@ -14,7 +14,8 @@ use crate::unwind::Contained;
 /// The queues of a loop.
 pub(super) type FrameQueues<B> = LoopQueues<DeviceTask<B>, AwaitedFrame<B>, FinishedFrame<B>>;
 
-/// A frame's place among the frames in flight. It is free again when the device has drawn the frame, or when this is dropped.
+/// A frame's place among the frames in flight. It is free again when the device has drawn the frame, or when this is
+/// dropped.
 #[must_use = "a slot is freed when it is dropped"]
 pub struct FrameSlot<B: Backend>
 where
@@ -54,8 +55,8 @@ where
         self.submit_then(recorded, |_| ());
     }
 
-    /// Hands a recorded frame to the device thread, which calls `after` when the frame is submitted: to present it, for example. If `after`
-    /// panics, the frame is [reported](super::FrameLoopError::Panicked) as failed.
+    /// Hands a recorded frame to the device thread, which calls `after` when the frame is submitted: to present it, for
+    /// example. If `after` panics, the frame is [reported](super::FrameLoopError::Panicked) as failed.
     pub fn submit_then(self, recorded: Recorded<B>, after: impl FnOnce(&Submitted<B>) + Send + 'static) {
         let queues = Arc::clone(&self.queues);
         let after: AfterSubmission<B> = Box::new(after);

@@ -7,8 +7,8 @@ use super::super::tables::PassTable;
 use crate::backend::{Backend, BackendError};
 use crate::view;
 
-/// Checks the objects that changed, and computes what all views need to know about them. If these are all objects, it also uploads
-/// them, while they are in the worker's caches. An item is a block with changed objects.
+/// Checks the objects that changed, and computes what all views need to know about them. If these are all objects, it
+/// also uploads them, while they are in the worker's caches. An item is a block with changed objects.
 pub(super) struct Objects;
 
 impl<B: Backend> Stage<B> for Objects {
@@ -63,8 +63,8 @@ impl<B: Backend> Stage<B> for Bins {
     }
 }
 
-/// Uploads what changed of the object table since the backend's buffers were written, unless that is done. An item is a block of
-/// objects.
+/// Uploads what changed of the object table since the backend's buffers were written, unless that is done. An item is a
+/// block of objects.
 pub(super) struct Upload;
 
 impl<B: Backend> Stage<B> for Upload {

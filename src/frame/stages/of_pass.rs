@@ -69,8 +69,8 @@ impl<B: Backend> Stage<B> for Record {
     }
 }
 
-/// Finishes the pass: its commands are ready to submit. Of passes that are finished together, the job of the one that becomes ready last
-/// finishes all.
+/// Finishes the pass: its commands are ready to submit. Of passes that are finished together, the job of the one that
+/// becomes ready last finishes all.
 pub(super) struct Finish {
     pub(super) pass: usize,
 }
@@ -168,8 +168,8 @@ impl<B: Backend> Drop for TakenParts<'_, B> {
     }
 }
 
-/// Divides the time of passes that one job finished among their views, by their batches. When the job ends, its whole time is added to the
-/// view of its own pass.
+/// Divides the time of passes that one job finished among their views, by their batches. When the job ends, its whole
+/// time is added to the view of its own pass.
 fn attribute_time<B: Backend>(
     frame: &FrameContext<'_, B>,
     requests: &[PassRequest<'_>],

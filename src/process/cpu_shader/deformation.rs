@@ -14,7 +14,7 @@ pub trait DeformationCpuShader<R: Real>: Send + Sync {
 }
 
 impl CpuShader {
-    /// The same CPU shader for objects that are deformed. CPU shaders that draw no objects stay as they are.
+    /// The same CPU shader for objects that are deformed. CPU shaders that draw no objects do not change.
     pub fn deformed<D>(self, deformation: D) -> Self
     where
         D: DeformationCpuShader<f32> + DeformationCpuShader<f64> + 'static,

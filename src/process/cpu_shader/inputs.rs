@@ -60,8 +60,8 @@ pub struct PassInputs<'a, R: Real> {
     /// For each class of lights, by [`LightClass::index`](crate::view::LightClass::index): where they end among the
     /// lights. They begin where those of the class before end.
     pub light_ends: &'a [usize; LightClass::COUNT],
-    /// By layer of the shadow maps, the light that the layer belongs to, as that map shows it; empty unless a light has several
-    /// maps.
+    /// By layer of the shadow maps, the light that the layer belongs to, as that map shows it; empty unless a light has
+    /// several maps.
     pub lights_by_layer: &'a [ShaderLight<R>],
     /// Materials and their textures.
     pub materials: &'a dyn Materials<R>,
@@ -73,7 +73,8 @@ pub struct PassInputs<'a, R: Real> {
 
 impl<R: Real> PassInputs<'_, R> {
     /// The values of a material in a slot: those that a shader on the device has after
-    /// [`Declare::reads_materials`](crate::process::Declare::reads_materials), all zeros if the material is of another type.
+    /// [`Declare::reads_materials`](crate::process::Declare::reads_materials), all zeros if the material is of another
+    /// type.
     pub fn material_values<T: Pod>(&self, material: MaterialType<T>, slot: u32) -> T {
         let values = self.materials.values(slot).filter(|values| values.layout() == material.layout());
         values.map_or_else(T::zeroed, |values| bytemuck::pod_read_unaligned(values.bytes()))
@@ -87,11 +88,12 @@ pub struct ShaderColumns<'a> {
 }
 
 impl ShaderColumns<'_> {
-    /// The value that a column has for an object, by its index in the scene: [`ShaderObject::index`] or [`ObjectPixel::object`].
+    /// The value that a column has for an object, by its index in the scene: [`ShaderObject::index`] or
+    /// [`ObjectPixel::object`].
     ///
     /// # Panics
-    /// If no process of the frame [reads the column](crate::process::Declare::reads_column), or the scene has no such object. A
-    /// panic of a CPU shader is an error of the submission.
+    /// If no process of the frame [reads the column](crate::process::Declare::reads_column), or the scene has no such
+    /// object. A panic of a CPU shader is an error of the submission.
     pub fn get<T: Pod>(&self, column: ObjectColumn<T>, object: u32) -> T {
         let ColumnLayout { name, stride } = column.layout();
         let values = self.columns.iter().find(|(layout, _)| *layout == column.layout());
@@ -136,8 +138,8 @@ pub trait SampledTexture<R: Real>: Sync {
         self.load(coordinates, layer)
     }
 
-    /// `textureSampleLevel` with the `target_sampler`: between the pixels of a level, from (0, 0) at the picture's upper left to (1, 1) at
-    /// its lower right, and between levels. Beyond the edges it is as on them.
+    /// `textureSampleLevel` with the `target_sampler`: between the pixels of a level, from (0, 0) at the picture's
+    /// upper left to (1, 1) at its lower right, and between levels. Beyond the edges it is as on them.
     fn sample_level(&self, uv: Vector2<R>, layer: usize, level: R) -> Vector4<R> {
         trilinear(self.level_count(), level, |level| {
             bilinear(self.size_of_level(level), uv, |pixel| self.load_level(pixel, layer, level))
@@ -149,7 +151,8 @@ pub trait SampledTexture<R: Real>: Sync {
         self.load_cube_level(direction, 0)
     }
 
-    /// The pixel of a cube map's mip level, which the texture has, that lies in a direction of the world, of any length but 0.
+    /// The pixel of a cube map's mip level, which the texture has, that lies in a direction of the world, of any length
+    /// but 0.
     fn load_cube_level(&self, direction: Vector3<R>, level: usize) -> Vector4<R> {
         let [x, y, z] = direction.0;
         let zero = R::zero();
@@ -229,7 +232,8 @@ pub struct VertexInput<R> {
     pub uv: Vector2<R>,
     /// The value of [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), and white if the process does not read it.
     pub color: Vector3<R>,
-    /// The first other attributes that the process reads, in the order declared, each with 0 for the numbers that it lacks.
+    /// The first other attributes that the process reads, in the order declared, each with 0 for the numbers that it
+    /// lacks.
     pub attributes: [Vector4<R>; MAX_ATTRIBUTES],
 }
 

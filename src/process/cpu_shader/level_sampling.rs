@@ -2,7 +2,7 @@
 
 use crate::raster::{Real, Vector2, Vector4};
 
-/// Blends the two levels around a level of detail, of so many. `sample` samples a level.
+/// Blends the two levels around a level of detail, of `count` levels. `sample` samples a level.
 pub(super) fn trilinear<R: Real>(count: usize, level: R, sample: impl Fn(usize) -> Vector4<R>) -> Vector4<R> {
     // NaN counts as 0.
     let level = level.max(R::zero()).min(R::of_integer(count as i64 - 1));
@@ -16,7 +16,8 @@ pub(super) fn trilinear<R: Real>(count: usize, level: R, sample: impl Fn(usize) 
     one + (sample(finer + 1) - one) * fraction
 }
 
-/// Blends the four pixels around a point of a level of this size, from (0, 0) to (1, 1). Beyond the edges it is as on them.
+/// Blends the four pixels around a point of a level of this size, from (0, 0) to (1, 1). Beyond the edges it is as on
+/// them.
 pub(super) fn bilinear<R: Real>(
     size: [usize; 2],
     uv: Vector2<R>,

@@ -1,8 +1,8 @@
 //! CPU shaders: Rust versions of the WGSL shaders, which the software backend runs in their place.
 //!
 //! `interface` has what a process implements, `inputs` what it is given, `prelude` the functions of `drawloom.wgsl`,
-//! `built_in` those of WGSL itself, `level_sampling` how mip levels are sampled, and `deformation` what moves vertices before a
-//! shader gets them.
+//! `built_in` those of WGSL itself, `level_sampling` how mip levels are sampled, and `deformation` what moves vertices
+//! before a shader gets them.
 
 pub(super) mod built_in;
 mod deformation;

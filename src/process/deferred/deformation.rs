@@ -6,12 +6,14 @@ use crate::process::{Access, CommandDraws, Declare, Draws, RenderProcess, Shader
 use crate::scene::LayerMask;
 use crate::unwind::Contained;
 
-/// Vertex code of the engine's own for some objects: skinning, morph targets, wind. The [deferred pipeline](super::Deferred) draws
-/// these objects as it draws others, with their shadows, in processes of their own: `skinning: geometry buffer` and so on.
+/// Vertex code of the engine's own for some objects: skinning, morph targets, wind. The [deferred
+/// pipeline](super::Deferred) draws these objects as it draws others, with their shadows, in processes of their own:
+/// `skinning: geometry buffer` and so on.
 ///
-/// The objects' [bounds](crate::scene::SceneRef::bounds) contain what the shader returns: culling knows nothing else of it. Deformed
-/// objects do not hide others from occlusion culling. Blended ones are drawn after the blended objects that are not deformed. The
-/// pipeline's draw lists depend on layers, so they are made anew in each frame in which an object changes.
+/// The objects' [bounds](crate::scene::SceneRef::bounds) contain what the shader returns: culling knows nothing else of
+/// it. Deformed objects do not hide others from occlusion culling. Blended ones are drawn after the blended objects
+/// that are not deformed. The pipeline's draw lists depend on layers, so they are made anew in each frame in which an
+/// object changes.
 ///
 /// ```
 /// use drawloom::process::{Declare, Deferred, Deformation};
@@ -53,13 +55,13 @@ pub trait Deformation: Send + Sync {
     /// Its name, with which the names of its processes begin.
     fn name(&self) -> &str;
 
-    /// The objects that it deforms: those that belong to one of these layers, and to none of the deformations that were added earlier.
-    /// No other process of the pipeline draws them. Objects without layers of their own belong to all layers, and so to these. Called
-    /// when a plan is made.
+    /// The objects that it deforms: those that belong to one of these layers, and to none of the deformations that were
+    /// added earlier. No other process of the pipeline draws them. Objects without layers of their own belong to all
+    /// layers, and so to these. Called when a plan is made.
     fn layers(&self) -> LayerMask;
 
-    /// Declares the [attributes](Declare::reads_attribute) and the [columns](Declare::reads_column) that its shader reads. Called for
-    /// each process that draws its objects.
+    /// Declares the [attributes](Declare::reads_attribute) and the [columns](Declare::reads_column) that its shader
+    /// reads. Called for each process that draws its objects.
     fn declare(&self, declare: &mut Declare);
 
     /// WGSL with the function `deform`: see [`CommandDraws::deformation`].
@@ -70,8 +72,8 @@ pub trait Deformation: Send + Sync {
         Vec::new()
     }
 
-    /// What the software backend runs: a process's own CPU shader, after the deformation, as `Some(process.deformed(…))`. Without
-    /// it, frames return an error on that backend.
+    /// What the software backend runs: a process's own CPU shader, after the deformation, as
+    /// `Some(process.deformed(…))`. Without it, frames return an error on that backend.
     #[cfg(feature = "software")]
     fn cpu_shader(&self, process: crate::process::CpuShader) -> Option<crate::process::CpuShader> {
         let _ = process;
@@ -135,8 +137,8 @@ impl<D: Deformation> Deformation for Contained<D> {
     }
 }
 
-/// Splits what each of these processes draws: processes of the same names for the objects that are not deformed, then one for each
-/// process and deformation.
+/// Splits what each of these processes draws: processes of the same names for the objects that are not deformed, then
+/// one for each process and deformation.
 pub(super) fn split_by_deformation(
     processes: Vec<Arc<dyn RenderProcess>>,
     deformations: &[Arc<dyn Deformation>],
@@ -173,7 +175,8 @@ pub(super) fn undeformed(
     if excluded == LayerMask::NONE { process } else { Arc::new(Undeformed { process, excluded }) }
 }
 
-/// The name of the process that a process of this name is for the objects of a deformation; `None` if it is not for these.
+/// The name of the process that a process of this name is for the objects of a deformation; `None` if it is not for
+/// these.
 pub(super) fn undeformed_name<'a>(deformation: &dyn Deformation, name: &'a str) -> Option<&'a str> {
     name.strip_prefix(&prefix_of(deformation))
 }

@@ -51,7 +51,8 @@ impl GeometryBuffer {
         Self { name, shader: shader(SURFACE_SHADER, formats), formats, share, has_depth: false, has_colors: false }
     }
 
-    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in meshes without colours.
+    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in
+    /// meshes without colours.
     pub fn with_vertex_colors(self) -> Self {
         Self { shader: shader(COLORED_SURFACE_SHADER, self.formats), has_colors: true, ..self }
     }

@@ -18,24 +18,25 @@ use crate::view::{LightClass, ShadowMaps};
 /// out. An engine adds further processes to the renderer's builder.
 ///
 /// It has only the processes that a scene requires. A class of lights without lights has no process; without a light
-/// that casts shadows there is no shadow map; without an object with a blended material there is no transparency, whatever
-/// materials the assets have. When a scene's requirements change, so do the processes, in the same frame.
+/// that casts shadows there is no shadow map; without an object with a blended material there is no transparency,
+/// whatever materials the assets have. When a scene's requirements change, so do the processes, in the same frame.
 ///
 /// ```text
 ///  shadow casters ───────────────────────────┐                  one view for each light that casts shadows
 ///  depth pre-pass → geometry buffer → lights, a process per class → transparency → post-processing
 /// ```
 ///
-/// [`Quality::radiance_sum`] sets how lights and blended objects add up in `radiance`. With [`RadianceSum::HalfFloat`], each process
-/// adds to it. The others have further processes, whose names are known to [`Self::keep`], [`Self::leave_out`] and [`Self::replace`]
-/// with every quality and on every device:
+/// [`Quality::radiance_sum`] sets how lights and blended objects add up in `radiance`. With [`RadianceSum::HalfFloat`],
+/// each process adds to it. The others have further processes, whose names are known to [`Self::keep`],
+/// [`Self::leave_out`] and [`Self::replace`] with every quality and on every device:
 ///
-/// - "sum of lights" follows the processes of lights with [`RadianceSum::Float`]. With [`RadianceSum::Shader`], and on devices that do
-///   not blend floats, it takes their place, and "tiles of lights" precedes it: that marks the lights that reach each tile.
+/// - "sum of lights" follows the processes of lights with [`RadianceSum::Float`]. With [`RadianceSum::Shader`], and on
+///   devices that do not blend floats, it takes their place, and "tiles of lights" precedes it: that marks the lights
+///   that reach each tile.
 /// - "sum of blended objects" follows transparency, on devices that blend floats.
 ///
-/// The shipped "sum of lights" reads the tiles, so renderers refuse a pipeline that leaves out the tiles alone: with [`RadianceSum::Float`]
-/// on every device.
+/// The shipped "sum of lights" reads the tiles, so renderers refuse a pipeline that leaves out the tiles alone: with
+/// [`RadianceSum::Float`] on every device.
 ///
 /// A process of lights or of transparency that the engine [replaces](Self::replace) draws over `radiance` as ever.
 ///
@@ -104,8 +105,9 @@ impl Deferred {
         Self { formats, ..self }
     }
 
-    /// Sets whether the colours of vertices, [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), are drawn; the default is no. Diffuse colours
-    /// are multiplied by them. Meshes without colours look as without this setting, and cost as much as those with colours.
+    /// Sets whether the colours of vertices, [`VERTEX_COLOR`](crate::scene::VERTEX_COLOR), are drawn; the default is
+    /// no. Diffuse colours are multiplied by them. Meshes without colours look as without this setting, and cost as
+    /// much as those with colours.
     pub fn vertex_colors(self, vertex_colors: bool) -> Self {
         Self { vertex_colors, ..self }
     }
@@ -117,8 +119,8 @@ impl Deferred {
 
     /// Applies a [`Quality`]: to the depth pre-pass, to normals and diffuse colours in the geometry buffer, to the sum
     /// of lights, to the post-processing steps added so far and to the shadow maps if there are any. It changes neither
-    /// the format of `radiance` nor how far the shadow maps of directional lights reach. A panic of a step unwinds to the
-    /// caller; [`RendererBuilder::quality`](crate::RendererBuilder::quality) makes it an error.
+    /// the format of `radiance` nor how far the shadow maps of directional lights reach. A panic of a step unwinds to
+    /// the caller; [`RendererBuilder::quality`](crate::RendererBuilder::quality) makes it an error.
     pub fn quality(mut self, quality: &Quality) -> Self {
         self.depth_pre_pass = quality.depth_pre_pass;
         let (normal, diffuse) = (quality.normals.into(), quality.diffuse.into());
@@ -160,9 +162,9 @@ impl Deferred {
         self
     }
 
-    /// Keeps the process called `name` in every frame, whether the scene requires it or not. The picture is the same to the byte, and
-    /// frames whose scene does not require the process pay for its passes: an engine does so to keep a change of the scene from
-    /// changing the plan and making pipelines. A process that is left out stays out.
+    /// Keeps the process called `name` in every frame, whether the scene requires it or not. The picture is the same to
+    /// the byte, and frames whose scene does not require the process pay for its passes: an engine does so to keep a
+    /// change of the scene from changing the plan and making pipelines. A process that is left out stays out.
     pub fn keep(mut self, name: impl Into<String>) -> Self {
         self.kept.push(name.into());
         self
@@ -174,8 +176,8 @@ impl Deferred {
         self
     }
 
-    /// The target that the frame outputs. Calls [`PostStep::process`] if processes are left out: a panic of a step unwinds
-    /// to the caller.
+    /// The target that the frame outputs. Calls [`PostStep::process`] if processes are left out: a panic of a step
+    /// unwinds to the caller.
     pub fn output(&self) -> &'static str {
         if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
@@ -194,8 +196,8 @@ impl Deferred {
         !self.blends_floats && self.would_sum_blended_objects()
     }
 
-    /// The names of all processes that a frame may have, whatever the scene, in order. Asks steps and deformations, whose
-    /// panics unwind to the caller.
+    /// The names of all processes that a frame may have, whatever the scene, in order. Asks steps and deformations,
+    /// whose panics unwind to the caller.
     pub fn names(&self) -> Vec<String> {
         self.build(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
     }
@@ -393,8 +395,8 @@ impl Deferred {
         self.blends_floats && self.would_sum_blended_objects()
     }
 
-    /// Whether a backend that blends floats sums blended objects in floats: all of them or none, because those that are drawn later
-    /// cover the others.
+    /// Whether a backend that blends floats sums blended objects in floats: all of them or none, because those that are
+    /// drawn later cover the others.
     fn would_sum_blended_objects(&self) -> bool {
         let draws_blended = |name: &str| {
             let mut deformed = self.deformations.iter().map(|deformation| undeformed_name(&**deformation, name));
@@ -418,7 +420,8 @@ impl Deferred {
         self.with_deformed(processes).into_iter().chain(sum).collect()
     }
 
-    /// These processes, which draw objects, and those that draw deformed objects, except in place of processes that are left out.
+    /// These processes, which draw objects, and those that draw deformed objects, except in place of processes that are
+    /// left out.
     fn with_deformed(&self, processes: Vec<Arc<dyn RenderProcess>>) -> Vec<Arc<dyn RenderProcess>> {
         let is_left_out = |process: &Arc<dyn RenderProcess>| self.left_out.iter().any(|name| name == process.name());
         let (left_out, drawn): (Vec<_>, Vec<_>) = processes.into_iter().partition(is_left_out);

@@ -1,10 +1,11 @@
 //! Places for an engine's processes in a frame of the deferred pipeline.
 
-/// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all of them,
-/// whatever the scene requires: see [`Declare::at`](crate::process::Declare::at). What its targets hold is listed at
-/// [`GeometryBuffer`](super::GeometryBuffer).
+/// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all
+/// of them, whatever the scene requires: see [`Declare::at`](crate::process::Declare::at). What its targets hold is
+/// listed at [`GeometryBuffer`](super::GeometryBuffer).
 ///
-/// A process needs a place where what it reads and writes leaves its order open, as that of all that change `radiance` does.
+/// A process needs a place where what it reads and writes leaves its order open, as that of all that change `radiance`
+/// does.
 ///
 /// ```text
 ///  geometry buffer │ lights │ transparency │ post-processing │
@@ -15,7 +16,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Place {
-    /// Before the depth pre-pass and the geometry buffer. Shadow maps are drawn in views of their own, which come first.
+    /// Before the depth pre-pass and the geometry buffer. Shadow maps are drawn in views of their own, which come
+    /// first.
     BeforeGeometry,
     /// When `radiance` holds ambient and emitted light.
     AfterGeometry,

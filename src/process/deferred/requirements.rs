@@ -4,8 +4,8 @@ use super::{LightVolumes, ShadowCasters, Transparency};
 use crate::scene::{Blend, Camera, Light, LightKind, Material, SceneRef, ViewKind};
 use crate::view::LightClass;
 
-/// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what the scene
-/// draws: materials of the assets that no object has require nothing.
+/// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what
+/// the scene draws: materials of the assets that no object has require nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Requirements {
     /// A bit for each class of lights in the scene, by [`LightClass::index`].
@@ -21,8 +21,9 @@ pub struct Requirements {
 const _: () = assert!(LightClass::COUNT <= 8);
 
 impl Requirements {
-    /// What a scene with these valid lights requires, some of whose objects [need transparency](Self::needs_transparency) if
-    /// `transparency` is true. If `shadows` is false, lights count as casting none.
+    /// What a scene with these valid lights requires, some of whose objects [need
+    /// transparency](Self::needs_transparency) if `transparency` is true. If `shadows` is false, lights count as
+    /// casting none.
     pub fn of(lights: &[Light], transparency: bool, shadows: bool) -> Self {
         let mut requirements = Self { transparency, ..Self::default() };
         for light in lights {
@@ -32,13 +33,14 @@ impl Requirements {
         Self { shadow_maps: requirements.shadows(), ..requirements }
     }
 
-    /// Whether objects with this material need transparency: it is blended, and of no material type. Objects with a material type
-    /// are left to the process that reads it.
+    /// Whether objects with this material need transparency: it is blended, and of no material type. Objects with a
+    /// material type are left to the process that reads it.
     pub fn needs_transparency(material: &Material) -> bool {
         material.blend != Blend::None && material.values.is_none()
     }
 
-    /// Whether an object of the scene needs transparency. Looks at all objects; a renderer keeps a witness from frame to frame instead.
+    /// Whether an object of the scene needs transparency. Looks at all objects; a renderer keeps a witness from frame
+    /// to frame instead.
     pub(crate) fn any_needs_transparency(scene: &SceneRef<'_>) -> bool {
         scene.materials.iter().any(|material| scene.assets.get(*material).is_ok_and(Self::needs_transparency))
     }
@@ -50,8 +52,8 @@ impl Requirements {
         requirements
     }
 
-    /// Requirements whose plans have every shader that a plan may have: transparency reads shadow maps or does not, and shadow casters are
-    /// drawn for hemispherical lights too or are not.
+    /// Requirements whose plans have every shader that a plan may have: transparency reads shadow maps or does not, and
+    /// shadow casters are drawn for hemispherical lights too or are not.
     pub(crate) fn with_every_shader() -> [Self; 3] {
         let without = |is_absent: fn(LightClass) -> bool| {
             let mut requirements = Self::all();
@@ -105,7 +107,8 @@ impl Requirements {
         LightClass::all().any(|class| class.shadowed && self.lights(class))
     }
 
-    /// Whether shadow maps are drawn: a light of the scene casts shadows, or the pipeline [keeps](super::Deferred::keep) their process.
+    /// Whether shadow maps are drawn: a light of the scene casts shadows, or the pipeline
+    /// [keeps](super::Deferred::keep) their process.
     pub fn shadow_maps(&self) -> bool {
         self.shadow_maps || self.shadows()
     }

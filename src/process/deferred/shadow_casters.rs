@@ -12,9 +12,9 @@ use crate::scene::ViewKind;
 /// Objects whose material [is a mask](crate::scene::Material::is_masked) cast shadows of the mask's shape, also if the
 /// material has a [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its
 /// `texture` at the vertices' first texture coordinates decide. If a type finds its holes in another way, its materials
-/// have an `alpha_cutoff` above 0 and an `opacity` of 0, so that they cast no shadow here, and a process of the engine draws
-/// them into [`TARGET`](Self::TARGET) after this one, which the pipeline [keeps](super::Deferred::keep) if processes of
-/// the engine read the maps.
+/// have an `alpha_cutoff` above 0 and an `opacity` of 0, so that they cast no shadow here, and a process of the engine
+/// draws them into [`TARGET`](Self::TARGET) after this one, which the pipeline [keeps](super::Deferred::keep) if
+/// processes of the engine read the maps.
 ///
 /// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same
 /// time (M 10.4, L 5). The first six steps of L 4.2.2 are: set the viewport, the depth buffer, the depth state and the

@@ -40,7 +40,8 @@ impl Transparency {
         Self { shader: shader(SURFACE_SHADER, maps, false), maps: maps.copied(), has_colors: false, sums: false }
     }
 
-    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in meshes without colours.
+    /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in
+    /// meshes without colours.
     pub fn with_vertex_colors(self) -> Self {
         let shader = shader(COLORED_SURFACE_SHADER, self.maps.as_ref(), self.sums);
         Self { shader, has_colors: true, ..self }

@@ -126,8 +126,8 @@ pub enum PlanError {
         /// What is wrong.
         problem: &'static str,
     },
-    /// A target that cannot have [mip levels](crate::process::Declare::mipmapped) is declared to have them, or processes disagree whether it
-    /// has them.
+    /// A target that cannot have [mip levels](crate::process::Declare::mipmapped) is declared to have them, or
+    /// processes disagree whether it has them.
     #[error("process {process:?} declares the mip levels of target {target:?} wrongly: {problem}")]
     MipLevels {
         /// The process.
@@ -353,8 +353,8 @@ pub enum ProcessError {
         /// The target.
         target: String,
     },
-    /// A raw pass declares that it draws into or samples a target, beside histories and layers, or another process that it writes,
-    /// changes or reads one by commands of its own.
+    /// A raw pass declares that it draws into or samples a target, beside histories and layers, or another process that
+    /// it writes, changes or reads one by commands of its own.
     #[error(
         "process {process:?} declares target {target:?} with an access of raw passes but draws no raw pass, or draws one with an access of drawn passes"
     )]

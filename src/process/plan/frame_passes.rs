@@ -17,11 +17,12 @@ pub(crate) struct FramePasses {
 }
 
 impl FramePasses {
-    /// Orders parts, which are submitted as a whole, by what their passes sample of other views, and by the `dependencies` between
-    /// processes. Those whose order is open stay in theirs.
+    /// Orders parts, which are submitted as a whole, by what their passes sample of other views, and by the
+    /// `dependencies` between processes. Those whose order is open stay in theirs.
     ///
     /// # Errors
-    /// If views sample each other in a circle, or views of a part that is submitted process by process sample each other.
+    /// If views sample each other in a circle, or views of a part that is submitted process by process sample each
+    /// other.
     pub(super) fn new(
         processes: &[PlannedProcess],
         dependencies: &[(usize, usize)],

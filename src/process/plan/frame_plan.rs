@@ -65,8 +65,8 @@ impl FramePlan {
         Self::for_views(chain, processes, outputs, (&[], &|_| true))
     }
 
-    /// The plan of frames that have the kinds of views that `is_present` tells. The processes of the chain that draw in main views draw in
-    /// those of `with_main` too.
+    /// The plan of frames that have the kinds of views that `is_present` tells. The processes of the chain that draw in
+    /// main views draw in those of `with_main` too.
     ///
     /// # Errors
     /// See [`PlanError`].
@@ -153,8 +153,8 @@ impl FramePlan {
         &self.view_groups
     }
 
-    /// The passes of a frame with these views, in submission order: each process in each view of its kind whose picture is not
-    /// cached. A view comes after those that it [samples](crate::process::Declare::samples_view).
+    /// The passes of a frame with these views, in submission order: each process in each view of its kind whose picture
+    /// is not cached. A view comes after those that it [samples](crate::process::Declare::samples_view).
     ///
     /// # Errors
     /// If views sample each other in a circle.
@@ -163,9 +163,9 @@ impl FramePlan {
         FramePasses::new(&self.processes, &self.dependencies, views, parts)
     }
 
-    /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such views, it is
-    /// the target of this name in views of another kind: its pixel has the same format. Where a history has no copy for that reason, it is
-    /// the target that it would be copied from.
+    /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such
+    /// views, it is the target of this name in views of another kind: its pixel has the same format. Where a history
+    /// has no copy for that reason, it is the target that it would be copied from.
     pub fn sampled_target(&self, views: ViewKind, name: &str) -> Option<&PlannedTarget> {
         sampled_target(&self.targets, views, name)
     }
@@ -220,7 +220,8 @@ impl FramePlan {
     }
 
     /// # Errors
-    /// If a scene with these material types lacks what the processes read, select or order by, or has it in another size.
+    /// If a scene with these material types lacks what the processes read, select or order by, or has it in another
+    /// size.
     pub(crate) fn check_scene(
         &self,
         draws: &[Draws<'_>],
@@ -391,8 +392,8 @@ mod tests {
         assert!(plan(Vec::new()).is_err());
     }
 
-    /// A process of some kind of view that writes and reads these targets; layered ones are written by clearing, and read as
-    /// layers of the kind that is given.
+    /// A process of some kind of view that writes and reads these targets; layered ones are written by clearing, and
+    /// read as layers of the kind that is given.
     fn view_process(
         name: &'static str,
         kind: ViewKind,

@@ -27,9 +27,9 @@ pub struct PlannedProcess {
 }
 
 impl PlannedProcess {
-    /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if `is_present` says that
-    /// frames have such views; if it draws in main views, for those of `with_main` too. What draws once a frame does so in the kind that it
-    /// declares.
+    /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if
+    /// `is_present` says that frames have such views; if it draws in main views, for those of `with_main` too. What
+    /// draws once a frame does so in the kind that it declares.
     ///
     /// # Errors
     /// If one of them panics, or `declare` declares more than one depth target.
@@ -73,8 +73,8 @@ impl PlannedProcess {
     /// What the process draws in this frame.
     ///
     /// # Errors
-    /// If the process panics, its draws do not fit its declaration, as only raw passes use targets by their own commands, or it
-    /// has a resource of a size that no buffer can have.
+    /// If the process panics, its draws do not fit its declaration, as only raw passes use targets by their own
+    /// commands, or it has a resource of a size that no buffer can have.
     pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
         let process = || self.name.clone();
         let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };

@@ -25,8 +25,8 @@ pub struct PlannedTarget {
     pub multisampled: bool,
     /// Whether it has [mip levels](crate::process::Declare::mipmapped).
     pub mipmapped: bool,
-    /// Whether it is an output of the frame: of a pipeline, or [named](crate::RendererBuilder::output) by the engine. Targets of reflections
-    /// are none where main views have the same one.
+    /// Whether it is an output of the frame: of a pipeline, or [named](crate::RendererBuilder::output) by the engine.
+    /// Targets of reflections are none where main views have the same one.
     pub output: bool,
     /// The target whose content is copied here at the end of each frame; `None` for one that processes write.
     pub copy_of: Option<String>,
@@ -46,13 +46,14 @@ impl AttachmentExtent {
     pub const PICTURE: Self = Self { size: TargetSize::Picture, multisampled: false };
 }
 
-/// The targets of all processes, in the order in which they are first written, then the copies of those whose history is read. `outputs`
-/// are the names of the frame's outputs.
+/// The targets of all processes, in the order in which they are first written, then the copies of those whose history
+/// is read. `outputs` are the names of the frame's outputs.
 ///
 /// # Errors
-/// If processes disagree about a target's format, layers, size or mip levels, give mip levels to one that cannot have them, use depth as
-/// colour or colour as depth, draw into targets of different sizes or numbers of samples, resolve one that cannot be resolved, or read the
-/// history of a target that is not written, is multisampled or is drawn in layers.
+/// If processes disagree about a target's format, layers, size or mip levels, give mip levels to one that cannot have
+/// them, use depth as colour or colour as depth, draw into targets of different sizes or numbers of samples, resolve
+/// one that cannot be resolved, or read the history of a target that is not written, is multisampled or is drawn in
+/// layers.
 pub(super) fn targets_of(processes: &[PlannedProcess], outputs: &[String]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut targets = written_targets(processes)?;
     for (planned, name, access) in accesses(processes) {
@@ -155,7 +156,8 @@ fn size_of(declaration: &Declaration, target: &str) -> TargetSize {
 }
 
 /// # Errors
-/// If a process sets the size of a target that it does not create, or that is drawn in layers, or sets one that no target can have.
+/// If a process sets the size of a target that it does not create, or that is drawn in layers, or sets one that no
+/// target can have.
 fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
     for (target, size) in &planned.declaration.sizes {
         let created =
@@ -213,7 +215,8 @@ fn multisampling_error(planned: &PlannedProcess, target: &str, problem: &'static
 }
 
 /// # Errors
-/// If a process draws into targets of different sizes or numbers of samples, tests depth of another, or resolves into another format.
+/// If a process draws into targets of different sizes or numbers of samples, tests depth of another, or resolves into
+/// another format.
 fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<(), PlanError> {
     let mut attached = attached_targets(planned, targets);
     let Some(first) = attached.next() else { return Ok(()) };
@@ -269,8 +272,8 @@ impl Attachments {
 }
 
 /// # Errors
-/// If a process blends with a target that cannot be blended, or has blend equations for another number of targets. Objects without
-/// equations are exempt: where the target cannot be blended, their materials' blending is ignored.
+/// If a process blends with a target that cannot be blended, or has blend equations for another number of targets.
+/// Objects without equations are exempt: where the target cannot be blended, their materials' blending is ignored.
 pub(super) fn check_blending(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
@@ -354,7 +357,8 @@ fn check_once_a_frame(processes: &[PlannedProcess]) -> Result<(), PlanError> {
 /// The copies of targets whose content of the frame before is read, in the same view or in others.
 ///
 /// # Errors
-/// If a target cannot have a history. What a process samples of other views may be missing: [`check_sampled_views`] reports it.
+/// If a target cannot have a history. What a process samples of other views may be missing: [`check_sampled_views`]
+/// reports it.
 ///
 /// [`check_sampled_views`]: super::sampled_views::check_sampled_views
 fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Result<Vec<PlannedTarget>, PlanError> {

@@ -7,11 +7,12 @@ use crate::graph::{CompileError, FrameGraph, Schedule};
 use crate::process::{Access, BufferAccess, previous_name};
 use crate::scene::ViewKind;
 
-/// Orders the processes by what they read and write, and drops those on which no output depends. `added` are the processes in
-/// descending priority, each with its slot in the chain if it has one. The nodes of the schedule are their indices.
+/// Orders the processes by what they read and write, and drops those on which no output depends. `added` are the
+/// processes in descending priority, each with its slot in the chain if it has one. The nodes of the schedule are their
+/// indices.
 ///
-/// What a process samples of other views is an output of those: which view that is, and the order of views, depends on the scene. So
-/// targets that the remaining processes sample are outputs too, and so are those whose history they read.
+/// What a process samples of other views is an output of those: which view that is, and the order of views, depends on
+/// the scene. So targets that the remaining processes sample are outputs too, and so are those whose history they read.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -103,8 +104,8 @@ fn process_graph(
     Ok(graph)
 }
 
-/// The name of a process, with the kind of view if it draws in main views too. Two processes of the same name and kind keep it, so that the
-/// graph reports it.
+/// The name of a process, with the kind of view if it draws in main views too. Two processes of the same name and kind
+/// keep it, so that the graph reports it.
 pub(super) fn node_name(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> String {
     let views = planned.declaration.views;
     let count = |kind: ViewKind| {

@@ -7,7 +7,8 @@ use crate::process::{Access, SampledShape, SampledView, source_of_previous};
 use crate::scene::{Camera, ViewKind, child_name};
 use crate::view::RenderView;
 
-/// The views that passes sample: those with a process that [samples other views](crate::process::Declare::samples_view).
+/// The views that passes sample: those with a process that [samples other
+/// views](crate::process::Declare::samples_view).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SampledViews {
     /// Of each such pass, by its process's [sampled views](crate::process::Declaration::sampled_views).
@@ -100,8 +101,8 @@ pub(super) fn layer_name(view: &str, layer: u32) -> String {
 }
 
 /// # Errors
-/// If a process samples a target of other views that no process writes in any view, or that cannot be a layer of an array, or if it
-/// samples more layers than a texture has.
+/// If a process samples a target of other views that no process writes in any view, or that cannot be a layer of an
+/// array, or if it samples more layers than a texture has.
 pub(super) fn check_sampled_views(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Result<(), PlanError> {
     for planned in processes {
         for (target, access) in &planned.declaration.accesses {

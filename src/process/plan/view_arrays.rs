@@ -23,9 +23,9 @@ pub(crate) struct ViewArray {
 }
 
 impl ViewArray {
-    /// Whether it can have the texture of an array of the same target in the frame before, with what the layers hold: both have the same
-    /// name and shapes, and no view that had a layer is gone, because the layer would still hold its picture. Otherwise its texture is a
-    /// new one, and all its views must be drawn.
+    /// Whether it can have the texture of an array of the same target in the frame before, with what the layers hold:
+    /// both have the same name and shapes, and no view that had a layer is gone, because the layer would still hold its
+    /// picture. Otherwise its texture is a new one, and all its views must be drawn.
     pub(crate) fn keeps_texture_of(&self, before: &Self) -> bool {
         let is_gone = |(before, now): (&Option<usize>, &Option<usize>)| before.is_some() && now.is_none();
         let is_alike = (&self.name, &self.shapes) == (&before.name, &before.shapes);
@@ -68,8 +68,8 @@ impl FramePlan {
     }
 }
 
-/// The arrays that views of this kind form under the name `sampled`: the shared one, and one for each parent view. Each has its full name
-/// and, by layer, the index of a view.
+/// The arrays that views of this kind form under the name `sampled`: the shared one, and one for each parent view. Each
+/// has its full name and, by layer, the index of a view.
 fn numbered_views(
     views: &[RenderView],
     kind: ViewKind,

@@ -5,7 +5,8 @@ use crate::process::Access;
 use crate::scene::ViewKind;
 use crate::view::RenderView;
 
-/// The views of some kinds, and the order in which their passes are submitted. A plan has its groups in submission order.
+/// The views of some kinds, and the order in which their passes are submitted. A plan has its groups in submission
+/// order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewGroup {
     /// The kinds of the views, ascending.
@@ -24,9 +25,9 @@ pub enum ViewOrder {
 }
 
 impl ViewGroup {
-    /// The passes of the group's views in submission order, in parts that nothing is submitted between: for each kind what draws once a
-    /// frame, then a part for each view; or one part for all if they are submitted process by process. A view whose picture is cached has
-    /// none.
+    /// The passes of the group's views in submission order, in parts that nothing is submitted between: for each kind
+    /// what draws once a frame, then a part for each view; or one part for all if they are submitted process by
+    /// process. A view whose picture is cached has none.
     pub(super) fn parts(&self, processes: &[PlannedProcess], views: &[RenderView]) -> Vec<Vec<Pass>> {
         let (mut parts, mut is_begun): (Vec<Vec<Pass>>, _) = (Vec::new(), [false; ViewKind::COUNT]);
         let drawn = |(_, view): &(usize, &RenderView)| self.kinds.contains(&view.kind()) && !view.is_cached();
@@ -56,9 +57,9 @@ impl ViewGroup {
 
 /// Groups the kinds of views that a plan draws. `edges` are the dependencies between processes, by index.
 ///
-/// A kind is submitted after the kinds that it depends on. Kinds that depend on each other are one group, process by process; so
-/// is a kind whose views read the layers of all views of that kind, or that has a process which draws once a frame, after one that draws
-/// in each view.
+/// A kind is submitted after the kinds that it depends on. Kinds that depend on each other are one group, process by
+/// process; so is a kind whose views read the layers of all views of that kind, or that has a process which draws once
+/// a frame, after one that draws in each view.
 pub(super) fn view_groups(processes: &[PlannedProcess], edges: &[(usize, usize)]) -> Vec<ViewGroup> {
     let kind_of = |process: usize| processes[process].declaration.views;
     let mut kinds: Vec<_> = processes.iter().map(|planned| planned.declaration.views).collect();

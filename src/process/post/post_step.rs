@@ -10,7 +10,8 @@ use crate::quality::Quality;
 /// The chain begins at the target `radiance`, which is linear, and ends at the target `picture`. Each step samples the
 /// target of the step before it, and writes a target of its own, in a format that it chooses; before
 /// [`ToneMapping`](super::ToneMapping) that is [`Format::Rgba16Float`](crate::process::Format::Rgba16Float), from then
-/// on one that is sRGB encoded, such as [`Format::Rgba8Srgb`](crate::process::Format::Rgba8Srgb). A step may sample other targets too, such as `depth`.
+/// on one that is sRGB encoded, such as [`Format::Rgba8Srgb`](crate::process::Format::Rgba8Srgb). A step may sample
+/// other targets too, such as `depth`.
 ///
 /// A closure from the names of the two targets to a process is a step:
 ///

@@ -10,8 +10,9 @@ use crate::scene::AttributeLayout;
 /// [`TransformPrecision::Absolute`](crate::quality::TransformPrecision::Absolute). The backend adds that line to the
 /// shaders of a frame's processes; whoever compiles the prelude elsewhere adds it themselves.
 ///
-/// `VertexInput` has further fields in the shaders of processes that [read attributes](crate::process::Declare::reads_attribute), and
-/// `deform` is the process's own if it [has one](crate::process::CommandDraws::deformation).
+/// `VertexInput` has further fields in the shaders of processes that [read
+/// attributes](crate::process::Declare::reads_attribute), and `deform` is the process's own if it [has
+/// one](crate::process::CommandDraws::deformation).
 pub const SHADER_PRELUDE: &str = concat!(
     include_str!("drawloom.wgsl"),
     "\nconst CLAMPS_CORNERS: bool = true;\n",

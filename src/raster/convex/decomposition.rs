@@ -144,7 +144,8 @@ mod tests {
 
     #[test]
     fn a_dent_deeper_than_half_the_tolerance_is_not_convex() {
-        // With a point in the middle of a side, the plane of a triangle there is off the opposite edge by twice the dent.
+        // With a point in the middle of a side, the plane of a triangle there is off the opposite edge by twice the
+        // dent.
         for (dent, is_closed) in [(0.0, true), (0.4, true), (0.6, false)] {
             let (mut points, mut triangles) = box_of(Vec3::ONE);
             triangles.truncate(10);
@@ -259,8 +260,8 @@ mod tests {
         let fan: Vec<_> = (0..12).map(|corner| [12, corner, (corner + 1) % 12]).collect();
         let (corners, area) = only_part(&ring(12, 0.0).chain([Vec3::ZERO]).collect::<Vec<_>>(), &fan);
         assert!(corners == 12 && (area - 3.0).abs() < 1e-6, "{corners} {area}");
-        // A grid of four times two rectangles has three corners inside, one after the other. The edges between columns are the longer
-        // ones, so each row is a polygon before both are one.
+        // A grid of four times two rectangles has three corners inside, one after the other. The edges between columns
+        // are the longer ones, so each row is a polygon before both are one.
         let points: Vec<_> = (0..15).map(|index| Vec3::new((index % 5) as f32, (index / 5 * 2) as f32, 0.0)).collect();
         let rectangles = (0..8).map(|rectangle| rectangle / 4 * 5 + rectangle % 4);
         let triangles: Vec<_> = rectangles.flat_map(|at| [[at, at + 1, at + 6], [at, at + 6, at + 5]]).collect();

@@ -51,8 +51,8 @@ proptest! {
 /// A corner is outside a plane only by more than a 4096th of |x| + |y| + |z| + |w|, whichever of them is the largest.
 #[test]
 fn a_triangle_is_off_screen_if_it_is_outside_by_more_than_the_tolerance() {
-    // The axis of each plane, and the sign with which a corner's distance from it is w − sign × coordinate. Where the sign is 0, it is the far
-    // plane, and the distance is z.
+    // The axis of each plane, and the sign with which a corner's distance from it is w − sign × coordinate. Where the
+    // sign is 0, it is the far plane, and the distance is z.
     for (axis, sign) in [(2, 1.0), (2, 0.0), (0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
         let others = [0, 1, 2].into_iter().filter(|other| *other != axis);
         for largest in others.chain([3]) {

@@ -7,7 +7,8 @@ use crate::view::UsedMeshes;
 /// The convex parts of the meshes that objects use, computed when a mesh is first used or changes.
 #[derive(Debug, Default)]
 pub struct OccluderMeshes {
-    /// The identity and the revision of the collection at the last [`OccluderMeshes::sync`], and the revision of the used meshes.
+    /// The identity and the revision of the collection at the last [`OccluderMeshes::sync`], and the revision of the
+    /// used meshes.
     synced: Option<(u64, u64, u64)>,
     /// For each slot, the mesh's revision and its parts.
     parts: Vec<(u64, Vec<ConvexPart>)>,

@@ -118,7 +118,8 @@ impl OcclusionCuller {
     }
 
     /// Tests the objects of a word whose bits in `visible` are set; bit 0 is `first`, a multiple of
-    /// [`VisibleSet::OBJECTS_PER_WORD`]. Returns a mask of the hidden objects. Call it after all strips have been drawn.
+    /// [`VisibleSet::OBJECTS_PER_WORD`]. Returns a mask of the hidden objects. Call it after all strips have been
+    /// drawn.
     pub fn hidden(&self, scene: &SceneRef<'_>, table: &ObjectTable, first: usize, visible: u64) -> u64 {
         let Some(camera) = self.camera.as_ref().filter(|_| visible != 0) else { return 0 };
         let objects = table.block(first / ObjectTable::BLOCK_SIZE);
@@ -173,8 +174,8 @@ impl OcclusionCuller {
 }
 
 impl Occluders {
-    /// Drops all candidates but the largest, and projects their parts, nearest first, which keeps the nearness of merged tiles as great as
-    /// possible.
+    /// Drops all candidates but the largest, and projects their parts, nearest first, which keeps the nearness of
+    /// merged tiles as great as possible.
     fn project_largest(
         &mut self,
         camera: &OcclusionCamera,

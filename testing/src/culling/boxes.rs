@@ -1,4 +1,5 @@
-//! Objects whose boxes almost touch a frustum, and objects anywhere, culled through the whole path from scene to result.
+//! Objects whose boxes almost touch a frustum, and objects anywhere, culled through the whole path from scene to
+//! result.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -234,7 +235,8 @@ impl Solid {
     }
 }
 
-/// A scale from a millionth to ten million, mirrored or not, or a degenerate one: zero, subnormal, very small or very uneven.
+/// A scale from a millionth to ten million, mirrored or not, or a degenerate one: zero, subnormal, very small or very
+/// uneven.
 fn any_scale(random: &mut Random) -> Vec3 {
     let even = magnitude(random, -6.0, 7.0) as f32;
     let signs = Vec3::from_array([(); 3].map(|()| if random.below(4) == 0 { -1.0 } else { 1.0 }));

@@ -5,9 +5,10 @@ use drawloom::scene::{Camera, Projection, ViewKind};
 
 use crate::random::Random;
 
-/// A camera with random parameters from the whole range of valid values, often at its limits: fields of view from 0.1° to
-/// 179°, pictures a hundred times as wide as high and the other way round, near planes from 1e-5 m, far planes up to 1e9 m
-/// and at infinity, positions up to 4e9 m from the world's origin, perspective and orthographic, and shadow views.
+/// A camera with random parameters from the whole range of valid values, often at its limits: fields of view from 0.1°
+/// to 179°, pictures a hundred times as wide as high and the other way round, near planes from 1e-5 m, far planes up to
+/// 1e9 m and at infinity, positions up to 4e9 m from the world's origin, perspective and orthographic, and shadow
+/// views.
 pub fn any_camera(random: &mut Random) -> Camera {
     let position = match random.below(4) {
         0 => DVec3::ZERO,

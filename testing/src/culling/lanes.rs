@@ -4,7 +4,8 @@ use drawloom::glam::{Vec3, Vec4};
 
 use super::naive::Naive;
 
-/// Bounding spheres in world space, an array for each coordinate. The last word is filled up with spheres that nothing sees.
+/// Bounding spheres in world space, an array for each coordinate. The last word is filled up with spheres that nothing
+/// sees.
 #[derive(Clone, Debug, Default)]
 pub struct SphereArrays {
     x: Vec<f32>,
@@ -28,8 +29,8 @@ impl SphereArrays {
         arrays
     }
 
-    /// Writes a mask of the visible spheres for each word of 64. It is inlined, so that a caller can compile it for several
-    /// instruction sets; `multiply_add(a, b, c)` is a × b + c in the best way of that set.
+    /// Writes a mask of the visible spheres for each word of 64. It is inlined, so that a caller can compile it for
+    /// several instruction sets; `multiply_add(a, b, c)` is a × b + c in the best way of that set.
     #[inline(always)]
     pub fn visible(&self, naive: &Naive, words: &mut [u64], multiply_add: impl Fn(f32, f32, f32) -> f32) {
         let [x, y, z, radii] = [&self.x, &self.y, &self.z, &self.radii].map(|axis| axis.as_chunks::<WORD>().0);

@@ -1,4 +1,5 @@
-//! The usual culling test: planes from an f32 clip-from-world matrix (Gribb and Hartmann 2001), and f32 world positions.
+//! The usual culling test: planes from an f32 clip-from-world matrix (Gribb and Hartmann 2001), and f32 world
+//! positions.
 
 use drawloom::glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
 use drawloom::scene::{Camera, Projection};

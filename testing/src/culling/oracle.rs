@@ -83,7 +83,8 @@ impl Oracle {
         [right, left, upper, lower, local.z - self.near, self.far - local.z]
     }
 
-    /// Classifies a volume around a point relative to the camera. `reaches` is its extent towards each plane, `size` that in any direction.
+    /// Classifies a volume around a point relative to the camera. `reaches` is its extent towards each plane, `size`
+    /// that in any direction.
     pub fn classify(&self, center: DVec3, reaches: [f64; 6], size: f64) -> Classification {
         let offsets = [self.edges[0].offset, self.edges[1].offset, self.near, self.far];
         let known = offsets.map(|offset| if offset.is_finite() { offset.abs() } else { 0.0 });

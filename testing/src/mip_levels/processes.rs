@@ -12,8 +12,8 @@ use drawloom::scene::{Blend, ViewKind};
 /// What [`Overlay`] adds.
 pub(super) const OVERLAY: f64 = 0.25;
 
-/// Draws a pattern, a quarter of level 1 of what the view held in the frame before, and a quarter of level 2 of what the view `mirror`
-/// held, into `pyramid`, a target with mip levels.
+/// Draws a pattern, a quarter of level 1 of what the view held in the frame before, and a quarter of level 2 of what
+/// the view `mirror` held, into `pyramid`, a target with mip levels.
 #[derive(Clone, Copy, Debug)]
 struct Pyramid;
 
@@ -21,7 +21,8 @@ struct Pyramid;
 #[derive(Clone, Copy, Debug)]
 struct Overlay;
 
-/// Shows levels of the view's own `pyramid` and of those of other views: of one as a picture, of two as an array, and of six as a cube map.
+/// Shows levels of the view's own `pyramid` and of those of other views: of one as a picture, of two as an array, and
+/// of six as a cube map.
 #[derive(Clone, Copy, Debug)]
 struct Levels;
 
@@ -199,7 +200,7 @@ pub(super) fn loaded_pixel<R: Real>(
     texture.load_level([x.min(width - 1), y.min(height - 1)], layer, level)
 }
 
-/// The first channel of such a pixel.
+/// The first channel of that pixel.
 fn loaded<R: Real>(texture: &dyn SampledTexture<R>, pixel: [usize; 2], layer: usize, level: usize) -> R {
     loaded_pixel(texture, pixel, layer, level)[0]
 }

@@ -1,4 +1,5 @@
-//! Random vertices of rotated and scaled objects anywhere in the world, at least as far from the camera as they are large.
+//! Random vertices of rotated and scaled objects anywhere in the world, at least as far from the camera as they are
+//! large.
 
 use std::f64::consts::TAU;
 
@@ -92,8 +93,8 @@ pub fn vertex_of(camera: Camera, random: &mut Random) -> Case {
     Case { camera, position, orientation, scale, vertex }
 }
 
-/// A random point in the picture, relative to the camera, and the distance that limits the mesh's radius. For orthographic views the
-/// limit is the size of the mesh in the picture.
+/// A random point in the picture, relative to the camera, and the distance that limits the mesh's radius. For
+/// orthographic views the limit is the size of the mesh in the picture.
 fn visible_point(camera: &Camera, random: &mut Random) -> (DVec3, f64) {
     let (x, y) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
     let aspect = f64::from(camera.size[0]) / f64::from(camera.size[1]);

@@ -11,8 +11,8 @@ use drawloom::wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::vertex::{ShaderInput, VertexShader};
 
-/// A compute stage behind the text that every shader of a frame begins with. Each dispatch computes one vertex, with the functions that the
-/// vertex shader of [`SURFACE_SHADER`](drawloom::process::SURFACE_SHADER) calls.
+/// A compute stage behind the text that every shader of a frame begins with. Each dispatch computes one vertex, with
+/// the functions that the vertex shader of [`SURFACE_SHADER`](drawloom::process::SURFACE_SHADER) calls.
 pub struct ShaderOnDevice {
     device: wgpu::Device,
     queue: wgpu::Queue,

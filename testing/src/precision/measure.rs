@@ -24,7 +24,8 @@ pub struct Errors {
     /// The greatest error of the shaders' computation, in pixels.
     pub greatest: f64,
     pub mean: f64,
-    /// The greatest error as an angle, in units of 2⁻²⁴ radians: see [`pixels_per_radian`]. Meaningless for orthographic views.
+    /// The greatest error as an angle, in units of 2⁻²⁴ radians: see [`pixels_per_radian`]. Meaningless for
+    /// orthographic views.
     pub greatest_angle: f64,
     /// The greatest error of absolute f32 positions, in pixels. A lost vertex counts as the picture's diagonal.
     pub absolute_greatest: f64,

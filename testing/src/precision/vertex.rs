@@ -19,8 +19,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// The vertex relative to the camera, along the world's axes, in f64. It subtracts the camera's position from the object's first,
-    /// which loses nothing relevant; a sum in world space would round to 10⁻⁷ m at 10⁹ m.
+    /// The vertex relative to the camera, along the world's axes, in f64. It subtracts the camera's position from the
+    /// object's first, which loses nothing relevant; a sum in world space would round to 10⁻⁷ m at 10⁹ m.
     pub fn relative(&self) -> DVec3 {
         let turned = unit(self.orientation) * (self.scale.as_dvec3() * self.vertex.as_dvec3());
         (self.position - self.camera.position) + turned
@@ -48,8 +48,8 @@ impl Case {
         self.pixels(clip)
     }
 
-    /// The position computed from f32 world positions: object to world, world to view and view to clip space, each with a
-    /// matrix of its own, as in most engines.
+    /// The position computed from f32 world positions: object to world, world to view and view to clip space, each with
+    /// a matrix of its own, as in most engines.
     pub fn absolute(&self, view: &RenderView) -> DVec2 {
         let camera = &self.camera;
         let model = Mat4::from_scale_rotation_translation(self.scale, self.orientation, self.position.as_vec3());
@@ -66,8 +66,8 @@ impl Case {
         self.truth().distance(DVec2::new(width, height) * 0.5)
     }
 
-    /// Where a device draws a vertex at this position in clip space, in pixels. It is computed in f64, so that only the error of the shader is
-    /// measured.
+    /// Where a device draws a vertex at this position in clip space, in pixels. It is computed in f64, so that only the
+    /// error of the shader is measured.
     pub fn drawn_at(&self, clip: Vec4) -> DVec2 {
         let clip = clip.as_dvec4();
         self.pixels(DVec2::new(clip.x, clip.y) / clip.w)
@@ -95,7 +95,8 @@ pub trait VertexShader {
     fn clip_positions(&mut self, inputs: &[ShaderInput<'_>]) -> Result<Vec<Vec4>, Box<dyn Error>>;
 }
 
-/// `relative_position` and `clip_position` of `drawloom.wgsl` in Rust, in f32 and in the same order. It needs no adapter.
+/// `relative_position` and `clip_position` of `drawloom.wgsl` in Rust, in f32 and in the same order. It needs no
+/// adapter.
 pub struct ShaderInRust;
 
 impl VertexShader for ShaderInRust {
@@ -121,9 +122,9 @@ fn projected(camera: &Camera, clip: Vec4) -> Vec4 {
     Vec4::new(position.x / across, position.y / across, 0.0, 1.0)
 }
 
-/// The maximum number of pixels per radian at this distance from the centre of a perspective picture, which is stretched
-/// towards its edges. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, with the derivative
-/// f(1 + tan² a).
+/// The maximum number of pixels per radian at this distance from the centre of a perspective picture, which is
+/// stretched towards its edges. The focal length f is in pixels; a ray at the angle a from the axis is at f·tan a, with
+/// the derivative f(1 + tan² a).
 pub fn pixels_per_radian(camera: &Camera, eccentricity: f64) -> f64 {
     match camera.projection {
         Projection::Perspective { field_of_view } => {

@@ -14,8 +14,8 @@ use super::{cube, sized, square};
 /// The size of its picture.
 pub const SIZE: [u32; 2] = [96, 64];
 
-/// Boxes on a floor before a wall, some of them behind panes of each blend mode, and a light of every class that reaches
-/// visible objects. Opaque objects have three draw states: a list, a mirrored list, and a double-sided strip.
+/// Boxes on a floor before a wall, some of them behind panes of each blend mode, and a light of every class that
+/// reaches visible objects. Opaque objects have three draw states: a list, a mirrored list, and a double-sided strip.
 pub fn everything() -> Scene {
     let mut scene = Scene::new();
     let list = scene.add(square(Topology::TriangleList)).unwrap();
@@ -138,8 +138,9 @@ pub fn glasses(scene: &Scene) -> Vec<(Handle<Material>, Material)> {
 /// The objects of [`everything_with_mirror`] but the mirror.
 pub const WORLD: LayerMask = LayerMask::layer(0);
 
-/// The scene with a mirror above the boxes, an object of the layer `mirror`, and with the camera that draws what it reflects: the view
-/// `mirror` of the camera. In the picture of that camera nothing transparent is in front of the mirror.
+/// The scene with a mirror above the boxes, an object of the layer `mirror`, and with the camera that draws what it
+/// reflects: the view `mirror` of the camera. In the picture of that camera nothing transparent is in front of the
+/// mirror.
 pub fn everything_with_mirror(mirror: LayerMask) -> Scene {
     let mut scene = everything();
     for handle in scene.objects().collect::<Vec<_>>() {

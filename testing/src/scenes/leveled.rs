@@ -47,8 +47,8 @@ pub fn globe() -> Mesh {
     mesh.with_levels(levels).unwrap()
 }
 
-/// How far the deepest triangle is below the unit sphere that its corners are on. All surfaces around the centre that lie between this
-/// depth and the sphere are within it of each other.
+/// How far the deepest triangle is below the unit sphere that its corners are on. All surfaces around the centre that
+/// lie between this depth and the sphere are within it of each other.
 fn depth_below_unit_sphere(vertices: &[Vertex], indices: &[u32]) -> f32 {
     let position = |index: &u32| Vec3::from(vertices[*index as usize].position).as_dvec3();
     let distances = indices.chunks_exact(3).map(|corners| {
@@ -58,7 +58,8 @@ fn depth_below_unit_sphere(vertices: &[Vertex], indices: &[u32]) -> f32 {
     ((1.0 - distances.fold(1.0, f64::min)) as f32).next_up()
 }
 
-/// The mesh with a level of half of its triangles, whose error is larger than the mesh; as it is if it has one triangle.
+/// The mesh with a level of half of its triangles, whose error is larger than the mesh; unchanged if it has one
+/// triangle.
 pub fn halved(mesh: &Mesh) -> Mesh {
     let corners = mesh.indices().len();
     let half = match mesh.topology() {
@@ -81,8 +82,8 @@ pub fn whole(mesh: &Mesh) -> Mesh {
     mesh.clone().with_levels([]).unwrap()
 }
 
-/// A square with sides of 2 m that faces +Z, whose levels are narrower by their errors on the left and on the right. Each level draws the
-/// same two triangles several times, the mesh itself eight times.
+/// A square with sides of 2 m that faces +Z, whose levels are narrower by their errors on the left and on the right.
+/// Each level draws the same two triangles several times, the mesh itself eight times.
 fn plate() -> Mesh {
     let errors = [0.0].into_iter().chain((0..LevelOfDetail::MAX_COUNT).map(|level| 0.005 * (1 << level) as f32));
     let corner = |x: f32, y: f32| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
@@ -93,8 +94,9 @@ fn plate() -> Mesh {
     Mesh::new("plate", Topology::TriangleList, vertices, indices(0)).unwrap().with_levels(levels).unwrap()
 }
 
-/// Plates of different colours that shine by themselves, in a row that leads away from the camera, before a black background. The camera is
-/// so far away that an error is about as large at the nearest point of a plate's bounds as at the plate.
+/// Plates of different colours that shine by themselves, in a row that leads away from the camera, before a black
+/// background. The camera is so far away that an error is about as large at the nearest point of a plate's bounds as at
+/// the plate.
 pub fn plates() -> Scene {
     let mut scene = Scene::new();
     let plate = scene.add(plate()).unwrap();
@@ -110,8 +112,8 @@ pub fn plates() -> Scene {
     scene
 }
 
-/// The largest distance in pixels between a pixel that is `marked` and the nearest one that is at the border, or differs from a neighbour in
-/// one of some pictures, which are rows of `width` pixels.
+/// The largest distance in pixels between a pixel that is `marked` and the nearest one that is at the border, or
+/// differs from a neighbour in one of some pictures, which are rows of `width` pixels.
 pub fn distance_from_edges<T: PartialEq>(pictures: &[&[T]], width: usize, marked: impl Fn(usize) -> bool) -> f64 {
     let coordinates = |pixel: usize| [(pixel % width) as f64, (pixel / width) as f64];
     let count = pictures[0].len();

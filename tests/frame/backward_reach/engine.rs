@@ -75,8 +75,8 @@ impl RenderProcess for ShowDiffuse {
     }
 }
 
-/// The processes in the order of their indices, as far as they draw in the same views. A frame without reflections does not know the
-/// names of processes that draw in these alone, so such a process names the others.
+/// The processes in the order of their indices, as far as they draw in the same views. A frame without reflections does
+/// not know the names of processes that draw in these alone, so a process that does names the others.
 fn ordered(own: &[OwnProcess]) -> Vec<Own> {
     let mut ordered: Vec<Own> = own
         .iter()

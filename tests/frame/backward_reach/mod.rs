@@ -1,5 +1,5 @@
-//! A frame is the backward reach of its outputs: over random scenes and random processes of an engine, it has the passes, the targets and
-//! the shadow maps that a naive oracle predicts, and no others.
+//! A frame is the backward reach of its outputs: over random scenes and random processes of an engine, it has the
+//! passes, the targets and the shadow maps that a naive oracle predicts, and no others.
 
 mod cases;
 mod engine;

@@ -1,4 +1,5 @@
-//! The oracle: every process that could exist, with what it reads and writes, and a walk backwards from the outputs to a fixpoint.
+//! The oracle: every process that could exist, with what it reads and writes, and a walk backwards from the outputs to
+//! a fixpoint.
 
 use drawloom::process::Place;
 
@@ -13,7 +14,7 @@ pub struct Frame {
     pub targets: Vec<(String, String)>,
     /// One for each shadow map.
     pub shadow_views: Vec<String>,
-    /// The first view for which there is no process: such a frame is an error, and has nothing.
+    /// The first view for which there is no process: that frame is an error, and has nothing.
     pub refused: Option<String>,
 }
 
@@ -250,7 +251,8 @@ fn shadow_views(world: &World) -> Vec<String> {
     views
 }
 
-/// Whether a camera sees a part of the ball around a light: the light is ahead of it, and beside its axis by less than it is far.
+/// Whether a camera sees a part of the ball around a light: the light is ahead of it, and beside its axis by less than
+/// it is far.
 fn sees(camera: &CameraSpec, light: &LightSpec) -> bool {
     let [x, y, z] = light.position;
     let ahead = if camera.looks_down { camera.z - z } else { z - camera.z };

@@ -48,7 +48,8 @@ const STEPS: &[Step] = &[
     }),
 ];
 
-/// The pipelines for objects in maps, for opaque objects and for glass, for eight classes of lights, and for tone mapping.
+/// The pipelines for objects in maps, for opaque objects and for glass, for eight classes of lights, and for tone
+/// mapping.
 const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 8 + 1;
 
 /// Makes this many of the glass materials opaque.

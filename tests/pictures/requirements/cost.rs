@@ -63,8 +63,8 @@ pub fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Faile
     Ok((cost, picture))
 }
 
-/// Checks a scene without a feature. Its cost and its picture must equal those of a bare pipeline without a process for the
-/// feature, and its cost must be lower than that of the scene with everything, by `saved`.
+/// Checks a scene without a feature. Its cost and its picture must equal those of a bare pipeline without a process for
+/// the feature, and its cost must be lower than that of the scene with everything, by `saved`.
 pub fn expect_saved(
     full: &(Cost, Picture),
     context: &str,
@@ -84,8 +84,8 @@ pub fn expect_saved(
     expect_changed(context, &full.1, &picture)
 }
 
-/// Compares what is saved with what should be. How many bytes, draws and commands that is depends on the objects, so of these none may be
-/// added, and shadow maps save some.
+/// Compares what is saved with what should be. How many bytes, draws and commands that is depends on the objects, so of
+/// these none may be added, and shadow maps save some.
 pub fn expect_difference(context: &str, saved: Cost, expected: Cost) -> Result<(), Failed> {
     let Cost { buffers, buffer_bytes, draws, commands, .. } = saved;
     let counted = Cost { buffers, buffer_bytes, draws, commands, ..expected };

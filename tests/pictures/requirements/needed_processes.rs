@@ -24,8 +24,8 @@ fn planned(fixture: &Fixture, is_wanted: impl Fn(ViewKind) -> bool) -> Vec<Strin
     processes.filter(|planned| is_wanted(planned.declaration.views)).map(|planned| planned.name.clone()).collect()
 }
 
-/// The pictures without each of these processes; fails if others than those expected are read by others. One renderer draws all pictures,
-/// because compiling the pipelines takes most of the time.
+/// The pictures without each of these processes; fails if others than those expected are read by others. One renderer
+/// draws all pictures, because compiling the pipelines takes most of the time.
 fn without_each(fixture: &mut Fixture, scene: &Scene, names: &[String]) -> Result<Vec<(String, Picture)>, Failed> {
     let (mut pictures, mut needed_by_others) = (Vec::new(), Vec::new());
     for name in names {
@@ -56,7 +56,8 @@ pub fn every_process_is_needed() -> Result<(), Failed> {
     }
 }
 
-/// Each process that draws in the mirror's view is needed for what the mirror shows, where the main view's own processes draw nothing.
+/// Each process that draws in the mirror's view is needed for what the mirror shows, where the main view's own
+/// processes draw nothing.
 pub fn every_process_of_a_mirror_is_needed() -> Result<(), Failed> {
     let scene = everything_with_mirror(SURFACE);
     let mut empty_mirror = everything_with_mirror(SURFACE);

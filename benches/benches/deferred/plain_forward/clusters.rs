@@ -1,5 +1,6 @@
-//! Clustered forward shading (Olsson et al. 2012), binned on the CPU (Persson 2013): the picture is divided into tiles, and each tile
-//! by distance. Each cluster has a list of the lights that reach it, and a pixel loops over that of its cluster.
+//! Clustered forward shading (Olsson et al. 2012), binned on the CPU (Persson 2013): the picture is divided into tiles,
+//! and each tile by distance. Each cluster has a list of the lights that reach it, and a pixel loops over that of its
+//! cluster.
 
 use std::array;
 use std::error::Error;

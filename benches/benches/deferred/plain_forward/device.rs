@@ -48,7 +48,8 @@ pub struct SurfacePipeline<'a> {
     pub shader: &'a str,
     /// The technique's own bindings.
     pub layout: Option<&'a wgpu::BindGroupLayout>,
-    /// Whether it adds to what was drawn at exactly the same depth, with the entry point `lit_vertex` instead of `vertex`.
+    /// Whether it adds to what was drawn at exactly the same depth, with the entry point `lit_vertex` instead of
+    /// `vertex`.
     pub adds: bool,
 }
 
@@ -343,7 +344,8 @@ fn buffer_group(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, buffers: 
     group(device, layout, buffers.iter().map(|buffer| buffer.as_entire_binding()).collect())
 }
 
-/// The materials, and textures that none of them has: the shaders are those of the other pipelines, which may have textures.
+/// The materials, and textures that none of them has: the shaders are those of the other pipelines, which may have
+/// textures.
 fn material_group(device: &wgpu::Device, materials: &wgpu::Buffer) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
     let storage = buffer_binding(wgpu::BufferBindingType::Storage { read_only: true });
     let array = texture_binding(wgpu::TextureViewDimension::D2Array, true);

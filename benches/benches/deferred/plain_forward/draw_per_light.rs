@@ -1,5 +1,5 @@
-//! Adds light by light: all objects are drawn once without lights, and then, for each light, the objects that its sphere reaches,
-//! within the rectangle of the picture that it reaches. (In L 2 each light draws all objects: N × L.)
+//! Adds light by light: all objects are drawn once without lights, and then, for each light, the objects that its
+//! sphere reaches, within the rectangle of the picture that it reaches. (In L 2 each light draws all objects: N × L.)
 
 use std::error::Error;
 

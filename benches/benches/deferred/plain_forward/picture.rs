@@ -59,7 +59,8 @@ impl Picture {
     }
 }
 
-/// The smallest sphere around what a light reaches: how far its centre is from the light, in the light's direction, and its radius.
+/// The smallest sphere around what a light reaches: how far its centre is from the light, in the light's direction, and
+/// its radius.
 fn bounding_sphere(light: &GpuLight) -> (f32, f32) {
     let cosine = light.cone_end;
     if light.kind != SPOT || cosine <= 0.0 {
@@ -77,7 +78,8 @@ fn bounding_sphere(light: &GpuLight) -> (f32, f32) {
 /// [`GpuLight::kind`].
 const SPOT: u32 = 2;
 
-/// The slopes of the lines through the origin that touch a disc, which is farther away than its radius (Mara and McGuire 2013).
+/// The slopes of the lines through the origin that touch a disc, which is farther away than its radius (Mara and
+/// McGuire 2013).
 fn tangents([across, ahead]: [f32; 2], radius: f32) -> [f32; 2] {
     let root = radius * (across * across + ahead * ahead - radius * radius).sqrt();
     let divisor = ahead * ahead - radius * radius;

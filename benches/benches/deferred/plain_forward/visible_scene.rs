@@ -18,7 +18,8 @@ pub struct VisibleScene {
     pub lights: Vec<GpuLight>,
 }
 
-/// An array for each coordinate. Each is filled up to whole groups of [`Spheres::GROUP`] with spheres infinitely far away.
+/// An array for each coordinate. Each is filled up to whole groups of [`Spheres::GROUP`] with spheres infinitely far
+/// away.
 #[derive(Default)]
 pub struct Spheres {
     pub x: Vec<f32>,

@@ -24,8 +24,8 @@ pub fn open(backend: BackendName) -> Result<RenderResources, Failure> {
     }
 }
 
-/// A device on wgpu's no-op backend with what a desktop's graphics card has: Bevy culls and draws indirectly there, with bindless
-/// materials.
+/// A device on wgpu's no-op backend with what a desktop's graphics card has: Bevy culls and draws indirectly there,
+/// with bindless materials.
 fn noop() -> Result<RenderResources, Failure> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::NOOP;
@@ -48,7 +48,8 @@ fn noop() -> Result<RenderResources, Failure> {
     ))
 }
 
-/// The features that Bevy's renderer looks for. The adapter also claims features of formats that it then has no answer for.
+/// The features that Bevy's renderer looks for. The adapter also claims features of formats that it then has no answer
+/// for.
 const FEATURES: wgpu::Features = wgpu::Features::INDIRECT_FIRST_INSTANCE
     .union(wgpu::Features::IMMEDIATES)
     .union(wgpu::Features::MULTI_DRAW_INDIRECT_COUNT)

@@ -101,8 +101,8 @@ impl Bevy {
         Ok(Self { app, mode, device, queue, targets, probe })
     }
 
-    /// Frames of a pipelined app overlap. Their time is that from the first submit to the last one, so the burst's start and its end,
-    /// where only one world works, are not charged.
+    /// Frames of a pipelined app overlap. Their time is that from the first submit to the last one, so the burst's
+    /// start and its end, where only one world works, are not charged.
     fn pipelined_burst(&mut self, frames: u32) -> Result<FrameTime, Failure> {
         self.probe.start();
         let start = Instant::now();

@@ -1,7 +1,7 @@
 //! A `bevy_ecs` world, whose columns are lent without copying them.
 //!
-//! All objects have the same components, so they are rows of one table, and each component is one slice. An engine with objects in
-//! several tables would gather the slices, or draw a scene for each.
+//! All objects have the same components, so they are rows of one table, and each component is one slice. An engine with
+//! objects in several tables would gather the slices, or draw a scene for each.
 
 use bevy_ecs::component::Component;
 use bevy_ecs::query::QueryState;

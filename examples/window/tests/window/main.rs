@@ -1,6 +1,7 @@
 //! The window as a user meets it: on a virtual display with a window manager, with keys and a mouse.
 //!
-//! Without Xvfb, xdotool and Openbox those that need a display show as ignored. With `DRAWLOOM_REQUIRE_DISPLAY` set they fail instead.
+//! Without Xvfb, xdotool and Openbox those that need a display show as ignored. With `DRAWLOOM_REQUIRE_DISPLAY` set
+//! they fail instead.
 
 mod display;
 mod program;

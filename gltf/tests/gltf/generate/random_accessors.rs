@@ -64,7 +64,7 @@ fn edge<const N: usize>(values: &[[f32; N]], pick: fn(f32, f32) -> f32) -> Vec<f
     (0..N).map(|axis| values.iter().map(|value| value[axis]).reduce(pick).unwrap_or(0.0)).collect()
 }
 
-/// A buffer view of vertices, so many bytes apart.
+/// A buffer view of vertices, `stride` bytes apart.
 fn strided(builder: &mut Builder, bytes: &[u8], stride: usize) -> usize {
     let view = builder.view(bytes);
     builder.json["bufferViews"][view]["byteStride"] = json!(stride);

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 /// The track of each slice, counted from 0: the first one on which it lies inside another slice or overlaps none.
 ///
-/// Slices are given by when they began and ended, ascending by when they began. Of two that began at once the longer one
-/// comes first.
+/// Slices are given by when they began and ended, ascending by when they began. Of two that began at once the longer
+/// one comes first.
 pub(super) fn nested_tracks(slices: impl IntoIterator<Item = (Duration, Duration)>) -> Vec<usize> {
     // For each track the ends of its open slices, the innermost last.
     let mut tracks: Vec<Vec<Duration>> = Vec::new();

@@ -1,4 +1,5 @@
-//! The spans of a run's nodes: when each could have been opened, when it was, and which dependency arrows begin and end at it.
+//! The spans of a run's nodes: when each could have been opened, when it was, and which dependency arrows begin and end
+//! at it.
 
 use std::iter;
 use std::time::Duration;
@@ -40,8 +41,8 @@ pub(super) struct NodeSpans {
     pub(super) left_out: u64,
 }
 
-/// The chunks of a run and its [empty](Run::empty) ones, each with whether it is empty. In topological order: they ascend by
-/// node.
+/// The chunks of a run and its [empty](Run::empty) ones, each with whether it is empty. In topological order: they
+/// ascend by node.
 pub(super) fn slices(run: &Run) -> impl Iterator<Item = (bool, &Chunk)> {
     let (mut chunks, mut empty) = (run.chunks.iter().peekable(), run.empty.iter().peekable());
     iter::from_fn(move || {

@@ -18,9 +18,9 @@ const DEVICE: usize = 2;
 /// Writes a log in the Trace Event Format (Duca and Sinclair, "Trace Event Format"), for `ui.perfetto.dev` and
 /// `chrome://tracing`.
 ///
-/// Times are microseconds with three decimals, on the log's own axis. There is a track for each worker, one for each thread
-/// that has spans, and below them the device's. Spans and passes that overlap without one lying inside the other get tracks
-/// of their own.
+/// Times are microseconds with three decimals, on the log's own axis. There is a track for each worker, one for each
+/// thread that has spans, and below them the device's. Spans and passes that overlap without one lying inside the other
+/// get tracks of their own.
 ///
 /// | what | events | category |
 /// | --- | --- | --- |
@@ -33,10 +33,10 @@ const DEVICE: usize = 2;
 /// | frames | `i` | `frame` |
 /// | counters, and `ready nodes`: how many nodes were ready but not opened | `C` | `counter` |
 ///
-/// The arguments of a chunk are its labels, its items, the frame, the index of its run among [`Log::runs`], when its node was
-/// opened (`opened_us`), how long after the last of the node's dependencies it began (`queued_us`), and whether it was
-/// stolen. `otherData` says how much was dropped, and how many dependencies have no arrow because there is no chunk at one
-/// of their ends, as in a run that failed or is not complete.
+/// The arguments of a chunk are its labels, its items, the frame, the index of its run among [`Log::runs`], when its
+/// node was opened (`opened_us`), how long after the last of the node's dependencies it began (`queued_us`), and
+/// whether it was stolen. `otherData` says how much was dropped, and how many dependencies have no arrow because there
+/// is no chunk at one of their ends, as in a run that failed or is not complete.
 ///
 /// Events are written one by one, so the trace is never in memory as a whole.
 ///
@@ -59,8 +59,8 @@ const DEVICE: usize = 2;
 /// ```
 ///
 /// # Errors
-/// Returns the error of `writer`, or [`InvalidInput`](io::ErrorKind::InvalidInput) if the log refers to a node, a worker or a
-/// thread that it does not list, or if a node waits for a later one.
+/// Returns the error of `writer`, or [`InvalidInput`](io::ErrorKind::InvalidInput) if the log refers to a node, a
+/// worker or a thread that it does not list, or if a node waits for a later one.
 pub fn write_chrome_trace(log: &Log, writer: impl io::Write) -> io::Result<()> {
     check_log(log).map_err(|problem| io::Error::new(io::ErrorKind::InvalidInput, problem))?;
     let events = EventWriter::new(BufWriter::new(writer))?;
@@ -158,9 +158,9 @@ impl<W: io::Write> TraceWriter<'_, W> {
         slice.end()
     }
 
-    /// Writes the ends of the arrows at a slice. They directly follow the slice, because Perfetto binds an arrow to the last
-    /// slice it has read of those that begin at the same time. They lie a nanosecond inside the slice if it is long enough,
-    /// because `chrome://tracing` binds an arrow at the border of two slices to the one that ends.
+    /// Writes the ends of the arrows at a slice. They directly follow the slice, because Perfetto binds an arrow to the
+    /// last slice it has read of those that begin at the same time. They lie a nanosecond inside the slice if it is
+    /// long enough, because `chrome://tracing` binds an arrow at the border of two slices to the one that ends.
     fn write_arrows(&mut self, slice: usize, chunk: &Chunk, span: &NodeSpan) -> io::Result<()> {
         let track = track_of(chunk.worker);
         let nanosecond = Duration::from_nanos(1);

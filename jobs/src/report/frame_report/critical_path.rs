@@ -11,8 +11,8 @@ use super::worker_spans::WorkerSpan;
 use crate::report::intervals::{difference, union};
 use crate::timeline::{Log, Span};
 
-/// The name of the step from the end of a run's last node to the end of the run: workers find that nothing is left, and the
-/// calling thread is woken if it sleeps.
+/// The name of the step from the end of a run's last node to the end of the run: workers find that nothing is left, and
+/// the calling thread is woken if it sleeps.
 const END_OF_RUN: &str = "end of the run";
 
 /// All steps of the frame, from its beginning to its end.
@@ -67,8 +67,8 @@ fn clip(mut step: Step, within: &Range<Duration>) -> Option<Step> {
     (!is_outside).then_some(step)
 }
 
-/// What threads did in these intervals, which lie outside of all runs. Each part belongs to its innermost span, which is the
-/// one that began last.
+/// What threads did in these intervals, which lie outside of all runs. Each part belongs to its innermost span, which
+/// is the one that began last.
 fn steps_of_spans(log: &Log, frame: u64, intervals: &[Range<Duration>], runs: &[RunSpans<'_>]) -> Vec<Step> {
     let mut spans: Vec<_> = log.spans_of(frame).collect();
     spans.sort_by_key(|span| span.began);

@@ -18,7 +18,8 @@ const MAX_LINES: usize = 10;
 const MAX_QUEUE_WAITS: usize = 5;
 const MAX_WORKERS: usize = 16;
 
-/// How many groups are named in one line: those that workers ran during a wait, and those with the longest shares of the path.
+/// How many groups are named in one line: those that workers ran during a wait, and those with the longest shares of
+/// the path.
 const MAX_MEANWHILE: usize = 3;
 const MAX_SHARES_IN_SUMMARY: usize = 3;
 

@@ -23,11 +23,11 @@ pub struct FrameReport {
     pub frame: u64,
     /// When it began.
     pub began: Duration,
-    /// How long it took: its runs, and what its threads did outside of them. Time in which no thread works on the frame does
-    /// not count, such as the time in which a recorded frame waits to be submitted.
+    /// How long it took: its runs, and what its threads did outside of them. Time in which no thread works on the frame
+    /// does not count, such as the time in which a recorded frame waits to be submitted.
     pub duration: Duration,
-    /// The chain of steps that the end of the frame waited for, from its beginning to its end. Their durations add up to the
-    /// frame's [duration](Self::duration).
+    /// The chain of steps that the end of the frame waited for, from its beginning to its end. Their durations add up
+    /// to the frame's [duration](Self::duration).
     pub critical_path: Vec<Step>,
     /// How much of the critical path each group takes, the longest first.
     pub shares: Vec<PathShare>,
@@ -35,14 +35,15 @@ pub struct FrameReport {
     pub slack: Vec<Slack>,
     /// How each worker spent the frame.
     pub workers: Vec<WorkerReport>,
-    /// The nodes that waited longest for a worker after all their dependencies were done, the longest first: 10 at most.
+    /// The nodes that waited longest for a worker after all their dependencies were done, the longest first: 10 at
+    /// most.
     pub queue_waits: Vec<QueueWait>,
-    /// How long a replay of the unchanged frame takes, on as many workers as there were. Compare the times below with this
-    /// one, not with the [duration](Self::duration): a replay stands for many such frames, and leaves out what else the
-    /// machine did.
+    /// How long a replay of the unchanged frame takes, on as many workers as there were. Compare the times below with
+    /// this one, not with the [duration](Self::duration): a replay stands for many such frames, and leaves out what
+    /// else the machine did.
     pub replayed: Duration,
-    /// How long the frame would take if the nodes of one group had nothing to do, what saves the most first. These are the 32
-    /// groups with the most work, as a group can hardly save more than its work.
+    /// How long the frame would take if the nodes of one group had nothing to do, what saves the most first. These are
+    /// the 32 groups with the most work, as a group can hardly save more than its work.
     pub what_if: Vec<WhatIf>,
     /// How long a replay takes on other numbers of workers: 1, 2, 4, 8, 16.
     pub on_workers: Vec<(usize, Duration)>,

@@ -11,10 +11,10 @@ pub struct Slack {
     pub node: (usize, usize),
     /// The name of the node.
     pub name: String,
-    /// How much later all worker spans of the node could have ended without delaying the run's last span. Every span that
-    /// waited for them, directly or not, keeps its time from ready to end: the spans of its dependents, and later spans of
-    /// the same workers. Zero on the critical path. It is the total float of the critical path method
-    /// (Kelley and Walker, "Critical-Path Planning and Scheduling", 1959), on a graph of [worker spans](super::Step).
+    /// How much later all worker spans of the node could have ended without delaying the run's last span. Every span
+    /// that waited for them, directly or not, keeps its time from ready to end: the spans of its dependents, and later
+    /// spans of the same workers. Zero on the critical path. It is the total float of the critical path method (Kelley
+    /// and Walker, "Critical-Path Planning and Scheduling", 1959), on a graph of [worker spans](super::Step).
     pub time: Duration,
 }
 
@@ -22,8 +22,8 @@ pub struct Slack {
 pub(super) fn slack(run: &RunSpans<'_>) -> Vec<Slack> {
     let (nodes, spans) = (&run.run.graph.nodes, run.worker_spans.as_slice());
     let end = spans.last().map_or(run.run.began, |span| span.ended);
-    // Every span of a node has to end before any span of its dependents is ready. One time for each node says the same as
-    // an edge for each pair of spans.
+    // Every span of a node has to end before any span of its dependents is ready. One time for each node says the same
+    // as an edge for each pair of spans.
     let mut latest_ends_of_nodes = vec![end; nodes.len()];
     let mut latest_ready = vec![end; nodes.len()];
     let mut latest_ends_of_spans = vec![end; spans.len()];

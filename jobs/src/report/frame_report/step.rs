@@ -4,18 +4,18 @@ use std::time::Duration;
 
 /// A step of the critical path: a worker span of a run, or what a thread did outside of all runs.
 ///
-/// A worker span is the time in which a worker runs chunks of one node, and of no other node of the run in between. It can
-/// begin when the last of its node's dependencies and the worker's previous span have ended. Whichever of these ended last
-/// is what it was [held up by](Self::held_by), and is the step before it. The first step of a run begins with the run, so
-/// there is no gap between one step and the next.
+/// A worker span is the time in which a worker runs chunks of one node, and of no other node of the run in between. It
+/// can begin when the last of its node's dependencies and the worker's previous span have ended. Whichever of these
+/// ended last is what it was [held up by](Self::held_by), and is the step before it. The first step of a run begins
+/// with the run, so there is no gap between one step and the next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// The name of the node or of the thread's span.
     pub name: String,
     /// The group it is counted in: see [`NodeInfo::group`](crate::timeline::NodeInfo::group).
     pub group: String,
-    /// The index of the run in the log, and of the node in its graph. `None` for what a thread did outside of all runs, and
-    /// for the end of a run after its last node.
+    /// The index of the run in the log, and of the node in its graph. `None` for what a thread did outside of all runs,
+    /// and for the end of a run after its last node.
     pub node: Option<(usize, usize)>,
     /// The worker whose span it is. `None` if there is no node, or if no chunk of the node is in the log.
     pub worker: Option<usize>,

@@ -35,8 +35,8 @@ pub(super) fn what_if(runs: &[RunSpans<'_>], replay: &Replay, workers: usize, re
     let mut all: Vec<_> = groups
         .into_iter()
         .map(|(group, _work)| {
-            // Less work can take longer, because it changes the order of the rest (Graham, "Bounds on Multiprocessing Timing
-            // Anomalies", 1969). That is chance, not a cost of the work that was left out.
+            // Less work can take longer, because it changes the order of the rest (Graham, "Bounds on Multiprocessing
+            // Timing Anomalies", 1969). That is chance, not a cost of the work that was left out.
             let time = replay.clone().without_work_of(group).frame_time(workers).min(replayed);
             WhatIf { group: group.to_owned(), time, saved: replayed - time }
         })

@@ -17,7 +17,8 @@ pub struct WorkerReport {
     pub searching: Duration,
     /// Its time asleep.
     pub asleep: Duration,
-    /// The rest: the scheduler's own work, jobs that belong to no schedule, and what worker 0's thread does outside of runs.
+    /// The rest: the scheduler's own work, jobs that belong to no schedule, and what worker 0's thread does outside of
+    /// runs.
     pub other: Duration,
     /// How many chunks of the frame it ran.
     pub chunks: usize,
@@ -58,8 +59,8 @@ fn chunks_by_worker(log: &Log, frame: u64, frame_intervals: &[Range<Duration>]) 
     by_worker
 }
 
-/// Chunks are nested where a chunk runs a schedule of its own, and idle times are nested in chunks that wait for others. So
-/// intervals are merged before they are measured.
+/// Chunks are nested where a chunk runs a schedule of its own, and idle times are nested in chunks that wait for
+/// others. So intervals are merged before they are measured.
 fn worker_report(worker: &WorkerLog, chunks: WorkerChunks, frame_intervals: &[Range<Duration>]) -> WorkerReport {
     // A log may cover many frames: only the idle times that overlap this one are considered.
     let until = frame_intervals.last().map_or(Duration::ZERO, |interval| interval.end);

@@ -48,8 +48,8 @@ impl NodeSpan {
     }
 }
 
-/// The spans of all nodes, and of all workers. Worker spans are in topological order: each comes after those that had to end
-/// before it, and the last is the one that ended last. Every node has at least one.
+/// The spans of all nodes, and of all workers. Worker spans are in topological order: each comes after those that had
+/// to end before it, and the last is the one that ended last. Every node has at least one.
 pub(super) fn node_and_worker_spans(run: &Run) -> (Vec<NodeSpan>, Vec<WorkerSpan>) {
     let mut worker_spans = worker_spans_by_node(run);
     let node_spans = enforce_dependencies(run, &mut worker_spans);
@@ -121,8 +121,8 @@ fn find_holders(run: &Run, spans: &mut [WorkerSpan]) {
     for index in 0..spans.len() {
         let previous = spans[index].worker.and_then(|worker| {
             let earlier = of_workers.entry(worker).or_default();
-            // A worker that waits for another run inside a chunk helps with this run meanwhile. Then one span lies inside
-            // another that began before it, and was not held up by that one.
+            // A worker that waits for another run inside a chunk helps with this run meanwhile. Then one span lies
+            // inside another that began before it, and was not held up by that one.
             let count = earlier.partition_point(|&earlier| spans[earlier].ended <= spans[index].started);
             let previous = earlier[..count].last().copied();
             earlier.push(index);

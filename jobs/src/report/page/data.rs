@@ -11,8 +11,9 @@ use crate::report::consistency::check_log;
 use crate::report::{FrameReport, SchedulerCosts};
 use crate::timeline::{self, Chunk, Graph, IdleKind, Log, NodeInfo, WorkerLog};
 
-/// A log and its reports, as `model.js` reads them. Strings are indices of `texts`. Times are in nanoseconds: points in time
-/// since the first one of the log, and durations. Long lists are flat, with a fixed number of numbers for each entry.
+/// A log and its reports, as `model.js` reads them. Strings are indices of `texts`. Times are in nanoseconds: points in
+/// time since the first one of the log, and durations. Long lists are flat, with a fixed number of numbers for each
+/// entry.
 #[derive(Serialize)]
 pub(super) struct Data {
     texts: Vec<String>,
@@ -41,8 +42,8 @@ struct Frame {
     ended: i64,
     /// The text of the report, or why there is none.
     report: usize,
-    /// The critical path: group, which is the span's name outside of runs; run, node and worker, which are −1 outside of runs;
-    /// ready, waited, duration.
+    /// The critical path: group, which is the span's name outside of runs; run, node and worker, which are −1 outside
+    /// of runs; ready, waited, duration.
     path: Vec<i64>,
 }
 

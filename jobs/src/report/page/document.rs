@@ -23,13 +23,13 @@ const SCRIPTS: [&str; 5] = [
 
 /// Writes a page that shows the log in a browser: one HTML file, which loads nothing else.
 ///
-/// Each worker has a track, and each stage a colour. Beside them is the [report](super::super::FrameReport) of the chosen
-/// frame. Every frame is replayed for its report, so a long log takes a while. A chunk takes some 40 bytes, and the report of a
-/// frame some 4 KiB.
+/// Each worker has a track, and each stage a colour. Beside them is the [report](super::super::FrameReport) of the
+/// chosen frame. Every frame is replayed for its report, so a long log takes a while. A chunk takes some 40 bytes, and
+/// the report of a frame some 4 KiB.
 ///
 /// # Errors
-/// Returns the error of `writer`, or [`InvalidData`](io::ErrorKind::InvalidData) if the log refers to a node, a worker or a
-/// thread that it does not list. A [`Timeline`](crate::timeline::Timeline) records no such log.
+/// Returns the error of `writer`, or [`InvalidData`](io::ErrorKind::InvalidData) if the log refers to a node, a worker
+/// or a thread that it does not list. A [`Timeline`](crate::timeline::Timeline) records no such log.
 pub fn write_page(log: &Log, costs: &SchedulerCosts, writer: impl Write) -> io::Result<()> {
     let data = Data::new(log, costs)?;
     let mut writer = BufWriter::new(writer);

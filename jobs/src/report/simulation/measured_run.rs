@@ -64,8 +64,8 @@ impl MeasuredRun {
         Self { dependencies: dependencies.collect(), nodes: nodes.collect(), always_parallel: run.always_parallel }
     }
 
-    /// The run as this number of workers would have it: nodes that are chunked by cost have the chunks that are chosen there. The
-    /// time of a recorded chunk is spread evenly over its items, and the time of each node stays the same.
+    /// The run as this number of workers would have it: nodes that are chunked by cost have the chunks that are chosen
+    /// there. The time of a recorded chunk is spread evenly over its items, and the time of each node stays the same.
     pub(super) fn cut_for(&self, workers: usize) -> Self {
         let nodes = self.nodes.iter().map(|node| node.cut_for(workers)).collect();
         Self { dependencies: self.dependencies.clone(), nodes, always_parallel: self.always_parallel }
@@ -124,8 +124,8 @@ impl MeasuredNode {
     }
 }
 
-/// No node is cut into more chunks: four seconds of work in the longest jobs. Without a bound, a log of a frame that took hours would be
-/// replayed for as long.
+/// No node is cut into more chunks: four seconds of work in the longest jobs. Without a bound, a log of a frame that
+/// took hours would be replayed for as long.
 const MAX_CHUNKS: usize = 1 << 16;
 
 /// Nodes of one kind have items of the same cost: see [`Node::chunked_by_cost`](crate::graph::Node::chunked_by_cost).
@@ -135,7 +135,8 @@ fn cost_kind(node: &NodeInfo) -> CostKind<'_> {
     [node.labels.process.as_deref(), node.labels.stage.as_deref()]
 }
 
-/// What an item costs in nanoseconds, by kind of the nodes that are chunked by cost, if `measured` says how long a chunk took.
+/// What an item costs in nanoseconds, by kind of the nodes that are chunked by cost, if `measured` says how long a
+/// chunk took.
 fn item_costs(run: &Run, measured: impl Fn(&Chunk) -> u64) -> HashMap<CostKind<'_>, f32> {
     let mut sums = HashMap::<_, [u64; 2]>::new();
     for chunk in &run.chunks {
@@ -150,8 +151,8 @@ fn item_costs(run: &Run, measured: impl Fn(&Chunk) -> u64) -> HashMap<CostKind<'
     sums.into_iter().map(|(kind, sums)| (kind, cost(sums))).collect()
 }
 
-/// Longer times are cut to this one, so that sums of costs do not overflow even if a cost is infinite, which is how a caller
-/// says that no worker is ever to be woken.
+/// Longer times are cut to this one, so that sums of costs do not overflow even if a cost is infinite, which is how a
+/// caller says that no worker is ever to be woken.
 const MAX_TIME: Duration = Duration::from_secs(3_600);
 
 pub(super) fn nanoseconds(time: Duration) -> u64 {
@@ -227,7 +228,8 @@ mod tests {
 
     #[test]
     fn a_recorded_cut_is_kept_while_it_is_nearly_right() {
-        // On two workers 50, 48 and 48.75 µs are best: 1.25, 1.5 and 1.63 times the recorded chunks. 1.6 times is wrong.
+        // On two workers 50, 48 and 48.75 µs are best: 1.25, 1.5 and 1.63 times the recorded chunks. 1.6 times is
+        // wrong.
         let cut =
             |size, time, count| measured(&TestRun::new().add_by_cost("fill", size, &vec![time; count])).cut_for(2);
         let sizes = [cut(40, 40, 10), cut(32, 32, 12), cut(30, 30, 13)].map(|run| run.nodes[0].chunks.range(0).len());
@@ -288,8 +290,8 @@ mod tests {
             let run = measured(&TestRun { nodes: vec![node] });
             let again = run.cut_for(recorded);
             prop_assert_eq!(works(&again.nodes[0]), works(&run.nodes[0]));
-            // Others cut it as their own frames, or keep its chunks if these are wrong by less than the hysteresis. Their own are
-            // rounded down to whole items.
+            // Others cut it as their own frames, or keep its chunks if these are wrong by less than the hysteresis.
+            // Their own are rounded down to whole items.
             let size = |run: &MeasuredRun| run.nodes[0].chunks.range(0).len() as f32;
             let own = size(&measured(&TestRun { nodes: vec![cut_node(width, per_item, others)] }));
             let (cut, recorded) = (size(&run.cut_for(others)), size(&run));

@@ -12,24 +12,25 @@ use crate::report::intervals::{frame_intervals, gaps_up_to, outermost_runs, tota
 use crate::task::{Scheduler, are_awake_after};
 use crate::timeline::{Log, Run};
 
-/// A recorded frame, to be replayed by any number of workers: by the scheduler's rules, on a simulated clock. The same record
-/// and costs always give the same times.
+/// A recorded frame, to be replayed by any number of workers: by the scheduler's rules, on a simulated clock. The same
+/// record and costs always give the same times.
 ///
-/// A replay stands for one of many such frames, one after another: schedules have learnt how long their nodes take and whether it
-/// is worth running them in parallel. Workers are awake when a run begins if they would have looked for jobs for that long after the
-/// run before, by the gaps between the runs of the log up to there. So a log of a single frame has them asleep, and loops and scopes
-/// that the engine ran between its frames are not known.
+/// A replay stands for one of many such frames, one after another: schedules have learnt how long their nodes take and
+/// whether it is worth running them in parallel. Workers are awake when a run begins if they would have looked for jobs
+/// for that long after the run before, by the gaps between the runs of the log up to there. So a log of a single frame
+/// has them asleep, and loops and scopes that the engine ran between its frames are not known.
 ///
-/// A renderer with `Granularity::Adaptive` cuts a frame by what its items cost and by the number
-/// of workers. Such [nodes](crate::timeline::NodeInfo::chunked_by_cost) are cut anew for the workers of the replay, by the rule
-/// of the renderer, as if its estimates were the costs of the recorded frame, into 65,536 chunks at most. The time of a recorded chunk is
-/// spread evenly over its items; what it costs whatever its size is not known apart. All other nodes keep their chunks. So do
-/// the stages that sort, instance or bin the objects of a pass, which a renderer divides by rules of their own.
+/// A renderer with `Granularity::Adaptive` cuts a frame by what its items cost and by the number of workers. Such
+/// [nodes](crate::timeline::NodeInfo::chunked_by_cost) are cut anew for the workers of the replay, by the rule of the
+/// renderer, as if its estimates were the costs of the recorded frame, into 65,536 chunks at most. The time of a
+/// recorded chunk is spread evenly over its items; what it costs whatever its size is not known apart. All other nodes
+/// keep their chunks. So do the stages that sort, instance or bin the objects of a pass, which a renderer divides by
+/// rules of their own.
 ///
-/// Where several workers ran, chunks have waited for each other's locks and cache lines. So a record of one worker is best
-/// for predicting the time on one worker, and a lower bound for many. A record of several workers is better for predicting
-/// the time on as many. Where chunks are shorter than half a microsecond, recording disturbs them, and all predicted times
-/// are too long.
+/// Where several workers ran, chunks have waited for each other's locks and cache lines. So a record of one worker is
+/// best for predicting the time on one worker, and a lower bound for many. A record of several workers is better for
+/// predicting the time on as many. Where chunks are shorter than half a microsecond, recording disturbs them, and all
+/// predicted times are too long.
 #[derive(Clone, Debug)]
 pub struct Replay {
     runs: Vec<RunOfLog>,
@@ -106,14 +107,15 @@ impl Replay {
         Ok(Self { runs: runs.into_iter().map(measured).collect::<Result<_, _>>()?, serial, costs })
     }
 
-    /// Adds time in which the calling thread works before or after the runs, while the other workers have nothing to do.
+    /// Adds time in which the calling thread works before or after the runs, while the other workers have nothing to
+    /// do.
     pub fn with_serial_time(mut self, time: Duration) -> Self {
         self.serial = self.serial.saturating_add(time);
         self
     }
 
-    /// The same frame without the work of a [group](crate::timeline::NodeInfo::group), for example of a render process. The
-    /// nodes of the group remain, and wait for their dependencies.
+    /// The same frame without the work of a [group](crate::timeline::NodeInfo::group), for example of a render process.
+    /// The nodes of the group remain, and wait for their dependencies.
     pub fn without_work_of(mut self, group: &str) -> Self {
         self.runs.iter_mut().for_each(|run| run.measured.remove_work_of(group));
         self
@@ -227,8 +229,8 @@ mod tests {
         let wide = TestRun::new().add(&[], &[10; 64]);
         let expected = [640, 320, 160, 80, 40, 20, 10].map(micros);
         assert_eq!(times(&replay(&wide, SchedulerCosts::ZERO), [1, 2, 4, 8, 16, 32, 64]), expected);
-        // On two workers the first begins at 10 µs and the second at 30. On four the others begin at 40, 70 and 90, since all
-        // but the last wake another worker before they begin.
+        // On two workers the first begins at 10 µs and the second at 30. On four the others begin at 40, 70 and 90,
+        // since all but the last wake another worker before they begin.
         assert_eq!(times(&replay(&wide, costly_wake_ups()), [1, 2, 4]), [640, 340, 220].map(micros));
         // Each of 32 chunks begins with a ticket.
         let costs = SchedulerCosts { ticket: micros(1), chunk: micros(1), ..SchedulerCosts::ZERO };
@@ -270,8 +272,8 @@ mod tests {
     fn one_ticket_takes_many_short_chunks() {
         let wide = TestRun::new().add(&[], &[1; 4_000]);
         let costs = SchedulerCosts { ticket: micros(1), ..SchedulerCosts::ZERO };
-        // Seven chunks and their ticket take 8 µs, so each of the two workers draws 286 tickets, and some for fewer chunks at
-        // both ends.
+        // Seven chunks and their ticket take 8 µs, so each of the two workers draws 286 tickets, and some for fewer
+        // chunks at both ends.
         let time = replay(&wide, costs).frame_time(2);
         assert!((micros(2_286)..micros(2_350)).contains(&time), "{time:?}");
     }
@@ -354,8 +356,8 @@ mod tests {
     #[test]
     fn one_worker_at_a_time_is_woken_and_wakes_the_next() {
         let test_run = TestRun::new().add(&[], &[10]).add(&[], &[200]).add(&[0], &[200]).add(&[0], &[100]);
-        // At 20 µs, when more nodes become ready, the second is still waking up. It looks for work at 30, wakes the third, and
-        // begins at 40.
+        // At 20 µs, when more nodes become ready, the second is still waking up. It looks for work at 30, wakes the
+        // third, and begins at 40.
         let replayed = replay(&test_run, costly_wake_ups()).run(3);
         assert_eq!(replayed.time, micros(240));
         assert_eq!(replayed.busy, [210, 200, 100].map(micros));

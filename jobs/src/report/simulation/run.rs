@@ -1,5 +1,5 @@
-//! The simulation of one run: which tokens its workers push, and how chunks are handed out. This follows `graph/parallel.rs`,
-//! and uses the tickets, ranks and chunks of real runs.
+//! The simulation of one run: which tokens its workers push, and how chunks are handed out. This follows
+//! `graph/parallel.rs`, and uses the tickets, ranks and chunks of real runs.
 
 use std::ops::Range;
 use std::time::Duration;

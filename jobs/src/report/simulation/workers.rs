@@ -1,9 +1,9 @@
 //! The simulated workers: their queues, which of them search for work or sleep, and who wakes whom. This follows
 //! `task/worker.rs`, `task/queues.rs`, `task/idle.rs`, `task/frame_gaps.rs` and `task/sleep.rs`.
 //!
-//! It is a discrete-event simulation: the clock jumps from one event to the next. A worker that searches does so all the
-//! time, so it reacts as soon as a token is pushed. All tokens lie in queues, as in a run that a thread outside
-//! of the scheduler calls for. Mailboxes, through which workers of a run inside a job pass on tokens, are not simulated.
+//! It is a discrete-event simulation: the clock jumps from one event to the next. A worker that searches does so all
+//! the time, so it reacts as soon as a token is pushed. All tokens lie in queues, as in a run that a thread outside of
+//! the scheduler calls for. Mailboxes, through which workers of a run inside a job pass on tokens, are not simulated.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -68,7 +68,8 @@ pub(super) enum Event<T, A> {
 }
 
 impl<T, A> SimulatedWorkers<T, A> {
-    /// Worker 0, the calling thread, begins with `first`. All others look for work if they `are_awake`, and sleep otherwise.
+    /// Worker 0, the calling thread, begins with `first`. All others look for work if they `are_awake`, and sleep
+    /// otherwise.
     pub(super) fn new(count: usize, costs: &SchedulerCosts, are_awake: bool, first: A) -> Self {
         let worker = |_| SimulatedWorker {
             state: State::Asleep,

@@ -109,8 +109,8 @@ impl Model {
         self.sleep.wake_owner_or_other(0, level, Priority::Normal);
     }
 
-    /// As the owner of a region that helps others: it looks for jobs, and checks for the end of its region only if there is
-    /// none.
+    /// As the owner of a region that helps others: it looks for jobs, and checks for the end of its region only if
+    /// there is none.
     fn wait_and_help(&self, worker: usize) {
         let mut is_searcher = false;
         loop {

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-/// Allots each owner a range of a buffer, of the length that `length` says, so that no two overlap. An owner whose range has that length
-/// already keeps it: views and passes come and go, and those that stay are bound where they were. Returns where the last range ends.
+/// Allots each owner a range of a buffer, of the length that `length` says, so that no two overlap. An owner whose
+/// range has that length already keeps it: views and passes come and go, and those that stay are bound where they were.
+/// Returns where the last range ends.
 ///
 /// Ranges are allotted anew from the start where more than half of the buffer would belong to nobody.
 pub(super) fn allot<T>(
@@ -31,7 +32,8 @@ pub(super) fn allot<T>(
     place(owners, gaps, &range, &length)
 }
 
-/// Takes away the ranges that have the wrong length. Returns the gaps between the others, and all that lies behind them.
+/// Takes away the ranges that have the wrong length. Returns the gaps between the others, and all that lies behind
+/// them.
 fn release_and_find_gaps<T>(
     owners: &mut [T],
     range: impl Fn(&mut T) -> &mut Range<usize>,

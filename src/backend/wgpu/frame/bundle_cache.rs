@@ -1,6 +1,7 @@
 //! The cache of a pass's bundles, kept from frame to frame.
 //!
-//! A bundle's inputs are compared as a whole. The cache keeps them alive, so that no other object can get their identity.
+//! A bundle's inputs are compared as a whole. The cache keeps them alive, so that no other object can get their
+//! identity.
 
 use std::sync::Arc;
 
@@ -11,16 +12,16 @@ use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::resources::SubdividedMesh;
 use crate::command::Batch;
 
-/// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot determines the
-/// meshes' ranges in their pages.
+/// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot
+/// determines the meshes' ranges in their pages.
 #[derive(Clone)]
 pub(crate) struct BundleKey {
     pub(crate) frame_bind_group: wgpu::BindGroup,
     pub(crate) materials_bind_group: wgpu::BindGroup,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
     pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
-    /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being overwritten: they are not
-    /// replayed with another snapshot.
+    /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being
+    /// overwritten: they are not replayed with another snapshot.
     pub(crate) meshes: u64,
     pub(crate) pipelines: Arc<ProcessPipelines>,
     /// See [`WgpuPassState`](super::WgpuPassState).

@@ -28,8 +28,8 @@ use crate::view::GpuView;
 
 /// A pool of frame buffers.
 ///
-/// A frame owns its buffers from `begin` until it is submitted or dropped. Then the next frame may stage writes to them at once,
-/// because wgpu orders these after earlier submissions. It may map them when the device is done with them.
+/// A frame owns its buffers from `begin` until it is submitted or dropped. Then the next frame may stage writes to them
+/// at once, because wgpu orders these after earlier submissions. It may map them when the device is done with them.
 pub(crate) struct BufferPool {
     free: Mutex<FreeBuffers>,
     /// Whether objects are written into mapped memory.
@@ -48,8 +48,8 @@ impl BufferPool {
     /// Buffers that no frame has taken for this many frames lose their bundles and bind groups.
     const MAX_UNUSED_FRAMES: u32 = 8;
 
-    /// Where objects are written into mapped memory, and while the device reads all free buffers, a frame takes new ones if there are
-    /// fewer than these.
+    /// Where objects are written into mapped memory, and while the device reads all free buffers, a frame takes new
+    /// ones if there are fewer than these.
     const MAX_ROTATING: usize = 3;
 
     /// An empty pool. `maps_memory`: whether objects are written into mapped memory.
@@ -71,7 +71,8 @@ impl BufferPool {
         sizes
     }
 
-    /// Drops all buffers, and those of frames in flight when these end, because a device error may have left them unusable.
+    /// Drops all buffers, and those of frames in flight when these end, because a device error may have left them
+    /// unusable.
     pub(crate) fn clear(&self) {
         let mut free = self.free.lock();
         free.buffers.clear();
@@ -136,7 +137,8 @@ impl Drop for FrameBuffers {
 }
 
 impl FrameBuffers {
-    /// Makes room for a frame, and uploads its materials, views, lights and parameters. After an error the buffers are unusable.
+    /// Makes room for a frame, and uploads its materials, views, lights and parameters. After an error the buffers are
+    /// unusable.
     ///
     /// # Errors
     /// If the device has no room, or a camera is out of reach.
@@ -359,8 +361,8 @@ impl Buffers {
         [&views.on_device, &lights.on_device, &parameters.on_device]
     }
 
-    /// Sets the passes of this frame, and collects their parameters. A pass that the latest frame with these buffers had keeps what it has
-    /// cached, whatever its index.
+    /// Sets the passes of this frame, and collects their parameters. A pass that the latest frame with these buffers
+    /// had keeps what it has cached, whatever its index.
     fn set_passes(&mut self, request: &FrameRequest<'_>) {
         let FrameRequest { plan, draws, views, passes, .. } = *request;
         let are_same = self.passes.len() == passes.len()
@@ -391,8 +393,8 @@ impl Buffers {
         }
     }
 
-    /// Allots each view its ranges, and collects the views and their lights. A view that the latest frame with these buffers had keeps its
-    /// ranges, whatever its index; a new view takes those of one of its kind that is gone.
+    /// Allots each view its ranges, and collects the views and their lights. A view that the latest frame with these
+    /// buffers had keeps its ranges, whatever its index; a new view takes those of one of its kind that is gone.
     ///
     /// # Errors
     /// If a camera is out of reach.
@@ -429,8 +431,8 @@ impl Buffers {
         Ok(())
     }
 
-    /// Allots each pass of commands a place for its list of objects. Returns the number of places, which is at most `max` if that many are
-    /// enough.
+    /// Allots each pass of commands a place for its list of objects. Returns the number of places, which is at most
+    /// `max` if that many are enough.
     fn allot_object_lists(&mut self, max: u64) -> usize {
         let allot_lists = |passes: &mut [WgpuPassState]| {
             allot(passes, |pass| &mut pass.object_list, |pass| usize::from(pass.draws_commands))

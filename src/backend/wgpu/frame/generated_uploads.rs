@@ -9,8 +9,8 @@ use crate::scene::{GeneratedContents, Topology};
 
 /// The contents that CPU nodes fill in a frame, with the buffers that they are for.
 ///
-/// They are uploaded right before the frame is submitted, on the device thread. Frames share the buffers on the device, and a frame that
-/// is recorded before another one is submitted must not write what that one draws.
+/// They are uploaded right before the frame is submitted, on the device thread. Frames share the buffers on the device,
+/// and a frame that is recorded before another one is submitted must not write what that one draws.
 pub(crate) struct GeneratedUploads {
     uploads: Vec<GeneratedUpload>,
 }

@@ -8,7 +8,8 @@ use crate::backend::wgpu::resources::{
     UploadQueue, check_storage_binding_size,
 };
 
-/// The materials of a frame in flight. Of materials that change, only what changed is uploaded, and the bind group stays the same.
+/// The materials of a frame in flight. Of materials that change, only what changed is uploaded, and the bind group
+/// stays the same.
 pub(crate) struct MaterialBuffer {
     buffer: MirroredBuffer,
     /// What the buffer holds and the bind group binds; `None` before the first update, or after one that failed.

@@ -8,8 +8,8 @@ use crate::backend::wgpu::resources::{ObjectBuffer, UploadQueue, check_storage_b
 use crate::scene::{ColumnLayout, SceneRef};
 use crate::view::{GpuObject, ObjectTable};
 
-/// The buffers of a frame's objects: one of their GPU layouts, and one of each column that a process reads. What changed is
-/// written to all of them at the same time.
+/// The buffers of a frame's objects: one of their GPU layouts, and one of each column that a process reads. What
+/// changed is written to all of them at the same time.
 pub(crate) struct ObjectBuffers {
     gpu_objects: ObjectBuffer,
     columns: Vec<(ColumnLayout, ObjectBuffer)>,
@@ -30,8 +30,8 @@ impl ObjectBuffers {
         self.all().map(|buffer| buffer.on_device().size())
     }
 
-    /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated, and lost its
-    /// contents.
+    /// Makes room for this many objects, and for these columns and no others. Returns whether a buffer was reallocated,
+    /// and lost its contents.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
@@ -142,8 +142,8 @@ struct Changed<'a> {
 type Visit<'v> = &'v mut dyn FnMut(Range<usize>, &[u8]);
 
 impl Changed<'_> {
-    /// Writes it to a buffer with `stride` bytes for each object. `for_each_part` calls its argument with the bytes of a run of
-    /// objects, in one part or several.
+    /// Writes it to a buffer with `stride` bytes for each object. `for_each_part` calls its argument with the bytes of
+    /// a run of objects, in one part or several.
     fn write(
         &self,
         uploads: &UploadQueue,

@@ -3,11 +3,12 @@
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 use crate::unwind::emit;
 
-/// The uploads of a frame, which wgpu keeps in memory until something is submitted. If the frame never is, an empty submission takes
-/// its place when this is dropped, so that frames that are recorded and dropped leave no memory behind.
+/// The uploads of a frame, which wgpu keeps in memory until something is submitted. If the frame never is, an empty
+/// submission takes its place when this is dropped, so that frames that are recorded and dropped leave no memory
+/// behind.
 ///
-/// What is uploaded early does no harm: buffers of the frame are used by nothing else, and what is shared with earlier frames that are not
-/// submitted yet would have been uploaded before them, too.
+/// What is uploaded early does no harm: buffers of the frame are used by nothing else, and what is shared with earlier
+/// frames that are not submitted yet would have been uploaded before them, too.
 pub(crate) struct PendingUploads {
     /// `None` once they are submitted.
     device: Option<(wgpu::Device, wgpu::Queue)>,

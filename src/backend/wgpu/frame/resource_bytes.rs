@@ -6,8 +6,8 @@ use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{MirroredBuffer, UploadQueue, check_storage_binding_size};
 
 /// The buffers of [`ShaderResource::Bytes`](crate::process::ShaderResource::Bytes),
-/// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), and the values of material types, which all
-/// views of a process share.
+/// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), and the values of material types,
+/// which all views of a process share.
 #[derive(Default)]
 pub(crate) struct ResourceBytes {
     /// Each with the number of its bytes.

@@ -18,8 +18,8 @@ pub(super) struct ViewRanges {
 }
 
 impl ViewRanges {
-    /// Makes `ranges` those of these views, by index. A view keeps those that it had, whatever its index was; a new view takes those of one of
-    /// its kind that is gone, or none. Allocates nothing if the views are the same.
+    /// Makes `ranges` those of these views, by index. A view keeps those that it had, whatever its index was; a new
+    /// view takes those of one of its kind that is gone, or none. Allocates nothing if the views are the same.
     pub(super) fn keep(ranges: &mut Vec<Self>, views: &[RenderView]) {
         if ranges.len() == views.len() && ranges.iter().zip(views).all(|(ranges, view)| ranges.are_of(view)) {
             return;

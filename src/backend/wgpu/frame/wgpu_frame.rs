@@ -43,7 +43,8 @@ pub struct WgpuFrame {
 }
 
 impl WgpuFrame {
-    /// Has a rectangle of a view's target read back when the frame is submitted: its upper left pixel, and its width and height.
+    /// Has a rectangle of a view's target read back when the frame is submitted: its upper left pixel, and its width
+    /// and height.
     ///
     /// # Errors
     /// See [`new_read_back`].

@@ -4,10 +4,12 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::wgpu::error_scope::with_error_scope;
 
-/// Compiles the shader of a process: its own texts of WGSL, each with what it is, behind what the crate puts before them.
+/// Compiles the shader of a process: its own texts of WGSL, each with what it is, behind what the crate puts before
+/// them.
 ///
 /// # Errors
-/// If it does not compile: [`BackendError::Shader`], with the line and column in that of the process's own texts which has the error.
+/// If it does not compile: [`BackendError::Shader`], with the line and column in that of the process's own texts which
+/// has the error.
 pub(super) fn compile_shader(
     device: &wgpu::Device,
     process: &str,
@@ -28,7 +30,8 @@ pub(super) fn compile_shader(
     }
 }
 
-/// The first error of a shader at its line; `None` if it is not in one of the process's own texts, which follow after `before`.
+/// The first error of a shader at its line; `None` if it is not in one of the process's own texts, which follow after
+/// `before`.
 fn located(
     process: &str,
     before: &str,
@@ -51,8 +54,8 @@ fn located(
     Some(BackendError::Shader { process, part, line, column, message, text })
 }
 
-/// What a diagnostic of wgpu says, without its excerpts, whose lines are counted from the beginning of the prelude: its first line, and
-/// the notes on the cause.
+/// What a diagnostic of wgpu says, without its excerpts, whose lines are counted from the beginning of the prelude: its
+/// first line, and the notes on the cause.
 fn without_excerpts(diagnostic: &str) -> String {
     let mut lines = diagnostic.lines().map(str::trim).filter(|line| !line.is_empty());
     let first = lines.next().unwrap_or_default();

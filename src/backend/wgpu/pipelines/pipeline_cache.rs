@@ -45,8 +45,8 @@ impl PipelineCache {
         self.failed.values().map(|(_, error)| error.to_string()).collect()
     }
 
-    /// The pipelines of every render process of a plan: cached ones, also of other plans, or new ones for a process whose
-    /// draws changed, or for another quality.
+    /// The pipelines of every render process of a plan: cached ones, also of other plans, or new ones for a process
+    /// whose draws changed, or for another quality.
     ///
     /// # Errors
     /// If the device refuses a shader.
@@ -145,8 +145,8 @@ impl PipelineCache {
         self.all().find(|pipelines| pipelines.inputs.fit(plan, planned, draws, quality))
     }
 
-    /// Adds complete pipelines that were made for a process of a plan without a lock on the cache, unless a frame has made them meanwhile. They
-    /// take the place of those that were prepared for it before.
+    /// Adds complete pipelines that were made for a process of a plan without a lock on the cache, unless a frame has
+    /// made them meanwhile. They take the place of those that were prepared for it before.
     pub(crate) fn add_prepared(
         &mut self,
         plan: &FramePlan,

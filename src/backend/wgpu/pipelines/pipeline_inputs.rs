@@ -7,8 +7,8 @@ use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, P
 use crate::quality::Quality;
 use crate::scene::ViewKind;
 
-/// What all pipelines of a process are made from: what it declares, and what it draws in frames of one quality. Pipelines of equal inputs
-/// are equal on one device.
+/// What all pipelines of a process are made from: what it declares, and what it draws in frames of one quality.
+/// Pipelines of equal inputs are equal on one device.
 #[derive(Clone, PartialEq)]
 pub(super) struct PipelineInputs {
     pub(super) name: String,
@@ -48,9 +48,9 @@ impl PipelineInputs {
     /// Whether there are pipelines of their own for views that [clamp depth](crate::view::RenderView::clamps_depth).
     pub(super) fn has_clamped_pipelines(&self) -> bool {
         let has_geometry = matches!(self.key.vertices, VertexSource::Meshes(_) | VertexSource::Procedural(_));
-        // What is beyond the far plane is clamped too, to depth 0. A test for a greater depth leaves it out; without a depth test it would
-        // be drawn. Processes that match depths or mark a stencil need the depths of a process that clamps, so they clamp as well, and
-        // their declarations say what passes beyond the far plane.
+        // What is beyond the far plane is clamped too, to depth 0. A test for a greater depth leaves it out; without a
+        // depth test it would be drawn. Processes that match depths or mark a stencil need the depths of a process that
+        // clamps, so they clamp as well, and their declarations say what passes beyond the far plane.
         let tests_depth =
             self.attachments.depth.is_some_and(|depth| depth.format.has_depth() && depth.access != Access::TestStencil);
         let can_clamp = has_geometry && self.draws_maps && tests_depth;
@@ -81,7 +81,8 @@ impl PipelineInputs {
         self.key == PipelineKey::new(draws, quality) && self.fit_resources(draws)
     }
 
-    /// Whether the inputs of a process of this plan for these draws would differ from these in the text of their shader only.
+    /// Whether the inputs of a process of this plan for these draws would differ from these in the text of their shader
+    /// only.
     pub(super) fn differ_in_text_only(
         &self,
         plan: &FramePlan,

@@ -119,8 +119,8 @@ impl<'a> PipelineKey<'a> {
     }
 }
 
-/// The draw state of a process that draws no commands; `None` for commands, which have one each, for compute shaders and for raw
-/// passes.
+/// The draw state of a process that draws no commands; `None` for commands, which have one each, for compute shaders
+/// and for raw passes.
 pub(crate) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
     match draws {
         Draws::FullScreen(full_screen) => {

@@ -30,7 +30,8 @@ pub(crate) struct ProcessPipelines {
     pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
     pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
-    /// The [values](attribute_defaults) that its attributes have in meshes that lack them; made for the first imported mesh.
+    /// The [values](attribute_defaults) that its attributes have in meshes that lack them; made for the first imported
+    /// mesh.
     attribute_defaults: OnceLock<wgpu::Buffer>,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
@@ -131,12 +132,12 @@ impl ProcessPipelines {
         Ok(created)
     }
 
-    /// Whether the shader cannot read an attribute of meshes with such a layout, so that there is no such pipeline.
+    /// Whether the shader cannot read an attribute of meshes with this layout, so that there is no pipeline for them.
     pub(crate) fn is_unreadable(&self, variant: &PipelineVariant) -> bool {
         variant.layout.is_some() && self.unreadable.read().contains(variant)
     }
 
-    /// Whether there is such a layout.
+    /// Whether this layout exists.
     pub(crate) fn has_unreadable(&self) -> bool {
         !self.unreadable.read().is_empty()
     }
@@ -150,7 +151,8 @@ impl ProcessPipelines {
         }
     }
 
-    /// Adds the shader and all pipelines to the library, if there is one. Call it only if the device has reported no error.
+    /// Adds the shader and all pipelines to the library, if there is one. Call it only if the device has reported no
+    /// error.
     pub(crate) fn share(&self) {
         if let Some((library, shader)) = self.library.as_ref().zip(self.shader.as_ref()) {
             library.add(&self.inputs, shader, &self.variants());
@@ -192,7 +194,7 @@ impl ProcessPipelines {
         &self.inputs.attributes
     }
 
-    /// The values of attributes that imported meshes lack; `None` before there is a pipeline for such a mesh.
+    /// The values of attributes that imported meshes lack; `None` before there is a pipeline for imported meshes.
     pub(crate) fn attribute_defaults(&self) -> Option<&wgpu::Buffer> {
         self.attribute_defaults.get()
     }

@@ -9,7 +9,8 @@ use super::compiled_shader::CompiledShader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_variant::PipelineVariant;
 
-/// The compiled shaders and pipelines of several backends, in the order in which they were compiled. Clones are the same library.
+/// The compiled shaders and pipelines of several backends, in the order in which they were compiled. Clones are the
+/// same library.
 #[derive(Clone, Default)]
 pub(crate) struct SharedPipelines(Arc<Mutex<Vec<SharedProcess>>>);
 

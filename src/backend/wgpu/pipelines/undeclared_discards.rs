@@ -30,8 +30,8 @@ pub(super) fn warn_of_undeclared_discards(process: &str, draws: &Draws<'_>, befo
     }
 }
 
-/// Whether a process's fragment entry point discards pixels or returns a depth; `masked` is the one of masked objects, which
-/// may. `own` are the process's own texts of WGSL, each with what it is.
+/// Whether a process's fragment entry point discards pixels or returns a depth; `masked` is the one of masked objects,
+/// which may. `own` are the process's own texts of WGSL, each with what it is.
 fn leaves_out_pixels(fragment: &str, masked: Option<&str>, before: &str, own: &[(&str, &str)]) -> bool {
     let may_leave_out = |text: &str| text.contains("discard") || text.contains("frag_depth");
     let around_masked = |text| masked.and_then(|masked| around_function(text, masked)).unwrap_or([text, ""]);

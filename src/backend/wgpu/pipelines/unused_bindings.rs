@@ -6,8 +6,8 @@ use wgpu::naga::front::wgsl;
 use crate::process::Declaration;
 use crate::unwind::emit_unlocked;
 
-/// Warns of the targets, buffers, columns and material types that a process declares and its shader, which compiles, has no variable for.
-/// A declaration that has no use still orders processes, and keeps or uploads what it names.
+/// Warns of the targets, buffers, columns and material types that a process declares and its shader, which compiles,
+/// has no variable for. A declaration that has no use still orders processes, and keeps or uploads what it names.
 pub(super) fn warn_of_unused_bindings(process: &str, declaration: &Declaration, before: &str, own: &[(&str, &str)]) {
     for (resource, ResourceBinding { group, binding }) in unused_bindings(declaration, before, own) {
         let process = process.to_owned();
@@ -20,7 +20,8 @@ pub(super) fn warn_of_unused_bindings(process: &str, declaration: &Declaration, 
     }
 }
 
-/// The unused resources of a shader: a process's own texts of WGSL, each with what it is, behind what the crate puts before them.
+/// The unused resources of a shader: a process's own texts of WGSL, each with what it is, behind what the crate puts
+/// before them.
 fn unused_bindings(declaration: &Declaration, before: &str, own: &[(&str, &str)]) -> Vec<(String, ResourceBinding)> {
     let mut unused: Vec<_> =
         declared_bindings(declaration).filter(|(_, binding)| !begins_a_line(own, *binding)).collect();
@@ -51,7 +52,7 @@ fn declared_bindings(declaration: &Declaration) -> impl Iterator<Item = (String,
     in_process_group.chain((0..).zip(columns.chain(material_types)).map(of_group(3)))
 }
 
-/// Whether a line of a text begins with these attributes as they are usually written.
+/// Whether a line of a text begins with these attributes in their usual spelling.
 fn begins_a_line(texts: &[(&str, &str)], ResourceBinding { group, binding }: ResourceBinding) -> bool {
     let attributes = format!("@group({group}) @binding({binding})");
     texts.iter().flat_map(|(_, text)| text.lines()).any(|line| line.trim_start().starts_with(&attributes))

@@ -96,7 +96,8 @@ impl VertexBuffer {
 }
 
 /// # Errors
-/// If the shader of a process, which reads an attribute in the format `declared`, cannot read it from the stream of a mesh.
+/// If the shader of a process, which reads an attribute in the format `declared`, cannot read it from the stream of a
+/// mesh.
 fn check_kind(
     [process, mesh, name]: [&str; 3],
     attribute: &StreamAttribute,
@@ -117,7 +118,8 @@ fn check_kind(
 /// The size of each element of [`attribute_defaults`]: that of the largest attribute.
 const DEFAULT_BYTES: usize = 16;
 
-/// The value of each attribute for meshes that lack it, by its location in the shader. Those of the shipped attributes are 0.
+/// The value of each attribute for meshes that lack it, by its location in the shader. Those of the shipped attributes
+/// are 0.
 pub(super) fn attribute_defaults(own: &[DeclaredAttribute]) -> Vec<u8> {
     let mut bytes = vec![0; FIRST_OWN_LOCATION as usize * DEFAULT_BYTES];
     for attribute in own {

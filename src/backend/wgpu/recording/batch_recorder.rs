@@ -26,8 +26,8 @@ pub(crate) struct BatchRecorder<'a> {
 }
 
 impl<'a> BatchRecorder<'a> {
-    /// Draws a range of the list's batches. State that does not change between batches is set once. Batches whose meshes are not on the
-    /// device draw nothing.
+    /// Draws a range of the list's batches. State that does not change between batches is set once. Batches whose
+    /// meshes are not on the device draw nothing.
     ///
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.

@@ -47,8 +47,8 @@ pub(crate) fn record_bundle(
     Ok(recorded)
 }
 
-/// Whether later frames may replay a bundle. The remaining triangles of partial batches change, so bundles with them are not
-/// cached.
+/// Whether later frames may replay a bundle. The remaining triangles of partial batches change, so bundles with them
+/// are not cached.
 fn is_cacheable(pass: &WgpuPassState, list: &DrawList, bundle: usize) -> bool {
     pass.strategy.recording == RecordingStrategy::CachedBundles && list.bundle_is_whole(bundle)
 }

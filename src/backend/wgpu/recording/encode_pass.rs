@@ -9,8 +9,8 @@ use crate::backend::{BackendError, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::Draws;
 
-/// Encodes a whole pass in one encoder: replays its bundles, or records it without bundles. Then it generates the mip levels that the pass
-/// leaves out of date.
+/// Encodes a whole pass in one encoder: replays its bundles, or records it without bundles. Then it generates the mip
+/// levels that the pass leaves out of date.
 ///
 /// # Errors
 /// If a resource of the pass is missing, or a raw pass fails.
@@ -70,7 +70,8 @@ fn record_pass(
     Ok(())
 }
 
-/// Encodes what follows the segments of a pass that is split over several encoders: the mip levels that it leaves out of date.
+/// Encodes what follows the segments of a pass that is split over several encoders: the mip levels that it leaves out
+/// of date.
 ///
 /// # Errors
 /// As [`encode_pass`].

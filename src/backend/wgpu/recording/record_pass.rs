@@ -118,8 +118,8 @@ pub(crate) fn record_without_commands(
 /// Has a raw pass encode itself.
 ///
 /// # Errors
-/// If the raw pass asks for what its process does not declare, or reports an error, or a resource of the pass is missing. The latter is a
-/// bug in Drawloom.
+/// If the raw pass asks for what its process does not declare, or reports an error, or a resource of the pass is
+/// missing. The latter is a bug in Drawloom.
 pub(crate) fn encode_raw(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
@@ -161,8 +161,8 @@ pub(crate) fn encode_raw(
         encoder.write_timestamp(set, begin);
     }
     let encoded = raw.encode(encoder, &resources);
-    // Before the pass's own error, which may follow from it, and even if there is none: a pass that goes on without a resource draws
-    // something else than its process promises.
+    // Before the pass's own error, which may follow from it, and even if there is none: a pass that goes on without a
+    // resource draws something else than its process promises.
     resources.access.end().map_err(BackendError::Access)?;
     encoded.map_err(BackendError::RawPass)?;
     if let Some((set, [_, end])) = queries {

@@ -6,8 +6,8 @@ use crate::backend::BackendError;
 use crate::process::DeclaredAttribute;
 use crate::scene::{AttributeFormat, AttributeLayout, Mesh};
 
-/// The attributes that processes have read so far. A page of vertices has a buffer for each of them, in which a vertex has the same index as
-/// in the buffer of vertices.
+/// The attributes that processes have read so far. A page of vertices has a buffer for each of them, in which a vertex
+/// has the same index as in the buffer of vertices.
 #[derive(Clone, Default)]
 pub(crate) struct AttributeSet {
     attributes: Vec<DeclaredAttribute>,
@@ -17,8 +17,8 @@ pub(crate) struct AttributeSet {
 pub(crate) type AttributeBuffers = Vec<(AttributeLayout, wgpu::Buffer)>;
 
 impl AttributeSet {
-    /// With the attributes that a plan's processes read; `None` if they are there already. If one is new, all meshes have to be written
-    /// anew.
+    /// With the attributes that a plan's processes read; `None` if they are there already. If one is new, all meshes
+    /// have to be written anew.
     pub(crate) fn with(&self, attributes: &[DeclaredAttribute]) -> Option<Self> {
         let is_new = |attribute: &&DeclaredAttribute| !self.attributes.contains(attribute);
         let mut changed = None;

@@ -1,4 +1,5 @@
-//! Bind group layouts: `@group(0)` and `@group(1)` of `drawloom.wgsl`, and `@group(2)` and `@group(3)` of each render process.
+//! Bind group layouts: `@group(0)` and `@group(1)` of `drawloom.wgsl`, and `@group(2)` and `@group(3)` of each render
+//! process.
 
 use wgpu::ShaderStages;
 
@@ -57,8 +58,8 @@ pub(crate) struct SampledTarget {
     pub(crate) multisampled: bool,
 }
 
-/// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples, then its buffers, each with
-/// whether its shader writes it. `None` if it has none of them.
+/// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples, then its
+/// buffers, each with whether its shader writes it. `None` if it has none of them.
 pub(crate) fn process_layout(
     device: &wgpu::Device,
     parameter_bytes: usize,
@@ -92,8 +93,8 @@ pub(crate) fn process_layout(
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
 }
 
-/// The layout of a process's `@group(3)`: arrays for the columns of objects and the materials that it reads, then the resources of the
-/// engine's own. `None` if it has neither.
+/// The layout of a process's `@group(3)`: arrays for the columns of objects and the materials that it reads, then the
+/// resources of the engine's own. `None` if it has neither.
 pub(crate) fn engine_layout(
     device: &wgpu::Device,
     arrays: usize,

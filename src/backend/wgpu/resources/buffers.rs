@@ -3,8 +3,8 @@
 use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 
-/// A zeroed buffer. It is mapped at creation, so that wgpu regards it as initialized: otherwise wgpu clears it again whenever
-/// a bind group uses it.
+/// A zeroed buffer. It is mapped at creation, so that wgpu regards it as initialized: otherwise wgpu clears it again
+/// whenever a bind group uses it.
 ///
 /// # Errors
 /// If the device allows no buffer of that size.

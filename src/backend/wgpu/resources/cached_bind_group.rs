@@ -28,8 +28,8 @@ pub(crate) enum BindingResource<'a> {
 }
 
 impl CachedBindGroup {
-    /// The bind group of these resources, each with the number of its binding: `before` if layout and resources are the same. `None`
-    /// without a layout. The label is of errors.
+    /// The bind group of these resources, each with the number of its binding: `before` if layout and resources are the
+    /// same. `None` without a layout. The label is of errors.
     ///
     /// # Errors
     /// If the device refuses a resource.

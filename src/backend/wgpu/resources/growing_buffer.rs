@@ -57,8 +57,9 @@ impl GrowingBuffer {
     }
 }
 
-/// The size of an allocation for `needed` bytes that had `before` bytes: `before` again if that is enough and not far too much,
-/// so that bindings change rarely; otherwise a quarter more than needed, within `max`. A multiple of [`ALIGNMENT`].
+/// The size of an allocation for `needed` bytes that had `before` bytes: `before` again if that is enough and not far
+/// too much, so that bindings change rarely; otherwise a quarter more than needed, within `max`. A multiple of
+/// [`ALIGNMENT`].
 pub(crate) fn size_with_headroom(before: usize, needed: usize, max: u64) -> usize {
     let needed = needed.max(1).next_multiple_of(ALIGNMENT);
     let max = usize::try_from(max).unwrap_or(usize::MAX) / ALIGNMENT * ALIGNMENT;

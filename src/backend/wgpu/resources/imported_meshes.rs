@@ -58,7 +58,8 @@ impl VertexStreamLayouts {
         }
     }
 
-    /// The vertex buffers of a pipeline whose shader reads these attributes beside those of every vertex: in this order.
+    /// The vertex buffers of a pipeline whose shader reads these attributes beside those of every vertex: in this
+    /// order.
     pub(crate) fn slots<'a>(&'a self, attributes: &'a [DeclaredAttribute]) -> impl Iterator<Item = VertexSlot> + 'a {
         let names = || [POSITION, NORMAL, UV].into_iter().chain(attributes.iter().map(|own| own.layout.name));
         let is_in = |stream: &StreamLayout, name| stream.attributes.iter().any(|attribute| attribute.name() == name);
@@ -132,8 +133,8 @@ impl ImportedMeshes {
         Ok(updated)
     }
 
-    /// The buffers on the device that nodes fill by the identity of a [`GeneratedBuffer`](crate::scene::GeneratedBuffer), and the
-    /// topology of those that are indices.
+    /// The buffers on the device that nodes fill by the identity of a
+    /// [`GeneratedBuffer`](crate::scene::GeneratedBuffer), and the topology of those that are indices.
     pub(crate) fn filled_by(&self, identity: u64) -> impl Iterator<Item = (&wgpu::Buffer, Option<Topology>)> {
         let meshes = self.meshes.values().filter_map(|mesh| Some((mesh, mesh.generated.as_ref()?)));
         meshes.flat_map(move |(mesh, generated)| {

@@ -20,7 +20,8 @@ impl ImportedTarget {
         (self.view.as_str(), self.target.as_str()) == (view, target)
     }
 
-    /// The target that the texture takes the place of: that of the first view with the name that has such a target.
+    /// The target that the texture takes the place of: that of the first view with the name that has a target of that
+    /// name.
     ///
     /// # Errors
     /// If there is none, or the texture does not fit.

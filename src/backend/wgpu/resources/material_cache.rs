@@ -37,7 +37,8 @@ pub(crate) struct MaterialTextures {
     pub(crate) samplers: [wgpu::Sampler; 2],
 }
 
-/// Keeps materials and textures, and uploads textures that changed since the last frame. Materials are uploaded by the buffers of a frame.
+/// Keeps materials and textures, and uploads textures that changed since the last frame. Materials are uploaded by the
+/// buffers of a frame.
 #[derive(Default)]
 pub(crate) struct MaterialCache {
     pub(crate) textures: TextureArrays,
@@ -89,7 +90,8 @@ impl MaterialCache {
         types: &[MaterialLayout],
         (limits, rejections): (SceneLimits, &Rejections),
     ) -> (MaterialSnapshot, Arc<[bool]>) {
-        // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on the device.
+        // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on
+        // the device.
         let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
         let Ok(snapshot) =
             self.update_snapshot(device, assets, types, (limits, rejections), textures, |_| Ok::<_, Infallible>(()));

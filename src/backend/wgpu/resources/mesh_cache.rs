@@ -17,8 +17,8 @@ use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::UsedMeshes;
 
-/// Keeps the meshes that objects use on the device, and uploads those that changed, or became used, since the last frame. What lies on
-/// the device stays where it is: where there is no room, pages are added.
+/// Keeps the meshes that objects use on the device, and uploads those that changed, or became used, since the last
+/// frame. What lies on the device stays where it is: where there is no room, pages are added.
 #[derive(Default)]
 pub(crate) struct MeshCache {
     pub(super) pages: MeshPages,
@@ -100,7 +100,8 @@ impl MeshCache {
         self.pages.attributes.of_mesh(device, uploads, mesh)
     }
 
-    /// The snapshot of those of the assets' meshes that are used, with vertices of this format: the latest one if nothing changed.
+    /// The snapshot of those of the assets' meshes that are used, with vertices of this format: the latest one if
+    /// nothing changed.
     ///
     /// # Errors
     /// If the device has no room for them.

@@ -50,8 +50,8 @@ pub(crate) struct MeshPages {
 }
 
 impl MeshPages {
-    /// Finds room for a mesh, or adds pages. A new page has room for everything that is about to come, of which there are so many bytes,
-    /// or for as much as all pages before it, within the page sizes.
+    /// Finds room for a mesh, or adds pages. A new page has room for everything that is about to come, of which this is
+    /// the number of bytes, or for as much as all pages before it, within the page sizes.
     pub(super) fn allocate(&mut self, mesh: &Mesh, expected: MeshBytes, sizes: PageSizes) -> MeshLocation {
         let page_bytes = |expected: u64, existing: u64| expected.max(existing).clamp(sizes.min, sizes.max);
         let stride = self.bytes_per_vertex();
@@ -204,8 +204,8 @@ impl MeshTarget {
         Ok(())
     }
 
-    /// Calls `write` for each buffer write of a mesh, with the buffer, the offset in bytes, and the bytes. `vertices` are those of the mesh, in the
-    /// pages' format. The writes are the same, in the same order, every time.
+    /// Calls `write` for each buffer write of a mesh, with the buffer, the offset in bytes, and the bytes. `vertices`
+    /// are those of the mesh, in the pages' format. The writes are the same, in the same order, every time.
     ///
     /// # Errors
     /// If the pages have no buffers. This is a bug in Drawloom.

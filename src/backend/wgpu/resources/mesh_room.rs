@@ -1,4 +1,4 @@
-//! Room for a mesh in the pages: as they are, or by taking other meshes off the device.
+//! Room for a mesh in the pages: free room, or by taking other meshes off the device.
 
 use super::mesh_pages::{INDEX, MeshBytes, MeshLocation, MeshPages, PageSizes, index_count};
 use super::page_set::PageRange;
@@ -14,9 +14,9 @@ pub(super) struct MeshRoom {
 }
 
 impl MeshPages {
-    /// Finds room for a mesh in the pages, or adds pages as long as all of them take no more than `budget` bytes. Where there is none, the
-    /// candidates make room, the first ones first: only those that lie where the mesh will, or in pages that are released for it. Nothing
-    /// changes if that is not enough.
+    /// Finds room for a mesh in the pages, or adds pages as long as all of them take no more than `budget` bytes. Where
+    /// there is none, the candidates make room, the first ones first: only those that lie where the mesh will, or in
+    /// pages that are released for it. Nothing changes if that is not enough.
     ///
     /// Those that make room are vacated; the caller retires them.
     pub(super) fn find_room(
@@ -123,8 +123,8 @@ impl Search {
                 released.indices.push(page);
             }
         }
-        // Pages of vertices and pages of indices share what is left of the budget as this mesh does, so that neither takes what the other
-        // one will need.
+        // Pages of vertices and pages of indices share what is left of the budget as this mesh does, so that neither
+        // takes what the other one will need.
         let rest = self.budget.saturating_sub(pages.page_bytes());
         let whole =
             MeshBytes { vertices: u64::from(self.vertex_count) * stride, indices: u64::from(self.index_count) * INDEX };

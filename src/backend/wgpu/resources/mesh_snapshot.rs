@@ -84,8 +84,8 @@ impl MeshSnapshot {
         }
     }
 
-    /// The range of the remaining indices that a batch of a list draws; `None` where it draws its whole mesh. A mesh that was replaced, and
-    /// is drawn nevertheless, is drawn as a whole: what remains is of the new one.
+    /// The range of the remaining indices that a batch of a list draws; `None` where it draws its whole mesh. A mesh
+    /// that was replaced, and is drawn nevertheless, is drawn as a whole: what remains is of the new one.
     pub(crate) fn remaining(&self, list: &DrawList, batch: usize) -> Option<Range<u32>> {
         list.remaining(batch).filter(|_| !self.outdated.contains(&list.batches[batch].mesh))
     }

@@ -31,7 +31,7 @@ pub(crate) enum Unplaced {
     Full,
     /// Its texture array has as many layers as the device allows, and none can make room.
     LayerLimit,
-    /// It can never have any: it takes so many bytes, and the limit of this name allows so many.
+    /// It can never have any: the bytes that it takes, and the limit of this name with the bytes that it allows.
     TooLarge { bytes: u64, limit: &'static str, allowed: u64 },
 }
 
@@ -47,8 +47,8 @@ pub(crate) enum EndOfUpload {
 }
 
 impl MeshCache {
-    /// Begins a frame with meshes that are streamed. Meshes that replace others on the device are uploaded at once, if there is room, up to so many
-    /// bytes. Otherwise the one before stays, and is drawn, until the new one arrives.
+    /// Begins a frame with meshes that are streamed. Meshes that replace others on the device are uploaded at once, if
+    /// there is room, up to a number of bytes. Otherwise the one before stays, and is drawn, until the new one arrives.
     ///
     /// # Errors
     /// If the device has no room.
@@ -101,7 +101,8 @@ impl MeshCache {
         Ok(())
     }
 
-    /// Uploads a mesh that replaces one on the device, if there is room that no frame in flight reads. Returns whether there is.
+    /// Uploads a mesh that replaces one on the device, if there is room that no frame in flight reads. Returns whether
+    /// there is.
     ///
     /// # Errors
     /// If the device has no room.
@@ -131,19 +132,19 @@ impl MeshCache {
         found.filter(|_| used.contains_slot(slot))
     }
 
-    /// Whether there is none in a slot that is on the device as it is, or on its way.
+    /// Whether the slot has no mesh that is on the device unchanged, or on its way.
     fn is_missing(&self, slot: u32) -> bool {
         let is_resident = self.meshes[slot as usize].is_some() && !self.outdated.contains(&slot);
         !is_resident && !self.in_flight.contains(&slot)
     }
 
-    /// The meshes that are used, and neither on the device, as they are, nor on their way: with handle and revision.
+    /// The meshes that are used, and neither on the device, unchanged, nor on their way: with handle and revision.
     pub(crate) fn missing<'a>(&self, assets: &'a Assets) -> impl Iterator<Item = (Handle<Mesh>, u64, &'a Mesh)> {
         self.missing.iter().filter_map(|slot| assets.meshes.entry(*slot))
     }
 
-    /// Finds room for a mesh in the pages, or adds pages if the budget allows. Otherwise the candidates make room, the first ones first.
-    /// `evictions` counts them.
+    /// Finds room for a mesh in the pages, or adds pages if the budget allows. Otherwise the candidates make room, the
+    /// first ones first. `evictions` counts them.
     ///
     /// # Errors
     /// If there is no such page. This is a bug in Drawloom.
@@ -245,8 +246,8 @@ impl MeshCache {
         Arc::ptr_eq(epoch, &self.epoch)
     }
 
-    /// A job has uploaded a mesh, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it is drawn until the next
-    /// one arrives.
+    /// A job has uploaded a mesh, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it is
+    /// drawn until the next one arrives.
     pub(crate) fn end_upload(
         &mut self,
         epoch: &Arc<()>,

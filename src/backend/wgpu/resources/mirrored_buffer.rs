@@ -23,7 +23,7 @@ impl MirroredBuffer {
         &mut self.next
     }
 
-    /// Uploads what of `bytes` the buffer does not hold: whole blocks of [`BLOCK`] bytes.
+    /// Uploads those of `bytes` that the buffer does not hold: whole blocks of [`BLOCK`] bytes.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.

@@ -9,11 +9,12 @@ use super::growing_buffer::GrowingBuffer;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{poll, refused, with_error_scope};
 
-/// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write straight into it while it is mapped, so
-/// nothing is staged, and nothing copied when the frame is submitted.
+/// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write
+/// straight into it while it is mapped, so nothing is staged, and nothing copied when the frame is submitted.
 ///
-/// A mapping is requested only when the device is done with all submissions that use the buffer. wgpu would grant a request that
-/// was made and cancelled before when the submission of that time is done, while a later one still reads the buffer.
+/// A mapping is requested only when the device is done with all submissions that use the buffer. wgpu would grant a
+/// request that was made and cancelled before when the submission of that time is done, while a later one still reads
+/// the buffer.
 pub(crate) struct ObjectBuffer {
     label: &'static str,
     on_device: GrowingBuffer,
@@ -33,7 +34,8 @@ struct Usage {
 }
 
 impl Usage {
-    /// Whether the buffer may be mapped. Before its first submission it may have writes that are staged, and not submitted.
+    /// Whether the buffer may be mapped. Before its first submission it may have writes that are staged, and not
+    /// submitted.
     fn is_idle(&self) -> bool {
         self.submitted > 0 && self.done == self.submitted
     }
@@ -90,13 +92,15 @@ impl ObjectBuffer {
         poll(device, wgpu::PollType::Poll)?;
         let maps_memory = !usage.lock().is_refused;
         if !self.is_mapped() {
-            // A new buffer, without the request. It is pending if a frame was dropped whose staged writes the device still executes.
+            // A new buffer, without the request. It is pending if a frame was dropped whose staged writes the device
+            // still executes.
             *self = Self::new(self.label, maps_memory);
         }
         Ok(())
     }
 
-    /// A view of a range in bytes, to write through; `None` if writes are staged. Views at the same time must not overlap.
+    /// A view of a range in bytes, to write through; `None` if writes are staged. Views at the same time must not
+    /// overlap.
     ///
     /// # Errors
     /// If wgpu refuses.
@@ -131,7 +135,8 @@ impl ObjectBuffer {
     }
 }
 
-/// Whether a device reads the CPU's own memory as fast as any other. Devices with memory of their own read the CPU's through a bus.
+/// Whether a device reads the CPU's own memory as fast as any other. Devices with memory of their own read the CPU's
+/// through a bus.
 pub(crate) fn shares_memory(adapter: &wgpu::AdapterInfo) -> bool {
     use wgpu::{Backend, DeviceType};
     adapter.backend == Backend::Noop || matches!(adapter.device_type, DeviceType::IntegratedGpu | DeviceType::Cpu)

@@ -7,7 +7,8 @@ use super::range_allocator::RangeAllocator;
 /// The buffers of a page. Whoever writes to it first makes them.
 pub(crate) type PageBuffers<B> = Arc<OnceLock<B>>;
 
-/// Pages with buffers `B`. A set grows by adding pages, so nothing that lies in one of them ever moves; a page that is empty is released.
+/// Pages with buffers `B`. A set grows by adding pages, so nothing that lies in one of them ever moves; a page that is
+/// empty is released.
 pub(crate) struct PageSet<B> {
     /// By index, which stays the same while the page exists.
     pages: Vec<Option<Page<B>>>,
@@ -45,7 +46,8 @@ impl<B> Default for PageSet<B> {
 }
 
 impl<B> PageSet<B> {
-    /// A range of this length in the first page that has room. If none has, adds a page of `page_length`, or longer if the range is.
+    /// A range of this length in the first page that has room. If none has, adds a page of `page_length`, or longer if
+    /// the range is.
     pub(super) fn allocate(&mut self, length: u32, page_length: u32) -> PageRange {
         let found = self.allocate_in_pages(length);
         found.unwrap_or_else(|| self.allocate_in_new_page(length, page_length))

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// Hands out ranges of `0..capacity`, and takes them back. It places a range where it fits first, so that the end of a page stays free.
+/// Hands out ranges of `0..capacity`, and takes them back. It places a range where it fits first, so that the end of a
+/// page stays free.
 #[derive(Debug)]
 pub(super) struct RangeAllocator {
     /// The start and length of each free range. No two of them touch.

@@ -6,8 +6,9 @@ use super::target_texture::{TextureKind, new_texture};
 use crate::backend::BackendError;
 use crate::process::{FramePlan, PlannedTarget};
 
-/// Textures whose layers are targets of different views. Each encoder and bundle of wgpu-core holds some bytes for every texture of the
-/// device, so with a texture for each of thousands of views, memory would grow with the square of their number.
+/// Textures whose layers are targets of different views. Each encoder and bundle of wgpu-core holds some bytes for
+/// every texture of the device, so with a texture for each of thousands of views, memory would grow with the square of
+/// their number.
 #[derive(Clone, Default)]
 pub(super) struct SmallTargets {
     textures: Vec<(TextureKind, wgpu::Texture)>,
@@ -21,7 +22,7 @@ pub(super) struct SmallTarget {
 }
 
 impl SmallTargets {
-    /// The most pixels of such a target. Larger ones cost more themselves than what wgpu-core holds for them.
+    /// The most pixels of a small target. Larger ones cost more themselves than what wgpu-core holds for them.
     const MAX_PIXELS: u64 = 64 * 64;
 
     /// The most layers of a texture, all of which stay as long as one is in use.
@@ -35,7 +36,8 @@ impl SmallTargets {
             && !plan.has_raw_access(planned)
     }
 
-    /// A texture and a layer for each of these targets, in their order, with the textures of the frame before as far as possible.
+    /// A texture and a layer for each of these targets, in their order, with the textures of the frame before as far as
+    /// possible.
     ///
     /// # Errors
     /// If the device cannot have a texture.

@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Weak};
 
-/// Lives as long as something may read what a snapshot refers to: a recorded frame that is not submitted yet, for example.
+/// Lives as long as something may read what a snapshot refers to: a recorded frame that is not submitted yet, for
+/// example.
 pub(crate) struct SnapshotToken {
     number: u64,
 }
@@ -18,10 +19,11 @@ impl SnapshotToken {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct LastReader(u64);
 
-/// Resources that snapshots refer to, and that the next snapshot will not have: each is free once no snapshot is alive that may refer to it.
+/// Resources that snapshots refer to, and that the next snapshot will not have: each is free once no snapshot is alive
+/// that may refer to it.
 ///
-/// Writes to the device are ordered by submissions. What is written after the last of these frames was submitted does not reach it, and
-/// what is written before it was submitted would.
+/// Writes to the device are ordered by submissions. What is written after the last of these frames was submitted does
+/// not reach it, and what is written before it was submitted would.
 pub(super) struct SnapshotLifetimes<T> {
     /// Those that may be alive, the oldest first.
     snapshots: Vec<Weak<SnapshotToken>>,

@@ -18,8 +18,8 @@ impl StorageBuffers {
         plan.buffers().iter().all(|layout| self.find(*layout).is_some())
     }
 
-    /// These buffers, and those that a plan's processes use and that are missing, of zeros. A buffer of the same name and another size is
-    /// replaced.
+    /// These buffers, and those that a plan's processes use and that are missing, of zeros. A buffer of the same name
+    /// and another size is replaced.
     ///
     /// # Errors
     /// If the device allows no buffer of that size.

@@ -104,7 +104,8 @@ impl WgpuTargets {
         found.map(|target| (&target.texture, &target.array))
     }
 
-    /// A target of one or several views, one for each layer, as a shader samples it. Zeros in place of views that the frame does not have.
+    /// A target of one or several views, one for each layer, as a shader samples it. Zeros in place of views that the
+    /// frame does not have.
     pub(crate) fn find_sampled(
         &self,
         views: &[Option<usize>],
@@ -169,13 +170,13 @@ impl WgpuTargets {
     }
 }
 
-/// Keeps targets from frame to frame, makes new ones when a picture's size or the plan changes, and drops those that the
-/// current frame does not need.
+/// Keeps targets from frame to frame, makes new ones when a picture's size or the plan changes, and drops those that
+/// the current frame does not need.
 #[derive(Default)]
 pub(crate) struct TargetCache {
     current: Arc<WgpuTargets>,
-    /// The key of the current targets, beside the views' names: the plan's identity, and of each view its kind, its size, its layer, and
-    /// whether it may be cached.
+    /// The key of the current targets, beside the views' names: the plan's identity, and of each view its kind, its
+    /// size, its layer, and whether it may be cached.
     plan: Option<u64>,
     views: Vec<(ViewKind, [u32; 2], u32, bool)>,
     /// The targets that are not among the current ones because they were imported: the view's index, and the name.

@@ -40,7 +40,8 @@ pub(super) fn texture_bytes(format: Format, texture: &wgpu::Texture) -> u64 {
     pixels * format.bytes() as u64 * u64::from(texture.sample_count())
 }
 
-/// A view to draw into, and one that shaders sample: of level 0, and of all levels unless the descriptor says otherwise.
+/// A view to draw into, and one that shaders sample: of level 0, and of all levels unless the descriptor says
+/// otherwise.
 pub(super) fn new_views(
     texture: &wgpu::Texture,
     format: Format,

@@ -24,8 +24,8 @@ impl TextureLocation {
     pub(crate) const NONE: Self = Self { array: ARRAY_SIDES.len() as u32, layer: 0 };
 }
 
-/// All texture arrays. Like pages of meshes, they never overwrite a layer that a frame in flight may still read. An array that is full
-/// moves to a larger one, and the device copies its layers.
+/// All texture arrays. Like pages of meshes, they never overwrite a layer that a frame in flight may still read. An
+/// array that is full moves to a larger one, and the device copies its layers.
 #[derive(Default)]
 pub(crate) struct TextureArrays {
     pub(super) arrays: [TextureLayers; ARRAY_SIDES.len()],
@@ -102,7 +102,7 @@ impl TextureArrays {
         Ok(())
     }
 
-    /// Makes a snapshot of the textures as they are.
+    /// Makes a snapshot of the present textures.
     pub(crate) fn begin_snapshot(&mut self) -> Arc<SnapshotToken> {
         self.lifetimes.begin_snapshot()
     }
@@ -159,7 +159,8 @@ impl TextureArrays {
         self.textures.resize(assets.textures.slot_count().max(self.textures.len()), None);
     }
 
-    /// Frees the layers of textures that are gone, as soon as no frame in flight may read them, and releases empty arrays.
+    /// Frees the layers of textures that are gone, as soon as no frame in flight may read them, and releases empty
+    /// arrays.
     fn free_unread(&mut self) {
         for location in self.lifetimes.reclaim() {
             self.free_layer(location);
@@ -181,7 +182,7 @@ impl TextureArrays {
         }
     }
 
-    /// Makes room for so many further textures in an array, if the device allows as many layers.
+    /// Makes room for `textures` further textures in an array, if the device allows that number of layers.
     fn make_room(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, textures: usize) {
         let array = &self.arrays[index];
         let max_layers = device.limits().max_texture_array_layers as usize;
@@ -200,7 +201,8 @@ impl TextureArrays {
         locations.filter(move |location| location.array == index as u32).map(|location| location.layer)
     }
 
-    /// Moves the textures of an array to the first layers of a new one, with this many layers, at least as many as textures.
+    /// Moves the textures of an array to the first layers of a new one, with this many layers, at least as many as
+    /// textures.
     pub(super) fn move_array(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, layers: u32) {
         let live: Vec<_> = self.live_layers(index).collect();
         self.arrays[index].move_to(device, uploads, ARRAY_SIDES[index], layers, &live);

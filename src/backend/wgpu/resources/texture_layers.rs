@@ -50,8 +50,8 @@ impl TextureLayers {
         *self = Self::default();
     }
 
-    /// Moves to a texture with this many layers; to none if that is 0. The device copies `live` layers to the first ones, in their order;
-    /// all others are free then. The copy is submitted before anything that reads it.
+    /// Moves to a texture with this many layers; to none if that is 0. The device copies `live` layers to the first
+    /// ones, in their order; all others are free then. The copy is submitted before anything that reads it.
     pub(super) fn move_to(
         &mut self,
         device: &wgpu::Device,
@@ -79,7 +79,7 @@ impl TextureLayers {
     }
 }
 
-/// Copies so many layers, with all mip levels, from one layer on to those from another one on.
+/// Copies `count` layers, with all mip levels, from one layer on to those from another one on.
 fn copy_layers(
     encoder: &mut wgpu::CommandEncoder,
     source: (&wgpu::Texture, u32),
@@ -139,8 +139,8 @@ pub(super) fn copy_layer(
 }
 
 /// Records a copy of whole rows to a mip level of a layer, from row `first` on. The rows wait in a buffer of their own.
-/// `Queue::write_texture` would copy them under a lock that every submission takes. It can also deadlock with a submission of commands that
-/// were recorded before all layers of the texture were initialised (wgpu issue 9460).
+/// `Queue::write_texture` would copy them under a lock that every submission takes. It can also deadlock with a
+/// submission of commands that were recorded before all layers of the texture were initialised (wgpu issue 9460).
 ///
 /// # Errors
 /// If the device has no room, or is lost.
@@ -158,7 +158,8 @@ pub(crate) fn copy_rows(
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let label = "rows of a texture";
     let size = u64::from(stride) * u64::from(extent.height);
-    // With `MAP_WRITE` the rows are written into this buffer. Without it, wgpu maps another one, which the device copies to this one.
+    // With `MAP_WRITE` the rows are written into this buffer. Without it, wgpu maps another one, which the device
+    // copies to this one.
     let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
     let buffer =
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });

@@ -23,7 +23,7 @@ pub(crate) struct ArrayBudget<'a> {
 }
 
 impl<'a> ArrayBudget<'a> {
-    /// So many bytes, and what the device allows.
+    /// The bytes that it takes, and the limit of the device.
     pub(crate) fn new(device: &'a wgpu::Device, uploads: &'a UploadQueue, bytes: u64) -> Self {
         Self { device, uploads, bytes, max_layers: u64::from(device.limits().max_texture_array_layers) }
     }
@@ -31,8 +31,8 @@ impl<'a> ArrayBudget<'a> {
 
 /// How much an array must gain, or give up, before it is copied for it.
 ///
-/// Arrays grow and shrink as a whole. If one gave up each layer as soon as it is free, two arrays could be copied in turn for every texture
-/// that comes.
+/// Arrays grow and shrink as a whole. If one gave up each layer as soon as it is free, two arrays could be copied in
+/// turn for every texture that comes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Copying {
     /// A part of its layers, so that copies of a layer are no more than a few for each texture.
@@ -42,12 +42,12 @@ enum Copying {
 }
 
 impl Copying {
-    /// The layers that an array with so many grows by at least.
+    /// The fewest layers that an array of this length grows by.
     fn min_growth(self, capacity: u64) -> u64 {
         if self == Self::Seldom { (capacity / 8).max(1) } else { 1 }
     }
 
-    /// What an array with so many layers, of which so many are free, gives up for another one.
+    /// The layers that an array gives up for another one, by its length and the number of its free layers.
     fn surplus(self, capacity: u64, free: u64) -> u64 {
         let is_enough = free > 0 && (self == Self::AnyTime || free >= capacity / 4);
         if is_enough { free } else { 0 }
@@ -81,7 +81,7 @@ impl TextureArrays {
         !self.in_flight.contains_key(&slot) && !is_resident
     }
 
-    /// The textures that are neither on the device, as they are, nor on their way: with handle and revision.
+    /// The textures that are neither on the device, unchanged, nor on their way: with handle and revision.
     pub(crate) fn missing<'a>(&self, assets: &'a Assets) -> impl Iterator<Item = (Handle<Texture>, u64, &'a Texture)> {
         self.missing.iter().filter_map(|slot| assets.textures.entry(*slot))
     }
@@ -101,8 +101,8 @@ impl TextureArrays {
         self.placed(location)
     }
 
-    /// The same where candidates make room, the first ones first: those that have a layer of the same array, or enough of the others.
-    /// `evictions` counts them.
+    /// The same where candidates make room, the first ones first: those that have a layer of the same array, or enough
+    /// of the others. `evictions` counts them.
     pub(crate) fn place_instead<C: Iterator<Item = u32>>(
         &mut self,
         texture: &Texture,
@@ -145,7 +145,8 @@ impl TextureArrays {
         Ok(TextureLocation { array: index as u32, layer })
     }
 
-    /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what they do not use.
+    /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what
+    /// they do not use.
     fn grow(&mut self, index: usize, budget: ArrayBudget<'_>, copying: Copying) -> Result<(), Unplaced> {
         let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.arrays[index].capacity() as u64);
         let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers);
@@ -183,7 +184,8 @@ impl TextureArrays {
         others.map(|other| self.surplus(other, copying, evicted(other)) * layer_bytes(ARRAY_SIDES[other])).sum()
     }
 
-    /// Evicts candidates until there is a free layer in an array, or the array can grow; none if there are not enough. Returns how many.
+    /// Evicts candidates until there is a free layer in an array, or the array can grow; none if there are not enough.
+    /// Returns how many.
     fn evict_for(
         &mut self,
         index: usize,
@@ -271,8 +273,8 @@ impl TextureArrays {
         Arc::ptr_eq(epoch, &self.epoch)
     }
 
-    /// A job has uploaded a texture, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it is drawn until the
-    /// next one arrives.
+    /// A job has uploaded a texture, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it
+    /// is drawn until the next one arrives.
     pub(crate) fn end_upload(
         &mut self,
         epoch: &Arc<()>,

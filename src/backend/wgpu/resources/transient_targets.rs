@@ -9,12 +9,13 @@ use crate::view::RenderView;
 
 /// Which targets of a frame are transient, and the textures that they share.
 ///
-/// The life of a view's target begins with the first pass that uses it and ends with the last one, in submission order. Passes of other
-/// views that sample it count. What a texture holds when a life begins is undefined, so that first pass must overwrite the target.
+/// The life of a view's target begins with the first pass that uses it and ends with the last one, in submission order.
+/// Passes of other views that sample it count. What a texture holds when a life begins is undefined, so that first pass
+/// must overwrite the target.
 #[derive(Debug, Default)]
 pub(crate) struct TransientTargets {
-    /// For each view a slice of one entry for each of the plan's targets: the index of the texture, `None` for targets with a texture of
-    /// their own.
+    /// For each view a slice of one entry for each of the plan's targets: the index of the texture, `None` for targets
+    /// with a texture of their own.
     assigned: Vec<Option<usize>>,
     /// The number of the plan's targets.
     target_count: usize,
@@ -31,8 +32,9 @@ struct Life {
 }
 
 impl TransientTargets {
-    /// Assigns textures to the targets of these views. `passes` are at least those that [use transient targets](uses_transient). Targets for
-    /// which `is_left_out` is true, by the indices of view and target, have textures of their own or of the engine's.
+    /// Assigns textures to the targets of these views. `passes` are at least those that [use transient
+    /// targets](uses_transient). Targets for which `is_left_out` is true, by the indices of view and target, have
+    /// textures of their own or of the engine's.
     pub(crate) fn new(
         plan: &FramePlan,
         views: &[RenderView],
@@ -82,14 +84,15 @@ impl TransientTargets {
         &self.textures
     }
 
-    /// The index of the texture of a view's target, by the index of the target in the plan; `None` if it has a texture of its own.
+    /// The index of the texture of a view's target, by the index of the target in the plan; `None` if it has a texture
+    /// of its own.
     pub(crate) fn texture_of(&self, view_index: usize, target_index: usize) -> Option<usize> {
         self.assigned.get(view_index * self.target_count + target_index).copied().flatten()
     }
 }
 
-/// Whether a pass may use transient targets. The others may come and go, as views are cached, without a change of the textures that targets
-/// have.
+/// Whether a pass may use transient targets. The others may come and go, as views are cached, without a change of the
+/// textures that targets have.
 pub(crate) fn uses_transient(plan: &FramePlan, views: &[RenderView], pass: Pass) -> bool {
     let declaration = &plan.processes()[pass.process_index].declaration;
     let samples_view = |(_, access): &(String, Access)| matches!(access, Access::SampleView(..));

@@ -12,7 +12,8 @@ pub(crate) fn vertex_stride(format: VertexFormat) -> u64 {
     bytes as u64
 }
 
-/// `VertexInput` in `drawloom.wgsl`. Shaders read floats in either format, and ignore the fourth component of a packed normal.
+/// `VertexInput` in `drawloom.wgsl`. Shaders read floats in either format, and ignore the fourth component of a packed
+/// normal.
 pub(crate) fn vertex_attributes(format: VertexFormat) -> &'static [wgpu::VertexAttribute] {
     const FULL: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
     const PACKED: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm8x4, 2 => Float16x2];

@@ -18,8 +18,8 @@ pub(super) struct ViewArrayTexture {
 }
 
 impl ViewArrayTexture {
-    /// The texture of an array; that of the frame before, among `known`, if the array [keeps](ViewArray::keeps_texture_of) it. The layers
-    /// of views that the frame does not have are zeros.
+    /// The texture of an array; that of the frame before, among `known`, if the array
+    /// [keeps](ViewArray::keeps_texture_of) it. The layers of views that the frame does not have are zeros.
     ///
     /// # Errors
     /// If a picture is larger than the device allows.

@@ -1,7 +1,7 @@
 //! Which segment of a pass an encoder records.
 
-/// The segment of a pass that one encoder records: the first one clears the targets, and the first and the last one write
-/// timestamps.
+/// The segment of a pass that one encoder records: the first one clears the targets, and the first and the last one
+/// write timestamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PassSegment {
     pub(crate) is_first: bool,

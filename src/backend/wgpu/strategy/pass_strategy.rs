@@ -12,8 +12,8 @@ pub enum RecordingStrategy {
     Direct,
     /// Into [bundles](DrawList::bundle), each on any worker; the pass replays them.
     Bundles,
-    /// Into bundles that are cached: a bundle whose batches, meshes, pipelines and bindings equal those of an earlier frame is
-    /// replayed instead of recorded. Objects may move in between, as long as the view draws the same ones.
+    /// Into bundles that are cached: a bundle whose batches, meshes, pipelines and bindings equal those of an earlier
+    /// frame is replayed instead of recorded. Objects may move in between, as long as the view draws the same ones.
     CachedBundles,
 }
 
@@ -23,8 +23,8 @@ pub enum EncodingStrategy {
     /// One encoder per pass, finished on a worker. Small passes that follow each other in one view share one,
     /// and in frames of many small views those of several.
     PerPass,
-    /// A pass of more than two bundles is split over up to eight encoders, which several workers finish. The first one clears
-    /// the targets; the others load them and draw on, in order. A smaller pass is encoded as with `PerPass`.
+    /// A pass of more than two bundles is split over up to eight encoders, which several workers finish. The first one
+    /// clears the targets; the others load them and draw on, in order. A smaller pass is encoded as with `PerPass`.
     Split,
     /// One encoder per pass, recorded on a worker and finished on the device thread, when the frame is submitted.
     OnSubmit,
@@ -80,8 +80,8 @@ impl PassStrategy {
         }
     }
 
-    /// The number of parts that are recorded before the pass is finished: the pass's encoders, if it has several; its bundles,
-    /// if it has one encoder that replays bundles; otherwise none.
+    /// The number of parts that are recorded before the pass is finished: the pass's encoders, if it has several; its
+    /// bundles, if it has one encoder that replays bundles; otherwise none.
     pub(crate) fn part_count(self, list: &DrawList) -> usize {
         let bundles = list.bundle_count();
         match (self.encoder_count(bundles), self.recording) {

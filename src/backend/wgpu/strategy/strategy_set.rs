@@ -12,8 +12,8 @@ pub(crate) struct StrategySet {
     strategies: Vec<PassStrategy>,
 }
 
-/// The longest pause between two trials of a strategy, in frames: there are several others, and recording is a small part of the
-/// frame.
+/// The longest pause between two trials of a strategy, in frames: there are several others, and recording is a small
+/// part of the frame.
 const MAX_PAUSE: u64 = 2048;
 
 impl StrategySet {

@@ -14,13 +14,13 @@ impl Allowance {
     /// The bytes of a portion: so small that a job looks at the time often.
     const PORTION: u64 = 1 << 18;
 
-    /// So many bytes within a time that begins now.
+    /// An allowance of bytes within a time that begins now.
     pub(super) fn new(bytes: u64, time: Duration) -> Self {
         Self { bytes, began: Instant::now(), time, has_begun: false }
     }
 
-    /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first portion is allowed at any
-    /// time, so that something is uploaded even if the time is over before it begins.
+    /// Takes at most `bytes`, a multiple of `unit`, which `bytes` is, too. 0 if nothing is allowed any more. The first
+    /// portion is allowed at any time, so that something is uploaded even if the time is over before it begins.
     pub(super) fn take(&mut self, bytes: u64, unit: u64) -> u64 {
         let taken = bytes.min(Self::PORTION.max(unit)).min(self.bytes) / unit * unit;
         if taken == 0 || self.is_late() {

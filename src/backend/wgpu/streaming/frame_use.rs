@@ -10,7 +10,7 @@ pub(crate) struct UseMarks {
 }
 
 impl UseMarks {
-    /// Makes room for so many slots. Frames in flight go on marking where they began.
+    /// Makes room for this number of slots. Frames in flight go on marking where they began.
     pub(super) fn reserve(&mut self, slots: usize) {
         if slots > self.marks.len() {
             let marks = (0..slots.next_power_of_two()).map(|slot| AtomicU64::new(self.latest_use(slot as u32)));
@@ -22,8 +22,8 @@ impl UseMarks {
     #[inline]
     fn mark(&self, slot: u32, frame: u64) {
         if let Some(mark) = self.marks.get(slot as usize) {
-            // Relaxed, here and below: jobs of one frame write the same number, and the next frame reads it after the run. They look first,
-            // so that a line of the cache does not travel between them for nothing.
+            // Relaxed, here and below: jobs of one frame write the same number, and the next frame reads it after the
+            // run. They look first, so that a line of the cache does not travel between them for nothing.
             if mark.load(Ordering::Relaxed) != frame {
                 mark.store(frame, Ordering::Relaxed);
             }
@@ -48,8 +48,8 @@ pub(crate) struct FrameUse {
 }
 
 impl FrameUse {
-    /// Marks a mesh that has arrived as if it had been drawn just before the frames that decide what is in sight. So what was drawn
-    /// earlier makes room first.
+    /// Marks a mesh that has arrived as if it had been drawn just before the frames that decide what is in sight. So
+    /// what was drawn earlier makes room first.
     pub(super) fn mark_arrival(&self, slot: u32, frames_in_sight: u64) {
         let before = self.frame.saturating_sub(frames_in_sight + 1);
         if self.meshes.latest_use(slot) < before {

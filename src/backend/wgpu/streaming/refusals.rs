@@ -20,16 +20,17 @@ pub(super) struct RefusedMeshes {
 }
 
 impl RefusedMeshes {
-    /// Once so many candidates were tried in vain, the rest of a frame's requests have room that is free, or none.
+    /// Once this number of candidates was tried in vain, the rest of a frame's requests have room that is free, or
+    /// none.
     const MAX_TRIED: usize = 1024;
 
-    /// Whether there is no room for such a mesh.
+    /// Whether there is no room for a mesh of this size.
     pub(super) fn covers(&self, mesh: &Mesh) -> bool {
         let size = size_of_mesh(mesh);
         self.sizes.iter().any(|refused| refused[0] <= size[0] && refused[1] <= size[1])
     }
 
-    /// Adds a mesh for which so many candidates were tried.
+    /// Adds a mesh for which this number of candidates was tried.
     pub(super) fn add(&mut self, mesh: &Mesh, tried: usize) {
         let size = size_of_mesh(mesh);
         self.sizes.retain(|refused| refused[0] < size[0] || refused[1] < size[1]);
@@ -57,7 +58,7 @@ pub(super) struct RefusedTextures {
 }
 
 impl RefusedTextures {
-    /// Why there is no room for such a texture.
+    /// Why there is no room for a texture of this size.
     pub(super) fn of(&self, texture: &Texture) -> Option<Unplaced> {
         self.by_array[array_for(texture)]
     }
@@ -72,7 +73,8 @@ impl RefusedTextures {
     }
 }
 
-/// When candidates are tried again for meshes for which many were tried in vain: not in every frame, as that takes long.
+/// When candidates are tried again for meshes for which many were tried in vain: not in every frame, as that takes
+/// long.
 #[derive(Default)]
 pub(super) struct Retries {
     frame: u64,
@@ -81,7 +83,7 @@ pub(super) struct Retries {
 }
 
 impl Retries {
-    /// So many candidates may be tried for a mesh in every frame.
+    /// The candidates that may be tried for a mesh in every frame.
     const MANY_CANDIDATES: usize = 256;
     const FRAMES_BETWEEN: u64 = 16;
 
@@ -94,7 +96,7 @@ impl Retries {
         !self.due.contains_key(&slot)
     }
 
-    /// So many candidates were tried in vain.
+    /// Counts candidates that were tried in vain.
     pub(super) fn add(&mut self, slot: u32, tried: usize) {
         if tried > Self::MANY_CANDIDATES {
             self.due.insert(slot, self.frame + Self::FRAMES_BETWEEN);
@@ -122,7 +124,7 @@ impl TooLarge {
         });
     }
 
-    /// Tells that something takes so many bytes, and the limit of a name allows so many, unless it was told already.
+    /// Reports, once, that something takes more bytes than the limit of this name allows.
     pub(super) fn tell(&mut self, requested: &Requested<'_>, (bytes, limit, allowed): (u64, &'static str, u64)) {
         let (told, slot, revision, name, kind) = match *requested {
             Requested::Mesh(handle, revision, mesh) => {

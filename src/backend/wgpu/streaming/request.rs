@@ -20,7 +20,8 @@ pub(super) enum Requested<'a> {
 }
 
 impl Request<'_> {
-    /// Meshes come before textures: without a texture something is drawn nevertheless. The rest is there so that any two differ.
+    /// Meshes come before textures: without a texture something is drawn nevertheless. The rest is there so that any
+    /// two differ.
     fn rank(&self) -> (bool, i32, bool, Reverse<u32>) {
         let (is_mesh, slot) = match self.requested {
             Requested::Mesh(handle, ..) => (true, handle.index()),

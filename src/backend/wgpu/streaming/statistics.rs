@@ -1,6 +1,7 @@
 //! What streaming has done.
 
-/// What streaming has done: see [`WgpuBackend::streaming_statistics`](crate::backend::WgpuBackend::streaming_statistics).
+/// What streaming has done: see
+/// [`WgpuBackend::streaming_statistics`](crate::backend::WgpuBackend::streaming_statistics).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StreamingStatistics {
     /// The pages of meshes on the device, in bytes.
@@ -21,11 +22,11 @@ pub struct StreamingStatistics {
     pub uploaded_bytes: u64,
     /// The meshes and textures that have made room for others so far.
     pub evictions: u64,
-    /// Of the wanted ones, those for which there is no room, because the latest frame draws everything that is on the device. If it is
-    /// above 0 for long, what a frame draws exceeds the budget.
+    /// Of the wanted ones, those for which there is no room, because the latest frame draws everything that is on the
+    /// device. If it is above 0 for long, what a frame draws exceeds the budget.
     pub over_budget: usize,
-    /// Meshes and textures that are used and can never be on the device: larger than the budget of their kind, or than the device's largest
-    /// buffer. They are not among the requested ones. Each is warned of once, by name.
+    /// Meshes and textures that are used and can never be on the device: larger than the budget of their kind, or than
+    /// the device's largest buffer. They are not among the requested ones. Each is warned of once, by name.
     pub too_large: usize,
 }
 

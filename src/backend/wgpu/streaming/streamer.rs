@@ -26,9 +26,9 @@ use crate::view::{RejectionReason, Rejections, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
 ///
-/// A frame that begins takes over what jobs have uploaded since the frame before, evicts what was used longest ago, and adds to the jobs
-/// what is missing: first what the latest frame would have drawn, then the rest, both by priority. It uploads nothing itself, but for meshes
-/// that replace others.
+/// A frame that begins takes over what jobs have uploaded since the frame before, evicts what was used longest ago, and
+/// adds to the jobs what is missing: first what the latest frame would have drawn, then the rest, both by priority. It
+/// uploads nothing itself, but for meshes that replace others.
 pub(crate) struct Streamer {
     pub(crate) budget: StreamingBudget,
     jobs: UploadJobs,
@@ -57,9 +57,10 @@ pub(crate) struct StreamedResources {
 }
 
 impl Streamer {
-    /// Something that was drawn in one of so many frames is in sight: a view need not be drawn in each.
+    /// How many frames something stays in sight after one drew it: a view need not be drawn in each.
     const FRAMES_IN_SIGHT: u64 = 2;
-    /// So many times what is uploaded from one frame to the next waits for jobs at most, so that priorities can change.
+    /// The most that waits for jobs, as a multiple of the uploads from one frame to the next, so that priorities can
+    /// change.
     const MAX_WAITING_FRAMES: u64 = 2;
 
     pub(crate) fn new(budget: StreamingBudget) -> Self {
@@ -97,7 +98,8 @@ impl Streamer {
             (request.limits, request.rejections),
         );
         frame_use.lacks_texture = lacks_texture;
-        // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in flight.
+        // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in
+        // flight.
         self.begin_uploads(&on_device, held);
         let OnDevice { meshes, materials: MaterialCache { textures, .. }, .. } = on_device;
         statistics.mesh_bytes = meshes.resident_bytes();

@@ -40,7 +40,8 @@ impl TextureUpload {
         layer_bytes(self.array.width())
     }
 
-    /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded, once the device has executed the commands.
+    /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded, once the device has
+    /// executed the commands.
     ///
     /// # Errors
     /// If the device has no room.

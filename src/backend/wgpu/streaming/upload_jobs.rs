@@ -22,8 +22,8 @@ pub(super) enum Upload {
 /// An upload, and whether the device had room for it.
 pub(super) type EndedUpload = (Upload, Result<(), BackendError>);
 
-/// What background jobs upload, and what they have uploaded. Frames add to it and take from it when they begin; one job at a time does
-/// what was added.
+/// What background jobs upload, and what they have uploaded. Frames add to it and take from it when they begin; one job
+/// at a time does what was added.
 #[derive(Default)]
 pub(super) struct UploadJobs {
     state: Mutex<State>,

@@ -50,7 +50,7 @@ pub(super) struct Uses<'a> {
 }
 
 impl<'a> Uses<'a> {
-    /// For a frame that is about to draw. What one of so many frames before it drew is in sight.
+    /// For a frame that is about to draw. Everything that one of the latest frames drew is in sight.
     pub(super) fn new(
         assets: &'a Assets,
         (frame_use, users): (&'a FrameUse, &'a TextureUsers),

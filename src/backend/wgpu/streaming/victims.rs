@@ -30,11 +30,12 @@ impl Victims {
         Self { victims, least_important }
     }
 
-    /// Those that may make room for what has this priority and slot, whether it is wanted or not. Some of them may have made room already.
+    /// Those that may make room for what has this priority and slot, whether it is wanted or not. Some of them may have
+    /// made room already.
     ///
-    /// What is in sight evicts what is not, and of what is in sight only what has a lower priority. What is not evicts only what is not in
-    /// sight either and has a lower priority. So nothing ever makes room for what it replaced before. The version of itself that it
-    /// replaces comes last.
+    /// What is in sight evicts what is not, and of what is in sight only what has a lower priority. What is not evicts
+    /// only what is not in sight either and has a lower priority. So nothing ever makes room for what it replaced
+    /// before. The version of itself that it replaces comes last.
     pub(super) fn candidates(&self, (is_wanted, priority): (bool, i32), slot: u32) -> impl Iterator<Item = u32> {
         let is_lower = |lowest: Option<i32>| lowest.is_some_and(|lowest| lowest < priority);
         let [out_of_sight, in_sight] = self.least_important;

@@ -14,11 +14,11 @@ use crate::unwind::emit;
 
 /// A calibration of the device's clock against a timeline, which converts the device's times to the timeline's axis.
 ///
-/// A reading submits an empty pass and waits for it: the device's timestamp lies between the two. So the error is half of the
-/// time in between, and the narrowest of several readings is kept.
+/// A reading submits an empty pass and waits for it: the device's timestamp lies between the two. So the error is half
+/// of the time in between, and the narrowest of several readings is kept.
 ///
-/// Clocks also drift apart, by some microseconds per second. So read the clock close to the frames, or before and after them,
-/// and combine both readings with [`until`](Self::until).
+/// Clocks also drift apart, by some microseconds per second. So read the clock close to the frames, or before and after
+/// them, and combine both readings with [`until`](Self::until).
 ///
 /// ```no_run
 /// # use drawloom::{Renderer, backend::WgpuBackend, process::Deferred, scene::Scene, task::Scheduler, wgpu};
@@ -115,8 +115,8 @@ impl DeviceClock {
     }
 
     /// Converts the times of frames' passes to the timeline's axis. Each frame comes with its number
-    /// ([`Recorded::frame_number`](crate::Recorded::frame_number)). Passes whose times cannot be converted are left out. A
-    /// warning reports their number, together with the [skipped](DevicePassTimes::skipped) ones.
+    /// ([`Recorded::frame_number`](crate::Recorded::frame_number)). Passes whose times cannot be converted are left
+    /// out. A warning reports their number, together with the [skipped](DevicePassTimes::skipped) ones.
     pub fn log(&self, frames: impl IntoIterator<Item = (u64, DevicePassTimes)>) -> DeviceLog {
         let (mut passes, mut skipped) = (Vec::new(), 0);
         for (frame, times) in frames {

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// What recording a pass cost. The frame's jobs write it, with relaxed atomics; the thread that submits the frame reads it, and
-/// the hand-over of the frame to that thread orders both.
+/// What recording a pass cost. The frame's jobs write it, with relaxed atomics; the thread that submits the frame reads
+/// it, and the hand-over of the frame to that thread orders both.
 #[derive(Default)]
 pub(crate) struct PassTiming {
     /// In nanoseconds, summed over all workers: the recording of parts.

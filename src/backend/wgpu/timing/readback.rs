@@ -85,7 +85,8 @@ impl ReadbackPool {
     }
 }
 
-/// Maps a buffer and reads the timestamps of `passes` passes: begin and end. The device must have finished the copy into it.
+/// Maps a buffer and reads the timestamps of `passes` passes: begin and end. The device must have finished the copy
+/// into it.
 ///
 /// # Errors
 /// If the device refuses or is lost.

@@ -60,8 +60,8 @@ impl ShadowFilter {
         self.filtered_visibility(maps, map_layer, &found)
     }
 
-    /// The point of a light's map at which a position is looked up: that of the position, moved towards the light by the
-    /// bias.
+    /// The point of a light's map at which a position is looked up: that of the position, moved towards the light by
+    /// the bias.
     fn biased_point<R: Real>(
         self,
         side: usize,
@@ -120,10 +120,11 @@ impl ShadowFilter {
     }
 }
 
-/// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples of 1/256 of a
-/// pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of a pixel's width at its distance, for
-/// which 1/256 is an upper bound. Where an oblique near plane makes depth differ across the picture, the same depth is that of a position
-/// farther or nearer there, too. And the corners were rounded to the steps of fixed-point positions.
+/// How far a position from depth may be off its surface, in metres. Devices move the corners of triangles to multiples
+/// of 1/256 of a pixel, and their depth with them. That moves a position parallel to the picture, by at most √2/512 of
+/// a pixel's width at its distance, for which 1/256 is an upper bound. Where an oblique near plane makes depth differ
+/// across the picture, the same depth is that of a position farther or nearer there, too. And the corners were rounded
+/// to the steps of fixed-point positions.
 fn distance_off_surface<R: Real>(view: &ShaderView<R>, position: Vector3<R>) -> R {
     let [width, height] = view.size.map(|pixels| R::of(pixels as f64));
     let mut pixel = R::of(2.0) * view.up.length() / height;

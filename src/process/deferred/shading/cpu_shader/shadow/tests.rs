@@ -167,8 +167,8 @@ proptest! {
         }
     }
 
-    /// A device that moves the corners of a surface by half of 1/256 of a pixel each way gives its positions the depth of others, so that they
-    /// may lie beyond the surface as the map shows it.
+    /// A device that moves the corners of a surface by half of 1/256 of a pixel each way gives its positions the depth
+    /// of others, so that they may lie beyond the surface as the map shows it.
     #[test]
     fn a_surface_whose_corners_were_moved_within_a_pixel_is_lit(
         across in prop::array::uniform2(-0.8..0.8_f64),
