@@ -25,18 +25,29 @@
 //!  submit            the device thread alone
 //! ```
 //!
-//! Where to begin:
+//! The twenty types you need:
 //!
-//! - `guide`, with the feature `wgpu`: from a plain wgpu renderer to Drawloom in seven steps, and what it is not for.
-//! - [`Renderer`] records frames, [`Submitter`] submits them; `examples/engine_loop.rs` shows both in an engine's loop.
-//!   [`FrameLoop`] is a device thread with one, two or three frames in flight.
-//! - [`process`] is what an engine adds to a frame: its own shaders over Drawloom's commands, or passes of its own.
-//! - [`scene::SceneRef`] is what a frame reads: slices that an engine lends.
-//! - [`CpuNode`] is work of an engine's own among the jobs of a frame, and [`scene::GeneratedBuffer`] what the same
-//!   frame draws of it.
-//! - [`timeline`] tells what ran where and when; `report`, behind its feature, why a frame took as long as it did.
-//! - [`task::Scheduler`] and [`graph::FrameGraph`] are of `drawloom-jobs`, a crate that stands on its own, for an
-//!   engine's other work.
+//! | type | what it is |
+//! | --- | --- |
+//! | [`Renderer`], [`RendererBuilder`] | records frames, on all workers; how one is made |
+//! | [`Submitter`], [`FrameLoop`] | submits them; a device thread with one, two or three frames in flight |
+//! | `WgpuBackend` in [`backend`] | what frames are recorded for |
+//! | [`scene::SceneRef`], [`scene::Scene`] | what a frame reads: slices that an engine lends; arrays for an engine without its own |
+//! | [`scene::Camera`], [`scene::Light`] | each camera is a view: mirrors, shadow maps, tiles |
+//! | [`scene::Mesh`], [`scene::Material`], [`scene::Texture`] | what objects are made of |
+//! | [`scene::Changes`] | which objects differ from the frame before |
+//! | [`process::Deferred`] | the shipped pipeline, with shadows, lights, transparency and tone mapping |
+//! | [`process::RenderProcess`], [`process::Declare`], [`process::Draws`] | what an engine adds to a frame: its shaders, what they read and write, and what they draw |
+//! | [`CpuNode`] | an engine's own work among the jobs of a frame |
+//! | [`quality::Quality`] | what trades accuracy for speed |
+//! | [`task::Scheduler`], [`FrameStatistics`] | the threads; what a frame drew and left out |
+//!
+//! The `guide` (feature `wgpu`) leads from a plain wgpu renderer to Drawloom in seven steps. [`timeline`] tells what ran
+//! where and when, and `report`, behind its feature, why a frame took its time. The modules [`task`], [`graph`],
+//! [`fence`], [`timeline`] and `report` are those of `drawloom-jobs`, a crate without wgpu.
+//!
+//! Beside it: `drawloom-obj` and `drawloom-gltf` load files, `drawloom-async-post` computes post-processing on idle
+//! workers, `drawloom-egui` inspects a running renderer, and `drawloom-tracy` shows frames in Tracy.
 //!
 //! The ideas are from three papers, cited as **M** (McAnlis, "Camera-Centric Engine Design for Multithreaded
 //! Rendering"), **L** (Lorenzon and Clua, "A Novel Multithreaded Rendering System based on a Deferred Approach",
@@ -46,24 +57,22 @@
 //!
 //! By default the crate is what an engine needs in order to draw with wgpu. Each feature adds one part:
 //!
-//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it everything down to the draw list is
-//!   there, and [`NullBackend`](backend::NullBackend), which counts and checks.
-//! - `vulkan`, `metal`, `dx12` (default): what wgpu draws with. An engine for one system names its own:
+//! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it, frames are prepared down to draw
+//!   lists, and [`NullBackend`](backend::NullBackend) counts and checks them. It needs a backend of wgpu to open a device:
+//! - `vulkan`, `metal`, `dx12` (default): backends of wgpu. Each brings `wgpu`. An engine for one system names its own:
 //!   `default-features = false, features = ["vulkan", "affinity"]`.
 //! - `noop`: wgpu's device without a graphics card, which draws nothing, for tests and for measuring the CPU's work.
-//! - `affinity` (default): [`SchedulerBuilder::affinity`](task::SchedulerBuilder::affinity), and workers that stay off
-//!   the processor of their caller. Linux and Android alone have it.
+//! - `affinity` (default): [`SchedulerBuilder::affinity`](task::SchedulerBuilder::affinity), and it
+//!   keeps workers off the processor of their caller, on Linux and Android. Without it, an affinity is an error.
 //! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
 //!   A process supplies one with `RenderProcess::cpu_shader`.
 //! - `occlusion`: culling of hidden objects, with `Quality::occlusion`, and of triangles, with
-//!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off, because in no scene that was measured
-//!   does either save the CPU's time.
+//!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off by default: in no measured scene do they
+//!   save CPU time.
 //! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
 //!   or a Chrome trace.
 //! - `meshopt`: `scene::Mesh::with_simplified_levels`, which makes levels of detail with meshoptimizer, a library in
 //!   C++.
-//!
-//! The crate `drawloom-obj` reads OBJ files into a [`Scene`](scene::Scene).
 //!
 //! # Spans
 //!

@@ -12,7 +12,8 @@ use drawloom::scene::{
     Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, Topology, Vertex, ViewKind,
 };
 use drawloom::task::Scheduler;
-use drawloom::view::{Frustum, LightTable, ObjectTable, RenderView};
+use drawloom::view::RenderView;
+use drawloom::view::internal::{Frustum, LightTable, ObjectTable};
 use drawloom_testing::culling::boxes::{BoxTallies, Shapes, VOLUMES};
 use drawloom_testing::culling::cameras::{any_camera, magnitude};
 use drawloom_testing::culling::oracle::{Classification, Oracle};

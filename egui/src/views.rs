@@ -12,10 +12,11 @@ const COLUMNS: [(&str, &str); 3] = [
     ("thread time", "The time of all workers in its stages, and in those of other views of its name."),
 ];
 
+type Count = fn(&ViewStatistics) -> usize;
+
 /// The columns after these: name, explanation, and number.
-const COUNTS: &[(&str, &str, fn(&ViewStatistics) -> usize)] = &[
+const COUNTS: &[(&str, &str, Count)] = &[
     ("visible", "Objects that it sees.", |view| view.visible),
-    #[cfg(feature = "occlusion")]
     ("occluded", "Objects in its frustum that others hide.", |view| view.occluded),
     ("lights", "Lights that reach it.", |view| view.lights),
     ("commands", "Draws of single objects, over all its processes.", |view| view.commands),

@@ -253,7 +253,7 @@ pub trait Backend: Send + Sync + 'static {
     /// Submits a frame's queues one after the other. Called only on the device thread.
     ///
     /// A view has one queue, unless its plan has it submitted [process by
-    /// process](crate::process::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
+    /// process](crate::process::internal::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
     ///
     /// The device sets each of `fences` when it has done all passes up to the fence's place; they are in the order of
     /// their places. A fence that is dropped is abandoned, so after an error none need be set.

@@ -34,12 +34,21 @@ pub use error::BackendError;
 pub use frame_fence::FrameFence;
 pub(crate) use guarded_backend::{CallPanic, GuardedBackend};
 pub(crate) use kept_views::{KeptView, kept_views};
-pub use null::{NullBackend, NullPass, NullSubmission};
+pub use null::NullBackend;
 pub use picture::Picture;
 pub use read_back::ReadBack;
-pub use requests::{FrameRequest, PassRequest, ViewRequest};
+#[cfg(feature = "software")]
+pub(crate) use requests::ViewRequest;
+pub use requests::{FrameRequest, PassRequest};
 pub use scene_limits::SceneLimits;
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
 pub use target_memory::TargetMemory;
 pub use view_queue::ViewQueue;
+
+/// For the tests of this repository. No part of the interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::null::{NullPass, NullSubmission};
+    pub use super::requests::ViewRequest;
+}

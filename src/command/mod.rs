@@ -19,17 +19,25 @@ mod sort_key;
 mod splitters;
 mod version;
 
-pub use binned_segment::BinnedSegment;
-pub use bins::{Bin, Bins};
-pub use bucket::{Batch, Bucket};
+pub use bucket::Batch;
 pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use instance::instance;
-pub use list_pieces::ListPieces;
+pub(crate) use internal::*;
 pub(crate) use partition::Partition;
 pub use render_command::RenderCommand;
 pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypeFilter, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
-pub use splitters::Splitters;
-pub use version::Version;
+
+/// Draw lists and how they are made: for backends, and for the tests and benchmarks of this repository. No part of
+/// the interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::binned_segment::BinnedSegment;
+    pub use super::bins::{Bin, Bins};
+    pub use super::bucket::Bucket;
+    pub use super::list_pieces::ListPieces;
+    pub use super::splitters::Splitters;
+    pub use super::version::Version;
+}

@@ -1,4 +1,5 @@
-//! What is in the place of `culling` without the feature `occlusion`: frames cull objects by their view frustum alone.
+//! Replaces `culling` if the feature `occlusion` is off: frames cull objects by their view frustum alone. Each function
+//! that the rest of the frame calls is in both modules.
 
 use std::iter;
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use crate::backend::{FrameRequest, KeptView};
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
+use crate::raster::CulledTriangles;
 use crate::scene::Assets;
 use crate::timeline::{Labels, TuningChoice};
 use crate::view::{RenderView, UsedMeshes};
@@ -30,14 +32,22 @@ pub(super) fn allows_triangle_culling(_: &FrameRequest<'_>, _pass: usize) -> boo
     false
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct CullingNeeds;
+
+impl CullingNeeds {
+    pub(super) const NONE: Self = Self;
+}
 
 #[derive(Default)]
 pub(super) struct CullingTables;
 
 impl CullingTables {
     pub(super) fn update(&mut self, _: &Assets, _: &UsedMeshes) {}
+
+    pub(super) fn hidden(&self, _view: usize) -> usize {
+        0
+    }
 
     pub(super) fn rearrange(&mut self, _: &[Option<usize>]) {}
 
@@ -87,6 +97,10 @@ pub(super) struct PassTriangles;
 
 impl PassTriangles {
     pub(super) fn begin_frame(&mut self, _culls_triangles: bool) {}
+
+    pub(super) fn culled(&self) -> CulledTriangles {
+        CulledTriangles::default()
+    }
 
     pub(super) fn find(&mut self, _: &DrawList, _: &CullingTables, _: &Assets) {}
 }

@@ -196,7 +196,7 @@ impl<B: Backend> StageGraph<B> {
         let every_frame = StageNeeds {
             draws_commands: true,
             orders_by_bin: false,
-            culling: CullingNeeds::default(),
+            culling: CullingNeeds::NONE,
             chooses_levels: false,
             has_pieces: key.options.has_pieces,
         };

@@ -6,7 +6,6 @@ use super::piece_statistics::PieceStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
-#[cfg(feature = "occlusion")]
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
 use crate::timeline::{FrameTuning, Timeline, TuningSubject};
@@ -56,8 +55,8 @@ pub struct ViewStatistics {
     pub pieces: usize,
     /// The objects of these pieces.
     pub objects_of_pieces: usize,
-    /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion).
-    #[cfg(feature = "occlusion")]
+    /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion). 0
+    /// without the feature `occlusion`.
     pub occluded: usize,
     /// Lights that reach it.
     pub lights: usize,
@@ -68,8 +67,7 @@ pub struct ViewStatistics {
     /// Bundles that the batches fill, whether they are recorded as bundles or not.
     pub bundles: usize,
     /// Triangles that were tested and culled on the CPU, over all its processes: see
-    /// [`Mesh::with_triangle_culling`](crate::scene::Mesh::with_triangle_culling).
-    #[cfg(feature = "occlusion")]
+    /// `Mesh::with_triangle_culling`. 0 without the feature `occlusion`.
     pub culled_triangles: CulledTriangles,
     /// What levels of detail save; `None` where [`Quality::level_of_detail`](crate::quality::Quality::level_of_detail)
     /// is 0 or no mesh has levels.
@@ -173,13 +171,11 @@ impl ViewStatistics {
             visible: visibility.set.count() + visibility.pieces.object_count(),
             pieces: visibility.pieces.executed().len(),
             objects_of_pieces: visibility.pieces.object_count(),
-            #[cfg(feature = "occlusion")]
-            occluded: tables.culling.occlusion[index].hidden(),
+            occluded: tables.culling.hidden(index),
             lights: tables.lights[index].light_count(),
             commands: 0,
             batches: 0,
             bundles: 0,
-            #[cfg(feature = "occlusion")]
             culled_triangles: CulledTriangles::default(),
             levels_of_detail: tables.levels.get(index).map(|_| LevelStatistics::default()),
         }
@@ -190,10 +186,7 @@ impl ViewStatistics {
         self.commands += list.drawn_count();
         self.batches += list.batches.len();
         self.bundles += list.bundle_count();
-        #[cfg(feature = "occlusion")]
-        {
-            self.culled_triangles += table.triangles.read().culled();
-        }
+        self.culled_triangles += table.triangles.read().culled();
         if let Some(levels) = &mut self.levels_of_detail {
             levels.add(&list.batches, assets);
         }

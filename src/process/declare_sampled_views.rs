@@ -12,7 +12,7 @@ impl Declare {
     ///
     /// That view is submitted before. Views that sample each other in a circle are
     /// [`FrameError::CircularViews`](crate::FrameError::CircularViews), and so are views that sample each other and are
-    /// submitted [process by process](super::ViewOrder::ProcessByProcess). If the frame has no such view, or only the
+    /// submitted [process by process](super::internal::ViewOrder::ProcessByProcess). If the frame has no such view, or only the
     /// view itself has that name, the texture is a single pixel whose channels and depth are all 0. So a format with
     /// alpha tells whether there is one, and the recursion of mirrors in mirrors ends where the engine adds no further
     /// camera. The shader finds the texture's size with `textureDimensions`. A target with [mip

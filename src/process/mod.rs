@@ -48,35 +48,46 @@ pub use cpu_shader::{
     ShaderView, VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
 };
 use declaration::source_of_previous;
-pub use declaration::{Declaration, Declare, DeclaredAttribute, previous_name};
+pub use declaration::{Declare, previous_name};
 pub use deferred::{
     COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
-    LightVolumes, Place, Requirements, SURFACE_SHADER, ShadowCasters, Transparency,
+    LightVolumes, Place, SURFACE_SHADER, ShadowCasters, Transparency,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
-pub use plan::{
-    AttachmentExtent, ChainSlot, FramePlan, Pass, PlanError, PlannedProcess, PlannedTarget, ProcessError, SampledViews,
-    ViewGroup, ViewOrder,
-};
 pub(crate) use plan::{FramePasses, ViewArray};
+pub use plan::{FramePlan, Pass};
+pub use plan::{PlanError, ProcessError};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
 pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
-pub use sampled_view::{SampledShape, SampledView};
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};
-pub use storage_buffer::{BufferAccess, BufferLayout, BufferOffset, StorageBuffer};
+pub use storage_buffer::{BufferLayout, BufferOffset, StorageBuffer};
 pub use target_size::TargetSize;
 
 #[cfg(feature = "software")]
 pub(crate) use cpu_shader::TypedCpuShader;
+pub(crate) use internal::*;
 #[cfg(feature = "wgpu")]
 pub(crate) use prelude::{FIRST_OWN_LOCATION, LightVolume, prelude_with};
 #[cfg(feature = "wgpu")]
 pub(crate) use raw_access::{RawAccess, RequestLog};
+
+/// The plan of a frame, which a backend reads: for backends, and for the tests of this repository. No part of the
+/// interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::declaration::{Declaration, DeclaredAttribute};
+    pub use super::deferred::Requirements;
+    pub use super::plan::{
+        AttachmentExtent, ChainSlot, PlannedProcess, PlannedTarget, SampledViews, ViewGroup, ViewOrder,
+    };
+    pub use super::sampled_view::{SampledShape, SampledView};
+    pub use super::storage_buffer::BufferAccess;
+}

@@ -5,6 +5,8 @@ use super::{
     TransformPrecision, VertexFormat,
 };
 
+type Setter = fn(&mut Quality);
+
 /// A setting of [`Quality`] with values to choose from.
 ///
 /// ```
@@ -26,7 +28,7 @@ pub struct Knob {
     /// Its error and its cost.
     pub explanation: &'static str,
     /// Its values: the name of each with its unit, and what sets it. Those of the presets are among them.
-    pub values: &'static [(&'static str, fn(&mut Quality))],
+    pub values: &'static [(&'static str, Setter)],
     copy: fn(&mut Quality, &Quality),
 }
 
@@ -99,7 +101,7 @@ impl Knob {
         knob!(
             [blended_order],
             "order of blended objects",
-            "Error: pairs drawn in the wrong order, which is visible. Cost: a pass of the radix sort for some nine bits.",
+            "Error: pairs drawn in the wrong order, which is visible. Cost: one pass of the radix sort for about nine bits.",
             {
                 "8 bits, logarithmic" => logarithmic(8),
                 "16 bits, logarithmic" => logarithmic(16),
@@ -221,20 +223,20 @@ impl Knob {
         ),
         knob!(
             [shadows.interval],
-            "frames between shadow maps",
-            "Error: shadows that lag behind. Cost: a map is drawn in one frame of so many.",
+            "redraw interval of shadow maps",
+            "Error: shadows lag behind. Cost: one frame in this many draws a map.",
             {
-                "1 frame" => 1,
-                "2 frames" => 2,
-                "4 frames" => 4,
-                "8 frames" => 8,
+                "every frame" => 1,
+                "every 2nd frame" => 2,
+                "every 4th frame" => 4,
+                "every 8th frame" => 8,
             }
         ),
         knob!(
             [shadows.widest_edge],
             "edges in paraboloid maps",
-            "Error: straight edges of large triangles bend in a paraboloid. Cost: triangles that are subdivided until their edges are \
-             seen under this angle.",
+            "Error: straight edges of large triangles bend in a paraboloid. Cost: triangles are \
+             subdivided until each edge spans at most this angle.",
             {
                 "2°" => 2.0,
                 "5°" => 5.0,

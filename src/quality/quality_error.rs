@@ -14,12 +14,13 @@ pub enum QualityError {
         /// The valid range.
         range: &'static str,
     },
+    /// Occlusion culling is enabled, and Drawloom was built without it.
+    #[error("occlusion needs the feature `occlusion` of drawloom, which is off")]
+    OcclusionFeature,
     /// Occlusion culling is enabled without a culling volume.
-    #[cfg(feature = "occlusion")]
     #[error("occlusion needs a culling volume: objects without one are never hidden")]
     OcclusionWithoutVolume,
     /// Occlusion culling is enabled with absolute transforms.
-    #[cfg(feature = "occlusion")]
     #[error("occlusion needs camera-relative transforms: absolute ones draw objects at inaccurate positions")]
     OcclusionWithAbsoluteTransforms,
 }

@@ -50,7 +50,8 @@ pub struct Quality {
     /// view; boxes take as long again for objects that the bounding sphere does not decide.
     pub culling: CullingVolume,
     /// The tile size of occlusion culling, which removes objects that larger ones hide: 1, 2, 4, 8 or 16 pixels of the
-    /// view's picture; `None` disables it, as all presets do. See S 9.6. With the feature `occlusion` alone.
+    /// view's picture; `None` disables it, as all presets do. See S 9.6. Without the feature
+    /// `occlusion`, [`check`](Self::check) accepts `None` alone.
     ///
     /// Error: hidden objects that are drawn; visible objects are never culled. Cost: a coarse depth buffer per view, on
     /// the CPU. If it takes more CPU time in a view than it saves until the frame is recorded, it is disabled there for
@@ -58,7 +59,6 @@ pub struct Quality {
     /// as their meshes are, or say that they [discard](crate::process::CommandDraws::discards) parts of them or
     /// [deform](crate::process::CommandDraws::deformation) them; objects that they move in another way must have bounds
     /// other than their mesh's.
-    #[cfg(feature = "occlusion")]
     pub occlusion: Option<u32>,
     /// The format of normals in the geometry buffer.
     ///
@@ -123,7 +123,6 @@ pub struct Quality {
 
 impl Quality {
     /// The valid tile sizes of [`Quality::occlusion`], in pixels.
-    #[cfg(feature = "occlusion")]
     pub const OCCLUSION_TILE_SIZES: [u32; 5] = [1, 2, 4, 8, 16];
 
     /// The fastest preset: errors are visible on inspection.
@@ -132,7 +131,6 @@ impl Quality {
             opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey { bits: 18, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::Sphere,
-            #[cfg(feature = "occlusion")]
             occlusion: None,
             normals: NormalFormat::Octahedral8,
             diffuse: DiffuseFormat::Srgb8,
@@ -153,7 +151,6 @@ impl Quality {
             opaque_order: DepthKey::UNORDERED,
             blended_order: DepthKey::EXACT,
             culling: CullingVolume::Sphere,
-            #[cfg(feature = "occlusion")]
             occlusion: None,
             normals: NormalFormat::HalfFloat,
             diffuse: DiffuseFormat::Srgb8,
@@ -189,7 +186,6 @@ impl Quality {
     pub fn check(&self) -> Result<(), QualityError> {
         self.opaque_order.check("opaque_order", 0..=DepthKey::MAX_OPAQUE_BITS)?;
         self.blended_order.check("blended_order", 1..=DepthKey::MAX_BLENDED_BITS)?;
-        #[cfg(feature = "occlusion")]
         self.check_occlusion()?;
         if !(self.light_cut_off >= 0.0 && self.light_cut_off.is_finite()) {
             let value = self.light_cut_off.to_string();
@@ -206,9 +202,11 @@ impl Quality {
         self.shadows.check()
     }
 
-    #[cfg(feature = "occlusion")]
     fn check_occlusion(&self) -> Result<(), QualityError> {
         let Some(tile_size) = self.occlusion else { return Ok(()) };
+        if !cfg!(feature = "occlusion") {
+            return Err(QualityError::OcclusionFeature);
+        }
         if !Self::OCCLUSION_TILE_SIZES.contains(&tile_size) {
             return Err(QualityError::OutOfRange {
                 setting: "occlusion",

@@ -17,6 +17,7 @@ mod pixel_bounds;
 mod grid;
 #[cfg(feature = "software")]
 mod triangle;
+mod culled_triangles;
 #[cfg(feature = "occlusion")]
 mod triangle_culling;
 
@@ -24,6 +25,7 @@ mod triangle_culling;
 pub(crate) use coarse_depth::CoarseDepth;
 #[cfg(feature = "occlusion")]
 pub(crate) use convex::{ConvexPart, Plane};
+pub use culled_triangles::CulledTriangles;
 #[cfg(any(feature = "occlusion", feature = "software"))]
 pub(crate) use grid::Winding;
 #[cfg(feature = "software")]
@@ -33,8 +35,6 @@ pub use real::Real;
 pub(crate) use silhouettes::Silhouettes;
 #[cfg(feature = "software")]
 pub(crate) use triangle::{NearPlane, Triangle};
-#[cfg(feature = "occlusion")]
-pub use triangle_culling::CulledTriangles;
 #[cfg(feature = "occlusion")]
 pub(crate) use triangle_culling::{CullVertex, cull_triangles};
 pub use vector::{Quaternion, Vector, Vector2, Vector3, Vector4};

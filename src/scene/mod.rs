@@ -52,11 +52,12 @@ pub use changes::Changes;
 pub(crate) use chunk_users::run_node_job;
 pub use clip_plane::ClipPlane;
 pub use error::SceneError;
+pub use generated_buffer::GeneratedBuffer;
 pub(crate) use generated_buffer::{ChunkError, GeneratedSource};
-pub use generated_buffer::{GeneratedBuffer, GeneratedContents, GeneratedLayout};
 pub use generated_geometry::GeneratedIndices;
 #[cfg(feature = "wgpu")]
 pub(crate) use generated_geometry::{GeneratedGeometry, IndexSource};
+pub(crate) use internal::*;
 pub use layer_mask::LayerMask;
 pub use level_of_detail::LevelOfDetail;
 pub use light::{Light, LightKind};
@@ -74,7 +75,6 @@ pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
 pub use object_filter::{ObjectFilter, ObjectList};
 pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
-pub use packed_vertex::PackedVertex;
 pub use piece::Piece;
 pub use projection::Projection;
 pub use redraw::Redraw;
@@ -83,3 +83,10 @@ pub use topology::Topology;
 pub(crate) use transform::is_unit;
 pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VERTEX_COLOR, VertexAttribute};
 pub use whole_picture::WholePicture;
+
+/// Layouts that backends read: for backends, and for the tests of this repository. No part of the interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::generated_buffer::{GeneratedContents, GeneratedLayout};
+    pub use super::packed_vertex::PackedVertex;
+}

@@ -1,6 +1,7 @@
 //! Views: "everything is a camera" (M 10.4). Tables that all views of a frame share, and culling for each view.
 //!
-//! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts.
+//! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts, most of which
+//! are in the hidden module `internal`.
 
 mod bin;
 mod block_bounds;
@@ -43,37 +44,40 @@ mod used_meshes;
 mod visible_set;
 
 pub(crate) use bin::{VisibleRange, bin_visible, may_walk};
-#[doc(hidden)]
-pub use bounding_boxes::BoundingBoxes;
 pub(crate) use bounding_boxes::OrientedBox;
-pub use bounding_spheres::{BoundingSphere, BoundingSpheres};
 pub(crate) use changed_objects::ChangedWord;
 pub(crate) use draw_states::possible_draw_states;
 pub(crate) use fill::Fill;
-pub use fixed_position::FixedPosition;
-pub use frustum::Frustum;
-pub use gpu_light::GpuLight;
-pub use gpu_object::GpuObject;
 pub use gpu_view::GpuView;
 pub(crate) use group_bounds::{GroupBounds, Overlap};
+pub(crate) use internal::*;
 pub(crate) use level_errors::MeshLevels;
 pub(crate) use level_selector::LevelSelector;
-pub use light_table::{LightClass, LightTable};
 pub(crate) use map_owners::MapOwners;
-pub use object_block::ObjectBlock;
-pub use object_description::ObjectDraw;
 pub(crate) use object_levels::ObjectLevels;
-pub use object_table::ObjectTable;
-#[cfg(feature = "occlusion")]
-#[doc(hidden)] // For this repository's tests and benchmarks.
-pub use occlusion::{OccluderMeshes, OcclusionCuller};
 pub(crate) use piece_objects::{ObjectWord, bin_objects, recordable_objects};
 pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
 pub(crate) use selection_filter::SelectionFilter;
 pub use shadow_maps::ShadowMaps;
 pub(crate) use table_limits::TableLimits;
-pub use used_meshes::UsedMeshes;
-#[doc(hidden)] // For this repository's tests and benchmarks.
-pub use visible_set::VisibleSet;
 pub(crate) use visible_set::set_bits;
+
+/// Tables and culling of a frame: for the tests and benchmarks of this repository. No part of the interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::bounding_boxes::BoundingBoxes;
+    pub use super::bounding_spheres::{BoundingSphere, BoundingSpheres};
+    pub use super::fixed_position::FixedPosition;
+    pub use super::frustum::Frustum;
+    pub use super::gpu_light::GpuLight;
+    pub use super::gpu_object::GpuObject;
+    pub use super::light_table::{LightClass, LightTable};
+    pub use super::object_block::ObjectBlock;
+    pub use super::object_description::ObjectDraw;
+    pub use super::object_table::ObjectTable;
+    #[cfg(feature = "occlusion")]
+    pub use super::occlusion::{OccluderMeshes, OcclusionCuller};
+    pub use super::used_meshes::UsedMeshes;
+    pub use super::visible_set::VisibleSet;
+}

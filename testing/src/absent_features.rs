@@ -11,7 +11,8 @@ use drawloom::process::{
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, ClipPlane, LayerMask, LightKind, Redraw, Scene, ViewKind};
-use drawloom::view::{LightClass, ShadowMaps};
+use drawloom::view::ShadowMaps;
+use drawloom::view::internal::LightClass;
 use drawloom::{BudgetedView, Renderer, RendererBuilder};
 
 use crate::scenes::everything::{class_of, everything, glasses, without_shadow};

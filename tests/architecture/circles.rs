@@ -150,7 +150,8 @@ struct FoundPath {
     /// From the crate's root.
     path: Vec<String>,
     line: usize,
-    /// The name that a `use` declaration of the file itself, not of a module or function in it, gives to the item.
+    /// The name that a `use` declaration of the file itself gives to the item, or one of a module in it from which the
+    /// file imports all.
     name: Option<String>,
     is_reexport: bool,
 }
@@ -180,8 +181,10 @@ fn find_paths(
                 let inner = trees_of(group.stream());
                 let is_visibility = at > 0 && is(trees.get(at - 1), "pub") && is(inner.first(), "in");
                 if at > 1 && is(trees.get(at - 2), "mod") {
-                    let module = [module, &[trees[at - 1].to_string()]].concat();
-                    find_paths(&inner, &module, &declared_modules(&inner), false, found);
+                    let name = trees[at - 1].to_string();
+                    let is_of_file = is_file && imports_all_of(trees, &name);
+                    let module = [module, &[name]].concat();
+                    find_paths(&inner, &module, &declared_modules(&inner), is_of_file, found);
                 } else if !is_visibility {
                     find_paths(&inner, module, children, false, found);
                 }
@@ -216,6 +219,12 @@ fn find_paths(
 fn declared_modules(trees: &[TokenTree]) -> BTreeSet<String> {
     let names = trees.windows(2).filter(|pair| is(Some(&pair[0]), "mod"));
     names.map(|pair| pair[1].to_string()).collect()
+}
+
+/// Whether a `use` declaration imports all that the module `name` has.
+fn imports_all_of(trees: &[TokenTree], name: &str) -> bool {
+    let glob = ["use", name, ":", ":", "*"];
+    trees.windows(glob.len()).any(|trees| trees.iter().zip(glob).all(|(tree, token)| is(Some(tree), token)))
 }
 
 /// Adds the words of the file's code, without `use` declarations and code for tests.
@@ -293,6 +302,11 @@ fn connected_circles_are_described_by_the_shortest() {
 #[test]
 fn imports_without_a_circle_are_allowed() {
     let root = ("low/mod.rs", "mod a; mod b; #[cfg(test)] mod tests; pub use a::A; pub(super) use b::B;");
+    let hidden = "mod a; mod b; pub use internal::*; pub mod internal { pub use super::b::B; }";
+    let problems = circles_of(&[("low/mod.rs", hidden), ("low/a.rs", ""), ("low/b.rs", "use super::a;")]);
+    assert_eq!(problems, [""; 0]);
+    let problems = circles_of(&[("low/mod.rs", hidden), ("low/a.rs", "use super::B;"), ("low/b.rs", "use super::a;")]);
+    assert_eq!(problems.len(), 1, "{problems:?}");
     let items = ("low/mod.rs", "mod part; pub use part::{P as M, part}; #[cfg(test)] use part::Q; struct L;");
     assert_eq!(circles_of(&[items, ("low/part.rs", "use super::L;")]), [""; 0]);
     for (a, b) in [

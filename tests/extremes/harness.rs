@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use drawloom::backend::internal::NullSubmission;
 use drawloom::backend::{
-    Backend, BackendError, NullBackend, NullSubmission, Picture, SoftwareBackend, SoftwareSubmission, WgpuSubmission,
+    Backend, BackendError, NullBackend, Picture, SoftwareBackend, SoftwareSubmission, WgpuSubmission,
 };
 use drawloom::process::{Deferred, RenderProcess};
 use drawloom::quality::{Quality, ShadowQuality};

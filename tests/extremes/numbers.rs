@@ -166,7 +166,7 @@ fn check_one(harness: &mut Harness, test: &TestScene, expected: Expected, has_co
 
 /// Whether a coordinate is within the reach of positions.
 fn is_within_reach(number: f64) -> bool {
-    number.abs() < drawloom::view::FixedPosition::MAX_COORDINATE
+    number.abs() < drawloom::view::internal::FixedPosition::MAX_COORDINATE
 }
 
 fn objects(harness: &mut Harness) -> Result<(), Failed> {

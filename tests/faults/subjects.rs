@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::{Backend, NullBackend, NullSubmission, SoftwareBackend, SoftwareSubmission};
+use drawloom::backend::internal::NullSubmission;
+use drawloom::backend::{Backend, NullBackend, SoftwareBackend, SoftwareSubmission};
 use drawloom::task::Scheduler;
 use libtest_mimic::Failed;
 

@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use drawloom::backend::{NullBackend, NullPass};
-use drawloom::command::{DrawList, Splitters};
+use drawloom::backend::NullBackend;
+use drawloom::backend::internal::NullPass;
+use drawloom::command::DrawList;
+use drawloom::command::internal::Splitters;
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Blend, Projection, Scene};

@@ -5,12 +5,15 @@ use std::sync::Arc;
 
 use drawloom::Granularity;
 use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest, SceneLimits};
-use drawloom::command::{Bucket, DrawList};
-use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass, SampledViews};
+use drawloom::command::DrawList;
+use drawloom::command::internal::Bucket;
+use drawloom::process::internal::SampledViews;
+use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
 use drawloom::quality::Quality;
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
-use drawloom::view::{LightTable, ObjectTable, Rejections, RenderView};
+use drawloom::view::internal::{LightTable, ObjectTable};
+use drawloom::view::{Rejections, RenderView};
 use drawloom_testing::scenes::field;
 
 use crate::renderer;

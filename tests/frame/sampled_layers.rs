@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
-use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, PlanError, RenderProcess, SampledShape,
-};
+use drawloom::process::internal::SampledShape;
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, PlanError, RenderProcess};
 use drawloom::scene::{Camera, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer, Submitter};

@@ -8,7 +8,7 @@ use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderPr
 use drawloom::quality::{Quality, VertexFormat};
 use drawloom::scene::{Changes, Mesh, Piece, Scene, SceneRef, Topology, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::view::GpuObject;
+use drawloom::view::internal::GpuObject;
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 use drawloom_testing::tinted::TINT;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use drawloom::backend::{NullBackend, NullPass};
+use drawloom::backend::NullBackend;
+use drawloom::backend::internal::NullPass;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
 use drawloom::scene::{Light, ViewKind};

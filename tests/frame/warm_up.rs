@@ -8,7 +8,7 @@ use drawloom::process::{Deferred, LightVolumes};
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Light, LightKind, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::LightClass;
+use drawloom::view::internal::LightClass;
 use drawloom::{Renderer, Submitter, WarmUp};
 use drawloom_testing::scenes::everything::{class_of, dark, everything, everything_with_mirror, glasses};
 use drawloom_testing::scenes::leveled::globe;

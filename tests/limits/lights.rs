@@ -3,7 +3,8 @@
 use drawloom::backend::SceneLimits;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Light, Scene};
-use drawloom::view::{GpuLight, RejectionReason};
+use drawloom::view::RejectionReason;
+use drawloom::view::internal::GpuLight;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 

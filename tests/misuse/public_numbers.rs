@@ -31,7 +31,6 @@ const RESULTS: &[&str] = &[
     "ViewQueue::",
     "ViewStatistics::",
     "backend::Device",
-    "backend::NullPass::",
     "backend::TargetMemory::",
     "backend::StreamingStatistics::",
     "backend::ViewQueue::",
@@ -81,7 +80,6 @@ const RESULTS: &[&str] = &[
     "backend::FrameFence::",
     "backend::FrameRequest::",
     "backend::PassRequest::",
-    "backend::ViewRequest::",
     "backend::Backend::",
     "backend::SoftwareBackend::",
     "backend::NullBackend::",
@@ -96,9 +94,7 @@ const RESULTS: &[&str] = &[
     "process::Pass::",
     "process::PassInputs::",
     "process::RawPassResources::",
-    "process::SampledShape::",
     "process::SampledTexture::",
-    "process::SampledViews::",
     "process::Shader",
     "process::FramePlan::",
     "process::Access::",
@@ -107,10 +103,8 @@ const RESULTS: &[&str] = &[
     "process::BufferLayout::",
     "process::BufferOffset::",
     "scene::ColumnLayout::",
-    "scene::GeneratedLayout::",
     "scene::MaterialLayout::",
     "scene::AttributeFormat::",
-    "process::DeclaredAttribute::",
     "NodeResource::Buffer::",
 ];
 
@@ -147,7 +141,6 @@ const EXTREMES: &[&str] = &[
     "quality::Quality::",
     "quality::ShadowQuality::",
     "process::ClearColor::Value",
-    "scene::PackedVertex::",
 ];
 
 fn is_listed(name: &str) -> bool {

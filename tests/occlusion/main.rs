@@ -6,7 +6,8 @@ mod properties;
 mod walls;
 
 use drawloom::scene::{Blend, SceneRef, ViewKind};
-use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
+use drawloom::view::RenderView;
+use drawloom::view::internal::{ObjectTable, OccluderMeshes, OcclusionCuller, VisibleSet};
 
 /// For each object, whether the frustum of the scene's first camera intersects it, and whether the occlusion culler
 /// finds it hidden.

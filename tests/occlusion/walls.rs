@@ -4,7 +4,7 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
     Blend, Bounds, Camera, Material, Mesh, Projection, RenderObject, Scene, SceneRef, Topology, Vertex, ViewKind,
 };
-use drawloom::view::{ObjectTable, OccluderMeshes};
+use drawloom::view::internal::{ObjectTable, OccluderMeshes};
 use drawloom_testing::samples::Samples;
 use drawloom_testing::scenes::{cube, sized, square};
 

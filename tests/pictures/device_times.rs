@@ -8,8 +8,9 @@ use drawloom::backend::{
     Backend, BackendError, DeviceClock, DevicePassTimes, EncodingStrategy, RecordingStrategy, WgpuBackend,
     WgpuSubmission,
 };
+use drawloom::process::internal::ViewOrder;
 use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess, ViewOrder,
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, RawPass, RawPassResources, RenderProcess,
 };
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;

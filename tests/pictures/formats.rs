@@ -179,7 +179,9 @@ fn packed_normals() -> Result<(), Failed> {
     // The shader's normal is that of the unpacked vertex.
     let unpacked = |normal: &Vec3| {
         let vertex = Vertex { normal: normal.to_array(), ..Vertex::default() };
-        DVec3::from(drawloom::scene::PackedVertex::new(&vertex, Default::default()).unpacked().normal.map(f64::from))
+        DVec3::from(
+            drawloom::scene::internal::PackedVertex::new(&vertex, Default::default()).unpacked().normal.map(f64::from),
+        )
     };
     for (found, normal) in normals_of(&directions, quality)?.into_iter().zip(&directions) {
         if angle(found, unpacked(normal)) > normals.max_error_degrees() {

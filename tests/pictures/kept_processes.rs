@@ -10,7 +10,8 @@ use drawloom::process::{
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{Blend, Material, Scene, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::{LightClass, ShadowMaps};
+use drawloom::view::ShadowMaps;
+use drawloom::view::internal::LightClass;
 use drawloom::{Recorded, Renderer, RendererBuilder, Submitter};
 use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror, glasses, without_shadow};
 use libtest_mimic::Failed;

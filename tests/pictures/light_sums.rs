@@ -7,7 +7,8 @@ use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, RadianceSum};
 use drawloom::scene::{
     Blend, Camera, LayerMask, Light, LightKind, Material, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
 };
-use drawloom::view::{LightClass, RejectionReason};
+use drawloom::view::RejectionReason;
+use drawloom::view::internal::LightClass;
 use drawloom_testing::adapter;
 use drawloom_testing::light_sums::{SUMS, SumScene, blended_scenes, light_scenes, quality};
 use drawloom_testing::scenes::everything::{class_of, everything};

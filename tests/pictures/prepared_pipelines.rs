@@ -4,7 +4,7 @@ use drawloom::RendererBuilder;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
 use drawloom::scene::{Blend, LightKind, Material, Scene};
-use drawloom::view::LightClass;
+use drawloom::view::internal::LightClass;
 use drawloom_testing::scenes::everything::{class_of, everything, glasses};
 use drawloom_testing::scenes::{cube, field};
 use libtest_mimic::Failed;

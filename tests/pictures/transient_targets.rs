@@ -2,9 +2,8 @@
 
 use drawloom::backend::{BackendError, Picture, TargetMemory, WgpuBackend, WgpuSubmission};
 use drawloom::glam::DVec3;
-use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, RenderProcess, ToneMapping, ViewOrder,
-};
+use drawloom::process::internal::ViewOrder;
+use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, RenderProcess, ToneMapping};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Scene, ViewKind};
 use drawloom::{Recorded, RendererBuilder, wgpu};

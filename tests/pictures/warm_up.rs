@@ -7,7 +7,7 @@ use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Blend, Material};
 use drawloom::task::Scheduler;
-use drawloom::view::LightClass;
+use drawloom::view::internal::LightClass;
 use drawloom::{Renderer, RendererBuilder, Submitter, WarmUp};
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror, glasses};

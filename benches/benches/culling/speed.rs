@@ -7,7 +7,7 @@ use std::time::Instant;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::CullingVolume;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
-use drawloom::view::{BoundingSphere, Frustum, ObjectTable};
+use drawloom::view::internal::{BoundingSphere, Frustum, ObjectTable};
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::statistics::median;
 use drawloom_testing::culling::lanes::SphereArrays;

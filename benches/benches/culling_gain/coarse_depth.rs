@@ -1,7 +1,8 @@
 //! This crate's occlusion culling, in a renderer that is written by hand.
 
 use drawloom::scene::{Blend, SceneRef};
-use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
+use drawloom::view::RenderView;
+use drawloom::view::internal::{ObjectTable, OccluderMeshes, OcclusionCuller, VisibleSet};
 
 /// The coarse depth buffer of a scene whose objects stand still.
 pub struct CoarseDepth {

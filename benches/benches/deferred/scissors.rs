@@ -15,7 +15,8 @@ use drawloom::process::{
     RenderProcess, SHADER_PRELUDE,
 };
 use drawloom::scene::{LightKind, SceneRef};
-use drawloom::view::{GpuLight, GpuView, LightClass, RenderView};
+use drawloom::view::internal::{GpuLight, LightClass};
+use drawloom::view::{GpuView, RenderView};
 use drawloom::wgpu;
 use drawloom_benches::stopwatch::FrameTime;
 

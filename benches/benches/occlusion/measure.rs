@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, SceneRef};
-use drawloom::view::{ObjectTable, OccluderMeshes, OcclusionCuller, RenderView, VisibleSet};
+use drawloom::view::RenderView;
+use drawloom::view::internal::{ObjectTable, OccluderMeshes, OcclusionCuller, VisibleSet};
 use drawloom_benches::statistics::median;
 use drawloom_benches::table::Table;
 use drawloom_testing::samples::Samples;

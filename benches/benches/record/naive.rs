@@ -4,7 +4,7 @@ use std::num::NonZeroU64;
 
 use drawloom::glam::Mat4;
 use drawloom::scene::{Mesh, SceneRef};
-use drawloom::view::Frustum;
+use drawloom::view::internal::Frustum;
 use drawloom::wgpu;
 use drawloom::wgpu::util::DeviceExt;
 

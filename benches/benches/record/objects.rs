@@ -3,7 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use drawloom::glam::{DVec3, Mat4};
 use drawloom::scene::{Camera, Material, SceneRef};
-use drawloom::view::{Frustum, RenderView};
+use drawloom::view::RenderView;
+use drawloom::view::internal::Frustum;
 
 /// An object's layout in shaders.
 #[repr(C)]

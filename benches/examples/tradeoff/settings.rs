@@ -166,5 +166,5 @@ const LEFT_OUT: [(&str, &str); 4] = [
     ("shadows.side", "4096 pixels"),
     ("shadows.filter", "4 texels"),
     ("shadows.bias", "4"),
-    ("shadows.interval", "8 frames"),
+    ("shadows.interval", "every 8th frame"),
 ];

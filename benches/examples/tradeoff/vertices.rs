@@ -3,7 +3,8 @@
 use drawloom::glam::{DVec2, Vec3};
 use drawloom::quality::TransformPrecision;
 use drawloom::scene::{Camera, Mesh, Projection, Scene};
-use drawloom::view::{FixedPosition, RenderView};
+use drawloom::view::RenderView;
+use drawloom::view::internal::FixedPosition;
 
 use crate::errors::worst_of;
 

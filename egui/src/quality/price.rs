@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn what_is_done_in_every_fourth_frame_costs_a_fourth() {
-        let fourth = value_of("frames between shadow maps", "4 frames");
+        let fourth = value_of("redraw interval of shadow maps", "every 4th frame");
         let costs = |quality: &Quality, frame: usize| {
             let draws_maps = frame.is_multiple_of(quality.shadows.interval as usize);
             [if draws_maps { 3.0 } else { 1.0 }, 10.0]

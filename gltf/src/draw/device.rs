@@ -9,8 +9,12 @@ use super::error::DrawError;
 /// that Drawloom requires.
 ///
 /// # Errors
-/// If there is no adapter, or it has not what Drawloom requires.
+/// If there is no adapter, Drawloom was built without a backend of wgpu, or the adapter has not what Drawloom requires.
 pub fn open_device() -> Result<(wgpu::Device, wgpu::Queue), DrawError> {
+    // Without a backend, wgpu panics.
+    if wgpu::Instance::enabled_backend_features().is_empty() {
+        return Err(DrawError::NoAdapter);
+    }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
     let adapter = adapter.map_err(|_| DrawError::NoAdapter)?;

@@ -166,9 +166,11 @@ mod other {
             Self
         }
 
-        pub(in crate::task) fn current_affinity() {}
+        pub(in crate::task) fn current_affinity() -> Option<()> {
+            None
+        }
 
-        pub(in crate::task) fn add_current_thread(&self, _before: ()) {}
+        pub(in crate::task) fn add_current_thread(&self, _before: Option<()>) {}
 
         pub(in crate::task) fn current_processor() -> Option<usize> {
             None

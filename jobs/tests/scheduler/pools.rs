@@ -4,7 +4,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, ThreadId};
 
-use drawloom_jobs::task::{AffinityMask, Scheduler, SchedulerBuilder, SchedulerError};
+#[cfg(all(feature = "affinity", target_os = "linux"))]
+use drawloom_jobs::task::AffinityMask;
+use drawloom_jobs::task::{Scheduler, SchedulerBuilder, SchedulerError};
 
 use crate::{assert_intact, eventually};
 
@@ -100,7 +102,7 @@ fn a_panic_in_a_stop_hook_does_not_affect_other_threads() {
     drop(scheduler);
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "affinity", target_os = "linux"))]
 #[test]
 fn threads_have_their_configured_affinity() {
     /// The processors that the calling thread may run on.
@@ -126,7 +128,7 @@ fn threads_have_their_configured_affinity() {
     }
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(all(feature = "affinity", target_os = "linux"))]
 #[test]
 fn an_impossible_affinity_is_an_error_that_names_the_worker() {
     for impossible in [AffinityMask::new([]), AffinityMask::new([1023]), AffinityMask::new([usize::MAX])] {

@@ -6,6 +6,9 @@ use crate::process::Format;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
+    /// Drawloom was built without a backend of wgpu.
+    #[error("drawloom was built without a backend of wgpu: it needs the feature `vulkan`, `metal` or `dx12`")]
+    NoBackend,
     /// wgpu makes no surface for the window.
     #[error("the window can have no surface: {0}")]
     Create(#[from] wgpu::CreateSurfaceError),

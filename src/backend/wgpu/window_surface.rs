@@ -109,7 +109,7 @@ impl WindowDevice {
     /// see [`wgpu::Device::on_uncaptured_error`].
     ///
     /// # Errors
-    /// If no adapter presents in the window, or the adapter lacks what Drawloom requires.
+    /// If Drawloom was built without a backend of wgpu, no adapter presents in the window, or the adapter lacks what Drawloom requires.
     ///
     /// # Panics
     /// As [`wgpu::Instance::create_surface`]: on macOS, unless this is the main thread.
@@ -117,6 +117,10 @@ impl WindowDevice {
         display: impl WgpuHasDisplayHandle,
         window: W,
     ) -> Result<(Self, WindowSurface), SurfaceError> {
+        // Without a backend, wgpu panics.
+        if wgpu::Instance::enabled_backend_features().is_empty() {
+            return Err(SurfaceError::NoBackend);
+        }
         let descriptor = wgpu::InstanceDescriptor::new_with_display_handle_from_env(Box::new(display));
         let instance = wgpu::Instance::new(descriptor);
         let surface = instance.create_surface(window.clone())?;

@@ -14,12 +14,16 @@ pub(in crate::frame) struct CullingOptions {
 }
 
 /// Which stages of culling a pass has, or its view.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(in crate::frame) struct CullingNeeds {
     /// Whether the view may test for occlusion.
     pub(in crate::frame) tests_occlusion: bool,
     /// Whether the scene has meshes whose triangles are culled.
     pub(in crate::frame) culls_triangles: bool,
+}
+
+impl CullingNeeds {
+    pub(in crate::frame) const NONE: Self = Self { tests_occlusion: false, culls_triangles: false };
 }
 
 impl CullingOptions {

@@ -25,6 +25,11 @@ impl CullingTables {
         self.cullable_meshes.update(assets, used);
     }
 
+    /// The number of objects that a view leaves out as hidden.
+    pub(in crate::frame) fn hidden(&self, view: usize) -> usize {
+        self.occlusion[view].hidden()
+    }
+
     /// Gives the tables of views to others: see [`rearrange`].
     pub(in crate::frame) fn rearrange(&mut self, of_views: &[Option<usize>]) {
         rearrange(&mut self.occlusion, of_views);

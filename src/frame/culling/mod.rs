@@ -1,5 +1,5 @@
-//! Culling beyond the view frustum (S 9.6): of objects that others hide, and of triangles that cover no pixel. Without
-//! the feature `occlusion`, `no_culling.rs` is in its place.
+//! Culling beyond the view frustum (S 9.6): of objects that others hide, and of triangles that cover no pixel. If
+//! the feature `occlusion` is off, `no_culling.rs` replaces this module.
 
 mod cullable_meshes;
 mod culling_options;

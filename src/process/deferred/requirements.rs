@@ -19,6 +19,7 @@ pub struct Requirements {
 }
 
 const _: () = assert!(LightClass::COUNT <= 8);
+const _: () = assert!(LightClass::COUNT == 8, "light_ends in drawloom.wgsl and light_sum.wgsl have two vectors");
 
 impl Requirements {
     /// What a scene with these valid lights requires, some of whose objects [need

@@ -8,7 +8,7 @@ use drawloom::glam::{DMat3, DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::quality::CullingVolume;
 use drawloom::scene::{Bounds, Material, Mesh, Scene, SceneError, SceneRef, Topology, Vertex};
-use drawloom::view::{FixedPosition, Frustum, ObjectTable};
+use drawloom::view::internal::{FixedPosition, Frustum, ObjectTable};
 
 use super::cameras::{any_camera, magnitude};
 use super::oracle::{Classification, Oracle};

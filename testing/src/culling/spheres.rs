@@ -3,7 +3,7 @@
 use std::array;
 use std::ops::Range;
 
-use drawloom::view::{BoundingSphere, BoundingSpheres, Frustum};
+use drawloom::view::internal::{BoundingSphere, BoundingSpheres, Frustum};
 
 use super::cameras::{any_camera, magnitude};
 use super::lanes::SphereArrays;

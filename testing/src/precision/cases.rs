@@ -7,7 +7,8 @@ use drawloom::glam::{DQuat, DVec3, Quat, Vec3};
 use drawloom::scene::{
     Camera, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, SceneRef, Topology, Vertex,
 };
-use drawloom::view::{GpuObject, ObjectTable, ShadowMaps};
+use drawloom::view::ShadowMaps;
+use drawloom::view::internal::{GpuObject, ObjectTable};
 
 use super::vertex::Case;
 use crate::random::Random;

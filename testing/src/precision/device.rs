@@ -5,7 +5,8 @@ use std::error::Error;
 use drawloom::bytemuck;
 use drawloom::glam::Vec4;
 use drawloom::process::SHADER_PRELUDE;
-use drawloom::view::{GpuObject, GpuView};
+use drawloom::view::GpuView;
+use drawloom::view::internal::GpuObject;
 use drawloom::wgpu;
 use drawloom::wgpu::util::{BufferInitDescriptor, DeviceExt};
 

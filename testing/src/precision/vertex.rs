@@ -4,7 +4,8 @@ use std::error::Error;
 
 use drawloom::glam::{DQuat, DVec2, DVec3, Mat4, Quat, UVec3, Vec3, Vec4};
 use drawloom::scene::{Camera, Projection, ViewKind};
-use drawloom::view::{GpuObject, GpuView, RenderView};
+use drawloom::view::internal::GpuObject;
+use drawloom::view::{GpuView, RenderView};
 
 /// A vertex of an object in a view.
 #[derive(Clone, Debug)]

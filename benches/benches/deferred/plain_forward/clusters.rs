@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use drawloom::process::ILLUMINATION_SHADER;
 use drawloom::scene::SceneRef;
-use drawloom::view::GpuLight;
+use drawloom::view::internal::GpuLight;
 use drawloom::wgpu;
 
 use super::device::{Device, SurfacePipeline};

@@ -8,7 +8,8 @@ use drawloom::backend::WgpuBackend;
 use drawloom::glam::Vec3;
 use drawloom::process::{SHADER_PRELUDE, SURFACE_SHADER};
 use drawloom::scene::{Material, Mesh, SceneRef, Vertex};
-use drawloom::view::{GpuLight, GpuObject, GpuView};
+use drawloom::view::GpuView;
+use drawloom::view::internal::{GpuLight, GpuObject};
 use drawloom::wgpu;
 use drawloom::wgpu::util::DeviceExt;
 

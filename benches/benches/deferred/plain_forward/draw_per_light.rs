@@ -5,7 +5,7 @@ use std::error::Error;
 
 use drawloom::process::ILLUMINATION_SHADER;
 use drawloom::scene::SceneRef;
-use drawloom::view::GpuLight;
+use drawloom::view::internal::GpuLight;
 use drawloom::wgpu;
 use multiversion::multiversion;
 

@@ -1,6 +1,7 @@
 //! What lights reach of a picture.
 
-use drawloom::view::{GpuLight, GpuView};
+use drawloom::view::GpuView;
+use drawloom::view::internal::GpuLight;
 
 /// A perspective camera's axes, to find what a light reaches of its picture.
 pub struct Picture {

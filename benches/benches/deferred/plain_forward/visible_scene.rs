@@ -3,7 +3,8 @@
 use std::error::Error;
 
 use drawloom::scene::{Light, SceneRef};
-use drawloom::view::{FixedPosition, GpuLight, GpuObject, GpuView, RenderView};
+use drawloom::view::internal::{FixedPosition, GpuLight, GpuObject};
+use drawloom::view::{GpuView, RenderView};
 
 #[derive(Default)]
 pub struct VisibleScene {
