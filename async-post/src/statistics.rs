@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// What has been computed for a view, and what of it a frame shows.
+/// The results computed for a view, and the one that a frame shows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AsyncPostStatistics {
     /// The step's name.

@@ -1,5 +1,8 @@
 //! A scene in which objects or cameras move.
 
+use std::hint;
+use std::time::{Duration, Instant};
+
 use drawloom::glam::{DVec3, Quat};
 use drawloom::scene::{Camera, Changes, Scene, SceneRef};
 use drawloom_testing::random::Random;
@@ -61,6 +64,15 @@ impl Moving {
         let positions = scene.as_scene_ref().positions.to_vec();
         let cameras = scene.cameras.clone();
         Self { scene, motion, positions, cameras, moved: Vec::new(), frame: 0, random: Random::new() }
+    }
+
+    /// A [step](Self::step) of an engine whose update takes this long: computes until then.
+    pub fn step_for(&mut self, update: Duration) {
+        let start = Instant::now();
+        self.step();
+        while start.elapsed() < update {
+            hint::spin_loop();
+        }
     }
 
     /// Moves what moves a little, back and forth, so that it stays near its original position.

@@ -213,20 +213,13 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Contender<B> {
     /// Draws frames, whose update takes so long, and waits for the last one.
     pub fn draw(&mut self, count: usize, update: Duration) -> Result<Vec<FrameSample>, Box<dyn Error>> {
         let world = &mut self.world;
-        let step = |world: &mut Moving| {
-            let start = Instant::now();
-            world.step();
-            while start.elapsed() < update {
-                std::hint::spin_loop();
-            }
-        };
         let mut samples = Vec::with_capacity(count);
         let frames = match &mut self.frames {
             Frames::Loop(frames) => frames,
             Frames::Waiting(renderer, submitter, waiting) => {
                 for _ in 0..count {
                     let begun = Instant::now();
-                    step(world);
+                    world.step_for(update);
                     let (finished, step) = waiting.draw(renderer, submitter, world)?;
                     samples.push(FrameSample { finished, latency: finished - begun, age: Some(0), step: Some(step) });
                 }
@@ -242,7 +235,7 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Contender<B> {
         for _ in 0..count {
             let (slot, more) = frames.begin();
             finished.extend(more);
-            step(world);
+            world.step_for(update);
             if let Some(post) = &self.post {
                 let cameras = world.as_scene_ref().cameras;
                 post.begin_frame(frames.renderer(), cameras);

@@ -89,13 +89,6 @@ where
     /// Draws frames, whose update takes so long, and waits for the last one.
     pub fn draw(&mut self, count: usize, update: Duration) -> Result<Vec<FrameTimes>, Box<dyn Error>> {
         let world = &mut self.world;
-        let step = |world: &mut Moving| {
-            let start = Instant::now();
-            world.step();
-            while start.elapsed() < update {
-                std::hint::spin_loop();
-            }
-        };
         let mut times = Vec::with_capacity(count);
         match &mut self.frames {
             Frames::Plain { renderer, submitter, in_flight } => {
@@ -110,7 +103,7 @@ where
                         times.push(finish(unfinished.pop_front().ok_or("it is not empty")?)?);
                     }
                     let begun = Instant::now();
-                    step(world);
+                    world.step_for(update);
                     let mut recorded = renderer.record(world.as_scene_ref())?;
                     let drawn = recorded.fence_at(FramePlace::End)?;
                     let recorded_at = Instant::now();
@@ -135,7 +128,7 @@ where
                 for _ in 0..count {
                     let (slot, more) = frames.begin();
                     finished.extend(more);
-                    step(world);
+                    world.step_for(update);
                     let recorded = frames.renderer().record(world.as_scene_ref())?;
                     slot.submit(recorded);
                 }

@@ -35,7 +35,7 @@ impl CullingTables {
         rearrange(&mut self.occlusion, of_views);
     }
 
-    /// Begins a frame of so many views.
+    /// Begins a frame with this number of views.
     pub(in crate::frame) fn begin_frame(&mut self, views: usize) {
         self.occlusion.resize_with(views, ViewOcclusion::default);
     }
