@@ -42,8 +42,8 @@
 //! | [`quality::Quality`] | what trades accuracy for speed |
 //! | [`task::Scheduler`], [`FrameStatistics`] | the threads; what a frame drew and left out |
 //!
-//! The `guide` (feature `wgpu`) leads from a plain wgpu renderer to Drawloom in seven steps. [`timeline`] tells what ran
-//! where and when, and `report`, behind its feature, why a frame took its time. The modules [`task`], [`graph`],
+//! The `guide` (feature `wgpu`) leads from a plain wgpu renderer to Drawloom in seven steps. [`timeline`] tells what
+//! ran where and when, and `report`, behind its feature, why a frame took its time. The modules [`task`], [`graph`],
 //! [`fence`], [`timeline`] and `report` are those of `drawloom-jobs`, a crate without wgpu.
 //!
 //! Beside it: `drawloom-obj` and `drawloom-gltf` load files, `drawloom-async-post` computes post-processing on idle
@@ -58,7 +58,8 @@
 //! By default the crate is what an engine needs in order to draw with wgpu. Each feature adds one part:
 //!
 //! - `wgpu` (default): the wgpu backend, and `drawloom::wgpu` itself. Without it, frames are prepared down to draw
-//!   lists, and [`NullBackend`](backend::NullBackend) counts and checks them. It needs a backend of wgpu to open a device:
+//!   lists, and [`NullBackend`](backend::NullBackend) counts and checks them. It needs a backend of wgpu to open a
+//!   device:
 //! - `vulkan`, `metal`, `dx12` (default): backends of wgpu. Each brings `wgpu`. An engine for one system names its own:
 //!   `default-features = false, features = ["vulkan", "affinity"]`.
 //! - `noop`: wgpu's device without a graphics card, which draws nothing, for tests and for measuring the CPU's work.
@@ -67,8 +68,8 @@
 //! - `software`: `backend::SoftwareBackend`, which draws on the CPU, and the CPU shaders that it runs in place of WGSL.
 //!   A process supplies one with `RenderProcess::cpu_shader`.
 //! - `occlusion`: culling of hidden objects, with `Quality::occlusion`, and of triangles, with
-//!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off by default: in no measured scene do they
-//!   save CPU time.
+//!   `Mesh::with_triangle_culling`, for an engine whose device is the limit. Off by default: in no measured scene do
+//!   they save CPU time.
 //! - `report`: the module `report`: frame reports, the replay on any number of workers, and timelines as an HTML page
 //!   or a Chrome trace.
 //! - `meshopt`: `scene::Mesh::with_simplified_levels`, which makes levels of detail with meshoptimizer, a library in
@@ -119,10 +120,10 @@ pub use bytemuck;
 pub use drawloom_jobs::report;
 pub use drawloom_jobs::{fence, graph, task, text, timeline};
 pub use frame::{
-    BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FinishedFrame, FrameData, FrameError, FrameLoop,
-    FrameLoopError, FramePlace, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, NodeAccessError,
-    NodeAccesses, NodeFrame, NodeResource, PieceStatistics, Recorded, Renderer, RendererBuilder, Rung, StageTimes,
-    SubmitError, Submitted, Submitter, ViewBudget, ViewForm, ViewStatistics, WarmUp,
+    BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FencePoint, FinishedFrame, FrameData, FrameError,
+    FrameLoop, FrameLoopError, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, NodeAccessError,
+    NodeAccesses, NodeContext, NodeResource, QualityLevel, RecordedFrame, Renderer, RendererBuilder, StageTimes,
+    StaticGroupStatistics, SubmitError, SubmittedFrame, Submitter, ViewBudget, ViewStatistics, ViewVariant, WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

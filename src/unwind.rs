@@ -17,7 +17,7 @@
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
 //! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |
 //! | `Deformation`: `declare`, `shader`, `resources`, `cpu_shader` | `process/deferred/deformation.rs`, in calls of the process that deforms | as that of the process |
-//! //! | `CpuNode`: `name`, `declare` | `frame/lent_nodes.rs` | `FrameError::Panicked` with the node |
+//! //! | `CpuNode`: `name`, `declare` | `frame/borrowed_nodes.rs` | `FrameError::Panicked` with the node |
 //! | `CpuNode`: `width`, `run` and others | in jobs, caught where a graph runs its nodes | `FrameError::Panicked` with the node |
 //! | predicates of materials | `frame/view_filter.rs` | `FrameError::FilterPanicked` |
 //! | what follows a submission | `frame/frame_loop.rs` | `FrameLoopError::Panicked` |

@@ -59,8 +59,8 @@ fn a_report_counts_what_is_drawn_and_by_kind_what_is_left_out() -> Result<(), Bo
     // Both objects have the square, whose triangles share no vertices, as the file has no normals.
     let expected = json!({ "triangles": 4, "vertices": 12, "degenerate_triangles": 1, "warnings": warnings });
     assert_eq!(found["content"], expected);
-    let rejections = json!([{ "kind": "object too far from the origin", "count": 1, "first": 1 }]);
-    assert_eq!(found["rejections"], rejections);
+    let scene_issues = json!([{ "kind": "object too far from the origin", "count": 1, "first": 1 }]);
+    assert_eq!(found["scene_issues"], scene_issues);
     assert_eq!((&found["objects"], &found["frames"], &found["cpu_ms"]["median"]), (&json!(2), &json!(3), &json!(5.0)));
     assert_eq!(found["views"][0]["visible"], json!(1));
 

@@ -6,7 +6,7 @@ use drawloom::backend::{Backend, Picture};
 use drawloom::process::{Format, PostStep, RenderProcess, ShaderResource};
 use drawloom::scene::Camera;
 use drawloom::task::Scheduler;
-use drawloom::{Recorded, Renderer};
+use drawloom::{RecordedFrame, Renderer};
 
 use crate::downsample::Downsample;
 use crate::error::AsyncPostError;
@@ -138,7 +138,7 @@ impl AsyncPost {
 
     /// Has the source of a recorded frame read back when the frame is drawn, and the step computed from it. Call it
     /// before the frame is submitted and the next one begins. It does not wait.
-    pub fn read_back<B: Backend>(&self, recorded: &mut Recorded<B>) {
+    pub fn read_back<B: Backend>(&self, recorded: &mut RecordedFrame<B>) {
         self.0.read_back(recorded);
     }
 

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "software")]
 use drawloom::process::CpuShader;
-use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, Place, RenderProcess};
+use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess};
 
 #[cfg(feature = "software")]
 use crate::cpu_shader::{CpuLayer, LatePictureCpuShader};
@@ -25,7 +25,7 @@ impl RenderProcess for LatePicture {
 
     fn declare(&self, declare: &mut Declare) {
         if let Some(source) = &self.source {
-            declare.at(Place::AfterPostProcessing);
+            declare.at(InjectionPoint::AfterPostProcessing);
             declare.samples(source);
         }
         declare.clears_color(&self.target, self.format, ClearColor::Value([0.0; 4]));

@@ -8,7 +8,7 @@ use drawloom::fence::{Fence, FenceError};
 use drawloom::process::{Format, ShaderResource};
 use drawloom::scene::{Camera, ViewKind};
 use drawloom::task::{JobPanic, Scheduler, catch};
-use drawloom::{FramePlace, Recorded};
+use drawloom::{FencePoint, RecordedFrame};
 use parking_lot::Mutex;
 
 use crate::downsample::Downsample;
@@ -142,7 +142,7 @@ impl Shared {
     }
 
     /// See [`AsyncPost::read_back`](crate::AsyncPost::read_back).
-    pub(crate) fn read_back<B: Backend>(self: &Arc<Self>, recorded: &mut Recorded<B>) {
+    pub(crate) fn read_back<B: Backend>(self: &Arc<Self>, recorded: &mut RecordedFrame<B>) {
         self.count_ages();
         let number = {
             let state = self.state.lock();
@@ -176,7 +176,7 @@ impl Shared {
             return;
         }
         // A frame always has an end.
-        let Ok(drawn) = recorded.fence_at(FramePlace::End) else { return };
+        let Ok(drawn) = recorded.fence_at(FencePoint::End) else { return };
         self.state.lock().in_flight.push(InFlight { number, drawn: drawn.clone(), sources });
         let shared = Arc::downgrade(self);
         drawn.on_set(move |outcome| {

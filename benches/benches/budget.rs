@@ -5,8 +5,8 @@
 //!
 //! A main view and six others look at boxes, on wgpu's `noop` device and two workers. All cameras move in every frame.
 //! The budget is what frames with few boxes cost, and half as much again. Then there are four times as many boxes, and
-//! few again. The table has the mean thread time of a frame from the 30th frame after each step on, and the rungs after
-//! it. `target/drawloom/budget.json` has the same. The last line names the targets that were missed.
+//! few again. The table has the mean thread time of a frame from the 30th frame after each step on, and the quality
+//! levels after it. `target/drawloom/budget.json` has the same. The last line names the targets that were missed.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -17,7 +17,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Changes, Material, Mesh, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::{BudgetedView, Renderer, Rung, Submitter, ViewBudget, ViewForm};
+use drawloom::{BudgetedView, QualityLevel, Renderer, Submitter, ViewBudget, ViewVariant};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::progress_bar;
 use drawloom_benches::results;
@@ -44,8 +44,8 @@ struct Row {
     /// The mean divided by the budget.
     share_of_budget: f64,
     /// Of each view after the step, by [`views`].
-    rungs: Vec<usize>,
-    /// How often a rung changed.
+    levels: Vec<usize>,
+    /// How often a quality level changed.
     changes: usize,
     /// The first frame of the step after which all views were at their best until its end.
     back_after: Option<usize>,
@@ -69,7 +69,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         "mean, ms",
         "95th percentile, ms",
         "mean ÷ budget",
-        "rungs",
+        "levels",
         "changes",
         "back after",
     ];
@@ -82,7 +82,7 @@ fn run() -> Result<(), Box<dyn Error>> {
             format!("{:.2}", row.ms),
             format!("{:.2}", row.percentile_95_ms),
             format!("{:.2}", row.share_of_budget),
-            format!("{:?}", row.rungs),
+            format!("{:?}", row.levels),
             row.changes.to_string(),
             row.back_after.map_or_else(|| "-".to_owned(), |frame| frame.to_string()),
         ]);
@@ -116,21 +116,21 @@ fn measure(few: usize, frames: usize, progress: &ProgressBar) -> Result<Vec<Row>
 
 /// The main view, two maps, a mirror with four samples, and three screens, in the order of the cameras.
 fn views(frame: usize) -> Vec<BudgetedView> {
-    let every = |interval| Rung::Drawn(ViewForm { interval, ..ViewForm::BEST });
-    let fewer = |max_cameras| Rung::Drawn(ViewForm { max_cameras, ..ViewForm::BEST });
-    let of = |name: &str, priority, cameras: usize, ladder: &[Rung]| {
+    let every = |interval| QualityLevel::Drawn(ViewVariant { interval, ..ViewVariant::BEST });
+    let fewer = |max_cameras| QualityLevel::Drawn(ViewVariant { max_cameras, ..ViewVariant::BEST });
+    let of = |name: &str, priority, cameras: usize, levels: &[QualityLevel]| {
         let camera = |index| overhead(&format!("{name} {index}"), (frame % 2 + index) as f64 * 0.01);
         let cameras = (0..cameras).map(camera).collect();
-        BudgetedView { name: name.to_owned(), priority, cameras, ladder: ladder.to_vec() }
+        BudgetedView { name: name.to_owned(), priority, cameras, levels: levels.to_vec() }
     };
     vec![
         of("main", 9, 1, &[]),
         of("map", 3, 1, &[every(2), every(4)]),
-        of("overview", 3, 1, &[every(2), every(4), Rung::LeftOut]),
+        of("overview", 3, 1, &[every(2), every(4), QualityLevel::LeftOut]),
         of("samples", 2, 4, &[fewer(2), fewer(1)]),
-        of("screen", 1, 1, &[every(2), every(4), Rung::LeftOut]),
-        of("other screen", 1, 1, &[every(2), Rung::LeftOut]),
-        of("preview", 0, 1, &[Rung::LeftOut]),
+        of("screen", 1, 1, &[every(2), every(4), QualityLevel::LeftOut]),
+        of("other screen", 1, 1, &[every(2), QualityLevel::LeftOut]),
+        of("preview", 0, 1, &[QualityLevel::LeftOut]),
     ]
 }
 
@@ -192,11 +192,11 @@ impl Runner {
     fn step(&mut self, step: &'static str, frames: usize, progress: &ProgressBar) -> Result<Row, Box<dyn Error>> {
         let (mut times, mut changes, mut back_after) = (Vec::new(), 0, None);
         for frame in 0..frames {
-            let before = self.rungs();
+            let before = self.levels();
             times.push(self.frame()?);
-            let rungs = self.rungs();
-            changes += before.iter().zip(&rungs).filter(|(before, after)| before != after).count();
-            let is_back = rungs.iter().all(|rung| *rung == 0);
+            let levels = self.levels();
+            changes += before.iter().zip(&levels).filter(|(before, after)| before != after).count();
+            let is_back = levels.iter().all(|level| *level == 0);
             back_after = is_back.then(|| back_after.unwrap_or(frame));
             progress.inc(1);
         }
@@ -210,7 +210,7 @@ impl Runner {
             median_ms: median(settled.iter().copied()),
             percentile_95_ms: percentile(95, settled.iter().copied()),
             share_of_budget: ms / self.milliseconds,
-            rungs: self.rungs(),
+            levels: self.levels(),
             changes,
             back_after,
         })
@@ -228,8 +228,8 @@ impl Runner {
         Ok(submitted.statistics.stages.total().as_secs_f64() * 1e3)
     }
 
-    fn rungs(&self) -> Vec<usize> {
-        views(0).iter().map(|view| self.budget.rung(&view.name).unwrap_or(0)).collect()
+    fn levels(&self) -> Vec<usize> {
+        views(0).iter().map(|view| self.budget.level(&view.name).unwrap_or(0)).collect()
     }
 }
 

@@ -33,10 +33,10 @@ use self::code::{Coder, Fault, MAX_LENGTH};
 ///
 /// ```
 /// use drawloom::command::{DrawState, RenderCommand, SortKey};
-/// use drawloom::quality::DepthKey;
+/// use drawloom::quality::DepthPrecision;
 /// use drawloom_benches::delta::DeltaCommands;
 ///
-/// let depth = DepthKey::EXACT.quantize(12.0, 0.1, 100.0);
+/// let depth = DepthPrecision::EXACT.quantize(12.0, 0.1, 100.0);
 /// let command = |object| {
 ///     let key = SortKey::opaque(DrawState::PLAIN, 3, depth);
 ///     RenderCommand { key, object, mesh: 3, material: 7, state: DrawState::PLAIN }

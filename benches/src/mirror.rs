@@ -1,7 +1,7 @@
 //! A process that shows what a mirror's view has drawn.
 
 use drawloom::command::Selection;
-use drawloom::process::{CommandDraws, Declare, Draws, Place, RenderProcess};
+use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess};
 use drawloom::scene::{LayerMask, ViewKind};
 
 /// The layer of the mirror's surface.
@@ -19,7 +19,7 @@ impl RenderProcess for Mirror {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, VIEW, "radiance");
         declare.draws_over("radiance");
         declare.matches_depth("depth");

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, BackendError};
 use drawloom::scene::SceneRef;
-use drawloom::{Renderer, Submitted, Submitter};
+use drawloom::{Renderer, SubmittedFrame, Submitter};
 
 /// The times of one frame.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ pub fn timed_frame<B: Backend>(
     submitter: &Submitter<B>,
     scene: SceneRef<'_>,
     wait: impl Fn(&B::Submission) -> Result<(), BackendError>,
-) -> Result<(Submitted<B>, FrameTime), Box<dyn Error>> {
+) -> Result<(SubmittedFrame<B>, FrameTime), Box<dyn Error>> {
     let start = Instant::now();
     let recorded = renderer.record(scene)?;
     let submit = Instant::now();

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use drawloom::backend::{WgpuBackend, WindowDevice, WindowSurface};
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{Declare, Deferred, Draws, FullScreen, Parameters, Place, RenderProcess, ToneMapping};
+use drawloom::process::{Declare, Deferred, Draws, FullScreen, InjectionPoint, Parameters, RenderProcess, ToneMapping};
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, SceneRef};
 use drawloom::task::Scheduler;
@@ -69,7 +69,7 @@ impl RenderProcess for Fog {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples("depth");
         declare.draws_over("radiance");
     }

@@ -1,7 +1,7 @@
 //! The window that shows frames.
 
 use drawloom::backend::Backend;
-use drawloom::{Recorded, Renderer};
+use drawloom::{RecordedFrame, Renderer};
 use egui::{Context, ScrollArea, Ui, Vec2, Window};
 
 use crate::choices;
@@ -104,7 +104,7 @@ impl Inspector {
     }
 
     /// Adds a frame that was just recorded. Call it once for each, whether the inspector is open or not.
-    pub fn add_frame<B: Backend>(&mut self, renderer: &Renderer<B>, recorded: &Recorded<B>) {
+    pub fn add_frame<B: Backend>(&mut self, renderer: &Renderer<B>, recorded: &RecordedFrame<B>) {
         if !self.is_open {
             return;
         }

@@ -2,7 +2,7 @@
 
 use drawloom::FrameStatistics;
 use drawloom::text::Escaped;
-use drawloom::view::Rejection;
+use drawloom::view::SceneIssue;
 use egui::{Grid, Ui};
 
 /// The warnings of all frames since the list was cleared, one for each reason.
@@ -14,7 +14,7 @@ pub struct WarningList {
 
 #[derive(Debug)]
 struct Entry {
-    rejection: Rejection,
+    issue: SceneIssue,
     /// The number of the latest frame with it, counted by the list.
     frame: u64,
 }
@@ -23,9 +23,9 @@ impl WarningList {
     /// Adds the warnings of a frame.
     pub fn add_frame(&mut self, statistics: &FrameStatistics) {
         self.frames += 1;
-        for rejection in &statistics.rejections {
-            let entry = Entry { rejection: rejection.clone(), frame: self.frames };
-            match self.entries.iter_mut().find(|entry| entry.rejection.reason == rejection.reason) {
+        for issue in &statistics.scene_issues {
+            let entry = Entry { issue: issue.clone(), frame: self.frames };
+            match self.entries.iter_mut().find(|entry| entry.issue.reason == issue.reason) {
                 Some(known) => *known = entry,
                 None => self.entries.push(entry),
             }
@@ -48,11 +48,11 @@ impl WarningList {
                 .into_iter()
                 .for_each(|name| _ = ui.weak(name));
             ui.end_row();
-            for Entry { rejection, frame } in &self.entries {
-                ui.label(rejection.reason.name());
-                ui.label(rejection.count.to_string());
-                ui.label(format!("index {}", rejection.first));
-                ui.label(rejection.name.as_deref().map(|name| Escaped::new(name).to_string()).unwrap_or_default());
+            for Entry { issue, frame } in &self.entries {
+                ui.label(issue.reason.name());
+                ui.label(issue.count.to_string());
+                ui.label(format!("index {}", issue.first));
+                ui.label(issue.name.as_deref().map(|name| Escaped::new(name).to_string()).unwrap_or_default());
                 ui.label(match self.frames - frame {
                     0 => "in the latest frame".to_owned(),
                     ago => format!("{ago} frames ago"),
@@ -68,7 +68,7 @@ impl WarningList {
 
 #[cfg(test)]
 mod tests {
-    use drawloom::view::RejectionReason;
+    use drawloom::view::IssueReason;
     use egui_kittest::Harness;
     use egui_kittest::kittest::Queryable;
 
@@ -76,10 +76,10 @@ mod tests {
 
     #[test]
     fn names_are_shown_as_they_are_but_on_one_line_and_in_one_direction() {
-        let reason = RejectionReason::StaleMesh;
-        let rejection = Rejection { reason, count: 1, first: 0, name: Some("'oak' \"é\"\n\u{202e}elm".into()) };
+        let reason = IssueReason::StaleMesh;
+        let issue = SceneIssue { reason, count: 1, first: 0, name: Some("'oak' \"é\"\n\u{202e}elm".into()) };
         let mut list = WarningList::default();
-        list.add_frame(&FrameStatistics { rejections: vec![rejection], ..FrameStatistics::default() });
+        list.add_frame(&FrameStatistics { scene_issues: vec![issue], ..FrameStatistics::default() });
         let harness = Harness::new_ui(|ui| list.show(ui));
         harness.get_by_label("'oak' \"é\"\\u{a}\\u{202e}elm");
     }

@@ -6,7 +6,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::graph::NodeError;
 use drawloom::scene::{GeneratedBuffer, Mesh, SceneError, Topology, Vertex};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 
 use crate::subdivision::{POINTS, Surface, Weights};
 
@@ -98,11 +98,11 @@ impl CpuNode for Creature {
         accesses.fills(&self.vertices);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.vertices.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         let points = points(self.seconds);
         let at = |weights: &Weights| {
             points.iter().zip(weights).fold(Vec3::ZERO, |sum, (point, weight)| sum + *point * *weight)

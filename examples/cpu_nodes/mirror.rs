@@ -6,10 +6,10 @@ use std::ops::Range;
 use drawloom::command::Cull;
 use drawloom::glam::{Vec2, Vec3};
 use drawloom::graph::NodeError;
-use drawloom::process::{Declare, DrawCount, Draws, Place, ProceduralDraws, RenderProcess, StorageBuffer};
+use drawloom::process::{Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer};
 use drawloom::scene::{GeneratedBuffer, NodeColumn};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, FrameData, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
 use parking_lot::RwLock;
 
 use crate::bvh::{Bvh, Triangle};
@@ -55,7 +55,7 @@ impl CpuNode for BuildBvh<'_> {
         accesses.reads(FrameData::Transforms).reads(&self.creature.vertices).writes("reflected");
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         let mut vertices = Vec::with_capacity(self.creature.vertices.capacity());
         for chunk in 0..self.creature.vertices.chunk_count() {
             vertices.extend_from_slice(&frame.filled(&self.creature.vertices, chunk)?);
@@ -121,7 +121,7 @@ impl CpuNode for TraceMirror<'_> {
         accesses.reads("reflected").fills(self.pixels);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.pixels.chunk_count()
     }
 
@@ -129,7 +129,7 @@ impl CpuNode for TraceMirror<'_> {
         Some(1)
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         let view = &frame.views()[0];
         let (eye, [right, up, forward]) = (view.camera.position.as_vec3(), view.picture_axes());
         let bvh = self.reflected.bvh.read();
@@ -178,7 +178,7 @@ impl RenderProcess for DrawMirror {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.reads_buffer(REFLECTION);
         declare.tests_depth("depth");
         declare.draws_over("radiance");

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use drawloom::graph::NodeError;
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 use parking_lot::Mutex;
 
 /// Samples in a second, and in a frame at 30 frames a second.
@@ -44,7 +44,7 @@ impl CpuNode for Sound {
         accesses.writes("samples");
     }
 
-    fn run(&self, _: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, _: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for (index, sample) in self.samples.lock().iter_mut().enumerate() {
             let time = self.seconds + index as f32 / RATE as f32;
             let voice = |voice: usize| {

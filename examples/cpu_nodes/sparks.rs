@@ -5,10 +5,10 @@ use std::ops::Range;
 use drawloom::command::Cull;
 use drawloom::glam::Vec3;
 use drawloom::graph::NodeError;
-use drawloom::process::{Declare, DrawCount, Draws, Place, ProceduralDraws, RenderProcess, StorageBuffer};
+use drawloom::process::{Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer};
 use drawloom::scene::{Blend, GeneratedBuffer};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 
 use crate::ground;
 use crate::random::random;
@@ -81,11 +81,11 @@ impl CpuNode for Sparks {
         accesses.fills(&self.sparks).fills(&self.arguments);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.sparks.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             if chunk == 0 {
                 frame.set_count(&self.sparks, self.count())?;
@@ -108,7 +108,7 @@ impl RenderProcess for DrawSparks {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.after("draw mirror");
         declare.reads_buffer(SPARKS);
         declare.reads_arguments(ARGUMENTS);

@@ -6,7 +6,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::graph::NodeError;
 use drawloom::scene::{GeneratedBuffer, Mesh, SceneError, Topology, Vertex};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 
 use crate::ground;
 
@@ -61,11 +61,11 @@ impl CpuNode for Terrain {
         accesses.fills(&self.vertices);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.vertices.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, rows: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, rows: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for row in rows {
             let z = row as f32 * STEP - HALF;
             for (column, vertex) in frame.fill(&self.vertices, row)?.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use drawloom::glam::{DVec3, Quat};
 use drawloom::graph::NodeError;
 use drawloom::scene::NodeColumn;
 use drawloom::task::Worker;
-use drawloom::{CpuNode, FrameData, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
 
 use crate::ground;
 use crate::random::random;
@@ -44,11 +44,11 @@ impl CpuNode for Walkers<'_> {
         accesses.writes(FrameData::Transforms);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.positions.chunk_count()
     }
 
-    fn run(&self, _: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, _: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             let (mut positions, mut orientations) = (self.positions.write(chunk)?, self.orientations.write(chunk)?);
             let objects = positions.objects().zip(&mut *orientations);

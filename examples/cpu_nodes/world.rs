@@ -6,7 +6,7 @@ use drawloom::scene::{
     Camera, Changes, GeneratedBuffer, Light, Material, Mesh, NodeColumn, RenderObject, Scene, SceneError, SceneRef,
     WrittenColumns,
 };
-use drawloom::{FrameError, Recorded, Renderer};
+use drawloom::{FrameError, RecordedFrame, Renderer};
 
 use crate::creature::{self, Creature};
 use crate::mirror::{self, BuildBvh, Reflected, TraceMirror};
@@ -83,7 +83,7 @@ impl World {
         &mut self,
         renderer: &mut Renderer<WgpuBackend>,
         seconds: f32,
-    ) -> Result<Recorded<WgpuBackend>, FrameError> {
+    ) -> Result<RecordedFrame<WgpuBackend>, FrameError> {
         let angle = f64::from((seconds * 0.4).sin()) * 0.5;
         let eye = DVec3::new(angle.sin() * 19.0 + 1.0, 6.5, angle.cos() * 19.0);
         let mut camera = Camera::looking_at("main", eye, DVec3::new(0.0, 3.2, 2.0));

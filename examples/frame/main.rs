@@ -28,7 +28,7 @@ use drawloom::backend::{Backend, NullBackend, Picture, WgpuBackend};
 use drawloom::scene::{Mesh, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
-use drawloom::{FrameStatistics, Submitted, wgpu};
+use drawloom::{FrameStatistics, SubmittedFrame, wgpu};
 use drawloom_output::{path_text, print_diagnostic, print_line};
 use drawloom_testing::adapter;
 use drawloom_testing::demo;
@@ -183,7 +183,7 @@ fn load_scene(arguments: &Arguments) -> Result<(Scene, Option<String>, Content),
 
 /// The results of all frames.
 struct Drawn<B: Backend> {
-    last: Submitted<B>,
+    last: SubmittedFrame<B>,
     report: Report,
     /// Empty unless a timeline was requested.
     log: Log,

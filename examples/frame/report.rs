@@ -27,15 +27,15 @@ pub struct Report {
     stages_ms: Stages,
     cpu_ms: Cpu,
     /// What was left out or drawn differently, of the median frame.
-    rejections: Vec<Rejections>,
+    scene_issues: Vec<SceneIssues>,
     /// Why the preferred backend did not draw the frames. It is printed, but not in the file.
     #[serde(skip)]
     reason: Option<String>,
 }
 
-/// Rejections of one kind.
+/// Scene issues of one kind.
 #[derive(Serialize)]
-struct Rejections {
+struct SceneIssues {
     kind: &'static str,
     count: usize,
     /// The number of the first object, light or material that was rejected.
@@ -99,10 +99,10 @@ impl Report {
             triangles: view.culled_triangles.triangles,
             culled_triangles: view.culled_triangles.culled(),
         };
-        let rejections = frame.rejections.iter().map(|rejection| Rejections {
-            kind: rejection.reason.name(),
-            count: rejection.count,
-            first: rejection.first,
+        let scene_issues = frame.scene_issues.iter().map(|issue| SceneIssues {
+            kind: issue.reason.name(),
+            count: issue.count,
+            first: issue.first,
         });
         Self {
             adapter,
@@ -123,7 +123,7 @@ impl Report {
                 submit: milliseconds(frame.stages.submit),
             },
             cpu_ms: Cpu { median: milliseconds(*median), p95: milliseconds(at_share(0.95).0) },
-            rejections: rejections.collect(),
+            scene_issues: scene_issues.collect(),
             reason: None,
         }
     }
@@ -157,7 +157,7 @@ impl Display for Report {
         writeln!(formatter, "frames   {frames} on {backend}, {workers} workers, {granularity}{record}")?;
         let Content { triangles, vertices, .. } = self.content;
         writeln!(formatter, "objects  {objects} of {triangles} triangles and {vertices} vertices")?;
-        for Rejections { kind, count, first } in &self.rejections {
+        for SceneIssues { kind, count, first } in &self.scene_issues {
             writeln!(formatter, "rejected: {count} × {kind}, the first is number {first}")?;
         }
         writeln!(formatter)?;

@@ -1,6 +1,6 @@
 //! A glow around bright objects: `radiance` at a half and a quarter of its size, added to itself.
 
-use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, Place, RenderProcess, TargetSize};
+use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess, TargetSize};
 use drawloom::scene::Blend;
 
 /// Draws a blurred picture of a target into a smaller one.
@@ -35,7 +35,7 @@ impl RenderProcess for BloomDown {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples(self.source);
         declare.clears_color(self.target, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
         declare.size(self.target, TargetSize::Divided(self.divisor));
@@ -55,7 +55,7 @@ impl RenderProcess for BloomUp {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.after(BloomDown::HALF.name());
         declare.samples(BloomDown::HALF.target);
         declare.samples(BloomDown::QUARTER.target);

@@ -5,7 +5,9 @@ use std::f32::consts::TAU;
 
 use drawloom::command::Selection;
 use drawloom::glam::{Vec2, Vec3};
-use drawloom::process::{CommandDraws, Declare, Draws, ILLUMINATION_SHADER, Place, RenderProcess, ShaderResource};
+use drawloom::process::{
+    CommandDraws, Declare, Draws, ILLUMINATION_SHADER, InjectionPoint, RenderProcess, ShaderResource,
+};
 use drawloom::scene::{MaterialType, Mesh, SceneError, Topology, Vertex, VertexAttribute};
 use drawloom::wgpu;
 use wgpu::util::DeviceExt;
@@ -65,7 +67,7 @@ impl RenderProcess for MetalSurfaces {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.draws_over("radiance");
         declare.draws_depth("depth");
         declare.reads_materials(METAL);

@@ -3,7 +3,8 @@
 
 use drawloom::command::Selection;
 use drawloom::process::{
-    CommandDraws, Comparison, Declare, Deformation, Draws, Format, Place, RenderProcess, SURFACE_SHADER, Stencil,
+    CommandDraws, Comparison, Declare, Deformation, Draws, Format, InjectionPoint, RenderProcess, SURFACE_SHADER,
+    Stencil,
 };
 use drawloom::scene::LayerMask;
 
@@ -41,7 +42,7 @@ impl<D: Deformation> RenderProcess for Outline<D> {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterPostProcessing);
+        declare.at(InjectionPoint::AfterPostProcessing);
         declare.tests_stencil(STENCIL);
         declare.draws_over("picture");
         self.0.declare(declare);

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use drawloom::command::Cull;
 use drawloom::process::{
-    ComputeDispatch, Declare, DrawCount, Draws, Place, ProceduralDraws, RenderProcess, StorageBuffer, Workgroups,
+    ComputeDispatch, Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer,
+    Workgroups,
 };
 use drawloom::scene::Blend;
 
@@ -80,7 +81,7 @@ impl RenderProcess for Draw {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.reads_buffer(PARTICLES);
         declare.reads_buffer(ALIVE);
         declare.reads_arguments(ARGUMENTS);

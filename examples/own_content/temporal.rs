@@ -3,7 +3,7 @@
 
 use drawloom::command::Selection;
 use drawloom::glam::Mat4;
-use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, Place, RenderProcess};
+use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess};
 use drawloom::scene::{Camera, ObjectColumn};
 use drawloom::view::RenderView;
 use parking_lot::Mutex;
@@ -55,7 +55,7 @@ impl RenderProcess for Motion {
 
     fn declare(&self, declare: &mut Declare) {
         // When all opaque objects are in the depth target.
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.after(metal::NAME);
         declare.clears_color(MOTION, Format::Rg16Float, ClearColor::Value([0.0; 4]));
         declare.matches_depth("depth");

@@ -2,7 +2,7 @@
 
 use drawloom::bytemuck;
 use drawloom::glam::Vec3;
-use drawloom::process::{BlendEquation, Declare, Draws, FullScreen, Place, RenderProcess};
+use drawloom::process::{BlendEquation, Declare, Draws, FullScreen, InjectionPoint, RenderProcess};
 
 /// Draws haze over everything, thicker with distance.
 pub struct Haze {
@@ -22,7 +22,7 @@ impl RenderProcess for Haze {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples("depth");
         declare.draws_over("radiance");
     }

@@ -32,8 +32,8 @@ pub struct ViewCost {
     /// By how many milliseconds a frame without it, and without those that only it samples, is recorded and submitted
     /// sooner. Only of views that may be left out.
     saves_ms: Option<f64>,
-    /// Its rung at the end of the frames with a budget: 0 at its best, and without a budget.
-    rung: usize,
+    /// Its quality level at the end of the frames with a budget: 0 at its best, and without a budget.
+    level: usize,
 }
 
 /// Frames drawn in a row with a view, and then without it, before the two alternate.
@@ -109,7 +109,7 @@ pub fn measure<B: Backend>(
             commands: view.commands,
             ms: times.get(&view.name).copied().unwrap_or_default().as_secs_f64() * 1e3 / f64::from(frames),
             saves_ms: saved.get(&view.name).copied(),
-            rung: 0,
+            level: 0,
             name: view.name,
         }
     };
@@ -134,21 +134,21 @@ fn add_times(log: &Log, times: &mut HashMap<String, Duration>) -> Result<(), Box
     Ok(())
 }
 
-/// Sets the rungs of views, by name.
-pub fn set_rungs(views: &mut [ViewCost], rungs: &HashMap<String, usize>) {
+/// Sets the quality levels of views, by name.
+pub fn set_levels(views: &mut [ViewCost], levels: &HashMap<String, usize>) {
     for view in views {
-        view.rung = rungs.get(&view.name).copied().unwrap_or(0);
+        view.level = levels.get(&view.name).copied().unwrap_or(0);
     }
 }
 
 /// Prints a line for each view, and the memory of all.
 pub fn print(views: &[ViewCost], targets: TargetMemory) {
     let line = format!("{:<28} {:<10} {:>8} {:>9}", "view", "kind", "objects", "commands");
-    print_line!("{line} {:>8} {:>9} {:>4}", "ms", "saves ms", "rung");
+    print_line!("{line} {:>8} {:>9} {:>4}", "ms", "saves ms", "quality level");
     for view in views {
         let saves = view.saves_ms.map_or_else(|| "-".to_owned(), |saves| format!("{saves:.3}"));
-        let ViewCost { name, kind, objects, commands, ms, rung, .. } = view;
-        print_line!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9} {rung:>4}");
+        let ViewCost { name, kind, objects, commands, ms, level, .. } = view;
+        print_line!("{name:<28} {kind:<10} {objects:>8} {commands:>9} {ms:>8.3} {saves:>9} {level:>4}");
     }
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let TargetMemory { textures, bytes, dedicated_bytes, .. } = targets;
@@ -156,7 +156,7 @@ pub fn print(views: &[ViewCost], targets: TargetMemory) {
     print_line!(
         "ms: thread time of a frame with all views. saves ms: wall time of a frame without the view; below 0 is noise."
     );
-    print_line!("rung: 0 is a view at its best, higher ones are cheaper.");
+    print_line!("quality level: 0 is a view at its best, higher ones are cheaper.");
     print_line!("{textures} textures of targets, {bytes:.1} MiB; {dedicated:.1} MiB if each target had its own");
 }
 

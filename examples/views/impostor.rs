@@ -4,7 +4,7 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
+    CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
     ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector4};
@@ -93,7 +93,7 @@ impl RenderProcess for Impostor {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         // What stands in front of it is drawn over it only where depth says so.
         declare.before(Surface::pool().name());
         declare.samples_view(ViewKind::Reflection, VIEW, "radiance");

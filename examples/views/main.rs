@@ -48,7 +48,7 @@ struct Arguments {
     frames: u32,
 
     /// Sheds views until a frame takes this much thread time, in milliseconds, and draws the sheet with those that are
-    /// left. The table still has what they cost at their best, and the rung that each ends on.
+    /// left. The table still has what they cost at their best, and the quality level that each ends on.
     #[arg(long, value_name = "MS")]
     budget_ms: Option<f64>,
 
@@ -81,7 +81,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     if let Some(milliseconds) = arguments.budget_ms {
         let chosen = budget::choose(milliseconds, &gallery, &mut renderer, &submitter)?;
-        costs::set_rungs(&mut views, &chosen.rungs);
+        costs::set_levels(&mut views, &chosen.levels);
         gallery.scene.cameras = chosen.cameras;
     }
     costs::print(&views, targets);

@@ -3,7 +3,7 @@
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
+    CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
     ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector4};
@@ -38,7 +38,7 @@ impl RenderProcess for MirrorBall {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.after(Surface::screen().name());
         declare.samples_view_cube(ViewKind::Reflection, PROBE, "radiance");
         declare.draws_over("radiance");

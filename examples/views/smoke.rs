@@ -5,7 +5,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{
     BlendEquation, ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader,
-    FullScreenPixel, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess, ShaderObject, ShaderView,
+    FullScreenPixel, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess, ShaderObject, ShaderView,
     TargetSize, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector2, Vector4};
@@ -64,7 +64,7 @@ impl RenderProcess for Smoke {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples("depth");
         declare.clears_color(TARGET, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
         declare.size(TARGET, TargetSize::Divided(self.divisor));
@@ -105,7 +105,7 @@ impl RenderProcess for UpsampledSmoke {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples(TARGET);
         declare.samples("depth");
         declare.draws_over("radiance");

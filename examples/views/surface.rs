@@ -2,7 +2,7 @@
 
 use drawloom::command::Selection;
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
+    CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
     ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector3, Vector4};
@@ -71,7 +71,7 @@ impl RenderProcess for Surface {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, self.name, "radiance");
         declare.draws_over("radiance");
         // The pipeline has drawn the surface as a black object.

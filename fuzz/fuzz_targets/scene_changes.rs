@@ -88,8 +88,8 @@ fuzz_target!(|input: Input| {
             Outcome::Failed => assert!(kept.renderer.record(SceneRef { cameras: &[], ..scene }).is_err()),
             Outcome::Dropped => drop(kept.renderer.record(scene)),
             Outcome::Drawn | Outcome::AlsoDrawn if step.is_compared => {
-                // Pieces change the order of what lies at the same depth.
-                let scene = SceneRef { pieces: &[], ..scene };
+                // Static groups change the order of what lies at the same depth.
+                let scene = SceneRef { static_groups: &[], ..scene };
                 let found = kept.draw(scene).map(|frame| frame.pictures());
                 let mut new = Drawer::with_quality(one, quality(choice));
                 let expected = new.draw(SceneRef { changes: Changes::Unknown, ..scene }).map(|frame| frame.pictures());

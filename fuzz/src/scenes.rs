@@ -10,7 +10,7 @@ use drawloom::handle::Handle;
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality, ShadowQuality};
 use drawloom::scene::{
-    Blend, Bounds, Camera, Changes, ClipPlane, LayerMask, Light, Material, Mesh, Piece, Projection, Scene, SceneRef,
+    Blend, Bounds, Camera, Changes, ClipPlane, LayerMask, Light, Material, Mesh, StaticGroup, Projection, Scene, SceneRef,
     Texture, Topology, Vertex,
 };
 use drawloom::task::Scheduler;
@@ -317,7 +317,7 @@ pub enum Change {
     AddCamera(AnyCamera),
     RemoveCamera(u8),
     SetColors([Vector; 2]),
-    SetPieces(Vec<(u8, u8)>),
+    SetStaticGroups(Vec<(u8, u8)>),
 }
 
 /// An engine's own storage of a scene.
@@ -330,7 +330,7 @@ pub struct World {
     object_meshes: Vec<Handle<Mesh>>,
     object_materials: Vec<Handle<Material>>,
     layers: Vec<LayerMask>,
-    pieces: Vec<Piece>,
+    static_groups: Vec<StaticGroup>,
     /// Handles that objects may have; some may be stale.
     meshes: Vec<Handle<Mesh>>,
     textures: Vec<Handle<Texture>>,
@@ -358,7 +358,7 @@ impl World {
             object_meshes: Vec::new(),
             object_materials: Vec::new(),
             layers: Vec::new(),
-            pieces: Vec::new(),
+            static_groups: Vec::new(),
             meshes,
             textures,
             materials,
@@ -393,7 +393,7 @@ impl World {
             layers: &self.layers,
             columns: &[],
             changes: Changes::Unknown,
-            pieces: &self.pieces,
+            static_groups: &self.static_groups,
             ..self.scene.as_scene_ref()
         }
     }
@@ -484,7 +484,7 @@ impl World {
                 }
             }
             Change::SetColors(colors) => self.set_colors(*colors),
-            Change::SetPieces(ranges) => self.set_pieces(ranges),
+            Change::SetStaticGroups(ranges) => self.set_static_groups(ranges),
         }
     }
 
@@ -596,14 +596,14 @@ impl World {
         [self.scene.ambient, self.scene.background] = colors.map(Vector::color);
     }
 
-    /// Makes pieces of ranges that do not overlap.
-    fn set_pieces(&mut self, ranges: &[(u8, u8)]) {
-        self.pieces.clear();
+    /// Makes static groups of ranges that do not overlap.
+    fn set_static_groups(&mut self, ranges: &[(u8, u8)]) {
+        self.static_groups.clear();
         let mut first = 0;
         for (gap, count) in ranges.iter().take(4) {
             let start = first + u32::from(*gap) % 4;
             first = start + u32::from(*count) % 12;
-            self.pieces.push(Piece::new(format!("from {start}"), (start..first).collect()));
+            self.static_groups.push(StaticGroup::new(format!("from {start}"), (start..first).collect()));
             first += 1;
         }
     }
@@ -664,7 +664,7 @@ pub fn check_error(error: &FrameError) -> String {
     let message = error.to_string();
     match error {
         FrameError::Scene(_) => {
-            let names = ["camera `camera ", "ambient", "background", "piece"];
+            let names = ["camera `camera ", "ambient", "background", "static group"];
             assert!(names.iter().any(|name| message.contains(name)), "{message}");
         }
         FrameError::EmptyTarget { .. } | FrameError::Backend(_) => assert!(message.contains("\"camera "), "{message}"),

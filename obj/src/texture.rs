@@ -418,8 +418,8 @@ mod tests {
         for skipped in [&[0xff; 9][..], &[0], &[0xff, 0], &[7, 0xff, 0xff, 0, 0xff]] {
             let skipping = [&file[..header], skipped, &file[header..]].concat();
             assert_eq!(components(&skipping), 3, "{skipped:?}");
-            let in_pieces = BufReader::with_capacity(header + 4, Cursor::new(&skipping));
-            assert_eq!(kept_components(&mut { in_pieces }).unwrap(), 3, "{skipped:?}");
+            let in_static_groups = BufReader::with_capacity(header + 4, Cursor::new(&skipping));
+            assert_eq!(kept_components(&mut { in_static_groups }).unwrap(), 3, "{skipped:?}");
             let error = decode_named("a.jpg", skipping, 5999).map(drop).unwrap_err();
             assert!(error.contains("it takes 6000 bytes"), "{skipped:?}: {error}");
         }

@@ -45,7 +45,7 @@ use crate::timeline::{Labels, TuningChoice};
 /// - Batches whose state has a [subdivision level](crate::command::DrawState::subdivision_level) above 0 draw their
 ///   mesh [subdivided](crate::scene::Mesh::subdivided), as a triangle list whose longest edge is that of the mesh,
 ///   halved that often. Objects whose mesh cannot be subdivided that far are drawn nevertheless, and counted as
-///   [`CoarseEdges`](crate::view::RejectionReason::CoarseEdges).
+///   [`CoarseEdges`](crate::view::IssueReason::CoarseEdges).
 /// - Partial batches draw only the triangles in [`DrawList::remaining`](crate::command::DrawList::remaining).
 /// - Batches are drawn in the order of their list, and passes in that of the queues.
 pub trait Backend: Send + Sync + 'static {
@@ -112,7 +112,7 @@ pub trait Backend: Send + Sync + 'static {
 
     /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or
     /// not, before the first frame with it, and again after another backend or format was set. Objects with a mesh that
-    /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::RejectionReason::UndrawableMesh);
+    /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::IssueReason::UndrawableMesh);
     /// the error becomes a warning. `begin` never sees that mesh among the used ones.
     ///
     /// # Errors
@@ -253,7 +253,8 @@ pub trait Backend: Send + Sync + 'static {
     /// Submits a frame's queues one after the other. Called only on the device thread.
     ///
     /// A view has one queue, unless its plan has it submitted [process by
-    /// process](crate::process::internal::ViewOrder::ProcessByProcess): then it has several, with other views' between them.
+    /// process](crate::process::internal::ViewOrder::ProcessByProcess): then it has several, with other views' between
+    /// them.
     ///
     /// The device sets each of `fences` when it has done all passes up to the fence's place; they are in the order of
     /// their places. A fence that is dropped is abandoned, so after an error none need be set.

@@ -22,7 +22,7 @@ use crate::task::Worker;
 ///   the scene;
 /// - each bundle is recorded once, and has 1 to [`DrawList::BATCHES_PER_BUNDLE`] batches;
 /// - batches are not empty, draw existing meshes, and follow each other without overlaps and, except between those of
-///   pieces, without gaps;
+///   static groups, without gaps;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
 /// - a pass without commands has neither batches nor bundles;
@@ -230,8 +230,8 @@ fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<Null
     ensure(within, || {
         format!("a bundle has 1 to {} batches, but one has {}", DrawList::BATCHES_PER_BUNDLE, batches.len())
     })?;
-    // Objects of pieces that the view does not execute lie between those of others.
-    let may_have_gaps = bundle < list.pieces().bundle_count();
+    // Objects of static groups that the view does not execute lie between those of others.
+    let may_have_gaps = bundle < list.static_groups().bundle_count();
     let first_object = batches[0].first as usize;
     let (mut end, mut objects, mut triangles) = (batches[0].first, 0, 0);
     for (index, batch) in list.bundle_range(bundle).zip(batches) {

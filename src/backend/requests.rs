@@ -9,7 +9,7 @@ use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
 use crate::scene::{GeneratedContents, Light, SceneRef};
-use crate::view::{GpuView, LightTable, ObjectTable, Rejections, RenderView};
+use crate::view::{GpuView, LightTable, ObjectTable, RenderView, SceneIssues};
 
 /// Everything that a backend needs to know of a frame.
 #[derive(Clone, Copy)]
@@ -33,7 +33,7 @@ pub struct FrameRequest<'a> {
     pub scene: &'a SceneRef<'a>,
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
-    /// The most objects that a draw list has: all of the scene, and once more those of its pieces.
+    /// The most objects that a draw list has: all of the scene, and once more those of its static groups.
     pub list_capacity: usize,
     /// What CPU nodes fill while the frame is recorded, for the device when it is submitted. Complete when all passes
     /// are finished.
@@ -47,7 +47,7 @@ pub struct FrameRequest<'a> {
     /// the scene's lights or materials may cut them off there.
     pub limits: SceneLimits,
     /// Counts what the backend leaves out.
-    pub rejections: &'a Rejections,
+    pub scene_issues: &'a SceneIssues,
 }
 
 impl FrameRequest<'_> {

@@ -3,7 +3,7 @@
 use crate::view::{GpuLight, GpuObject};
 
 /// What a backend can hold of a scene: the limits of its device's buffers and textures. A frame draws what is within
-/// them, leaves out the rest, and counts it among its [rejections](crate::FrameStatistics::rejections).
+/// them, leaves out the rest, and counts it among its [scene issues](crate::FrameStatistics::scene_issues).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneLimits {
     /// The size of the largest buffer, in bytes: what the lights of all views can take together.
@@ -13,7 +13,7 @@ pub struct SceneLimits {
     /// object, material slot or light has an element.
     pub binding_bytes: u64,
     /// The most layers of a texture: what shadow maps can take together. Lights without room for theirs are counted as
-    /// [`ShadowMapLimit`](crate::view::RejectionReason::ShadowMapLimit).
+    /// [`ShadowMapLimit`](crate::view::IssueReason::ShadowMapLimit).
     pub texture_layers: u32,
 }
 
@@ -23,13 +23,13 @@ impl SceneLimits {
 
     /// The maximum number of objects if shaders read columns of up to `column_stride` bytes an object. Each object also
     /// takes 64 bytes itself. Objects at higher indices are counted as
-    /// [`ObjectLimit`](crate::view::RejectionReason::ObjectLimit).
+    /// [`ObjectLimit`](crate::view::IssueReason::ObjectLimit).
     pub fn max_objects(&self, column_stride: usize) -> usize {
         elements(self.binding_bytes, column_stride.max(size_of::<GpuObject>()))
     }
 
     /// The most lights that a view can have, each layer of shadow maps counted as another one if a light has several.
-    /// Lights that come later in the scene are counted as [`LightLimit`](crate::view::RejectionReason::LightLimit).
+    /// Lights that come later in the scene are counted as [`LightLimit`](crate::view::IssueReason::LightLimit).
     pub fn max_lights(&self) -> usize {
         elements(self.binding_bytes, size_of::<GpuLight>())
     }

@@ -11,7 +11,7 @@ use super::requests::FrameRequest;
 use crate::command::{Batch, DrawList};
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
-use crate::view::RejectionReason;
+use crate::view::IssueReason;
 
 /// Keeps subdivided meshes, as a backend's geometry `T`. A view that comes back finds those that it drew before,
 /// because to subdivide takes longer than the rest of a frame; so unused ones are dropped only where they take much
@@ -109,12 +109,12 @@ impl<T> SubdivisionCache<T> {
             let &Batch { first, count, .. } = batch;
             let found = self.get_or_create(request.scene.assets, subdivision_of(batch), vertices, &mut create)?;
             let reason = match &found.geometry {
-                None => Some(RejectionReason::UndrawableMesh),
-                Some(_) => found.is_coarse.then_some(RejectionReason::CoarseEdges),
+                None => Some(IssueReason::UndrawableMesh),
+                Some(_) => found.is_coarse.then_some(IssueReason::CoarseEdges),
             };
             if let Some(reason) = reason {
                 let objects = &list.objects[first as usize..][..count as usize];
-                request.rejections.count_all_once(reason, objects.iter().map(|object| *object as usize));
+                request.scene_issues.count_all_once(reason, objects.iter().map(|object| *object as usize));
             }
             emit(subdivision_of(batch), found);
         }

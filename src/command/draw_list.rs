@@ -2,7 +2,7 @@
 
 use std::ops::{DerefMut, Range};
 
-use super::list_pieces::{BATCHES_PER_BUNDLE, ListPieces};
+use super::draw_list_static_groups::{BATCHES_PER_BUNDLE, DrawListStaticGroups};
 use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
@@ -12,18 +12,18 @@ pub struct DrawList {
     /// are part of the list; the others keep their memory for later frames.
     commands: Vec<Vec<RenderCommand>>,
     bucket_count: usize,
-    /// The batches in draw order: those of the pieces that the view executes, then all others.
+    /// The batches in draw order: those of the static groups that the view executes, then all others.
     pub batches: Vec<Batch>,
     /// What batches draw: the object index of each command, which are the 4 bytes per object that a pass uploads. Those
-    /// of [pieces](crate::scene::Piece) come first, also of pieces that the view does not execute.
+    /// of [static groups](crate::scene::StaticGroup) come first, also of static groups that the view does not execute.
     pub objects: Vec<u32>,
-    /// Which of the objects and batches belong to pieces.
-    pieces: ListPieces,
+    /// Which of the objects and batches belong to static groups.
+    static_groups: DrawListStaticGroups,
     /// The corners of the remaining triangles of partial batches, three per triangle.
     remaining_indices: Vec<u32>,
     /// The indices of partial batches, ascending, each with its range of `remaining_indices`.
     partial_batches: Vec<(u32, Range<u32>)>,
-    /// The version of batches and objects, without the objects of pieces.
+    /// The version of batches and objects, without the objects of static groups.
     version: Version,
     /// The number of batches in a bundle, if it is less than [`DrawList::BATCHES_PER_BUNDLE`].
     bundle_size: Option<usize>,
@@ -47,7 +47,7 @@ impl DrawList {
     pub const BATCHES_PER_BUNDLE: usize = BATCHES_PER_BUNDLE;
 
     /// Sets the number of batches in a bundle, from 1 to [`BATCHES_PER_BUNDLE`](Self::BATCHES_PER_BUNDLE). Bundles of
-    /// pieces are recorded once and keep that size.
+    /// static groups are recorded once and keep that size.
     pub(crate) fn set_batches_per_bundle(&mut self, batches: usize) {
         self.bundle_size = (batches < Self::BATCHES_PER_BUNDLE).then_some(batches.max(1));
     }
@@ -65,16 +65,16 @@ impl DrawList {
 
     /// Removes everything and keeps the memory.
     pub fn clear(&mut self) {
-        self.pieces = ListPieces::default();
+        self.static_groups = DrawListStaticGroups::default();
         self.clear_own();
     }
 
-    /// Removes everything but what belongs to pieces.
+    /// Removes everything but what belongs to static groups.
     pub(crate) fn clear_own(&mut self) {
         self.version = Version::default();
         self.bucket_count = 0;
-        self.batches.truncate(self.pieces.batch_count());
-        self.objects.truncate(self.pieces.object_count());
+        self.batches.truncate(self.static_groups.batch_count());
+        self.objects.truncate(self.static_groups.object_count());
         self.remaining_indices.clear();
         self.partial_batches.clear();
     }
@@ -205,40 +205,40 @@ impl DrawList {
 
     /// The number of objects that the batches draw.
     pub fn drawn_count(&self) -> usize {
-        self.pieces.drawn_count() + self.own_objects().len()
+        self.static_groups.drawn_count() + self.own_objects().len()
     }
 
-    /// The objects of the batches that belong to no piece.
+    /// The objects of the batches that belong to no static group.
     pub fn own_objects(&self) -> Range<usize> {
-        self.pieces.object_count()..self.objects.len()
+        self.static_groups.object_count()..self.objects.len()
     }
 
-    /// What belongs to pieces.
-    pub fn pieces(&self) -> ListPieces {
-        self.pieces
+    /// What belongs to static groups.
+    pub fn static_groups(&self) -> DrawListStaticGroups {
+        self.static_groups
     }
 
-    /// Replaces the objects of pieces, unless they are those of this version.
-    pub(crate) fn set_piece_objects(&mut self, version: Version, objects: &[u32]) {
+    /// Replaces the objects of static groups, unless they are those of this version.
+    pub(crate) fn set_static_group_objects(&mut self, version: Version, objects: &[u32]) {
         self.clear_own();
-        if self.pieces.set_objects(version, objects.len()) {
+        if self.static_groups.set_objects(version, objects.len()) {
             self.batches.clear();
             self.objects.clear();
             self.objects.extend_from_slice(objects);
         }
     }
 
-    /// Replaces the batches of pieces, unless they are those of this version. They come in draw order; neighbours whose
-    /// objects follow each other become one batch where both have the same state and mesh, and `can_merge` holds for
-    /// that mesh's slot.
-    pub(crate) fn execute_pieces(
+    /// Replaces the batches of static groups, unless they are those of this version. They come in draw order;
+    /// neighbours whose objects follow each other become one batch where both have the same state and mesh, and
+    /// `can_merge` holds for that mesh's slot.
+    pub(crate) fn execute_static_groups(
         &mut self,
         version: Version,
         batches: impl Iterator<Item = Batch>,
         can_merge: impl Fn(u32) -> bool,
     ) {
         self.clear_own();
-        if !self.pieces.set_executed(version) {
+        if !self.static_groups.set_executed(version) {
             return;
         }
         self.batches.clear();
@@ -255,17 +255,17 @@ impl DrawList {
                 _ => self.batches.push(batch),
             }
         }
-        self.pieces.set_drawn(drawn, self.batches.len());
+        self.static_groups.set_drawn(drawn, self.batches.len());
     }
 
     fn batches_per_bundle(&self) -> usize {
         self.bundle_size.unwrap_or(Self::BATCHES_PER_BUNDLE)
     }
 
-    /// The number of bundles that the batches fill. No bundle has batches of pieces and of other objects.
+    /// The number of bundles that the batches fill. No bundle has batches of static groups and of other objects.
     pub fn bundle_count(&self) -> usize {
-        let own = self.batches.len() - self.pieces.batch_count();
-        self.pieces.bundle_count() + own.div_ceil(self.batches_per_bundle())
+        let own = self.batches.len() - self.static_groups.batch_count();
+        self.static_groups.bundle_count() + own.div_ceil(self.batches_per_bundle())
     }
 
     /// The batches of one bundle.
@@ -281,19 +281,19 @@ impl DrawList {
     /// # Panics
     /// If `index` is [`DrawList::bundle_count`] or more.
     pub fn bundle_range(&self, index: usize) -> Range<usize> {
-        match index.checked_sub(self.pieces.bundle_count()) {
-            None => self.pieces.bundle_range(index),
+        match index.checked_sub(self.static_groups.bundle_count()) {
+            None => self.static_groups.bundle_range(index),
             Some(own) => {
-                let start = self.pieces.batch_count() + own * self.batches_per_bundle();
+                let start = self.static_groups.batch_count() + own * self.batches_per_bundle();
                 start..self.batches.len().min(start + self.batches_per_bundle())
             }
         }
     }
 
-    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of pieces does not depend
-    /// on other objects, and that of others not on pieces.
+    /// The number by which a backend that keeps bundles knows one of them. That of a bundle of static groups does not
+    /// depend on other objects, and that of others not on static groups.
     pub fn bundle_slot(&self, index: usize) -> usize {
-        index.checked_sub(self.pieces.bundle_count()).map_or(2 * index, |own| 2 * own + 1)
+        index.checked_sub(self.static_groups.bundle_count()).map_or(2 * index, |own| 2 * own + 1)
     }
 
     /// More than the number of every bundle.
@@ -307,7 +307,7 @@ impl PartialEq for DrawList {
         self.batches == other.batches
             && self.objects == other.objects
             && (&self.remaining_indices, &self.partial_batches) == (&other.remaining_indices, &other.partial_batches)
-            && self.pieces == other.pieces
+            && self.static_groups == other.static_groups
             && self.commands().eq(other.commands())
     }
 }
@@ -322,9 +322,9 @@ mod tests {
     use crate::command::DrawState;
 
     proptest! {
-        /// Batches of pieces, then others, against a plain list of what is drawn.
+        /// Batches of static groups, then others, against a plain list of what is drawn.
         #[test]
-        fn executed_pieces_merge_and_their_bundles_are_apart_from_others(
+        fn executed_static_groups_merge_and_their_bundles_are_apart_from_others(
             counts in prop::collection::vec((1_u32..4, 0_u32..3, any::<bool>()), 0..1_800),
             own in 0_usize..1_100,
             partial in prop::collection::btree_set(0_u32..2_000, 0..6),
@@ -344,14 +344,14 @@ mod tests {
             let objects: Vec<_> = (7..first + 7).collect();
             for version in [1, 2] {
                 // The second time with what is there already.
-                list.set_piece_objects(Version { frame: 1, index: 0 }, &objects);
-                list.execute_pieces(Version { frame: version, index: 0 }, batches.iter().copied(), |_| merges);
+                list.set_static_group_objects(Version { frame: 1, index: 0 }, &objects);
+                list.execute_static_groups(Version { frame: version, index: 0 }, batches.iter().copied(), |_| merges);
                 prop_assert_eq!(list.drawn_count(), expected.len());
                 let start = list.objects.len() as u32;
                 list.objects.extend((0..own as u32).map(|object| object + 10_000));
                 list.batches.extend((0..own as u32).map(|object| Batch { mesh: 9, state: DrawState::PLAIN, first: start + object, count: 1 }));
-                let of_pieces = list.pieces().batch_count();
-                let drawn = list.batches[..of_pieces].iter().flat_map(|batch| {
+                let of_static_groups = list.static_groups().batch_count();
+                let drawn = list.batches[..of_static_groups].iter().flat_map(|batch| {
                     let of_batch = &list.objects[batch.first as usize..][..batch.count as usize];
                     of_batch.iter().map(|object| (batch.mesh, *object))
                 });
@@ -359,12 +359,12 @@ mod tests {
                 let could_merge = |pair: &[Batch]| {
                     (pair[0].mesh, pair[0].first + pair[0].count) == (pair[1].mesh, pair[1].first)
                 };
-                prop_assert!(!merges || !list.batches[..of_pieces].windows(2).any(could_merge));
-                prop_assert!(merges || of_pieces == batches.len());
+                prop_assert!(!merges || !list.batches[..of_static_groups].windows(2).any(could_merge));
+                prop_assert!(merges || of_static_groups == batches.len());
                 let ranges: Vec<_> = (0..list.bundle_count()).map(|bundle| list.bundle_range(bundle)).collect();
                 prop_assert_eq!(ranges.iter().cloned().flatten().collect::<Vec<_>>(), (0..list.batches.len()).collect::<Vec<_>>());
                 prop_assert!(ranges.iter().all(|range| (1..=256).contains(&range.len())));
-                prop_assert!(ranges.iter().all(|range| range.end <= of_pieces || range.start >= of_pieces));
+                prop_assert!(ranges.iter().all(|range| range.end <= of_static_groups || range.start >= of_static_groups));
                 let mut slots: Vec<_> = (0..ranges.len()).map(|bundle| list.bundle_slot(bundle)).collect();
                 prop_assert!(slots.iter().all(|slot| *slot < list.bundle_slot_count()));
                 slots.sort_unstable();
@@ -378,8 +378,8 @@ mod tests {
                     prop_assert_eq!(list.bundle_is_whole(bundle), is_whole);
                 }
             }
-            let executed = list.batches[..list.pieces().batch_count()].to_vec();
-            list.execute_pieces(Version { frame: 2, index: 0 }, std::iter::empty(), |_| merges);
+            let executed = list.batches[..list.static_groups().batch_count()].to_vec();
+            list.execute_static_groups(Version { frame: 2, index: 0 }, std::iter::empty(), |_| merges);
             prop_assert_eq!(list.batches, executed, "a version has one content");
         }
     }
@@ -389,7 +389,7 @@ mod tests {
         let command = |object| RenderCommand { object, ..RenderCommand::EMPTY };
         let batch = |first| Batch { mesh: 0, state: DrawState::PLAIN, first, count: 1 };
         let mut one = DrawList::default();
-        one.set_piece_objects(Version { frame: 1, index: 0 }, &[5]);
+        one.set_static_group_objects(Version { frame: 1, index: 0 }, &[5]);
         one.objects.extend([6, 7]);
         one.batches.extend([batch(1), batch(2)]);
         one.make_partial(1, |corners| corners.extend([0, 1, 2]));
@@ -407,7 +407,7 @@ mod tests {
         assert_ne!(changed(|list| list.objects[2] = 8), one);
         assert_ne!(changed(|list| list.remaining_indices[2] = 3), one);
         assert_ne!(changed(|list| list.partial_batches[0].0 = 0), one);
-        assert_ne!(changed(|list| list.pieces = ListPieces::default()), one);
+        assert_ne!(changed(|list| list.static_groups = DrawListStaticGroups::default()), one);
         assert_ne!(changed(|list| list.commands[0][1].object = 8), one);
     }
 }

@@ -91,7 +91,7 @@ mod tests {
 
     use super::*;
     use crate::command::DrawState;
-    use crate::quality::{DepthCurve, DepthKey};
+    use crate::quality::{DepthCurve, DepthPrecision};
 
     proptest! {
         #[test]
@@ -127,7 +127,7 @@ mod tests {
     fn fewer_bits_of_depth_make_shorter_packed_keys() {
         let width = |bits: u32, blends: bool| {
             let key = |depth: u16| {
-                let order = DepthKey { bits, curve: DepthCurve::Logarithmic };
+                let order = DepthPrecision { bits, curve: DepthCurve::Logarithmic };
                 let depth = order.quantize(f32::from(depth) * 0.37, 0.1, 1e4);
                 if blends { SortKey::blended(depth) } else { SortKey::opaque(DrawState::PLAIN, 5, depth) }
             };

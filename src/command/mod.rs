@@ -9,7 +9,7 @@ mod draw_list;
 mod draw_state;
 mod instance;
 mod key_packer;
-mod list_pieces;
+mod draw_list_static_groups;
 mod partition;
 mod radix_sort;
 mod render_command;
@@ -26,7 +26,7 @@ pub(crate) use instance::instance;
 pub(crate) use internal::*;
 pub(crate) use partition::Partition;
 pub use render_command::RenderCommand;
-pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypeFilter, Selection};
+pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypes, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
 
@@ -37,7 +37,7 @@ pub mod internal {
     pub use super::binned_segment::BinnedSegment;
     pub use super::bins::{Bin, Bins};
     pub use super::bucket::Bucket;
-    pub use super::list_pieces::ListPieces;
+    pub use super::draw_list_static_groups::DrawListStaticGroups;
     pub use super::splitters::Splitters;
     pub use super::version::Version;
 }

@@ -12,7 +12,7 @@ pub struct Selection {
     /// By material.
     pub materials: MaterialShare,
     /// By the type of the material.
-    pub material_types: MaterialTypeFilter,
+    pub material_types: MaterialTypes,
     /// By layer: objects that belong to one of these layers.
     pub layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
@@ -36,7 +36,7 @@ impl Selection {
         Self {
             blending,
             materials: MaterialShare::ALL,
-            material_types: MaterialTypeFilter::Any,
+            material_types: MaterialTypes::Any,
             layers: LayerMask::ALL,
             excluded_layers: LayerMask::NONE,
             visible_layers: LayerMask::ALL,
@@ -51,12 +51,12 @@ impl Selection {
 
     /// Those of these objects whose material has this [`MaterialType`].
     pub const fn of_material_type<T: Pod>(self, material_type: MaterialType<T>) -> Self {
-        Self { material_types: MaterialTypeFilter::Only(material_type.layout()), ..self }
+        Self { material_types: MaterialTypes::Only(material_type.layout()), ..self }
     }
 
     /// Those of these objects whose material has no [`MaterialType`]: those that the shipped processes draw.
     pub const fn of_shipped_materials(self) -> Self {
-        Self { material_types: MaterialTypeFilter::Shipped, ..self }
+        Self { material_types: MaterialTypes::Shipped, ..self }
     }
 
     /// Those of these objects that belong to none of some layers.
@@ -143,7 +143,7 @@ pub enum Blending {
 
 /// Objects by their material types.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum MaterialTypeFilter {
+pub enum MaterialTypes {
     /// All.
     #[default]
     Any,
@@ -153,7 +153,7 @@ pub enum MaterialTypeFilter {
     Only(MaterialLayout),
 }
 
-impl MaterialTypeFilter {
+impl MaterialTypes {
     /// Whether it contains materials of a type; `None` stands for those without one.
     #[inline]
     pub fn contains(self, material_type: Option<MaterialLayout>) -> bool {

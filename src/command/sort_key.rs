@@ -18,9 +18,10 @@ use super::DrawState;
 /// Commands of a process with a [draw order](super::DrawOrder) of its own are all ordered by a number, opaque or not.
 ///
 /// The picture depends on bits 63 and 62 (blended after opaque), on the depth of blended commands and on those numbers.
-/// All other bits only save state changes and overdraw. Depths are codes of a [`DepthKey`](crate::quality::DepthKey):
-/// the upper 20 bits for opaque commands, all 32 for blended ones. A [`DepthKey`](crate::quality::DepthKey) with fewer
-/// bits leaves the lower ones equal in all keys, and the sort skips bits that are equal.
+/// All other bits only save state changes and overdraw. Depths are codes of a
+/// [`DepthPrecision`](crate::quality::DepthPrecision): the upper 20 bits for opaque commands, all 32 for blended ones.
+/// A [`DepthPrecision`](crate::quality::DepthPrecision) with fewer bits leaves the lower ones equal in all keys, and
+/// the sort skips bits that are equal.
 ///
 /// Materials have no bits: shaders find them by object, so a change of material is no change of state, and sorting by
 /// material would split batches.
@@ -35,7 +36,7 @@ impl SortKey {
     pub const LAST: Self = Self(u64::MAX);
 
     /// The key of an opaque command: by state, mesh and level of detail, then front to back. `depth` is a
-    /// [quantised](crate::quality::DepthKey::quantize) depth.
+    /// [quantised](crate::quality::DepthPrecision::quantize) depth.
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
         let (bits, level) = (u64::from(state.bits()), u64::from(state.level_of_detail()));
         // Subdivision level, mask, culling and topology.
@@ -44,7 +45,7 @@ impl SortKey {
     }
 
     /// The key of a blended command: back to front, exact to the last bit of `depth`, a
-    /// [quantised](crate::quality::DepthKey::quantize) depth.
+    /// [quantised](crate::quality::DepthPrecision::quantize) depth.
     pub fn blended(depth: u32) -> Self {
         Self(1 << 62 | u64::from(!depth) << 30)
     }

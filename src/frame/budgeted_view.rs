@@ -10,30 +10,31 @@ use crate::scene::{Camera, Redraw};
 pub struct BudgetedView {
     /// Identifies the view from frame to frame, and names it in reports.
     pub name: String,
-    /// Views of lower priority are shed first. Of equal ones, the last is.
+    /// Views of lower priority are degraded first. Of equal ones, the last is.
     pub priority: i32,
-    /// The view at its best: one camera, or several that are shed together, such as the sides of a cube map, a mirror
-    /// and the mirrors in it, or the samples of antialiasing. Their names are unique among all views of the budget.
+    /// The view at its best: one camera, or several that are degraded together, such as the sides of a cube map, a
+    /// mirror and the mirrors in it, or the samples of antialiasing. Their names are unique among all views of the
+    /// budget.
     pub cameras: Vec<Camera>,
-    /// Forms that cost less, each less than the one before: rung 1, rung 2, and so on. Rung 0 is the view at its best.
-    /// Only the last one may be [`Rung::LeftOut`]. A view whose ladder differs from that of the frame before is a new
-    /// view: it is at its best, and not measured.
-    pub ladder: Vec<Rung>,
+    /// Forms that cost less, each less than the one before: quality level 1, quality level 2, and so on. QualityLevel 0
+    /// is the view at its best. Only the last one may be [`QualityLevel::LeftOut`]. A view whose quality levels differs
+    /// from that of the frame before is a new view: it is at its best, and not measured.
+    pub levels: Vec<QualityLevel>,
 }
 
 /// A form in which a view is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Rung {
+pub enum QualityLevel {
     /// It is drawn in a cheaper form.
-    Drawn(ViewForm),
+    Drawn(ViewVariant),
     /// The frame leaves the view out. Processes that sample it read zeros.
     LeftOut,
 }
 
 /// A cheaper form of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ViewForm {
+pub struct ViewVariant {
     /// The interval of frames in which the view is drawn, at least 1: see [`Redraw::Interval`]. At 1, its cameras say
     /// how often. A camera with [`Redraw::OnCameraChange`] keeps that.
     pub interval: u32,
@@ -46,7 +47,7 @@ pub struct ViewForm {
     pub max_cameras: usize,
 }
 
-impl ViewForm {
+impl ViewVariant {
     /// The view at its best.
     pub const BEST: Self = Self { interval: 1, size: 1.0, level_of_detail_scale: 1.0, max_cameras: usize::MAX };
 
@@ -86,11 +87,12 @@ impl ViewForm {
     }
 }
 
-impl Rung {
+impl QualityLevel {
     /// The view at its best.
-    pub(super) const BEST: Self = Self::Drawn(ViewForm::BEST);
+    pub(super) const BEST: Self = Self::Drawn(ViewVariant::BEST);
 
-    /// The cameras of the view on this rung, of those that it has at its best: for an engine that chooses forms itself.
+    /// The cameras of the view on this quality level, of those that it has at its best: for an engine that chooses
+    /// forms itself.
     pub fn cameras(self, cameras: &[Camera]) -> impl Iterator<Item = Camera> {
         let form = match self {
             Self::Drawn(form) => Some(form),
@@ -119,7 +121,7 @@ impl Rung {
         }
     }
 
-    /// Whether drawing a camera costs the same on both rungs.
+    /// Whether drawing a camera costs the same on both quality levels.
     pub(super) fn draws_like(self, other: Self) -> bool {
         let (Self::Drawn(one), Self::Drawn(other)) = (self, other) else { return false };
         (one.size, one.level_of_detail_scale) == (other.size, other.level_of_detail_scale)
@@ -146,24 +148,24 @@ impl Rung {
 }
 
 impl BudgetedView {
-    /// All rungs, rung 0 first.
-    pub(super) fn rungs(&self) -> impl Iterator<Item = Rung> {
-        std::iter::once(Rung::BEST).chain(self.ladder.iter().copied())
+    /// All quality levels, quality level 0 first.
+    pub(super) fn levels(&self) -> impl Iterator<Item = QualityLevel> {
+        std::iter::once(QualityLevel::BEST).chain(self.levels.iter().copied())
     }
 
     /// # Errors
-    /// If a rung is invalid, or comes after the one that leaves the view out.
+    /// If a quality level is invalid, or comes after the one that leaves the view out.
     pub(super) fn check(&self) -> Result<(), BudgetError> {
         if let Some(left_out) =
-            self.rungs().position(|rung| rung == Rung::LeftOut).filter(|rung| *rung < self.ladder.len())
+            self.levels().position(|level| level == QualityLevel::LeftOut).filter(|level| *level < self.levels.len())
         {
-            return Err(BudgetError::RungAfterLeftOut { view: self.name.clone(), rung: left_out + 1 });
+            return Err(BudgetError::QualityLevelAfterLeftOut { view: self.name.clone(), level: left_out + 1 });
         }
-        for (rung, form) in self.rungs().enumerate() {
-            if let Rung::Drawn(form) = form
+        for (level, form) in self.levels().enumerate() {
+            if let QualityLevel::Drawn(form) = form
                 && let Some(problem) = form.problem()
             {
-                return Err(BudgetError::InvalidRung { view: self.name.clone(), rung, problem });
+                return Err(BudgetError::InvalidQualityLevel { view: self.name.clone(), level, problem });
             }
         }
         Ok(())

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use super::borrowed_nodes::BorrowedNodes;
 use super::cost_model::CostModel;
 use super::culling::{OcclusionControls, allows_triangle_culling};
 use super::granularity::Granularity;
-use super::lent_nodes::LentNodes;
 use super::list_inputs::{ListInputs, OrderInputs};
 use super::pass_recording::PassRecording;
 use super::pass_runs::PassRuns;
@@ -14,7 +14,7 @@ use super::tables::{FrameTables, MAX_SEGMENTS};
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::{DrawList, Splitters};
 use crate::scene::Projection;
-use crate::view::{ObjectLevels, SelectionFilter, VisibleRange};
+use crate::view::{DrawFilter, ObjectLevels, VisibleRange};
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -32,7 +32,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) recordings: &'a [PassRecording<B>],
     pub(super) pass_runs: &'a PassRuns,
     /// The engine's own nodes.
-    pub(super) nodes: LentNodes<'a>,
+    pub(super) nodes: BorrowedNodes<'a>,
     pub(super) clock: &'a StageClock<'a>,
     pub(super) costs: &'a CostModel,
     pub(super) occlusion: &'a OcclusionControls,
@@ -67,9 +67,9 @@ impl<B: Backend> FrameContext<'_, B> {
         self.tables.passes[pass].orders_by_bin
     }
 
-    /// Whether the draw list of a pass has a place for pieces.
-    pub(super) fn has_pieces(&self, pass: usize) -> bool {
-        !self.tables.pieces.is_empty() && self.orders_by_bin(pass)
+    /// Whether the draw list of a pass has a place for static groups.
+    pub(super) fn has_static_groups(&self, pass: usize) -> bool {
+        !self.tables.static_groups.is_empty() && self.orders_by_bin(pass)
     }
 
     /// What the draw list of a pass is made from, once its view's visible set is complete.
@@ -77,12 +77,15 @@ impl<B: Backend> FrameContext<'_, B> {
         let view_index = self.view_index_of(pass);
         let objects = &self.tables.objects;
         let selection = self.tables.passes[pass].selection.unwrap_or_default();
-        let filter = SelectionFilter::new(objects, self.request.scene, selection);
+        let filter = DrawFilter::new(objects, self.request.scene, selection);
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
-            pieces: self
-                .has_pieces(pass)
-                .then(|| [self.tables.pieces.version(selection), self.tables.visibility[view_index].pieces.version()]),
+            static_groups: self.has_static_groups(pass).then(|| {
+                [
+                    self.tables.static_groups.version(selection),
+                    self.tables.visibility[view_index].static_groups.version(),
+                ]
+            }),
             levels: self.levels_of_detail(view_index).map(ObjectLevels::version),
             selection,
             layers: (!filter.ignores_layers()).then(|| objects.epoch()),

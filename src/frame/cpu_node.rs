@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{NodeAccesses, NodeFrame};
+use super::{NodeAccesses, NodeContext};
 use crate::graph::NodeError;
 use crate::task::Worker;
 
@@ -39,11 +39,11 @@ use crate::task::Worker;
 ///         accesses.writes(FrameData::Transforms);
 ///     }
 ///
-///     fn width(&self, _: &NodeFrame<'_>) -> usize {
+///     fn width(&self, _: &NodeContext<'_>) -> usize {
 ///         self.positions.chunk_count()
 ///     }
 ///
-///     fn run(&self, _: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+///     fn run(&self, _: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
 ///         for chunk in chunks {
 ///             for (_, position) in self.positions.write(chunk)?.objects() {
 ///                 position.y = (position.x + self.seconds).sin();
@@ -66,7 +66,7 @@ pub trait CpuNode: Send + Sync {
 
     /// The number of items. It is called when everything that the node waits for is complete. A node of width 0 is
     /// complete at once.
-    fn width(&self, frame: &NodeFrame<'_>) -> usize {
+    fn width(&self, frame: &NodeContext<'_>) -> usize {
         let _ = frame;
         1
     }
@@ -82,5 +82,5 @@ pub trait CpuNode: Send + Sync {
     /// # Errors
     /// An error fails the frame, as [`FrameError::Failed`](crate::FrameError::Failed) with the name of the node. The
     /// next frame is not affected.
-    fn run(&self, frame: &NodeFrame<'_>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
+    fn run(&self, frame: &NodeContext<'_>, items: Range<usize>, worker: &Worker) -> Result<(), NodeError>;
 }

@@ -76,7 +76,7 @@ pub enum FrameError {
         /// How many.
         views: usize,
     },
-    /// The [predicate on materials](crate::scene::ObjectFilter::materials) of a view's filter panicked. Where the
+    /// The [predicate on materials](crate::scene::ViewFilter::materials) of a view's filter panicked. Where the
     /// program is built with `panic = "abort"` the program ends instead.
     #[error("the filter of view {view:?} panicked: {message}")]
     FilterPanicked {
@@ -128,7 +128,7 @@ pub enum FrameError {
     /// A callback of the scheduler panicked.
     #[error(transparent)]
     Scheduler(#[from] JobPanic),
-    /// A frame has no such [place](super::FramePlace).
+    /// A frame has no such [place](super::FencePoint).
     #[error("the frame draws nothing at this place: {place}")]
     UnknownPlace {
         /// The place.
@@ -215,23 +215,25 @@ pub enum BudgetError {
         /// The time.
         milliseconds: f64,
     },
-    /// A rung of a view's ladder is invalid.
-    #[error("rung {rung} of view {view:?} has {problem}")]
-    InvalidRung {
+    /// A quality level of a view's quality levels is invalid.
+    #[error("quality level {level} of view {view:?} has {problem}")]
+    InvalidQualityLevel {
         /// The view.
         view: String,
-        /// The rung.
-        rung: usize,
+        /// The quality level.
+        level: usize,
         /// What is wrong with it.
         problem: &'static str,
     },
-    /// A rung of a view's ladder comes after the one that leaves the view out.
-    #[error("rung {rung} of view {view:?} comes after the rung that leaves the view out, which must be the last one")]
-    RungAfterLeftOut {
+    /// A quality level of a view's quality levels comes after the one that leaves the view out.
+    #[error(
+        "quality level {level} of view {view:?} comes after the quality level that leaves the view out, which must be the last one"
+    )]
+    QualityLevelAfterLeftOut {
         /// The view.
         view: String,
-        /// The rung.
-        rung: usize,
+        /// The quality level.
+        level: usize,
     },
     /// Two cameras of one name.
     #[error("the budget has two cameras named {camera:?}: in view {:?} and in view {:?}", views[0], views[1])]

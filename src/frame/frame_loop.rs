@@ -15,8 +15,8 @@ pub use finished_frame::{FinishedFrame, FrameLoopError, FrameTimes};
 pub use slot::FrameSlot;
 
 use self::queues::LoopQueues;
-use self::slot::{AfterSubmission, AwaitedFrame, DeviceTask, FrameQueues, RecordedFrame, Submission};
-use super::{FramePlace, Recorded, Renderer, Submitter};
+use self::slot::{AfterSubmission, AwaitedFrame, DeviceTask, FrameQueues, QueuedFrame, Submission};
+use super::{FencePoint, RecordedFrame, Renderer, Submitter};
 use crate::backend::{Backend, BackendError};
 use crate::fence::{Fence, FenceError};
 use crate::task::{JobPanic, catch};
@@ -204,7 +204,7 @@ where
     B::Submission: Send,
 {
     while let Some(task) = queues.next_task() {
-        let RecordedFrame { slot, recorded, after, recorded_at } = match task {
+        let QueuedFrame { slot, recorded, after, recorded_at } = match task {
             DeviceTask::Submit(frame) => *frame,
             DeviceTask::ReplaceBackend(backend, timeline) => {
                 submitter = Submitter::new(backend, timeline);
@@ -222,10 +222,10 @@ where
 /// called.
 fn submit_then<B: Backend>(
     submitter: &Submitter<B>,
-    mut recorded: Recorded<B>,
+    mut recorded: RecordedFrame<B>,
     after: Contained<AfterSubmission<B>>,
 ) -> Result<Submission<B>, FrameLoopError> {
-    let drawn = recorded.fence_at(FramePlace::End)?;
+    let drawn = recorded.fence_at(FencePoint::End)?;
     let submitted = submitter.submit(recorded)?;
     // The device draws the frame, whatever the engine's code does.
     let called = caught(|| {

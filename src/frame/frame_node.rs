@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
+use super::borrowed_nodes::BorrowedNodes;
 use super::context::FrameContext;
-use super::lent_nodes::LentNodes;
 use super::stage::StageNode;
 use super::stage_clock::StageGroup;
-use super::{CpuNode, NodeFrame};
+use super::{CpuNode, NodeContext};
 use crate::backend::Backend;
 use crate::graph::{Node, NodeError};
 use crate::scene::run_node_job;
@@ -28,10 +28,10 @@ pub(super) struct CpuNodeIndex {
 }
 
 impl CpuNodeIndex {
-    fn get<'a, B: Backend>(self, frame: &FrameContext<'a, B>) -> (&'a dyn CpuNode, NodeFrame<'a>) {
-        let LentNodes { nodes, declarations } = frame.nodes;
+    fn get<'a, B: Backend>(self, frame: &FrameContext<'a, B>) -> (&'a dyn CpuNode, NodeContext<'a>) {
+        let BorrowedNodes { nodes, declarations } = frame.nodes;
         let accesses = declarations.of_node(self.lent);
-        (nodes[self.lent], NodeFrame { request: frame.request, tables: frame.tables, accesses })
+        (nodes[self.lent], NodeContext { request: frame.request, tables: frame.tables, accesses })
     }
 }
 

@@ -10,7 +10,7 @@ use crate::command::DrawList;
 /// view are cut by measured cost in every mode; with [`PerCamera`](Self::PerCamera), culling is one job a view.
 ///
 /// Frames of all but [`Adaptive`](Self::Adaptive) are executed in parallel even where one worker alone would be faster.
-/// Two things are not divided: [pieces](crate::scene::Piece) keep their bundles of
+/// Two things are not divided: [static groups](crate::scene::StaticGroup) keep their bundles of
 /// [`BATCHES_PER_BUNDLE`](DrawList::BATCHES_PER_BUNDLE) draws, and a backend whose recording strategy an engine has
 /// fixed records by that strategy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat};
 
 use crate::command::{Blending, DrawOrder, Selection, Version};
-use crate::quality::DepthKey;
+use crate::quality::DepthPrecision;
 use crate::scene::{Camera, Projection};
 use crate::view::RenderView;
 
@@ -12,9 +12,9 @@ use crate::view::RenderView;
 pub(super) struct ListInputs {
     /// The version of the view's visible set.
     pub(super) visible: Version,
-    /// The versions of the lists of pieces and of the pieces that the view executes; `None` for a scene without pieces,
-    /// or a pass that orders its objects by depth.
-    pub(super) pieces: Option<[Version; 2]>,
+    /// The versions of the lists of static groups and of the static groups that the view executes; `None` for a scene
+    /// without static groups, or a pass that orders its objects by depth.
+    pub(super) static_groups: Option<[Version; 2]>,
     /// The version of the levels of detail in the view; `None` if all are 0.
     pub(super) levels: Option<Version>,
     pub(super) selection: Selection,
@@ -44,7 +44,7 @@ impl OrderInputs {
 
 /// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order,
 /// and the view is not a paraboloid, where the subdivision level gives an object another state.
-pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthKey) -> bool {
+pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthPrecision) -> bool {
     (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
         && opaque_order.bits == 0
         && view.camera.projection != Projection::Paraboloid

@@ -93,7 +93,7 @@ impl NodeAccesses {
         self.add(NodeAccess::Modifies(resource.into()))
     }
 
-    /// The node fills a buffer that this frame draws: see [`NodeFrame::fill`](super::NodeFrame::fill).
+    /// The node fills a buffer that this frame draws: see [`NodeContext::fill`](super::NodeContext::fill).
     pub fn fills<T: bytemuck::Pod>(&mut self, buffer: &GeneratedBuffer<T>) -> &mut Self {
         if !self.filled.iter().any(|known| Arc::ptr_eq(known, buffer.source())) {
             self.filled.push(Arc::clone(buffer.source()));

@@ -1,6 +1,6 @@
 //! A frame with work of the engine's own.
 
-use super::{CpuNode, FrameError, Recorded, Renderer};
+use super::{CpuNode, FrameError, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::scene::SceneRef;
 
@@ -16,7 +16,7 @@ impl<B: Backend> Renderer<B> {
         &mut self,
         scene: SceneRef<'_>,
         nodes: &[&dyn CpuNode],
-    ) -> Result<Recorded<B>, FrameError> {
+    ) -> Result<RecordedFrame<B>, FrameError> {
         self.record_part(&scene, nodes, true)
     }
 }

@@ -5,14 +5,15 @@ use std::sync::Arc;
 use parking_lot::RwLockReadGuard;
 
 use super::backend_maintenance::BackendMaintenance;
+use super::borrowed_nodes::NodeDeclarations;
 use super::change_check::ChangeCheck;
 use super::context::FrameContext;
 use super::culling::CullingOptions;
-use super::lent_nodes::NodeDeclarations;
 use super::pass_recording::{PassRecording, reset_recordings};
 use super::pass_runs::PassRuns;
 use super::plan_cache::{PlanCache, with_quality};
-use super::recorded::{FrameFences, Recorded};
+use super::recorded_frame::{FrameFences, RecordedFrame};
+use super::resolved_view_filter::count_unknown_objects;
 use super::run_error::error_of_pass;
 use super::scene_capacity::SceneCapacity;
 use super::scene_check::check_scene;
@@ -23,7 +24,6 @@ use super::stage_graph_cache::StageGraphCache;
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
 use super::view_cache::ViewCache;
-use super::view_filter::count_unknown_objects;
 use super::view_queues::view_queues;
 use super::views::FrameViews;
 use super::warnings::Warnings;
@@ -131,14 +131,14 @@ impl<B: Backend> Renderer<B> {
     /// since the last call.
     ///
     /// What cannot be drawn, or [has no room](Backend::limits), is left out, counted and named in the
-    /// [statistics](FrameStatistics::rejections), and warned of when its number changes; everything else is drawn. A
+    /// [statistics](FrameStatistics::scene_issues), and warned of when its number changes; everything else is drawn. A
     /// process that declares what its [raw pass](crate::process::RawPassResources) never asks for is warned of once.
     ///
     /// # Errors
     /// If the scene cannot be drawn as a whole: no camera or an invalid one, slices of different lengths, an invalid
     /// ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
-    pub fn record(&mut self, scene: SceneRef<'_>) -> Result<Recorded<B>, FrameError> {
+    pub fn record(&mut self, scene: SceneRef<'_>) -> Result<RecordedFrame<B>, FrameError> {
         self.record_part(&scene, &[], true)
     }
 
@@ -152,7 +152,7 @@ impl<B: Backend> Renderer<B> {
         scene: &SceneRef<'_>,
         nodes: &[&dyn CpuNode],
         transparency: bool,
-    ) -> Result<Recorded<B>, FrameError> {
+    ) -> Result<RecordedFrame<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
         // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned
         // all the same.
@@ -278,7 +278,7 @@ impl<B: Backend> Renderer<B> {
         nodes: &[&dyn CpuNode],
         mut choices: Vec<TuningChoice>,
         transparency: bool,
-    ) -> Result<Recorded<B>, FrameError> {
+    ) -> Result<RecordedFrame<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
         let objects = scene.object_count();
@@ -293,15 +293,15 @@ impl<B: Backend> Renderer<B> {
         let limits = self.backend.limits()?;
         self.tables.objects.configure(self.quality.culling);
         self.capacity.begin_frame(&self.backend, limits, scene, &mut self.tables.objects, self.quality.vertices)?;
-        count_unknown_objects(scene, self.tables.objects.rejections());
-        let valid_lights = ValidLights::new(scene, self.tables.objects.rejections(), self.quality.light_cut_off);
+        count_unknown_objects(scene, self.tables.objects.scene_issues());
+        let valid_lights = ValidLights::new(scene, self.tables.objects.scene_issues(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
         let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
         self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
         self.tables.blended_object.count_half_floats(scene, self.plans.deferred(), &self.tables.objects);
         let interval = self.quality.shadows.interval;
         let maps = self.plans.shadow_maps().map(|maps| MapSettings { maps, interval, limits });
-        let requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.rejections())?;
+        let requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.scene_issues())?;
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
         let frame_views = Arc::new(self.view_cache.resolve(&plan, requested, is_imported)?);
         let FrameViews { views, lights, .. } = &*frame_views;
@@ -316,7 +316,7 @@ impl<B: Backend> Renderer<B> {
             culling,
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
-            has_pieces: !scene.pieces.is_empty(),
+            has_static_groups: !scene.static_groups.is_empty(),
         };
         let nodes = self.node_declarations.lend(nodes)?;
         let graph = self.graphs.get(&plan, &draws, views, options, nodes)?;
@@ -335,12 +335,12 @@ impl<B: Backend> Renderer<B> {
             sampled_views: &graph.sampled_views,
             scene,
             objects: &self.tables.objects,
-            list_capacity: self.tables.objects.len() + self.tables.pieces.listed_objects(),
+            list_capacity: self.tables.objects.len() + self.tables.static_groups.listed_objects(),
             generated: &nodes.declarations.generated,
             records_bundles: self.granularity.draws_per_job().is_some(),
             quality: &self.quality,
             limits,
-            rejections: self.tables.objects.rejections(),
+            scene_issues: self.tables.objects.scene_issues(),
         };
         let uploaded_before = self.backend.uploaded_bytes()?;
         let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0??;
@@ -388,12 +388,12 @@ impl<B: Backend> Renderer<B> {
         let memory = (uploaded, self.backend.target_memory(&frame)?);
         let lights = frame_views.light_count();
         let statistics = FrameStatistics::new(&request, lights, &self.tables, memory, clock.times(), tuning);
-        statistics.count_pieces(self.scheduler.timeline());
-        self.warnings.report(&statistics.rejections, views.iter().any(RenderView::is_cached));
+        statistics.count_static_groups(self.scheduler.timeline());
+        self.warnings.report(&statistics.scene_issues, views.iter().any(RenderView::is_cached));
         #[cfg(feature = "wgpu")]
         self.warnings.report_unrequested(&plan, &draws);
         let in_flight = self.view_cache.store(&plan, &frame_views);
-        Ok(Recorded {
+        Ok(RecordedFrame {
             queues,
             submission_order: graph.passes.clone(),
             plan,

@@ -24,7 +24,7 @@ impl<B: Backend> Renderer<B> {
     ///   passes, transient targets, and imports for the next frame.
     /// - [Meshes in its own buffers](crate::scene::Mesh::from_buffers) and other resources of its own belong to the
     ///   device before. It makes their buffers anew and replaces the assets. Otherwise objects with these meshes are
-    ///   left out, and [named](crate::view::RejectionReason::UndrawableMesh), if the new device is of the same
+    ///   left out, and [named](crate::view::IssueReason::UndrawableMesh), if the new device is of the same
     ///   `wgpu::Instance`; wgpu cannot tell resources of several instances apart.
     /// - A window's [surface](crate::backend::WindowSurface) belongs to a device too. It is dropped before another one
     ///   is made.
@@ -44,7 +44,7 @@ impl<B: Backend> Renderer<B> {
     ///     submitter: &mut Submitter<B>,
     ///     world: SceneRef<'_>,
     ///     open: impl Fn() -> Result<B, BackendError>,
-    /// ) -> Result<Submitted<B>, Box<dyn std::error::Error>> {
+    /// ) -> Result<SubmittedFrame<B>, Box<dyn std::error::Error>> {
     ///     let is_loss = |error: Option<&BackendError>| matches!(error, Some(BackendError::DeviceLost { .. }));
     ///     match renderer.record(world) {
     ///         Ok(frame) => match submitter.submit(frame) {

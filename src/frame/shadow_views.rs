@@ -4,7 +4,7 @@ use super::error::FrameError;
 use super::valid_lights::ValidLights;
 use crate::backend::SceneLimits;
 use crate::scene::{Camera, Light, Redraw, SceneRef, ViewKind};
-use crate::view::{MapOwners, RejectionReason, Rejections, RenderView, ShadowMaps};
+use crate::view::{IssueReason, MapOwners, RenderView, SceneIssues, ShadowMaps};
 
 /// The lights of a frame, and the views of their shadow maps.
 pub(super) struct ShadowViews {
@@ -46,19 +46,19 @@ impl ShadowViews {
 
     /// The maps of each light that casts shadows and reaches what one of `views` may see; `views` are those of the
     /// scene's cameras, and get their [main views](RenderView::main_view). Lights whose maps do not fit have none, and
-    /// are counted as rejections.
+    /// are counted as scene issues.
     pub(super) fn new(
         scene: &SceneRef<'_>,
         valid: ValidLights,
         views: &mut [RenderView],
         settings: MapSettings<'_>,
-        rejections: &Rejections,
+        scene_issues: &SceneIssues,
     ) -> Self {
         let owners = settings.maps.map_owners(scene.cameras);
         for (index, view) in views.iter_mut().enumerate().filter(|(_, view)| view.kind() != ViewKind::Shadow) {
             view.main_view = owners.owner_of(index);
         }
-        let maps = maps_that_fit(scene, &valid, views, &owners, settings, rejections);
+        let maps = maps_that_fit(scene, &valid, views, &owners, settings, scene_issues);
         let mut maps = maps.into_iter().peekable();
         let redraw = Redraw::Interval(settings.interval);
         let mut frame =
@@ -92,7 +92,7 @@ fn maps_that_fit(
     views: &[RenderView],
     owners: &MapOwners,
     settings: MapSettings<'_>,
-    rejections: &Rejections,
+    scene_issues: &SceneIssues,
 ) -> Vec<LightMaps> {
     let is_directional = |light: &Light| matches!(light, Light::Directional { .. });
     let lights = valid.lights.iter().zip(&valid.scene_indices).enumerate();
@@ -109,7 +109,7 @@ fn maps_that_fit(
                 continue;
             }
             if settings.maps.map_count(light) > room {
-                rejections.count_once(RejectionReason::ShadowMapLimit, scene_index);
+                scene_issues.count_once(IssueReason::ShadowMapLimit, scene_index);
                 continue;
             }
             let name = format!("shadow of light {scene_index}");

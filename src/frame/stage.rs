@@ -84,8 +84,8 @@ pub(super) struct StageNeeds {
     pub(super) culling: CullingNeeds,
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
-    /// Whether the scene has pieces.
-    pub(super) has_pieces: bool,
+    /// Whether the scene has static groups.
+    pub(super) has_static_groups: bool,
 }
 
 impl StageNeeds {

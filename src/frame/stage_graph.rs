@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::FrameError;
+use super::borrowed_nodes::{BorrowedNodes, NodeKeys};
 use super::culling::{CullingNeeds, CullingOptions, OcclusionControls};
 use super::frame_node::{CpuNodeIndex, FrameNode};
 use super::granularity::Granularity;
-use super::lent_nodes::{LentNodes, NodeKeys};
 use super::list_inputs::orders_by_bin;
-use super::pieces::ListConditions;
 use super::stage::{Stage, StageNeeds, StageNode};
 use super::stage_tuning::{StageTuning, TuningLabels};
 use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
+use super::static_groups::ListConditions;
 use super::table_keys::TableKeys;
 use super::tables::{FrameTables, PassTable};
 use super::view_levels::ViewLevels;
@@ -20,7 +20,7 @@ use crate::backend::{Backend, kept_views};
 use crate::command::Selection;
 use crate::graph::{FrameGraph, NodeId, Schedule};
 use crate::process::{Draws, FramePasses, FramePlan, Pass, SampledViews};
-use crate::quality::{DepthKey, Quality};
+use crate::quality::{DepthPrecision, Quality};
 use crate::scene::{LayerMask, Projection, SceneRef, ViewKind};
 use crate::timeline::Labels;
 use crate::view::{LevelSelector, RenderView};
@@ -71,9 +71,9 @@ pub(super) struct StageOptions {
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
     /// The order of opaque objects.
-    pub(super) opaque_order: DepthKey,
-    /// Whether the scene has pieces.
-    pub(super) has_pieces: bool,
+    pub(super) opaque_order: DepthPrecision,
+    /// Whether the scene has static groups.
+    pub(super) has_static_groups: bool,
 }
 
 /// What decides which stages a view has.
@@ -127,7 +127,7 @@ impl GraphKey {
         draws: &[Draws<'_>],
         views: &[RenderView],
         options: StageOptions,
-        nodes: LentNodes<'_>,
+        nodes: BorrowedNodes<'_>,
     ) -> Result<Self, FrameError> {
         Ok(Self {
             views: views.iter().map(ViewKey::new).collect(),
@@ -138,7 +138,7 @@ impl GraphKey {
     }
 
     /// Whether the key matches the inputs of a frame. Allocates nothing.
-    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions, nodes: LentNodes<'_>) -> bool {
+    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions, nodes: BorrowedNodes<'_>) -> bool {
         self.options == options
             && self.nodes.fit(nodes)
             && self.views.len() == views.len()
@@ -157,7 +157,7 @@ impl<B: Backend> StageGraph<B> {
         draws: &[Draws<'_>],
         views: &[RenderView],
         options: StageOptions,
-        nodes: LentNodes<'_>,
+        nodes: BorrowedNodes<'_>,
     ) -> Result<Self, FrameError> {
         Self::new(plan, draws, views, GraphKey::new(draws, views, options, nodes)?)
     }
@@ -169,7 +169,7 @@ impl<B: Backend> StageGraph<B> {
         draws: &[Draws<'_>],
         views: &[RenderView],
         options: StageOptions,
-        nodes: LentNodes<'_>,
+        nodes: BorrowedNodes<'_>,
     ) -> bool {
         self.plan.identity() == plan.identity() && self.key.fits(draws, views, options, nodes)
     }
@@ -198,7 +198,7 @@ impl<B: Backend> StageGraph<B> {
             orders_by_bin: false,
             culling: CullingNeeds::NONE,
             chooses_levels: false,
-            has_pieces: key.options.has_pieces,
+            has_static_groups: key.options.has_static_groups,
         };
         let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
         let mut view_scopes = vec![None; views.len()];
@@ -211,7 +211,7 @@ impl<B: Backend> StageGraph<B> {
                     .is_some_and(|selection| orders_by_bin(selection, view, key.options.opaque_order)),
                 culling: occlusion.needs(pass.view_index),
                 chooses_levels: key.options.chooses_levels,
-                has_pieces: key.options.has_pieces,
+                has_static_groups: key.options.has_static_groups,
             };
             // The stages of a view stand right before those of its first pass: a serial run has what they write in its
             // caches.
@@ -299,7 +299,7 @@ impl<B: Backend> StageGraph<B> {
             table.begin_frame(frame, selection, tables.objects.len(), culls_triangles, orders_by_bin, granularity);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
-        tables.begin_pieces(scene, conditions, &self.passes)?;
+        tables.begin_static_groups(scene, conditions, &self.passes)?;
         self.tuning.occlusion.begin_frame(tables, scene.assets, views);
         if chooses_levels {
             ViewLevels::keep(&mut tables.levels, views);
@@ -310,7 +310,7 @@ impl<B: Backend> StageGraph<B> {
             if self.view_draws_commands[index] {
                 let tests_occlusion = tables.culling.tests_occlusion(index);
                 let version = tables.version(index);
-                let (visibility, objects) = (&mut tables.visibility[index], (&tables.objects, &tables.pieces));
+                let (visibility, objects) = (&mut tables.visibility[index], (&tables.objects, &tables.static_groups));
                 let begun =
                     visibility.begin_frame(view, objects, scene.assets, quality.culling, tests_occlusion, version);
                 begun.map_err(|panic| FrameError::FilterPanicked {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::FrameError;
-use super::lent_nodes::LentNodes;
+use super::borrowed_nodes::BorrowedNodes;
 use super::stage_graph::{StageGraph, StageOptions};
 use crate::backend::Backend;
 use crate::process::{Draws, FramePlan};
@@ -34,7 +34,7 @@ impl<B: Backend> StageGraphCache<B> {
         draws: &[Draws<'_>],
         views: &[RenderView],
         options: StageOptions,
-        nodes: LentNodes<'_>,
+        nodes: BorrowedNodes<'_>,
     ) -> Result<&mut StageGraph<B>, FrameError> {
         let found = self.latest_first.iter().position(|graph| graph.fits(plan, draws, views, options, nodes));
         let graph = match found {

@@ -8,7 +8,7 @@ mod of_culling;
 mod of_draw_list;
 mod of_frame;
 mod of_pass;
-mod of_pieces;
+mod of_static_groups;
 mod of_view;
 
 #[cfg(feature = "occlusion")]
@@ -16,7 +16,7 @@ use of_culling::{CoarseDepth, CullList, Occluders, Occlusion, Triangles};
 use of_draw_list::{Bin, Fill, Instance, Join, Sort, Split};
 use of_frame::{Bins, Objects, Upload};
 use of_pass::{Finish, Prepare, Record};
-use of_pieces::{ExecutePieces, RecordPieces};
+use of_static_groups::{ExecuteStaticGroups, RecordStaticGroups};
 use of_view::{Compact, Levels, Visibility};
 
 use super::stage::Stage;
@@ -24,7 +24,7 @@ use crate::backend::Backend;
 
 /// The stages that a frame has once.
 pub(super) fn stages_of_frame<B: Backend>() -> Vec<Box<dyn Stage<B>>> {
-    vec![Box::new(Objects), Box::new(Bins), Box::new(Upload), Box::new(RecordPieces)]
+    vec![Box::new(Objects), Box::new(Bins), Box::new(Upload), Box::new(RecordStaticGroups)]
 }
 
 /// The stages of one view, by index.
@@ -50,7 +50,7 @@ pub(super) fn stages_of_pass<B: Backend>(pass: usize) -> Vec<Box<dyn Stage<B>>> 
         Box::new(Sort { pass }),
         Box::new(Instance { pass }),
         Box::new(Bin { pass }),
-        Box::new(ExecutePieces { pass }),
+        Box::new(ExecuteStaticGroups { pass }),
         Box::new(Join { pass }),
         #[cfg(feature = "occlusion")]
         Box::new(Triangles { pass }),

@@ -2,29 +2,29 @@
 
 use std::time::Duration;
 
-use super::piece_statistics::PieceStatistics;
+use super::static_group_statistics::StaticGroupStatistics;
 use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
 use crate::timeline::{FrameTuning, Timeline, TuningSubject};
-use crate::view::{Rejection, RenderView};
+use crate::view::{RenderView, SceneIssue};
 
 /// Statistics of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameStatistics {
     /// Objects in the scene.
     pub objects: usize,
-    /// Valid lights in the scene; the others are among the rejections.
+    /// Valid lights in the scene; the others are among the scene issues.
     pub lights: usize,
     /// One for each view.
     pub views: Vec<ViewStatistics>,
     /// The thread time of each view's own stages and of those of its passes, summed over workers. 0 for a view that is
     /// not drawn.
     pub view_times: Vec<Duration>,
-    /// What the frame did with the scene's [pieces](crate::scene::Piece).
-    pub pieces: PieceStatistics,
+    /// What the frame did with the scene's [static groups](crate::scene::StaticGroup).
+    pub static_groups: StaticGroupStatistics,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
     /// Bytes that [CPU nodes](super::CpuNode) have filled, which are uploaded when the frame is submitted.
@@ -34,7 +34,7 @@ pub struct FrameStatistics {
     /// The thread time of each group of stages.
     pub stages: StageTimes,
     /// What was left out or cannot be drawn as requested, and why.
-    pub rejections: Vec<Rejection>,
+    pub scene_issues: Vec<SceneIssue>,
     /// What was chosen by measurement, and by which costs.
     pub tuning: FrameTuning,
 }
@@ -49,12 +49,12 @@ pub struct ViewStatistics {
     /// How many frames before this one it was drawn: 0 if this frame draws it. Else all figures below are 0: see
     /// [`Redraw`](crate::scene::Redraw).
     pub age: u32,
-    /// Objects it sees, and all those that it executes with pieces.
+    /// Objects it sees, and all those that it executes with static groups.
     pub visible: usize,
-    /// Pieces that it executes.
-    pub pieces: usize,
-    /// The objects of these pieces.
-    pub objects_of_pieces: usize,
+    /// Static groups that it executes.
+    pub static_groups: usize,
+    /// The objects of these static groups.
+    pub objects_of_static_groups: usize,
     /// Objects in its frustum that others hide: see [`Quality::occlusion`](crate::quality::Quality::occlusion). 0
     /// without the feature `occlusion`.
     pub occluded: usize,
@@ -112,20 +112,20 @@ impl StageTimes {
 }
 
 impl FrameStatistics {
-    /// The rung of each view of a [`ViewBudget`](super::ViewBudget), by name: 0 at its best.
-    pub fn rungs(&self) -> impl Iterator<Item = (&str, usize)> {
-        let choices = self.tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::Rung);
+    /// The quality level of each view of a [`ViewBudget`](super::ViewBudget), by name: 0 at its best.
+    pub fn levels(&self) -> impl Iterator<Item = (&str, usize)> {
+        let choices = self.tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::QualityLevel);
         choices.filter_map(|choice| Some((choice.labels.view.as_deref()?, choice.chosen)))
     }
 
-    /// Tells a timeline what the frame did with pieces, if the scene has any.
-    pub(super) fn count_pieces(&self, timeline: &Timeline) {
-        if self.pieces != PieceStatistics::default() {
-            let executed = self.views.iter().map(|view| view.pieces).sum::<usize>();
-            let objects = self.views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
-            timeline.count("pieces recorded", self.pieces.recorded as f64);
-            timeline.count("pieces executed", executed as f64);
-            timeline.count("objects of executed pieces", objects as f64);
+    /// Tells a timeline what the frame did with static groups, if the scene has any.
+    pub(super) fn count_static_groups(&self, timeline: &Timeline) {
+        if self.static_groups != StaticGroupStatistics::default() {
+            let executed = self.views.iter().map(|view| view.static_groups).sum::<usize>();
+            let objects = self.views.iter().map(|view| view.objects_of_static_groups).sum::<usize>();
+            timeline.count("static groups recorded", self.static_groups.recorded as f64);
+            timeline.count("static groups executed", executed as f64);
+            timeline.count("objects of executed static groups", objects as f64);
         }
     }
 
@@ -149,12 +149,12 @@ impl FrameStatistics {
             lights,
             views,
             view_times: tables.view_times.times().collect(),
-            pieces: tables.pieces.statistics(),
+            static_groups: tables.static_groups.statistics(),
             uploaded,
             generated: request.generated.iter().map(|contents| contents.byte_count() as u64).sum(),
             targets,
             stages,
-            rejections: request.rejections.list_of(request.scene),
+            scene_issues: request.scene_issues.list_of(request.scene),
             tuning,
         }
     }
@@ -168,9 +168,9 @@ impl ViewStatistics {
             name: view.name().to_owned(),
             kind: view.kind(),
             age: view.age,
-            visible: visibility.set.count() + visibility.pieces.object_count(),
-            pieces: visibility.pieces.executed().len(),
-            objects_of_pieces: visibility.pieces.object_count(),
+            visible: visibility.set.count() + visibility.static_groups.object_count(),
+            static_groups: visibility.static_groups.executed().len(),
+            objects_of_static_groups: visibility.static_groups.object_count(),
             occluded: tables.culling.hidden(index),
             lights: tables.lights[index].light_count(),
             commands: 0,

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
 
-use super::blended_object_witness::BlendedObjectWitness;
+use super::blended_tracker::BlendedTracker;
 use super::culling::{CullingTables, PassTriangles};
 use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
-use super::pieces::{ListConditions, PieceTable};
+use super::static_groups::{ListConditions, StaticGroupTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::view_levels::ViewLevels;
 use super::view_times::ViewTimes;
@@ -22,15 +22,15 @@ use crate::command::{
 use crate::leaked_guards::unlock;
 use crate::process::Pass;
 use crate::scene::{SceneError, SceneRef};
-use crate::view::{LightTable, MeshLevels, ObjectTable, RejectionReason, RenderView};
+use crate::view::{IssueReason, LightTable, MeshLevels, ObjectTable, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
 pub(super) struct FrameTables {
     pub(super) objects: ObjectTable,
-    pub(super) pieces: PieceTable,
+    pub(super) static_groups: StaticGroupTable,
     /// Whether an object needs transparency.
-    pub(super) blended_object: BlendedObjectWitness,
+    pub(super) blended_object: BlendedTracker,
     /// The thread time of each view.
     pub(super) view_times: ViewTimes,
     /// One for each view.
@@ -79,24 +79,24 @@ impl FrameTables {
         self.sort_scratch.resize_with(workers, Mutex::default);
     }
 
-    /// Begins a frame of a scene's pieces. The tables of these passes have begun it already.
+    /// Begins a frame of a scene's static groups. The tables of these passes have begun it already.
     ///
     /// # Errors
-    /// If the pieces contradict each other.
-    pub(super) fn begin_pieces(
+    /// If the static groups contradict each other.
+    pub(super) fn begin_static_groups(
         &mut self,
         scene: &SceneRef<'_>,
         conditions: ListConditions,
         passes: &[Pass],
     ) -> Result<(), SceneError> {
-        self.visibility.iter_mut().for_each(|view| view.may_execute_pieces = true);
+        self.visibility.iter_mut().for_each(|view| view.may_execute_static_groups = true);
         for (pass, table) in passes.iter().zip(&self.passes) {
             let draws_in_order = |selection: Selection| !table.orders_by_bin && selection.blending != Blending::Blended;
-            self.visibility[pass.view_index].may_execute_pieces &= !table.selection.is_some_and(draws_in_order);
+            self.visibility[pass.view_index].may_execute_static_groups &= !table.selection.is_some_and(draws_in_order);
         }
         let selections = self.passes.iter().filter(|table| table.orders_by_bin).filter_map(|table| table.selection);
-        self.pieces.begin_frame(scene, self.objects.len(), conditions, selections)?;
-        self.pieces.count_unknown_objects(scene.object_count(), self.objects.rejections());
+        self.static_groups.begin_frame(scene, self.objects.len(), conditions, selections)?;
+        self.static_groups.count_unknown_objects(scene.object_count(), self.objects.scene_issues());
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl FrameTables {
     /// Makes the next frame derive everything anew.
     pub(super) fn invalidate(&mut self) {
         self.objects.invalidate();
-        self.pieces.invalidate();
+        self.static_groups.invalidate();
         self.visibility.iter_mut().for_each(ViewVisibility::invalidate);
         self.passes.iter_mut().for_each(PassTable::invalidate);
     }
@@ -148,7 +148,7 @@ impl FrameTables {
             room = room.saturating_sub(bytes.next_multiple_of(LIGHT_ALIGNMENT));
         }
         let left_out = left_out.into_iter().map(|light| scene_indices[light]);
-        self.objects.rejections().count_all_once(RejectionReason::LightLimit, left_out);
+        self.objects.scene_issues().count_all_once(IssueReason::LightLimit, left_out);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::scene::{Light, SceneRef};
 use crate::unwind::emit;
-use crate::view::{FixedPosition, RejectionReason, Rejections};
+use crate::view::{FixedPosition, IssueReason, SceneIssues};
 
 /// The lights of a scene that can be drawn, in the scene's order, each with its range cut off: see
 /// [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off).
@@ -13,18 +13,18 @@ pub(super) struct ValidLights {
 }
 
 impl ValidLights {
-    /// The valid lights of `scene`. The others are counted as rejections.
-    pub(super) fn new(scene: &SceneRef<'_>, rejections: &Rejections, cut_off: f32) -> Self {
+    /// The valid lights of `scene`. The others are counted as scene issues.
+    pub(super) fn new(scene: &SceneRef<'_>, scene_issues: &SceneIssues, cut_off: f32) -> Self {
         let capacity = scene.lights.len();
         let mut valid = Self { lights: Vec::with_capacity(capacity), scene_indices: Vec::with_capacity(capacity) };
         for (index, light) in scene.lights.iter().enumerate() {
             if let Err(error) = light.check(index) {
                 emit(|| tracing::debug!(target: "drawloom", %error, "light left out"));
-                rejections.count(RejectionReason::InvalidLight, index);
+                scene_issues.count(IssueReason::InvalidLight, index);
             } else if light.bounding_sphere().is_some_and(|(position, _)| FixedPosition::new(position).is_none()) {
-                rejections.count(RejectionReason::LightOutOfReach, index);
+                scene_issues.count(IssueReason::LightOutOfReach, index);
             } else if light.is_dark() {
-                rejections.count(RejectionReason::DarkLight, index);
+                scene_issues.count(IssueReason::DarkLight, index);
             } else {
                 valid.lights.push(light.cut_off_at(cut_off));
                 valid.scene_indices.push(index);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::view_visibility::{TestScope, ViewVisibility};
+use super::view_visibility::{Retest, ViewVisibility};
 use crate::backend::kept_views;
 use crate::scene::{SceneRef, ViewKind};
 use crate::view::{LevelSelector, MeshLevels, ObjectLevels, ObjectTable, RenderView};
@@ -16,7 +16,7 @@ pub(super) struct ViewLevels {
     pub(super) levels: ObjectLevels,
     /// `None` before the first frame.
     selector: Option<LevelSelector>,
-    scope: TestScope,
+    scope: Retest,
 }
 
 impl ViewLevels {
@@ -26,7 +26,7 @@ impl ViewLevels {
             name: view.name().to_owned(),
             levels: ObjectLevels::default(),
             selector: None,
-            scope: TestScope::None,
+            scope: Retest::None,
         }
     }
 
@@ -51,7 +51,7 @@ impl ViewLevels {
     pub(super) fn begin_frame(&mut self, selector: LevelSelector, visibility: &ViewVisibility, objects: usize) {
         self.levels.resize(objects);
         let is_same = self.selector.replace(selector) == Some(selector);
-        self.scope = if is_same { visibility.scope() } else { TestScope::All };
+        self.scope = if is_same { visibility.scope() } else { Retest::All };
     }
 
     /// The number of words of objects for which levels are chosen.

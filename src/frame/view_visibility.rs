@@ -3,12 +3,12 @@
 use std::array;
 use std::ops::Range;
 
-use super::pieces::PieceTable;
-use super::view_filter::ViewFilter;
-use super::view_pieces::ViewPieces;
+use super::resolved_view_filter::ResolvedViewFilter;
+use super::static_groups::StaticGroupTable;
+use super::view_static_groups::ViewStaticGroups;
 use crate::command::Version;
 use crate::quality::CullingVolume;
-use crate::scene::{Assets, ObjectList};
+use crate::scene::{Assets, FilteredObjects};
 use crate::task::JobPanic;
 use crate::view::{ChangedWord, Frustum, ObjectTable, Overlap, RenderView, VisibleSet};
 
@@ -19,11 +19,11 @@ pub(super) struct ViewVisibility {
     pub(super) set: VisibleSet,
     /// `None` where the next frame must test all objects.
     tested_with: Option<TestedWith>,
-    filter: ViewFilter,
-    /// Whether all passes of the view may execute pieces.
-    pub(super) may_execute_pieces: bool,
-    pub(super) pieces: ViewPieces,
-    tests: TestScope,
+    filter: ResolvedViewFilter,
+    /// Whether all passes of the view may execute static groups.
+    pub(super) may_execute_static_groups: bool,
+    pub(super) static_groups: ViewStaticGroups,
+    tests: Retest,
 }
 
 /// The inputs of a visible set.
@@ -33,7 +33,7 @@ struct TestedWith {
     volume: CullingVolume,
     /// The revision of the view's filter.
     filter: u64,
-    /// The revision of the objects that pieces exclude.
+    /// The revision of the objects that static groups exclude.
     excluded: u64,
     objects: usize,
     epoch: u64,
@@ -41,7 +41,7 @@ struct TestedWith {
 
 /// Which objects a frame tests against a view's frustum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum TestScope {
+pub(super) enum Retest {
     /// All.
     #[default]
     All,
@@ -51,7 +51,7 @@ pub(super) enum TestScope {
     None,
 }
 
-impl TestScope {
+impl Retest {
     /// The number of words with objects to test.
     pub(super) fn word_count(self, set: &VisibleSet, table: &ObjectTable) -> usize {
         match self {
@@ -76,44 +76,44 @@ impl TestScope {
 const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
 
 impl ViewVisibility {
-    /// Begins a frame of a view that draws commands: decides which pieces it executes, and which objects it tests. The
-    /// version is one that no other view gets.
+    /// Begins a frame of a view that draws commands: decides which static groups it executes, and which objects it
+    /// tests. The version is one that no other view gets.
     ///
     /// # Errors
     /// If the predicate of the view's filter panics.
     pub(super) fn begin_frame(
         &mut self,
         view: &RenderView,
-        (table, pieces): (&ObjectTable, &PieceTable),
+        (table, static_groups): (&ObjectTable, &StaticGroupTable),
         assets: &Assets,
         volume: CullingVolume,
         tests_occlusion: bool,
         version: Version,
     ) -> Result<(), JobPanic> {
         self.filter.update(&view.camera.filter, assets)?;
-        if self.may_execute_pieces && !tests_occlusion && !pieces.is_empty() {
-            self.pieces.find(pieces, &view.frustum, volume, &self.filter, version);
+        if self.may_execute_static_groups && !tests_occlusion && !static_groups.is_empty() {
+            self.static_groups.find(static_groups, &view.frustum, volume, &self.filter, version);
         } else {
-            self.pieces.clear(version);
+            self.static_groups.clear(version);
         }
         let (frustum, filter, excluded) =
-            (view.frustum.clone(), self.filter.revision(), self.pieces.excluded_revision());
+            (view.frustum.clone(), self.filter.revision(), self.static_groups.excluded_revision());
         let now = TestedWith { frustum, volume, filter, excluded, objects: table.len(), epoch: table.epoch() };
         let is_same_view = |before: &TestedWith| {
             (&before.frustum, before.volume, before.filter, before.excluded, before.objects)
                 == (&now.frustum, now.volume, now.filter, now.excluded, now.objects)
         };
         self.tests = match &self.tested_with {
-            _ if tests_occlusion => TestScope::All,
-            Some(before) if *before == now => TestScope::None,
+            _ if tests_occlusion => Retest::All,
+            Some(before) if *before == now => Retest::None,
             Some(before) if is_same_view(before) && before.epoch + 1 == now.epoch && !table.all_changed() => {
-                TestScope::Changed
+                Retest::Changed
             }
-            _ => TestScope::All,
+            _ => Retest::All,
         };
         // Occlusion removes objects from the set, so it is not the result of the frustum's test.
         self.tested_with = (!tests_occlusion).then_some(now);
-        if self.tests == TestScope::All {
+        if self.tests == Retest::All {
             self.set.reset(table.len());
         }
         Ok(())
@@ -121,7 +121,7 @@ impl ViewVisibility {
 
     /// Empties the set of a view that draws no commands.
     pub(super) fn clear(&mut self, version: Version) {
-        self.pieces.clear(version);
+        self.static_groups.clear(version);
         self.tested_with = None;
         self.set.reset(0);
     }
@@ -132,7 +132,7 @@ impl ViewVisibility {
     }
 
     /// Which objects the frame tests.
-    pub(super) fn scope(&self) -> TestScope {
+    pub(super) fn scope(&self) -> Retest {
         self.tests
     }
 
@@ -149,17 +149,17 @@ impl ViewVisibility {
         frustum: &Frustum,
         volume: CullingVolume,
     ) {
-        if self.tests == TestScope::Changed {
+        if self.tests == Retest::Changed {
             for (word, mask) in indices.map(|index| self.tests.word(index, table)) {
-                let tested = mask & !self.pieces.excluded(word);
+                let tested = mask & !self.static_groups.excluded(word);
                 self.set.replace(word, mask, self.visible_among(word, tested, table, frustum, volume));
             }
             return;
         }
-        if let ObjectList::Only(set) = self.filter.objects() {
+        if let FilteredObjects::Only(set) = self.filter.objects() {
             // Words without listed objects stay empty, and need no work.
             for (word, mask) in set.masks(indices) {
-                let tested = mask & !self.pieces.excluded(word);
+                let tested = mask & !self.static_groups.excluded(word);
                 self.set.replace(word, u64::MAX, self.visible_among(word, tested, table, frustum, volume));
             }
             return;
@@ -167,7 +167,7 @@ impl ViewVisibility {
         let blocks = indices.start / WORDS_PER_BLOCK..indices.end.div_ceil(WORDS_PER_BLOCK);
         let test_block = |index: usize, overlap: Overlap| {
             let first = index * WORDS_PER_BLOCK;
-            let excluded: [_; WORDS_PER_BLOCK] = array::from_fn(|word| self.pieces.excluded(first + word));
+            let excluded: [_; WORDS_PER_BLOCK] = array::from_fn(|word| self.static_groups.excluded(first + word));
             if excluded == [u64::MAX; WORDS_PER_BLOCK] {
                 return;
             }
@@ -208,7 +208,7 @@ impl ViewVisibility {
 
     /// Completes the set when all tests are done and hidden objects removed.
     pub(super) fn compact(&self, version: Version) {
-        if self.tests != TestScope::None {
+        if self.tests != Retest::None {
             self.set.compact(version);
         }
     }

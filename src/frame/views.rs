@@ -5,7 +5,7 @@ use super::shadow_views::{MapSettings, ShadowViews};
 use super::valid_lights::ValidLights;
 use crate::process::{FramePlan, SampledShape, ViewArray};
 use crate::scene::{Light, SceneRef, ViewKind};
-use crate::view::{Rejections, RenderView};
+use crate::view::{RenderView, SceneIssues};
 
 /// The views of a frame, and the valid lights that light them.
 pub(super) struct FrameViews {
@@ -32,11 +32,11 @@ impl FrameViews {
         valid: ValidLights,
         maps: Option<MapSettings<'_>>,
         plan: &FramePlan,
-        rejections: &Rejections,
+        scene_issues: &SceneIssues,
     ) -> Result<Self, FrameError> {
         let mut views: Vec<_> = scene.cameras.iter().map(RenderView::new).collect();
         let ShadowViews { lights, main_views, scene_indices, views: of_maps } = match maps {
-            Some(settings) => ShadowViews::new(scene, valid, &mut views, settings, rejections),
+            Some(settings) => ShadowViews::new(scene, valid, &mut views, settings, scene_issues),
             None => ShadowViews::without_maps(valid),
         };
         views.extend(of_maps);

@@ -4,7 +4,7 @@ use std::vec;
 
 use glam::Vec3;
 
-use super::{FrameError, Recorded, Renderer};
+use super::{FrameError, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::process::Requirements;
 use crate::scene::{Camera, Changes, Light, SceneRef, ViewKind};
@@ -84,7 +84,10 @@ impl<'a> WarmUp<'a> {
     ///
     /// # Errors
     /// As [`Renderer::record`]. The warm-up goes on with the frame after it.
-    pub fn record_next<B: Backend>(&mut self, renderer: &mut Renderer<B>) -> Result<Option<Recorded<B>>, FrameError> {
+    pub fn record_next<B: Backend>(
+        &mut self,
+        renderer: &mut Renderer<B>,
+    ) -> Result<Option<RecordedFrame<B>>, FrameError> {
         let Some(WarmUpFrame { lights, transparency, reflections }) = self.frames.next() else { return Ok(None) };
         let is_drawn = |camera: &&Camera| reflections || camera.kind != ViewKind::Reflection;
         let cameras: Vec<_> = self.scene.cameras.iter().filter(is_drawn).cloned().collect();

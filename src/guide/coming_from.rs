@@ -6,7 +6,7 @@
 //! | `Mesh`, `Mesh3d` | `Mesh`, `MeshHandle` | vertex and index buffers | [`Mesh`], by [`Handle`]; [`Mesh::from_buffers`] for buffers of the engine's |
 //! | `Material`, `AsBindGroup` | `Material` | a bind group and a pipeline | [`Material`] for what ships; a [`MaterialType`] and a shader for the engine's own |
 //! | `Camera`, `RenderTarget` | `Camera` | a view matrix and a target | [`Camera`]: each is a view; [`import_target`] draws it into a texture of the engine's |
-//! | `ViewVisibility`, `RenderLayers` | | an `if` in the loop | culling by [`CullingVolume`], [`LayerMask`], [`ObjectFilter`] |
+//! | `ViewVisibility`, `RenderLayers` | | an `if` in the loop | culling by [`CullingVolume`], [`LayerMask`], [`ViewFilter`] |
 //! | render graph node, `RenderSystems` | a routine in a `RenderGraph` | a function that encodes a pass | [`RenderProcess`]: its order follows from what it declares |
 //! | phases, `PhaseItem`, `SetItemPipeline` ... | | a sort of draws | a process's commands, by its [`Selection`] |
 //! | `MeshUniform`, instance data | | a storage buffer by object | an [`ObjectColumn`], lent and uploaded where objects changed |
@@ -22,7 +22,7 @@
 //!   return, nothing is copied into a render world, and nothing is drawn that the engine did not lend.
 //! - **From rend3.** The renderer keeps no objects: the engine lends all of them in each frame, and says which changed.
 //! - **From a hand-written renderer.** Passes say what they read and write, and not when they run. A pass that must run
-//!   at a place says so by `Place`, or by `after` and `before`.
+//!   at a place says so by `InjectionPoint`, or by `after` and `before`.
 //!
 //! [`CullingVolume`]: crate::quality::CullingVolume
 //! [`Camera`]: crate::scene::Camera
@@ -34,7 +34,7 @@
 //! [`Mesh`]: crate::scene::Mesh
 //! [`Mesh::from_buffers`]: crate::scene::Mesh::from_buffers
 //! [`ObjectColumn`]: crate::scene::ObjectColumn
-//! [`ObjectFilter`]: crate::scene::ObjectFilter
+//! [`ViewFilter`]: crate::scene::ViewFilter
 //! [`RenderProcess`]: crate::process::RenderProcess
 //! [`Renderer::prepare_pipelines_in_background`]: crate::Renderer::prepare_pipelines_in_background
 //! [`WarmUp`]: crate::WarmUp

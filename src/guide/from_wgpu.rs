@@ -170,7 +170,7 @@
 //!     }
 //!
 //!     fn declare(&self, declare: &mut Declare) {
-//!         declare.at(Place::AfterTransparency);
+//!         declare.at(InjectionPoint::AfterTransparency);
 //!         declare.draws_over("radiance");
 //!     }
 //!

@@ -18,11 +18,11 @@
 //!   a world are loaded is its own decision: see `examples/streaming`. Mip levels and levels of detail are streamed
 //!   with their texture and mesh, not one by one.
 //! - **More than a device can hold.** Objects, lights and materials beyond the device's largest buffers, and meshes
-//!   that none of them holds, are left out, counted and [named](crate::view::Rejection); everything else is drawn. With
-//!   the limits that every device has, a scene has two million objects, as many materials, and 1.6 million lights in a
-//!   view; request the limits of the adapter for more.
+//!   that none of them holds, are left out, counted and [named](crate::view::SceneIssue); everything else is drawn.
+//!   With the limits that every device has, a scene has two million objects, as many materials, and 1.6 million lights
+//!   in a view; request the limits of the adapter for more.
 //! - **Textures of more than 2048 × 2048 pixels.** Larger ones are scaled down, and
-//!   [named](crate::view::RejectionReason::ReducedTexture). A texture of any shape takes the memory of a square with
+//!   [named](crate::view::IssueReason::ReducedTexture). A texture of any shape takes the memory of a square with
 //!   sides of 256, 512, 1024 or 2048 pixels.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how
 //!   many frames it keeps.

@@ -2,7 +2,9 @@
 
 use bytemuck::Pod;
 
-use super::{Access, BufferAccess, BufferLayout, ClearColor, Format, Place, SampledView, StorageBuffer, TargetSize};
+use super::{
+    Access, BufferAccess, BufferLayout, ClearColor, Format, InjectionPoint, SampledView, StorageBuffer, TargetSize,
+};
 use crate::scene::{
     AttributeLayout, AttributeValue, ColumnLayout, MaterialLayout, MaterialType, ObjectColumn, VertexAttribute,
     ViewKind,
@@ -312,7 +314,7 @@ impl Declare {
     /// Puts the process at a place of the [deferred pipeline](super::Deferred): after all of the pipeline's processes
     /// before it, and before those behind it. Processes at the same place that write the same target still need an
     /// order.
-    pub fn at(&mut self, place: Place) {
+    pub fn at(&mut self, place: InjectionPoint) {
         let [begin, end] = place.slots();
         self.after(begin);
         self.before(end);

@@ -12,10 +12,10 @@ impl Declare {
     ///
     /// That view is submitted before. Views that sample each other in a circle are
     /// [`FrameError::CircularViews`](crate::FrameError::CircularViews), and so are views that sample each other and are
-    /// submitted [process by process](super::internal::ViewOrder::ProcessByProcess). If the frame has no such view, or only the
-    /// view itself has that name, the texture is a single pixel whose channels and depth are all 0. So a format with
-    /// alpha tells whether there is one, and the recursion of mirrors in mirrors ends where the engine adds no further
-    /// camera. The shader finds the texture's size with `textureDimensions`. A target with [mip
+    /// submitted [process by process](super::internal::ViewOrder::ProcessByProcess). If the frame has no such view, or
+    /// only the view itself has that name, the texture is a single pixel whose channels and depth are all 0. So a
+    /// format with alpha tells whether there is one, and the recursion of mirrors in mirrors ends where the engine adds
+    /// no further camera. The shader finds the texture's size with `textureDimensions`. A target with [mip
     /// levels](Declare::mipmapped) is sampled with all of them. A raw pass cannot sample views.
     ///
     /// ```
@@ -34,7 +34,7 @@ impl Declare {
     ///     }
     ///
     ///     fn declare(&self, declare: &mut Declare) {
-    ///         declare.at(Place::AfterLighting);
+    ///         declare.at(InjectionPoint::AfterLighting);
     ///         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
     ///         declare.draws_over("radiance");
     ///         // The pipeline has drawn the mirror as an opaque object.
@@ -129,7 +129,7 @@ impl Declare {
     /// /// A screen that shows the camera `lens`, which may see the screen.
     /// fn declare(declare: &mut Declare) {
     ///     declare.also_views(ViewKind::Reflection);
-    ///     declare.at(Place::AfterLighting);
+    ///     declare.at(InjectionPoint::AfterLighting);
     ///     // In the shader: @group(2) @binding(1) var shown: texture_2d<f32>;
     ///     declare.samples_view_previous(ViewKind::Reflection, "lens", "radiance");
     ///     declare.draws_over("radiance");

@@ -32,7 +32,7 @@ use parking_lot::{Mutex, ReentrantMutex};
 ///     }
 ///
 ///     fn declare(&self, declare: &mut Declare) {
-///         declare.at(Place::AfterTransparency);
+///         declare.at(InjectionPoint::AfterTransparency);
 ///         declare.samples("depth");
 ///         declare.draws_over("radiance");
 ///     }

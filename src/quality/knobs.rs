@@ -1,7 +1,7 @@
 //! The settings of the quality as a table, for panels that show them and programs that measure them.
 
 use super::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, RadianceSum, ToneCurve,
+    CullingVolume, DepthCurve, DepthPrecision, DiffuseFormat, NormalFormat, Quality, RadianceSum, ToneCurve,
     TransformPrecision, VertexFormat,
 };
 
@@ -73,12 +73,12 @@ macro_rules! copy {
     ([$first:ident $(.$rest:ident)?]) => { |quality, other| quality.$first$(.$rest)? = other.$first$(.$rest)? };
 }
 
-const fn logarithmic(bits: u32) -> DepthKey {
-    DepthKey { bits, curve: DepthCurve::Logarithmic }
+const fn logarithmic(bits: u32) -> DepthPrecision {
+    DepthPrecision { bits, curve: DepthCurve::Logarithmic }
 }
 
-const fn linear_to_1_km(bits: u32) -> DepthKey {
-    DepthKey { bits, curve: DepthCurve::Linear { far: 1000.0 } }
+const fn linear_to_1_km(bits: u32) -> DepthPrecision {
+    DepthPrecision { bits, curve: DepthCurve::Linear { far: 1000.0 } }
 }
 
 impl Knob {
@@ -90,7 +90,7 @@ impl Knob {
             "Error: objects drawn back to front cost overdraw; the picture does not change. Cost: with bits, every visible object is a \
              command, and commands are sorted anew when something moves.",
             {
-                "unordered" => DepthKey::UNORDERED,
+                "unordered" => DepthPrecision::UNORDERED,
                 "1 bit, logarithmic" => logarithmic(1),
                 "8 bits, logarithmic" => logarithmic(8),
                 "16 bits, logarithmic" => logarithmic(16),
@@ -108,7 +108,7 @@ impl Knob {
                 "18 bits, logarithmic" => logarithmic(18),
                 "24 bits, logarithmic" => logarithmic(24),
                 "16 bits, linear to 1 km" => linear_to_1_km(16),
-                "exact" => DepthKey::EXACT,
+                "exact" => DepthPrecision::EXACT,
             }
         ),
         knob!(

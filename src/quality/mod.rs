@@ -6,7 +6,7 @@
 //! [`Camera::impostor`](crate::scene::Camera::impostor) and the forms of views in a [`ViewBudget`](crate::ViewBudget).
 
 mod culling_volume;
-mod depth_key;
+mod depth_precision;
 mod formats;
 mod knobs;
 mod quality_error;
@@ -17,8 +17,8 @@ mod tone_curve;
 mod transform_precision;
 
 pub use culling_volume::CullingVolume;
-pub(crate) use depth_key::DepthQuantizer;
-pub use depth_key::{DepthCurve, DepthKey};
+pub(crate) use depth_precision::DepthQuantizer;
+pub use depth_precision::{DepthCurve, DepthPrecision};
 pub use formats::{DiffuseFormat, NormalFormat, VertexFormat};
 pub use knobs::Knob;
 pub use quality_error::QualityError;

@@ -22,7 +22,7 @@ pub enum RadianceSum {
     /// Cost: 16 bytes per pixel, read and written for every light that reaches it, and up to two targets of that size.
     /// It needs a device that [blends floats](crate::backend::Backend::can_blend_floats). Without one, lights are
     /// summed as by [`Self::Shader`], and blended objects as by [`Self::HalfFloat`], which frames count as
-    /// [`HalfFloatBlending`](crate::view::RejectionReason::HalfFloatBlending).
+    /// [`HalfFloatBlending`](crate::view::IssueReason::HalfFloatBlending).
     Float,
     /// Lights by a shader that adds them in batches of 32, these in batches of 32, and then to `radiance` once. On
     /// every device. Blended objects as by [`Self::Float`].

@@ -1,7 +1,7 @@
 //! The quality of frames: accuracy settings and presets.
 
 use super::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, QualityError, RadianceSum, ShadowQuality,
+    CullingVolume, DepthCurve, DepthPrecision, DiffuseFormat, NormalFormat, QualityError, RadianceSum, ShadowQuality,
     ToneCurve, TransformPrecision, VertexFormat,
 };
 
@@ -27,8 +27,8 @@ use super::{
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// The depth precision of the front-to-back order of opaque objects of one mesh: 0 to [`DepthKey::MAX_OPAQUE_BITS`]
-    /// bits. With 0 bits they are not ordered by depth.
+    /// The depth precision of the front-to-back order of opaque objects of one mesh: 0 to
+    /// [`DepthPrecision::MAX_OPAQUE_BITS`] bits. With 0 bits they are not ordered by depth.
     ///
     /// Error: pairs drawn back to front, which cause overdraw but do not change the picture, except that of coinciding
     /// surfaces the first drawn wins. Cost: with 0 bits, objects are counted by state and mesh, and a draw list is kept
@@ -36,12 +36,13 @@ pub struct Quality {
     /// anew in every frame in which an object or the camera moves: 9 to 16 ns an object and view. That saves from half
     /// of the fragments of a city of one mesh to next to none where meshes are many (`benches/README.md`, "The order of
     /// opaque objects").
-    pub opaque_order: DepthKey,
-    /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthKey::MAX_BLENDED_BITS`] bits.
+    pub opaque_order: DepthPrecision,
+    /// The depth precision of the back-to-front order of blended objects: 1 to [`DepthPrecision::MAX_BLENDED_BITS`]
+    /// bits.
     ///
-    /// Error: pairs drawn in the wrong order, which is visible; none farther apart than [`DepthKey::step`]. Cost: a
-    /// radix sort pass for some nine bits.
-    pub blended_order: DepthKey,
+    /// Error: pairs drawn in the wrong order, which is visible; none farther apart than [`DepthPrecision::step`]. Cost:
+    /// a radix sort pass for some nine bits.
+    pub blended_order: DepthPrecision,
     /// The bounding volume for view frustum culling.
     ///
     /// Error: invisible objects that are drawn; visible objects are never culled. So the picture does not change, with
@@ -128,8 +129,8 @@ impl Quality {
     /// The fastest preset: errors are visible on inspection.
     pub fn fast() -> Self {
         Self {
-            opaque_order: DepthKey::UNORDERED,
-            blended_order: DepthKey { bits: 18, curve: DepthCurve::Logarithmic },
+            opaque_order: DepthPrecision::UNORDERED,
+            blended_order: DepthPrecision { bits: 18, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::Sphere,
             occlusion: None,
             normals: NormalFormat::Octahedral8,
@@ -148,8 +149,8 @@ impl Quality {
     /// The default preset: errors are below what is visible.
     pub fn balanced() -> Self {
         Self {
-            opaque_order: DepthKey::UNORDERED,
-            blended_order: DepthKey::EXACT,
+            opaque_order: DepthPrecision::UNORDERED,
+            blended_order: DepthPrecision::EXACT,
             culling: CullingVolume::Sphere,
             occlusion: None,
             normals: NormalFormat::HalfFloat,
@@ -168,7 +169,7 @@ impl Quality {
     /// The reference preset: errors are below a step of the picture's 8-bit channels.
     pub fn exact() -> Self {
         Self {
-            opaque_order: DepthKey { bits: 20, curve: DepthCurve::Logarithmic },
+            opaque_order: DepthPrecision { bits: 20, curve: DepthCurve::Logarithmic },
             culling: CullingVolume::OrientedBox,
             normals: NormalFormat::Octahedral16,
             diffuse: DiffuseFormat::HalfFloat,
@@ -184,8 +185,8 @@ impl Quality {
     /// # Errors
     /// Returns a [`QualityError`] if a setting is out of range, or if two settings are incompatible.
     pub fn check(&self) -> Result<(), QualityError> {
-        self.opaque_order.check("opaque_order", 0..=DepthKey::MAX_OPAQUE_BITS)?;
-        self.blended_order.check("blended_order", 1..=DepthKey::MAX_BLENDED_BITS)?;
+        self.opaque_order.check("opaque_order", 0..=DepthPrecision::MAX_OPAQUE_BITS)?;
+        self.blended_order.check("blended_order", 1..=DepthPrecision::MAX_BLENDED_BITS)?;
         self.check_occlusion()?;
         if !(self.light_cut_off >= 0.0 && self.light_cut_off.is_finite()) {
             let value = self.light_cut_off.to_string();
@@ -245,7 +246,7 @@ mod tests {
     fn errors_name_the_invalid_setting() {
         let valid = Quality::exact();
         let shadows = valid.shadows;
-        let order = |bits, curve| DepthKey { bits, curve };
+        let order = |bits, curve| DepthPrecision { bits, curve };
         for (wrong, setting) in [
             (Quality { occlusion: Some(3), ..valid }, "occlusion"),
             (Quality { occlusion: Some(0), ..valid }, "occlusion"),

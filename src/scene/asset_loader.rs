@@ -19,7 +19,7 @@ use crate::unwind::{Contained, discard};
 /// and used at once; its content arrives with [`Assets::receive`]. Clones load for the same assets.
 ///
 /// Until its mesh and its material have arrived, an object is not drawn, and counted as
-/// [`NotResident`](crate::view::RejectionReason::NotResident); a material whose texture has not arrived has its plain
+/// [`NotResident`](crate::view::IssueReason::NotResident); a material whose texture has not arrived has its plain
 /// colour.
 ///
 /// ```

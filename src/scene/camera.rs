@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
 use super::projection::MAX_SHIFT;
 use super::transform::is_unit;
-use super::{ClipPlane, LayerMask, ObjectFilter, Projection, Redraw, SceneError, WholePicture};
+use super::{ClipPlane, LayerMask, Projection, Redraw, SceneError, ViewFilter, WholePicture};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Camera {
     /// its own reflection, or all but what only another player sees.
     pub layers: LayerMask,
     /// Only objects that it lets pass are drawn, of those in the layers: by a list of objects, and by their materials.
-    pub filter: ObjectFilter,
+    pub filter: ViewFilter,
     /// Whether processes [sample other views](crate::process::Declare::samples_view) in this one. Without it, what
     /// shows another view looks as if the frame did not have that: in the faces of a cube map, say, so that a ball may
     /// show a screen's surroundings and the screen the ball. What views held [in the frame
@@ -111,7 +111,7 @@ impl Camera {
             size: [960, 540],
             level_of_detail_scale: 1.0,
             layers: LayerMask::ALL,
-            filter: ObjectFilter::ALL,
+            filter: ViewFilter::ALL,
             samples_views: true,
             kind: ViewKind::Main,
             redraw: Redraw::EveryFrame,

@@ -167,19 +167,19 @@ pub enum SceneError {
         /// Their name.
         column: &'static str,
     },
-    /// Two [pieces](super::Piece) of the same name.
-    #[error("the scene has two pieces {piece:?}")]
-    RepeatedPiece {
+    /// Two [static groups](super::StaticGroup) of the same name.
+    #[error("the scene has two static groups {static_group:?}")]
+    RepeatedStaticGroup {
         /// Their name.
-        piece: String,
+        static_group: String,
     },
-    /// An object that is in two [pieces](super::Piece).
-    #[error("object {object} is in the pieces {:?} and {:?}, and can be in one only", pieces[0], pieces[1])]
+    /// An object that is in two [static groups](super::StaticGroup).
+    #[error("object {object} is in the static groups {:?} and {:?}, and can be in one only", static_groups[0], static_groups[1])]
     SharedObject {
         /// Its index.
         object: usize,
-        /// The names of the pieces.
-        pieces: [String; 2],
+        /// The names of the static groups.
+        static_groups: [String; 2],
     },
     /// A stale handle.
     #[error(transparent)]

@@ -49,11 +49,11 @@ use crate::leaked_guards::unlock;
 ///         accesses.fills(&self.vertices);
 ///     }
 ///
-///     fn width(&self, _: &NodeFrame<'_>) -> usize {
+///     fn width(&self, _: &NodeContext<'_>) -> usize {
 ///         self.vertices.chunk_count()
 ///     }
 ///
-///     fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+///     fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
 ///         for chunk in chunks {
 ///             let elements = self.vertices.chunk_range(chunk);
 ///             for (index, vertex) in elements.zip(&mut *frame.fill(&self.vertices, chunk)?) {
@@ -260,8 +260,8 @@ impl GeneratedContents {
     fn new(layout: GeneratedLayout) -> Option<Self> {
         let mut chunks = Vec::new();
         chunks.try_reserve_exact(layout.chunk_count()).ok()?;
-        // A system that overcommits grants memory that it does not have, in small pieces, and ends the process when the
-        // memory is written. As a rule it refuses one piece that is larger than its memory.
+        // A system that overcommits grants memory that it does not have, in small static groups, and ends the process
+        // when the memory is written. As a rule it refuses one static group that is larger than its memory.
         let mut all = Vec::<u8>::new();
         all.try_reserve_exact(layout.bytes()).ok()?;
         // Otherwise the compiler may leave out memory that nobody uses.

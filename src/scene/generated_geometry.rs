@@ -33,8 +33,8 @@ impl From<Vec<u32>> for GeneratedIndices {
 
 impl From<&GeneratedBuffer<u32>> for GeneratedIndices {
     /// Those that nodes fill the buffer with. Each is less than the number of vertices. The number of triangles is that
-    /// of a full buffer; of indices beyond the [count](crate::NodeFrame::set_count), and of a triangle that these would
-    /// complete, nothing is drawn.
+    /// of a full buffer; of indices beyond the [count](crate::NodeContext::set_count), and of a triangle that these
+    /// would complete, nothing is drawn.
     fn from(buffer: &GeneratedBuffer<u32>) -> Self {
         Self(IndexSource::Generated(Arc::clone(buffer.source())))
     }

@@ -19,8 +19,8 @@ impl Mesh {
     /// Like a mesh [in the engine's own buffers](Self::from_buffers) it has no triangles that the CPU sees when it
     /// culls, so it is never an occluder, and neither subdivided for paraboloids nor culled by triangle. The software
     /// backend draws it; if a vertex is then not finite, or an index is not one of a vertex that
-    /// [counts](crate::NodeFrame::set_count), that frame lacks the mesh, and a warning names it. Nothing is drawn of it
-    /// until a node has filled its buffers.
+    /// [counts](crate::NodeContext::set_count), that frame lacks the mesh, and a warning names it. Nothing is drawn of
+    /// it until a node has filled its buffers.
     ///
     /// # Errors
     /// If it has no triangle, or a part of one, or if the bounding box is inverted, not finite or too large.

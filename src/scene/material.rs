@@ -102,7 +102,7 @@ pub enum Blend {
 /// Backends scale a texture to a square with sides of 256, 512, 1024 or 2048 pixels: to the smallest that is at least
 /// as wide and as high, so that it keeps its detail, or else to the largest. One that has more pixels than
 /// [`Texture::MAX_DETAIL`] in a direction is drawn with that many, filtered when it is uploaded, and counted as
-/// [`ReducedTexture`](crate::view::RejectionReason::ReducedTexture) in every frame: details that are finer become their
+/// [`ReducedTexture`](crate::view::IssueReason::ReducedTexture) in every frame: details that are finer become their
 /// mean.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {

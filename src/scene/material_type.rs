@@ -40,7 +40,7 @@ use bytemuck::Pod;
 ///     }
 ///
 ///     fn declare(&self, declare: &mut Declare) {
-///         declare.at(Place::AfterLighting);
+///         declare.at(InjectionPoint::AfterLighting);
 ///         declare.draws_over("radiance");
 ///         declare.draws_depth("depth");
 ///         declare.reads_materials(GLOW);

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A set of a scene's objects, by index: what an [`ObjectFilter`](super::ObjectFilter) lists. A clone shares its
+/// A set of a scene's objects, by index: what an [`ViewFilter`](super::ViewFilter) lists. A clone shares its
 /// memory, which is 16 bytes for each 64 indices of the scene among which one is in the set.
 ///
 /// An index is that of an entry in the slices of a [`SceneRef`](super::SceneRef), in every frame anew. If an object

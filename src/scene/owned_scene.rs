@@ -6,8 +6,8 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet, Piece,
-    SceneError, SceneRef, WrittenColumns,
+    Arrivals, Asset, AssetLoader, Assets, Bounds, Camera, Changes, LayerMask, Light, Material, Mesh, ObjectSet,
+    SceneError, SceneRef, StaticGroup, WrittenColumns,
 };
 use crate::handle::{Handle, Slots, StaleHandle};
 
@@ -38,7 +38,7 @@ pub struct Scene {
     /// The radiance of the background, linear.
     pub background: Vec3,
     /// Objects that stand still together, and that views execute as a whole.
-    pub pieces: Vec<Piece>,
+    pub static_groups: Vec<StaticGroup>,
     assets: Assets,
     /// The index of each object in the arrays below.
     indices: Slots<usize>,
@@ -100,7 +100,7 @@ impl Scene {
             columns: &[],
             written: WrittenColumns::default(),
             changes: Changes::Unknown,
-            pieces: &self.pieces,
+            static_groups: &self.static_groups,
             assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,
@@ -210,13 +210,13 @@ impl Scene {
         self.handles.iter().copied().map(ObjectHandle)
     }
 
-    /// The set of some objects at their present indices, for an [`ObjectFilter`](super::ObjectFilter). Removing an
+    /// The set of some objects at their present indices, for an [`ViewFilter`](super::ViewFilter). Removing an
     /// object changes indices: make the set again then.
     ///
     /// ```
     /// # use drawloom::glam::DVec3;
     /// # use drawloom::scene::{Material, Mesh, RenderObject, Scene, Topology, Vertex};
-    /// use drawloom::scene::{Camera, ObjectFilter};
+    /// use drawloom::scene::{Camera, ViewFilter};
     ///
     /// # let mut scene = Scene::new();
     /// # let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
@@ -226,7 +226,7 @@ impl Scene {
     /// # let object = RenderObject::new(mesh, material, DVec3::ZERO);
     /// let statue = scene.add_object(object)?;
     /// let portrait = Camera::looking_at("portrait", DVec3::Z * 3.0, DVec3::ZERO);
-    /// let filter = ObjectFilter::only(scene.object_set([statue])?);
+    /// let filter = ViewFilter::only(scene.object_set([statue])?);
     /// scene.cameras.push(Camera { filter, ..portrait });
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

@@ -4,8 +4,8 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::transform::transform_is_valid;
 use super::{
-    Assets, Bounds, Camera, Changes, Column, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, Piece,
-    SceneError, WrittenColumns,
+    Assets, Bounds, Camera, Changes, Column, ColumnLayout, ColumnValues, LayerMask, Light, Material, Mesh, SceneError,
+    StaticGroup, WrittenColumns,
 };
 use crate::handle::Handle;
 
@@ -42,7 +42,7 @@ pub struct SceneRef<'a> {
     /// Which objects changed since the last frame.
     pub changes: Changes<'a>,
     /// Objects that stand still together, and that views execute as a whole.
-    pub pieces: &'a [Piece],
+    pub static_groups: &'a [StaticGroup],
     /// The assets that the handles refer to.
     pub assets: &'a Assets,
     /// The lights.
@@ -81,7 +81,7 @@ impl<'a> SceneRef<'a> {
             columns: &[],
             written: WrittenColumns::default(),
             changes: Changes::Unknown,
-            pieces: &[],
+            static_groups: &[],
             assets,
             lights: &[],
             cameras: &[],

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::block_reader::BlockReader;
-use super::{ObjectTable, SelectionFilter, VisibleSet, set_bits};
+use super::{DrawFilter, ObjectTable, VisibleSet, set_bits};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 use crate::scene::Blend;
 
@@ -12,7 +12,7 @@ use crate::scene::Blend;
 const WALK_THRESHOLD: usize = 4;
 
 /// Whether a process that draws a selection may walk all objects in the order of their bins.
-pub(crate) fn may_walk(selection: Selection) -> bool {
+pub(crate) fn can_scan_bin_order(selection: Selection) -> bool {
     selection.materials == MaterialShare::ALL
 }
 
@@ -40,13 +40,13 @@ pub(crate) fn bin_visible(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    filter: SelectionFilter<'_>,
+    filter: DrawFilter<'_>,
     range: &VisibleRange,
     segment: &mut BinnedSegment,
 ) {
     let bins = table.bins();
     if matches!(range, VisibleRange::Share { .. })
-        && may_walk(selection)
+        && can_scan_bin_order(selection)
         && visible.count() * WALK_THRESHOLD > table.len()
         && let Some(all) = table.objects_by_bin()
     {
@@ -71,7 +71,7 @@ fn collect(
     table: &ObjectTable,
     visible: &VisibleSet,
     selection: Selection,
-    filter: SelectionFilter<'_>,
+    filter: DrawFilter<'_>,
     ranks: Range<usize>,
     segment: &mut BinnedSegment,
 ) {

@@ -4,31 +4,31 @@ use std::ops::Range;
 
 use drawloom_jobs::internal::block_ranges;
 
+use super::bounds4::{Bounds4, Overlap};
 use super::frustum::Frustum;
-use super::group_bounds::{GroupBounds, Overlap};
 
-/// Bounds of blocks, and of groups of [`GroupBounds::GROUPS`] blocks. Each level tests four groups at once.
+/// Bounds of blocks, and of groups of [`Bounds4::GROUPS`] blocks. Each level tests four groups at once.
 #[derive(Debug, Default)]
 pub(crate) struct BlockBounds {
     /// The blocks, in groups.
-    blocks: Vec<GroupBounds>,
+    blocks: Vec<Bounds4>,
     /// The groups of blocks, in groups.
-    groups: Vec<GroupBounds>,
+    groups: Vec<Bounds4>,
 }
 
 impl BlockBounds {
     /// Makes room for some blocks. New ones have no objects.
     pub(super) fn resize(&mut self, blocks: usize) {
-        let groups = blocks.div_ceil(GroupBounds::GROUPS);
-        self.blocks.resize_with(groups, GroupBounds::default);
-        self.groups.resize_with(groups.div_ceil(GroupBounds::GROUPS), GroupBounds::default);
+        let groups = blocks.div_ceil(Bounds4::GROUPS);
+        self.blocks.resize_with(groups, Bounds4::default);
+        self.groups.resize_with(groups.div_ceil(Bounds4::GROUPS), Bounds4::default);
     }
 
     /// Replaces the bounds of a block by those around its words.
-    pub(super) fn set(&mut self, block: usize, words: &GroupBounds) {
-        let group = block / GroupBounds::GROUPS;
-        self.blocks[group].set_union(block % GroupBounds::GROUPS, words);
-        self.groups[group / GroupBounds::GROUPS].set_union(group % GroupBounds::GROUPS, &self.blocks[group]);
+    pub(super) fn set(&mut self, block: usize, words: &Bounds4) {
+        let group = block / Bounds4::GROUPS;
+        self.blocks[group].set_union(block % Bounds4::GROUPS, words);
+        self.groups[group / Bounds4::GROUPS].set_union(group % Bounds4::GROUPS, &self.blocks[group]);
     }
 
     /// Calls `visit` with the blocks of a range, in order, and how they lie; not with those that lie outside a frustum
@@ -39,11 +39,11 @@ impl BlockBounds {
         blocks: Range<usize>,
         mut visit: impl FnMut(usize, Overlap),
     ) {
-        const BLOCKS: usize = GroupBounds::GROUPS;
-        for (index, blocks) in block_ranges(blocks, BLOCKS * GroupBounds::GROUPS) {
+        const BLOCKS: usize = Bounds4::GROUPS;
+        for (index, blocks) in block_ranges(blocks, BLOCKS * Bounds4::GROUPS) {
             let overlaps_of_groups = frustum.overlaps(&self.groups[index]);
             for (group, blocks) in block_ranges(blocks, BLOCKS) {
-                if overlaps_of_groups[group % GroupBounds::GROUPS] == Overlap::Outside {
+                if overlaps_of_groups[group % Bounds4::GROUPS] == Overlap::Outside {
                     continue;
                 }
                 let overlaps = frustum.overlaps(&self.blocks[group]);
@@ -64,10 +64,10 @@ mod tests {
     use crate::scene::Camera;
     use crate::view::{BoundingSphere, BoundingSpheres};
 
-    fn bounds_of(sphere: BoundingSphere) -> GroupBounds {
+    fn bounds_of(sphere: BoundingSphere) -> Bounds4 {
         let mut table = BoundingSpheres::default();
         table.set(0, sphere);
-        let mut words = GroupBounds::default();
+        let mut words = Bounds4::default();
         words.set_word(0, &table);
         words
     }

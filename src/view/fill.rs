@@ -7,9 +7,7 @@ use glam::DVec3;
 
 use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
-use super::{
-    ObjectBlock, ObjectLevels, ObjectTable, RejectionReason, RenderView, SelectionFilter, VisibleSet, set_bits,
-};
+use super::{DrawFilter, IssueReason, ObjectBlock, ObjectLevels, ObjectTable, RenderView, VisibleSet, set_bits};
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, ColumnValues, Projection, SceneRef};
@@ -27,7 +25,7 @@ pub(crate) struct Fill<'a> {
     pub(crate) visible: &'a VisibleSet,
     /// The objects that the render process draws.
     pub(crate) selection: Selection,
-    pub(crate) filter: SelectionFilter<'a>,
+    pub(crate) filter: DrawFilter<'a>,
     /// The levels of detail in the view; `None` if all are 0.
     pub(crate) levels: Option<&'a ObjectLevels>,
     /// The scene, for the subdivision level.
@@ -101,7 +99,7 @@ impl Fill<'_> {
             };
             state = state.with_subdivision_level(level);
             if level > DrawState::MAX_SUBDIVISION_LEVEL {
-                self.table.rejections().count_once(RejectionReason::CoarseEdges, object);
+                self.table.scene_issues().count_once(IssueReason::CoarseEdges, object);
             }
         }
         let center = objects.spheres.get(entry).center;

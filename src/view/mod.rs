@@ -1,6 +1,6 @@
 //! Views: "everything is a camera" (M 10.4). Tables that all views of a frame share, and culling for each view.
 //!
-//! Engines use [`ShadowMaps`] and [`RejectionReason`]. Backends also use the tables and the GPU layouts, most of which
+//! Engines use [`ShadowMaps`] and [`IssueReason`]. Backends also use the tables and the GPU layouts, most of which
 //! are in the hidden module `internal`.
 
 mod bin;
@@ -19,7 +19,7 @@ mod frustum;
 mod gpu_light;
 mod gpu_object;
 mod gpu_view;
-mod group_bounds;
+mod bounds4;
 mod level_errors;
 mod level_selector;
 mod light_table;
@@ -31,10 +31,10 @@ mod object_table;
 #[cfg(feature = "occlusion")]
 mod occlusion;
 mod packet_columns;
-mod piece_objects;
-mod rejection;
+mod static_group_objects;
+mod scene_issue;
 mod render_view;
-mod selection_filter;
+mod draw_filter;
 mod shadow_maps;
 mod subdivision_level;
 mod table_limits;
@@ -43,23 +43,23 @@ mod triangle_culling;
 mod used_meshes;
 mod visible_set;
 
-pub(crate) use bin::{VisibleRange, bin_visible, may_walk};
+pub(crate) use bin::{VisibleRange, bin_visible, can_scan_bin_order};
 pub(crate) use bounding_boxes::OrientedBox;
+pub(crate) use bounds4::{Bounds4, Overlap};
 pub(crate) use changed_objects::ChangedWord;
+pub(crate) use draw_filter::DrawFilter;
 pub(crate) use draw_states::possible_draw_states;
 pub(crate) use fill::Fill;
 pub use gpu_view::GpuView;
-pub(crate) use group_bounds::{GroupBounds, Overlap};
 pub(crate) use internal::*;
 pub(crate) use level_errors::MeshLevels;
 pub(crate) use level_selector::LevelSelector;
 pub(crate) use map_owners::MapOwners;
 pub(crate) use object_levels::ObjectLevels;
-pub(crate) use piece_objects::{ObjectWord, bin_objects, recordable_objects};
-pub use rejection::{Rejection, RejectionReason, Rejections};
 pub use render_view::RenderView;
-pub(crate) use selection_filter::SelectionFilter;
+pub use scene_issue::{IssueReason, SceneIssue, SceneIssues};
 pub use shadow_maps::ShadowMaps;
+pub(crate) use static_group_objects::{ObjectWord, bin_objects, recordable_objects};
 pub(crate) use table_limits::TableLimits;
 pub(crate) use visible_set::set_bits;
 

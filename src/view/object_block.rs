@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use super::bounding_spheres::{BoundingSphere, BoundingSpheres};
+use super::bounds4::{Bounds4, Overlap};
 use super::frustum::Classified;
-use super::group_bounds::{GroupBounds, Overlap};
 use super::object_description::{ObjectDescription, ObjectDraw, PacketDescription};
 use super::packet_columns::{LANES, PacketColumns};
-use super::{BoundingBoxes, Frustum, GpuObject, OrientedBox, RejectionReason, set_bits};
+use super::{BoundingBoxes, Frustum, GpuObject, IssueReason, OrientedBox, set_bits};
 use crate::quality::CullingVolume;
 use crate::scene::Blend;
 
@@ -29,12 +29,12 @@ pub struct ObjectBlock {
     /// The objects that a view may see, because they are neither rejected nor removed: a mask for each word.
     drawable: [u64; Self::WORDS],
     /// The bounds of each word.
-    pub(super) word_bounds: GroupBounds,
+    pub(super) word_bounds: Bounds4,
     /// The table's epoch when an object of a packet of [`ObjectBlock::PACKET`] last changed.
     pub(super) changed_in: [u64; Self::SIZE / Self::PACKET],
     /// The number of objects that are rejected, and why they are.
     rejected_count: usize,
-    rejected: [Option<RejectionReason>; Self::SIZE],
+    rejected: [Option<IssueReason>; Self::SIZE],
 }
 
 impl ObjectBlock {
@@ -127,13 +127,13 @@ impl ObjectBlock {
     }
 
     /// The description of an object, or why it is rejected.
-    pub(super) fn description(&self, entry: usize) -> Result<ObjectDescription, RejectionReason> {
+    pub(super) fn description(&self, entry: usize) -> Result<ObjectDescription, IssueReason> {
         let (gpu_object, bounds, draw) = (self.gpu_objects[entry], self.spheres.get(entry), self.draws[entry]);
         self.rejected[entry].map_or(Ok(ObjectDescription { gpu_object, bounds, draw }), Err)
     }
 
     /// The rejected objects.
-    pub(super) fn rejected(&self) -> impl Iterator<Item = (usize, RejectionReason)> {
+    pub(super) fn rejected(&self) -> impl Iterator<Item = (usize, IssueReason)> {
         let searched = if self.rejected_count > 0 { &self.rejected[..] } else { &[] };
         searched.iter().enumerate().filter_map(|(entry, reason)| reason.map(|reason| (entry, reason)))
     }
@@ -146,11 +146,11 @@ impl ObjectBlock {
     }
 
     /// Rejects an object that its packet's description left empty: no view sees it.
-    pub(super) fn reject(&mut self, entry: usize, reason: RejectionReason) {
+    pub(super) fn reject(&mut self, entry: usize, reason: IssueReason) {
         self.set_rejected(entry, Some(reason));
     }
 
-    fn set_rejected(&mut self, entry: usize, reason: Option<RejectionReason>) {
+    fn set_rejected(&mut self, entry: usize, reason: Option<IssueReason>) {
         if self.rejected[entry] != reason {
             let before = std::mem::replace(&mut self.rejected[entry], reason);
             self.rejected_count = self.rejected_count - usize::from(before.is_some()) + usize::from(reason.is_some());
@@ -262,7 +262,7 @@ impl Default for ObjectBlock {
             bins: [0; Self::SIZE],
             opaque: [0; Self::WORDS],
             drawable: [0; Self::WORDS],
-            word_bounds: GroupBounds::default(),
+            word_bounds: Bounds4::default(),
             changed_in: [0; Self::SIZE / Self::PACKET],
             rejected_count: 0,
             rejected: [None; Self::SIZE],

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::draw_states::DrawStates;
 use super::fixed_position::{is_within_reach, nearest_step};
 use super::packet_columns::{LANES, Lanes, PacketColumns};
-use super::{BoundingSphere, FixedPosition, GpuObject, OrientedBox, RejectionReason};
+use super::{BoundingSphere, FixedPosition, GpuObject, IssueReason, OrientedBox};
 use crate::command::DrawState;
 use crate::scene::{SceneRef, is_unit};
 
@@ -116,26 +116,26 @@ fn nearest_steps(positions: &[Lanes<f64>; 3]) -> [Lanes<i64>; 3] {
 
 /// Why an object cannot be drawn.
 #[cold]
-pub(super) fn rejection_reason(scene: &SceneRef<'_>, draw_states: &DrawStates, object: usize) -> RejectionReason {
+pub(super) fn rejection_reason(scene: &SceneRef<'_>, draw_states: &DrawStates, object: usize) -> IssueReason {
     let [x, y, z, w] = scene.orientation_column().get(object).to_array();
     // Rounded as where it was found to be invalid.
     let is_rotation = is_unit(x * x + y * y + z * z + w * w);
     if !is_rotation || !scene.transform_is_valid(object) {
-        RejectionReason::InvalidTransform
+        IssueReason::InvalidTransform
     } else if FixedPosition::new(scene.position_column().get(object)).is_none() {
-        RejectionReason::OutOfReach
+        IssueReason::OutOfReach
     } else if scene.assets.is_pending(scene.meshes[object]) || scene.assets.is_pending(scene.materials[object]) {
-        RejectionReason::NotResident
+        IssueReason::NotResident
     } else if scene.assets.get(scene.meshes[object]).is_err() {
-        RejectionReason::StaleMesh
+        IssueReason::StaleMesh
     } else if scene.assets.get(scene.materials[object]).is_err() {
-        RejectionReason::StaleMaterial
+        IssueReason::StaleMaterial
     } else if !draw_states.is_drawable(scene.meshes[object].index() as usize) {
-        RejectionReason::UndrawableMesh
+        IssueReason::UndrawableMesh
     } else if !draw_states.has_material(scene.materials[object].index() as usize) {
-        RejectionReason::MaterialLimit
+        IssueReason::MaterialLimit
     } else {
-        RejectionReason::InvalidBounds
+        IssueReason::InvalidBounds
     }
 }
 

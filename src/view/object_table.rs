@@ -13,7 +13,7 @@ use super::object_block::ObjectBlock;
 use super::object_description::{PacketDescription, rejection_reason};
 use super::packet_columns::GatheredColumns;
 use super::used_meshes::UsedMeshes;
-use super::{BoundingBoxes, GpuObject, RejectionReason, Rejections, TableLimits};
+use super::{BoundingBoxes, GpuObject, IssueReason, SceneIssues, TableLimits};
 use crate::command::{BinnedSegment, Bins};
 use crate::leaked_guards::unlock;
 use crate::quality::CullingVolume;
@@ -32,7 +32,7 @@ pub struct ObjectTable {
     blocks: Vec<RwLock<Box<ObjectBlock>>>,
     block_bounds: RwLock<BlockBounds>,
     bins: RwLock<Bins>,
-    rejections: Rejections,
+    scene_issues: SceneIssues,
     length: usize,
     /// The number of objects of the scene: more than `length` if some are beyond the limits.
     scene_length: usize,
@@ -110,7 +110,7 @@ impl ObjectTable {
             self.blocks.iter_mut().for_each(|block| block.get_mut().forget_bins());
         }
         let length_before = std::mem::replace(&mut self.length, objects);
-        self.rejections = Rejections::default();
+        self.scene_issues = SceneIssues::default();
         if self.is_current && !assets_changed && self.boxes_volume == self.culling {
             self.changed.set(scene.changes, length_before, objects);
         } else {
@@ -126,9 +126,9 @@ impl ObjectTable {
 
     /// Begins the frame that it has begun anew, within other limits. What is rejected already stays so.
     pub(crate) fn begin_frame_anew(&mut self, scene: &SceneRef<'_>, limits: &TableLimits<'_>) {
-        let rejections = std::mem::take(&mut self.rejections);
+        let scene_issues = std::mem::take(&mut self.scene_issues);
         self.begin_frame_within(scene, limits);
-        self.rejections = rejections;
+        self.scene_issues = scene_issues;
     }
 
     fn resize_blocks(&mut self, length_before: usize) {
@@ -230,13 +230,13 @@ impl ObjectTable {
     /// rejected.
     pub fn finish(&self) {
         self.bins.write().sort();
-        self.rejections.count_range(RejectionReason::ObjectLimit, self.length..self.scene_length);
+        self.scene_issues.count_range(IssueReason::ObjectLimit, self.length..self.scene_length);
         if self.summary.read().has_rejected {
             let mut has_rejected = false;
             for (index, block) in self.blocks[..self.block_count()].iter().enumerate() {
                 for (entry, reason) in block.read().rejected() {
                     has_rejected = true;
-                    self.rejections.count(reason, index * Self::BLOCK_SIZE + entry);
+                    self.scene_issues.count(reason, index * Self::BLOCK_SIZE + entry);
                 }
             }
             self.summary.write().has_rejected = has_rejected;
@@ -382,8 +382,8 @@ impl ObjectTable {
     }
 
     /// What the frame rejects. Objects are among it after [`ObjectTable::finish`].
-    pub fn rejections(&self) -> &Rejections {
-        &self.rejections
+    pub fn scene_issues(&self) -> &SceneIssues {
+        &self.scene_issues
     }
 }
 

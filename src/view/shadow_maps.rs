@@ -5,13 +5,13 @@ use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 use super::FixedPosition;
 use super::cascades::{cascade_slice, visible_sphere};
 use super::map_owners::MapOwners;
-use crate::scene::{Camera, LayerMask, Light, ObjectFilter, Projection, Redraw, ViewKind};
+use crate::scene::{Camera, LayerMask, Light, Projection, Redraw, ViewFilter, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 ///
 /// So a frame has at most as many maps as the device's textures have layers: 256, unless the device was requested with
 /// a higher limit. That is 42 point lights whose range a camera sees. Lights beyond that are drawn without a shadow,
-/// and counted as [`RejectionReason::ShadowMapLimit`](super::RejectionReason::ShadowMapLimit): main cameras take maps
+/// and counted as [`IssueReason::ShadowMapLimit`](super::IssueReason::ShadowMapLimit): main cameras take maps
 /// one after the other in the scene's order, each for the lights that reach what it sees in the scene's order, if all
 /// maps of the light fit. So what one camera shows does not depend on the cameras after it.
 ///
@@ -162,7 +162,7 @@ impl ShadowMaps {
             size: [self.side; 2],
             level_of_detail_scale: 1.0,
             layers: self.layers,
-            filter: ObjectFilter::ALL,
+            filter: ViewFilter::ALL,
             samples_views: true,
             kind: ViewKind::Shadow,
             redraw: Redraw::EveryFrame,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use drawloom::backend::Backend;
 use drawloom::glam::Vec3;
 use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, GeometryBuffer, GeometryFormats, LightVolumes, Place,
-    RenderProcess, ShadowCasters, ToneMapping, Transparency,
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, GeometryBuffer, GeometryFormats, InjectionPoint,
+    LightVolumes, RenderProcess, ShadowCasters, ToneMapping, Transparency,
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, ClipPlane, LayerMask, LightKind, Redraw, Scene, ViewKind};
@@ -70,7 +70,7 @@ impl Setup {
     pub fn views(&self, scene: &Scene) -> Vec<BudgetedView> {
         let view = |camera: &Camera| {
             let (name, cameras) = (camera.name.clone(), vec![camera.clone()]);
-            BudgetedView { name, priority: 0, cameras, ladder: Vec::new() }
+            BudgetedView { name, priority: 0, cameras, levels: Vec::new() }
         };
         scene.cameras.iter().map(view).collect()
     }
@@ -303,7 +303,7 @@ fn view_arrays() -> AbsentFeature {
 pub const VIEW_ARRAYS: &str = "arrays of views";
 
 fn draws_over(declare: &mut Declare) {
-    declare.at(Place::AfterLighting);
+    declare.at(InjectionPoint::AfterLighting);
     declare.draws_over("radiance");
 }
 

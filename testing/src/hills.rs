@@ -8,7 +8,7 @@ use drawloom::scene::{
     Camera, GeneratedBuffer, Light, Material, Mesh, RenderObject, Scene, SceneError, Topology, Vertex,
 };
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 
 use crate::scenes::cube;
 
@@ -99,11 +99,11 @@ impl CpuNode for MakeVertices<'_> {
         accesses.fills(&self.hills.vertices);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.hills.vertices.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             let numbers = self.hills.vertices.chunk_range(chunk);
             for (number, made) in numbers.zip(&mut *frame.fill(&self.hills.vertices, chunk)?) {
@@ -130,11 +130,11 @@ impl CpuNode for MakeIndices<'_> {
         accesses.fills(&self.hills.indices);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.hills.indices.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             let numbers = self.hills.indices.chunk_range(chunk);
             for (number, made) in numbers.zip(&mut *frame.fill(&self.hills.indices, chunk)?) {

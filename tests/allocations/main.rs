@@ -7,7 +7,7 @@
 //! happen in any frame. So the test first fills each queue with more jobs than the frames could put there.
 
 mod absent_features;
-mod pieces;
+mod static_groups;
 
 use std::alloc::System;
 use std::hint::black_box;
@@ -261,6 +261,6 @@ fn a_steady_frame_allocates_nothing() {
 #[test]
 fn frames_allocate_no_more_than_they_need() {
     absent_features::what_a_scene_does_not_use_allocates_nothing();
-    pieces::frames_that_execute_pieces_allocate_nothing_more();
+    static_groups::frames_that_execute_static_groups_allocate_nothing_more();
     a_steady_frame_allocates_nothing();
 }

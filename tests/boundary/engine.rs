@@ -21,7 +21,7 @@ use drawloom::raster::{Real, Vector4};
 use drawloom::scene::Mesh;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::timeline::{Labels, TuningChoice};
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 use drawloom_async_post::UploadPicture;
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
@@ -299,7 +299,7 @@ impl RenderProcess for OwnProcess {
 
     fn declare(&self, declare: &mut Declare) {
         call(Kind::Process, "process's declare");
-        declare.at(drawloom::process::Place::AfterPostProcessing);
+        declare.at(drawloom::process::InjectionPoint::AfterPostProcessing);
         declare.draws_over("picture");
         declare.keep();
     }
@@ -339,7 +339,7 @@ impl CpuNode for OwnNode {
         call(Kind::Node, "declare");
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         call(Kind::Node, "width");
         3
     }
@@ -349,7 +349,7 @@ impl CpuNode for OwnNode {
         None
     }
 
-    fn run(&self, _: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, _: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         call(Kind::Node, "run");
         Ok(())
     }

@@ -10,7 +10,7 @@ use drawloom::fence::Fence;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{
-    Camera, Changes, Material, MaterialPredicate, Mesh, ObjectFilter, Redraw, RenderObject, Scene, SceneRef, ViewKind,
+    Camera, Changes, Material, MaterialPredicate, Mesh, Redraw, RenderObject, Scene, SceneRef, ViewFilter, ViewKind,
 };
 use drawloom::task::Scheduler;
 use drawloom::{CpuNode, Renderer, Submitter};
@@ -61,7 +61,7 @@ impl<S: Subject> Fixture<S> {
             fuse::call(Kind::Predicate, "contains");
             material.emission == Vec3::ONE
         });
-        self.worlds[world].cameras[0].filter = ObjectFilter::ALL.of_materials(predicate);
+        self.worlds[world].cameras[0].filter = ViewFilter::ALL.of_materials(predicate);
         let scene = SceneRef { changes, ..self.worlds[world].as_scene_ref() };
         let nodes: [&dyn CpuNode; 1] = [&OwnNode];
         let recorded = self.renderer.record_with_nodes(scene, &nodes);
@@ -73,7 +73,7 @@ impl<S: Subject> Fixture<S> {
             // Its destructor is the engine's to catch.
             Ok(read_back) => catch_unwind(AssertUnwindSafe(|| drop(read_back))).unwrap_or_else(std::mem::forget),
         }
-        let drawn = recorded.fence_at(drawloom::FramePlace::End).map_err(|error| error.to_string())?;
+        let drawn = recorded.fence_at(drawloom::FencePoint::End).map_err(|error| error.to_string())?;
         let captured = Owned::new("captured by a callback", ());
         drawn.on_set(move |_| {
             let _ = &captured;

@@ -11,7 +11,7 @@ use drawloom::fence::Fence;
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom::{Buffering, FinishedFrame, FrameLoop, FramePlace, Renderer};
+use drawloom::{Buffering, FencePoint, FinishedFrame, FrameLoop, Renderer};
 
 use crate::engine::{OwnBackend, OwnDevice, OwnProcess};
 use crate::frames::worlds;
@@ -63,7 +63,7 @@ impl Told {
         match frames.renderer().record(scene.as_scene_ref()) {
             Ok(mut recorded) => {
                 let captured = Owned::new("captured by a callback", ());
-                recorded.fence_at(FramePlace::End).unwrap().on_set(move |_| {
+                recorded.fence_at(FencePoint::End).unwrap().on_set(move |_| {
                     let _ = &captured;
                     fuse::call(Kind::Hook, "on_set");
                 });
@@ -217,7 +217,7 @@ fn use_on_own_thread(after_submission: bool, frames_before: usize, use_it: Use) 
     }
     let (slot, _) = frames.begin();
     let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
-    let drawn = recorded.fence_at(FramePlace::End).unwrap();
+    let drawn = recorded.fence_at(FencePoint::End).unwrap();
     let place = Arc::new(Mutex::new(None));
     let held = place.lock().unwrap();
     let take = {

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use drawloom::backend::WgpuBackend;
-use drawloom::process::{Declare, Deferred, Draws, Place, RawPass, RawPassResources, RenderProcess};
+use drawloom::process::{Declare, Deferred, Draws, InjectionPoint, RawPass, RawPassResources, RenderProcess};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, wgpu};
 use drawloom_testing::adapter::noop_device;
@@ -24,7 +24,7 @@ impl RenderProcess for OwnRawPass {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterPostProcessing);
+        declare.at(InjectionPoint::AfterPostProcessing);
         declare.changes("picture");
         declare.keep();
     }

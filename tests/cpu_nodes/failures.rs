@@ -67,7 +67,7 @@ fn a_node_that_is_named_like_a_stage_is_told_so() {
         "levels",
         "occlusion",
         "bin",
-        "record pieces",
+        "record static groups",
         "compact, view 0 \"front\"",
         "geometry buffer, view 0 \"front\", record",
     ] {

@@ -8,7 +8,7 @@ use drawloom::graph::{GraphProblem, NodeError};
 use drawloom::process::Deferred;
 use drawloom::scene::{GeneratedBuffer, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::{FrameError, NodeAccesses, NodeFrame, Renderer, Submitter};
+use drawloom::{FrameError, NodeAccesses, NodeContext, Renderer, Submitter};
 use drawloom_testing::hills::{self, GeneratedHills};
 
 use crate::{TestNode, renderer};
@@ -166,7 +166,7 @@ fn a_buffer_is_filled_as_declared() {
 /// The error of a frame in which one node fills a buffer, and another one that comes after it does this.
 fn error_of_reader(
     declare: impl Fn(&mut NodeAccesses, &GeneratedBuffer<u32>) + Send + Sync,
-    run: impl Fn(&NodeFrame<'_>, &GeneratedBuffer<u32>) -> Result<(), NodeError> + Send + Sync,
+    run: impl Fn(&NodeContext<'_>, &GeneratedBuffer<u32>) -> Result<(), NodeError> + Send + Sync,
 ) -> String {
     let buffer = GeneratedBuffer::<u32>::with_chunk("numbers", 8, 4);
     let scene = drawloom_testing::scenes::field(50);

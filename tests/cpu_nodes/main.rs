@@ -13,7 +13,7 @@ use drawloom::backend::NullBackend;
 use drawloom::graph::NodeError;
 use drawloom::process::Deferred;
 use drawloom::task::{Scheduler, Worker};
-use drawloom::{CpuNode, NodeAccesses, NodeFrame, Renderer, Submitter};
+use drawloom::{CpuNode, NodeAccesses, NodeContext, Renderer, Submitter};
 
 /// The shipped processes on the null backend.
 fn renderer(workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -22,7 +22,7 @@ fn renderer(workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
 }
 
 type Declare<'a> = Box<dyn Fn(&mut NodeAccesses) + Send + Sync + 'a>;
-type Body<'a> = Box<dyn Fn(&NodeFrame<'_>, Range<usize>) -> Result<(), NodeError> + Send + Sync + 'a>;
+type Body<'a> = Box<dyn Fn(&NodeContext<'_>, Range<usize>) -> Result<(), NodeError> + Send + Sync + 'a>;
 
 /// A node made of closures.
 struct TestNode<'a> {
@@ -37,7 +37,7 @@ impl<'a> TestNode<'a> {
     fn new(
         name: &str,
         declare: impl Fn(&mut NodeAccesses) + Send + Sync + 'a,
-        body: impl Fn(&NodeFrame<'_>, Range<usize>) -> Result<(), NodeError> + Send + Sync + 'a,
+        body: impl Fn(&NodeContext<'_>, Range<usize>) -> Result<(), NodeError> + Send + Sync + 'a,
     ) -> Self {
         let (declare, body) = (Box::new(declare), Box::new(body));
         Self { name: name.to_owned(), width: 1, items_per_job: Some(1), declare, body }
@@ -57,7 +57,7 @@ impl CpuNode for TestNode<'_> {
         (self.declare)(accesses);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.width
     }
 
@@ -65,7 +65,7 @@ impl CpuNode for TestNode<'_> {
         self.items_per_job
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, items: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, items: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         (self.body)(frame, items)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::graph::GraphProblem;
 use drawloom::timeline::{Log, NodeInfo};
-use drawloom::{FrameData, FrameError, NodeAccesses, NodeFrame, NodeResource};
+use drawloom::{FrameData, FrameError, NodeAccesses, NodeContext, NodeResource};
 use drawloom_testing::scenes::field;
 use proptest::prelude::*;
 
@@ -117,7 +117,7 @@ fn check(nodes: &[Declared], workers: usize) -> Result<(), TestCaseError> {
                 accesses.after(NAMES[after]);
             }
         };
-        let body = move |_: &NodeFrame<'_>, _| {
+        let body = move |_: &NodeContext<'_>, _| {
             times[0].fetch_min(clock.fetch_add(1, Ordering::SeqCst), Ordering::SeqCst);
             times[1].fetch_max(clock.fetch_add(1, Ordering::SeqCst), Ordering::SeqCst);
             Ok(())

@@ -8,7 +8,7 @@ use drawloom::command::DrawList;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Bounds, Changes, NodeColumn, Piece, Scene, SceneRef, WrittenColumns};
+use drawloom::scene::{Bounds, Changes, NodeColumn, Scene, SceneRef, StaticGroup, WrittenColumns};
 use drawloom::task::Scheduler;
 use drawloom::{FrameData, Renderer};
 use drawloom_testing::scenes::field;
@@ -17,9 +17,9 @@ use drawloom_testing::scenes::leveled::plates;
 use crate::{TestNode, renderer};
 
 #[test]
-fn nodes_see_the_objects_of_executed_pieces() {
+fn nodes_see_the_objects_of_executed_static_groups() {
     let mut scene = field(300);
-    scene.pieces.push(Piece::new("most", scene.object_set(scene.objects().take(250)).unwrap()));
+    scene.static_groups.push(StaticGroup::new("most", scene.object_set(scene.objects().take(250)).unwrap()));
     let seen = Mutex::new(Vec::new());
     let node = TestNode::new(
         "look",
@@ -36,15 +36,15 @@ fn nodes_see_the_objects_of_executed_pieces() {
     for changes in [Changes::Unknown, Changes::NONE, Changes::NONE, Changes::NONE] {
         let scene = SceneRef { changes, ..scene.as_scene_ref() };
         let recorded = renderer.record_with_nodes(scene, &[&node]).unwrap();
-        executed.push(recorded.statistics().views[0].pieces);
+        executed.push(recorded.statistics().views[0].static_groups);
         submitter.submit(recorded).unwrap();
     }
     assert_eq!(executed, [0, 0, 1, 1]);
     let seen = seen.lock().unwrap();
     assert!(seen.iter().all(|objects| objects.is_sorted()));
-    let of_pieces: BTreeSet<_> = seen[2].iter().collect();
+    let of_static_groups: BTreeSet<_> = seen[2].iter().collect();
     assert!(
-        !seen[0].is_empty() && seen[0].iter().all(|object| of_pieces.contains(object)),
+        !seen[0].is_empty() && seen[0].iter().all(|object| of_static_groups.contains(object)),
         "an object that is seen is missing"
     );
 }
@@ -94,7 +94,7 @@ impl Columns {
 fn with_nodes<B: drawloom::backend::Backend, R>(
     renderer: &mut Renderer<B>,
     scene: &Scene,
-    mut take: impl FnMut(&mut Renderer<B>, drawloom::Recorded<B>) -> R,
+    mut take: impl FnMut(&mut Renderer<B>, drawloom::RecordedFrame<B>) -> R,
 ) -> Vec<R> {
     let base = scene.as_scene_ref();
     let mut columns = Columns::new(&base);
@@ -163,7 +163,7 @@ fn with_nodes<B: drawloom::backend::Backend, R>(
 fn before_record<B: drawloom::backend::Backend, R>(
     renderer: &mut Renderer<B>,
     scene: &Scene,
-    mut take: impl FnMut(&mut Renderer<B>, drawloom::Recorded<B>) -> R,
+    mut take: impl FnMut(&mut Renderer<B>, drawloom::RecordedFrame<B>) -> R,
 ) -> Vec<R> {
     let base = scene.as_scene_ref();
     let mut columns = Columns::new(&base);

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use drawloom::report::{FrameReport, Replay, SchedulerCosts, write_chrome_trace, write_page};
-use drawloom::{FrameData, NodeFrame};
+use drawloom::{FrameData, NodeContext};
 use drawloom_testing::scenes::field;
 use tracing::Dispatch;
 use tracing::subscriber::NoSubscriber;
@@ -20,7 +20,7 @@ fn spin(time: Duration) {
 }
 
 fn nodes() -> Vec<TestNode<'static>> {
-    let work = |_: &NodeFrame<'_>, items: std::ops::Range<usize>| {
+    let work = |_: &NodeContext<'_>, items: std::ops::Range<usize>| {
         items.for_each(|_| spin(Duration::from_micros(300)));
         Ok(())
     };

@@ -10,7 +10,7 @@ use drawloom::process::{Deferred, RenderProcess};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::view::Rejection;
+use drawloom::view::SceneIssue;
 use drawloom::{BuildError, CpuNode, FrameError, Renderer, SubmitError, Submitter};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
@@ -20,7 +20,7 @@ use crate::capture::{Capture, capture};
 /// A backend that cases are run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendName {
-    /// [`NullBackend`], which draws no picture: cases compare counts, rejections and errors only, as its name says.
+    /// [`NullBackend`], which draws no picture: cases compare counts, scene issues and errors only, as its name says.
     Null,
     /// [`SoftwareBackend`] in f32.
     Software,
@@ -125,13 +125,13 @@ pub struct Drawn {
     /// The pictures of the first view. `None` if the backend draws nothing.
     pub capture: Option<Capture>,
     /// The objects and effects that were left out or drawn at lower quality.
-    pub rejections: Vec<Rejection>,
+    pub scene_issues: Vec<SceneIssue>,
     /// The number of visible objects of the first view.
     pub visible: usize,
     /// The triangles of the levels of detail that it draws, if there are any.
     pub triangles: Option<usize>,
-    /// The pieces that it executes.
-    pub pieces: usize,
+    /// The static groups that it executes.
+    pub static_groups: usize,
     /// The targets of the process of the test's own; none if the backend draws nothing.
     pub own_targets: Vec<Picture>,
 }
@@ -183,14 +183,18 @@ impl Harness {
     /// The same; nothing may be left out.
     pub fn draw_whole(&mut self, scene: &Scene) -> Result<Drawn, Failed> {
         let drawn = self.draw(scene)?;
-        if drawn.rejections.is_empty() { Ok(drawn) } else { Err(format!("left out: {:?}", drawn.rejections).into()) }
+        if drawn.scene_issues.is_empty() {
+            Ok(drawn)
+        } else {
+            Err(format!("left out: {:?}", drawn.scene_issues).into())
+        }
     }
 
     /// Records a scene, which must fail, and returns the error.
     pub fn refusal(&mut self, scene: &SceneRef<'_>) -> Result<FrameError, Failed> {
         match self.outcome(scene)? {
             Outcome::Refused(error) => Ok(error),
-            Outcome::Drawn(drawn) => Err(format!("it was drawn, without {:?}", drawn.rejections).into()),
+            Outcome::Drawn(drawn) => Err(format!("it was drawn, without {:?}", drawn.scene_issues).into()),
             Outcome::NotSubmitted(error) => Err(format!("it was recorded, and then: {error}").into()),
         }
     }
@@ -261,9 +265,9 @@ impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
             capture,
             visible: view.map_or(0, |view| view.visible),
             triangles: view.and_then(|view| view.levels_of_detail).map(|levels| levels.triangles),
-            pieces: view.map_or(0, |view| view.pieces),
+            static_groups: view.map_or(0, |view| view.static_groups),
             own_targets: own_targets.collect::<Result<_, _>>()?,
-            rejections: submitted.statistics.rejections,
+            scene_issues: submitted.statistics.scene_issues,
         }))
     }
 }

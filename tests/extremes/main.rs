@@ -15,7 +15,7 @@ mod columns;
 mod degenerate;
 mod derived;
 mod error_table;
-mod levels_and_pieces;
+mod levels_and_static_groups;
 mod lit_mirrors;
 mod moved_scenes;
 mod placement;
@@ -66,7 +66,7 @@ fn main() {
             lit_mirrors::CASES,
             shown_mirror::CASES,
         ];
-        let geometry = [columns::CASES, levels_and_pieces::CASES, vertices::CASES];
+        let geometry = [columns::CASES, levels_and_static_groups::CASES, vertices::CASES];
         let cases = earlier.into_iter().chain(views).chain(geometry).flatten();
         for &(name, case) in cases {
             let case = move || {

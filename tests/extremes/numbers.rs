@@ -7,7 +7,7 @@ use drawloom::scene::{
     Bounds, Camera, ClipPlane, Light, Material, Mesh, Projection, RenderObject, Scene, SceneError, Texture, Topology,
     Vertex, WholePicture,
 };
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
@@ -30,7 +30,7 @@ enum Expected {
     /// It is drawn completely.
     Drawn,
     /// It is drawn without the item that has the number.
-    Without(RejectionReason),
+    Without(IssueReason),
     /// It is refused because of its camera.
     InvalidCamera,
     /// It is refused because of its camera's position.
@@ -143,8 +143,8 @@ fn check_one(harness: &mut Harness, test: &TestScene, expected: Expected, has_co
     match (test.outcome(harness)?, expected) {
         (Outcome::Drawn(drawn), expected @ (Expected::Drawn | Expected::Without(_))) => {
             // `CoarseEdges` means lower quality, and not that something is left out.
-            let left_out = drawn.rejections.iter().filter(|rejection| rejection.reason != RejectionReason::CoarseEdges);
-            let reasons: Vec<_> = left_out.map(|rejection| rejection.reason).collect();
+            let left_out = drawn.scene_issues.iter().filter(|issue| issue.reason != IssueReason::CoarseEdges);
+            let reasons: Vec<_> = left_out.map(|issue| issue.reason).collect();
             let expected_reasons = if let Expected::Without(reason) = expected { vec![reason] } else { Vec::new() };
             if reasons != expected_reasons {
                 return Err(format!("left out: {reasons:?}").into());
@@ -160,7 +160,7 @@ fn check_one(harness: &mut Harness, test: &TestScene, expected: Expected, has_co
         (Outcome::Refused(FrameError::Scene(SceneError::InvalidColor { .. })), Expected::InvalidColor) => Ok(()),
         (Outcome::Refused(error), _) => Err(format!("it was refused: {error}").into()),
         (Outcome::NotSubmitted(error), _) => Err(format!("it was not submitted: {error}").into()),
-        (Outcome::Drawn(drawn), _) => Err(format!("it was drawn, without {:?}", drawn.rejections).into()),
+        (Outcome::Drawn(drawn), _) => Err(format!("it was drawn, without {:?}", drawn.scene_issues).into()),
     }
 }
 
@@ -171,9 +171,9 @@ fn is_within_reach(number: f64) -> bool {
 
 fn objects(harness: &mut Harness) -> Result<(), Failed> {
     let position = |number: f64| match number {
-        _ if !number.is_finite() => Expected::Without(RejectionReason::InvalidTransform),
+        _ if !number.is_finite() => Expected::Without(IssueReason::InvalidTransform),
         _ if is_within_reach(number) => Expected::Drawn,
-        _ => Expected::Without(RejectionReason::OutOfReach),
+        _ => Expected::Without(IssueReason::OutOfReach),
     };
     check(
         harness,
@@ -184,19 +184,19 @@ fn objects(harness: &mut Harness) -> Result<(), Failed> {
         ],
     )?;
     let orientation = |number: f32| {
-        if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidTransform) }
+        if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(IssueReason::InvalidTransform) }
     };
     let scale = |number: f32| match number {
-        _ if !number.is_finite() => Expected::Without(RejectionReason::InvalidTransform),
-        _ if number.abs() == f32::MAX => Expected::Without(RejectionReason::InvalidBounds),
+        _ if !number.is_finite() => Expected::Without(IssueReason::InvalidTransform),
+        _ if number.abs() == f32::MAX => Expected::Without(IssueReason::InvalidBounds),
         _ => Expected::Drawn,
     };
     let radius = |number: f32| {
         let is_valid = (0.0..1.0).contains(&number);
-        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
+        if is_valid { Expected::Drawn } else { Expected::Without(IssueReason::InvalidBounds) }
     };
     let center = |number: f32| {
-        if number.abs() < 1.0 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidBounds) }
+        if number.abs() < 1.0 { Expected::Drawn } else { Expected::Without(IssueReason::InvalidBounds) }
     };
     check(
         harness,
@@ -344,9 +344,9 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
     const SPOT: usize = 1;
     const HEMISPHERE: usize = 2;
     let position = |number: f64| match number {
-        _ if !number.is_finite() => Expected::Without(RejectionReason::InvalidLight),
+        _ if !number.is_finite() => Expected::Without(IssueReason::InvalidLight),
         _ if is_within_reach(number) => Expected::Drawn,
-        _ => Expected::Without(RejectionReason::LightOutOfReach),
+        _ => Expected::Without(IssueReason::LightOutOfReach),
     };
     check(
         harness,
@@ -371,19 +371,19 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
     )?;
     let color = |number: f32| {
         let is_valid = number >= 0.0 && number.is_finite();
-        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
+        if is_valid { Expected::Drawn } else { Expected::Without(IssueReason::InvalidLight) }
     };
     let whole_color = |number: f32| match number {
-        0.0 => Expected::Without(RejectionReason::DarkLight),
+        0.0 => Expected::Without(IssueReason::DarkLight),
         _ if number > 0.0 && number.is_finite() => Expected::Drawn,
-        _ => Expected::Without(RejectionReason::InvalidLight),
+        _ => Expected::Without(IssueReason::InvalidLight),
     };
     let range = |number: f32| {
         let is_valid = number > 0.0 && number.is_finite();
-        if is_valid { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
+        if is_valid { Expected::Drawn } else { Expected::Without(IssueReason::InvalidLight) }
     };
     let direction = |number: f32| {
-        if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(RejectionReason::InvalidLight) }
+        if number.abs() < 0.01 { Expected::Drawn } else { Expected::Without(IssueReason::InvalidLight) }
     };
     check(
         harness,
@@ -440,7 +440,7 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
                     if (0.0..0.1).contains(&number) {
                         Expected::Drawn
                     } else {
-                        Expected::Without(RejectionReason::InvalidLight)
+                        Expected::Without(IssueReason::InvalidLight)
                     }
                 },
             ),
@@ -451,7 +451,7 @@ fn lights(harness: &mut Harness) -> Result<(), Failed> {
                         *outer_angle = number;
                     }
                 },
-                |_| Expected::Without(RejectionReason::InvalidLight),
+                |_| Expected::Without(IssueReason::InvalidLight),
             ),
         ],
     )
@@ -553,7 +553,7 @@ fn vertices(harness: &mut Harness) -> Result<(), Failed> {
                 Ok(mesh) => mesh,
             };
             let is_far = name.starts_with("position") && number.abs() == f32::MAX;
-            let expected = if is_far { Expected::Without(RejectionReason::InvalidBounds) } else { Expected::Drawn };
+            let expected = if is_far { Expected::Without(IssueReason::InvalidBounds) } else { Expected::Drawn };
             let test = TestScene::with(mesh, Material { double_sided: true, ..Material::default() }, Some(red()?))?;
             check_one(harness, &test, expected, true).map_err(|failed| with_context(&context, failed))?;
             if is_far {

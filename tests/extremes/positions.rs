@@ -4,7 +4,7 @@ use drawloom::FrameError;
 use drawloom::backend::BackendError;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{Camera, Light, Mesh, Scene, Topology, Vertex};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::view::internal::FixedPosition;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::square;
@@ -125,9 +125,9 @@ fn out_of_reach(harness: &mut Harness) -> Result<(), Failed> {
         markers.scene.lights =
             vec![Light::Point { position: DVec3::X * far, intensity, range: 10.0, casts_shadow: false }];
         let drawn = harness.draw(&markers.scene)?;
-        let rejections: Vec<_> = drawn.rejections.iter().map(|rejection| (rejection.reason, rejection.count)).collect();
-        if rejections != [(RejectionReason::OutOfReach, 1), (RejectionReason::LightOutOfReach, 1)] {
-            return Err(format!("an object and a light at {far:e} m: {rejections:?}").into());
+        let scene_issues: Vec<_> = drawn.scene_issues.iter().map(|issue| (issue.reason, issue.count)).collect();
+        if scene_issues != [(IssueReason::OutOfReach, 1), (IssueReason::LightOutOfReach, 1)] {
+            return Err(format!("an object and a light at {far:e} m: {scene_issues:?}").into());
         }
         markers.compare(&drawn, 1)?;
         whole.expect(harness, "the frame after", 1)?;
@@ -284,9 +284,9 @@ fn too_large(harness: &mut Harness) -> Result<(), Failed> {
         markers.add(Marker { scale: Vec3::splat(scale), ..Marker::before(&camera, 6.0, 1.0) }.colored(RED))?;
         markers.markers.pop();
         let drawn = harness.draw(&markers.scene)?;
-        let rejections: Vec<_> = drawn.rejections.iter().map(|rejection| (rejection.reason, rejection.count)).collect();
-        if rejections != [(RejectionReason::InvalidBounds, 1)] {
-            return Err(format!("scale {scale:e}: {rejections:?}").into());
+        let scene_issues: Vec<_> = drawn.scene_issues.iter().map(|issue| (issue.reason, issue.count)).collect();
+        if scene_issues != [(IssueReason::InvalidBounds, 1)] {
+            return Err(format!("scale {scale:e}: {scene_issues:?}").into());
         }
         markers.compare(&drawn, 1)?;
     }

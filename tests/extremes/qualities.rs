@@ -3,7 +3,7 @@
 use drawloom::BuildError;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::quality::{
-    CullingVolume, DepthCurve, DepthKey, DiffuseFormat, NormalFormat, Quality, QualityError, RadianceSum,
+    CullingVolume, DepthCurve, DepthPrecision, DiffuseFormat, NormalFormat, Quality, QualityError, RadianceSum,
     ShadowQuality, ToneCurve, TransformPrecision, VertexFormat,
 };
 use drawloom::scene::{Camera, Light, Material, Scene};
@@ -76,12 +76,12 @@ fn presets(harness: &mut Harness) -> Result<(), Failed> {
 fn limits(harness: &mut Harness) -> Result<(), Failed> {
     let usual = harness.name().affordable(Quality::balanced());
     let shadows = usual.shadows;
-    let key = |bits, curve| DepthKey { bits, curve };
+    let key = |bits, curve| DepthPrecision { bits, curve };
     let linear = |far| DepthCurve::Linear { far };
     for quality in [
-        Quality { opaque_order: DepthKey::UNORDERED, ..usual },
+        Quality { opaque_order: DepthPrecision::UNORDERED, ..usual },
         Quality { opaque_order: key(1, DepthCurve::Logarithmic), ..usual },
-        Quality { opaque_order: key(DepthKey::MAX_OPAQUE_BITS, linear(f32::MAX)), ..usual },
+        Quality { opaque_order: key(DepthPrecision::MAX_OPAQUE_BITS, linear(f32::MAX)), ..usual },
         Quality { opaque_order: key(1, linear(f32::MIN_POSITIVE)), ..usual },
         Quality { blended_order: key(1, linear(f32::from_bits(1))), ..usual },
         Quality { blended_order: key(31, linear(f32::MAX)), ..usual },
@@ -122,7 +122,7 @@ fn limits(harness: &mut Harness) -> Result<(), Failed> {
 fn invalid(harness: &mut Harness) -> Result<(), Failed> {
     let usual = Quality::exact();
     let shadows = usual.shadows;
-    let key = |bits, curve| DepthKey { bits, curve };
+    let key = |bits, curve| DepthPrecision { bits, curve };
     for (wrong, setting) in [
         (Quality { occlusion: Some(32), ..usual }, "occlusion"),
         (Quality { level_of_detail: f32::INFINITY, ..usual }, "level_of_detail"),

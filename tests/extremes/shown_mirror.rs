@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
+    CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
     ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::quality::Quality;
@@ -35,7 +35,7 @@ impl RenderProcess for Surface {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
         declare.draws_over("radiance");
         declare.matches_depth("depth");

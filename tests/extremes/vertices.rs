@@ -16,10 +16,10 @@ use drawloom::scene::{
     Scene, SceneError, SceneRef, StreamAttribute, StreamLayout, Topology, Vertex, VertexStream,
 };
 use drawloom::task::Worker;
-use drawloom::view::{Rejection, RejectionReason};
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom::wgpu::util::DeviceExt;
 use drawloom::wgpu::{self, BufferUsages, IndexFormat, VertexFormat};
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::cube;
 use libtest_mimic::Failed;
@@ -196,11 +196,11 @@ impl CpuNode for Fill<'_> {
         accesses.fills(self.buffer);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.buffer.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             let numbers = self.buffer.chunk_range(chunk);
             frame.fill(self.buffer, chunk)?.copy_from_slice(&self.vertices[numbers]);
@@ -292,10 +292,9 @@ fn has_buffers(harness: &mut Harness) -> Result<bool, Failed> {
     if matches!(harness.name(), BackendName::Software | BackendName::Reference) && adapter::shared_device().is_ok() {
         let place = Extreme { name: TOUCHING, position: DVec3::ZERO, scale: 1.0 };
         let scene = scene_of(in_buffers(&cube(), cube().vertices())?, &place, 0.7)?;
-        let left_out = harness.draw(&scene)?.rejections;
-        let is_named = |rejection: &Rejection| {
-            rejection.reason == RejectionReason::UndrawableMesh && rejection.name.as_deref() == Some("cube")
-        };
+        let left_out = harness.draw(&scene)?.scene_issues;
+        let is_named =
+            |issue: &SceneIssue| issue.reason == IssueReason::UndrawableMesh && issue.name.as_deref() == Some("cube");
         if !left_out.iter().any(is_named) {
             return Err(format!("buffers of a device in software: {left_out:?}").into());
         }

@@ -22,8 +22,8 @@ pub const CASES: &[Case] = &[
     ("every_call_of_a_frame_of_the_software_backend_fails_once", software),
     ("every_call_of_a_simple_frame_of_the_software_backend_fails_once", simple_software),
     (
-        "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
-        with_nodes_and_pieces::<SoftwareBackend>,
+        "every_call_of_a_frame_with_nodes_and_static_groups_of_the_software_backend_fails_once",
+        with_nodes_and_static_groups::<SoftwareBackend>,
     ),
     ("slow_calls_change_no_picture", slow_calls),
     ("pipelines_whose_preparation_failed_are_made_by_the_next_frame", preparation),
@@ -33,7 +33,10 @@ pub const CASES: &[Case] = &[
 pub const CASES_OF_ADAPTERS: &[Case] = &[
     ("every_call_of_a_frame_of_wgpu_fails_once", wgpu),
     ("every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once", wgpu_together),
-    ("every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once", with_nodes_and_pieces::<WgpuBackend>),
+    (
+        "every_call_of_a_frame_with_nodes_and_static_groups_of_wgpu_fails_once",
+        with_nodes_and_static_groups::<WgpuBackend>,
+    ),
 ];
 
 fn null() -> Result<(), Failed> {
@@ -67,11 +70,11 @@ fn wgpu_together() -> Result<(), Failed> {
     every_call_fails_once::<WgpuBackend>(Setting { workers: 1, joins_passes: true, ..Setting::FULL })
 }
 
-fn with_nodes_and_pieces<S: Subject>() -> Result<(), Failed> {
+fn with_nodes_and_static_groups<S: Subject>() -> Result<(), Failed> {
     for joins_passes in [false, true] {
-        // Views that test for occlusion execute no pieces.
+        // Views that test for occlusion execute no static groups.
         let setting = Setting { joins_passes, tests_occlusion: false, ..Setting::FULL };
-        every_call_of_worlds_fails_once::<S>(setting, &Worlds::with_nodes_and_pieces()?)?;
+        every_call_of_worlds_fails_once::<S>(setting, &Worlds::with_nodes_and_static_groups()?)?;
     }
     Ok(())
 }
@@ -112,9 +115,9 @@ fn every_call_of_worlds_fails_once<S: Subject>(setting: Setting, worlds: &Worlds
                 let Some(call) = fixture.renderer.backend().failed_call() else {
                     let picture = drawn.map_err(|refusal| format!("{name} did not come, but {refusal:?}"))?;
                     expect(picture == *expected, || format!("{name} did not come, and the picture is another one"))?;
-                    let executes_pieces = reported == Reported::Nothing;
-                    expect(!executes_pieces || fixture.executed_pieces > 0, || {
-                        format!("{name}: no piece is executed")
+                    let executes_static_groups = reported == Reported::Nothing;
+                    expect(!executes_static_groups || fixture.executed_static_groups > 0, || {
+                        format!("{name}: no static group is executed")
                     })?;
                     break;
                 };
@@ -149,16 +152,16 @@ enum Reported {
     Everything,
     /// The objects that moved are uploaded apart from the others.
     MovedObjects,
-    /// Objects that moved in the frame before are recorded as pieces.
+    /// Objects that moved in the frame before are recorded as static groups.
     Nothing,
 }
 
 impl Reported {
-    /// Those of frames that differ in their calls: without pieces, a frame in which nothing moved makes no call that
-    /// others do not make.
+    /// Those of frames that differ in their calls: without static groups, a frame in which nothing moved makes no call
+    /// that others do not make.
     fn of(worlds: &Worlds) -> impl Iterator<Item = Self> {
-        let of_pieces = worlds.has_pieces().then_some(Self::Nothing);
-        [Self::Everything, Self::MovedObjects].into_iter().chain(of_pieces)
+        let of_static_groups = worlds.has_static_groups().then_some(Self::Nothing);
+        [Self::Everything, Self::MovedObjects].into_iter().chain(of_static_groups)
     }
 }
 

@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use drawloom::backend::{BackendError, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, Declare, Deferred, Draws, Format, FullScreen, Place, RawPass, RawPassResources, RenderProcess,
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RawPass, RawPassResources, RenderProcess,
     ShadowCasters, StorageBuffer, previous_name,
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Light, Redraw, Scene, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::{FrameError, Recorded, Renderer, Submitter, wgpu};
+use drawloom::{FrameError, RecordedFrame, Renderer, Submitter, wgpu};
 use drawloom_testing::adapter::shared_backend;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -53,7 +53,7 @@ impl RenderProcess for Destroys {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterPostProcessing);
+        declare.at(InjectionPoint::AfterPostProcessing);
         declare.changes("picture");
         declare.changes("own");
         declare.reads("depth");
@@ -141,7 +141,7 @@ impl Fixture {
         Ok(Self { renderer, submitter, scene, is_armed })
     }
 
-    fn record(&mut self) -> Result<Recorded<WgpuBackend>, FrameError> {
+    fn record(&mut self) -> Result<RecordedFrame<WgpuBackend>, FrameError> {
         self.renderer.record(self.scene.as_scene_ref())
     }
 

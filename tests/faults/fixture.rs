@@ -45,7 +45,7 @@ pub struct Fixture<S: Subject> {
     pub renderer: Renderer<FaultyBackend<S>>,
     pub submitter: Submitter<FaultyBackend<S>>,
     /// Of all views of the latest frame that was recorded.
-    pub executed_pieces: usize,
+    pub executed_static_groups: usize,
 }
 
 /// Why a frame was not drawn.
@@ -67,7 +67,7 @@ impl<S: Subject> Fixture<S> {
         let backend = if setting.joins_passes { backend.joining_passes() } else { backend };
         let builder = Renderer::builder(backend).granularity(setting.granularity);
         let (renderer, submitter) = with_deferred(builder, setting).build(Arc::clone(&scheduler))?;
-        Ok(Self { scheduler, renderer, submitter, executed_pieces: 0 })
+        Ok(Self { scheduler, renderer, submitter, executed_static_groups: 0 })
     }
 
     /// Draws a frame. `Err` within `Ok` is a refusal by the renderer or submitter.
@@ -85,7 +85,7 @@ impl<S: Subject> Fixture<S> {
             Ok(recorded) => recorded,
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };
-        self.executed_pieces = recorded.statistics().views.iter().map(|view| view.pieces).sum::<usize>();
+        self.executed_static_groups = recorded.statistics().views.iter().map(|view| view.static_groups).sum::<usize>();
         match self.submitter.submit(recorded) {
             Ok(submitted) => S::read(&submitted.submission, 0, "picture").map(Ok),
             Err(error) => Ok(Err(Refusal::Submission(error))),

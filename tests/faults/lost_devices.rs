@@ -11,7 +11,7 @@ use drawloom::scene::{
     Changes, IndexBuffer, Mesh, MeshBuffers, Scene, StreamAttribute, StreamLayout, Topology, VertexStream,
 };
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason};
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom::wgpu::util::DeviceExt;
 use drawloom::{FrameError, Renderer, SubmitError, Submitter, wgpu};
 use drawloom_testing::adapter;
@@ -186,9 +186,9 @@ fn meshes_in_buffers() -> Result<(), Failed> {
     renderer.1 = renderer.0.replace_backend(WgpuBackend::new(second.0.clone(), second.1)?);
     for _ in 0..2 {
         let recorded = renderer.0.record(scene.as_scene_ref())?;
-        let found = &recorded.statistics().rejections;
-        let is_it = |known: &Rejection| {
-            (known.reason, known.name.as_deref()) == (RejectionReason::UndrawableMesh, Some(mesh.name()))
+        let found = &recorded.statistics().scene_issues;
+        let is_it = |known: &SceneIssue| {
+            (known.reason, known.name.as_deref()) == (IssueReason::UndrawableMesh, Some(mesh.name()))
         };
         expect(found.iter().any(is_it), || format!("{found:?}"))?;
         renderer.1.submit(recorded)?;

@@ -10,14 +10,14 @@ use drawloom::backend::{Backend, NullBackend, SoftwareBackend};
 use drawloom::fence::Fence;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    CpuShader, Declare, Deferred, Draws, FullScreen, FullScreenCpuShader, FullScreenPixel, PassInputs, Place,
+    CpuShader, Declare, Deferred, Draws, FullScreen, FullScreenCpuShader, FullScreenPixel, InjectionPoint, PassInputs,
     RenderProcess,
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{Camera, Changes, Light, Material, Mesh, Redraw, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::{Buffering, FrameLoop, FrameLoopError, Recorded, Renderer, SubmitError, Submitter};
+use drawloom::{Buffering, FrameLoop, FrameLoopError, RecordedFrame, Renderer, SubmitError, Submitter};
 use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
 use drawloom_testing::feedback::with_feedback;
 use libtest_mimic::Failed;
@@ -61,7 +61,7 @@ impl Loss {
 
     fn happen<S: Subject>(
         self,
-        mut recorded: Recorded<FaultyBackend<S>>,
+        mut recorded: RecordedFrame<FaultyBackend<S>>,
         submitter: &Submitter<FaultyBackend<S>>,
     ) -> Result<(), Failed> {
         let fault = match self {
@@ -91,7 +91,7 @@ impl RenderProcess for Shows {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterPostProcessing);
+        declare.at(InjectionPoint::AfterPostProcessing);
         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
         declare.draws_over("picture");
         declare.keep();
@@ -141,11 +141,11 @@ impl<S: Subject> Mirrors<S> {
         Ok(Self { renderer, submitter, read })
     }
 
-    fn record(&mut self, scene: &Scene) -> Result<Recorded<FaultyBackend<S>>, Failed> {
+    fn record(&mut self, scene: &Scene) -> Result<RecordedFrame<FaultyBackend<S>>, Failed> {
         Ok(self.renderer.record(scene.as_scene_ref())?)
     }
 
-    fn submit(&self, recorded: Recorded<FaultyBackend<S>>) -> Result<Vec<u8>, Failed> {
+    fn submit(&self, recorded: RecordedFrame<FaultyBackend<S>>) -> Result<Vec<u8>, Failed> {
         (self.read)(&self.submitter.submit(recorded)?.submission)
     }
 
@@ -207,7 +207,7 @@ impl Anew {
 
 /// Whether a frame was refused because of a lost view.
 fn expect_refusal<S: Subject>(
-    outcome: Result<drawloom::Submitted<FaultyBackend<S>>, SubmitError>,
+    outcome: Result<drawloom::SubmittedFrame<FaultyBackend<S>>, SubmitError>,
     anew: Anew,
     name: &str,
 ) -> Result<(), Failed> {
@@ -289,7 +289,7 @@ fn refusals<S: Subject>(read: Read<S>) -> Result<(), Failed> {
 /// What a lost frame was told has changed is not told again, and what it uploaded is there.
 fn uploads<S: Subject>() -> Result<(), Failed> {
     let setting = Setting { tests_occlusion: false, ..Setting::FULL };
-    for worlds in [Worlds::plain()?, Worlds::with_nodes_and_pieces()?] {
+    for worlds in [Worlds::plain()?, Worlds::with_nodes_and_static_groups()?] {
         let expected = [0, 1].map(|index| -> Result<_, Failed> {
             worlds.picture(&mut Fixture::<S>::new(setting)?, index, Changes::Unknown)
         });

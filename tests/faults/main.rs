@@ -28,8 +28,8 @@ const SLOW_CASES: [&str; 7] = [
     "cached_views_of_a_wgpu_backend_are_drawn_anew_by_the_next",
     "every_call_of_a_frame_of_the_software_backend_fails_once",
     "every_call_of_a_frame_of_wgpu_with_passes_finished_together_fails_once",
-    "every_call_of_a_frame_with_nodes_and_pieces_of_the_software_backend_fails_once",
-    "every_call_of_a_frame_with_nodes_and_pieces_of_wgpu_fails_once",
+    "every_call_of_a_frame_with_nodes_and_static_groups_of_the_software_backend_fails_once",
+    "every_call_of_a_frame_with_nodes_and_static_groups_of_wgpu_fails_once",
     "frames_in_flight_are_lost_with_their_device_and_no_others",
 ];
 

@@ -1,7 +1,7 @@
 //! What frames that fail draw in turn.
 
-use drawloom::scene::{Changes, Piece, RenderObject, Scene, SceneRef};
-use drawloom::{FrameError, Recorded, Renderer};
+use drawloom::scene::{Changes, RenderObject, Scene, SceneRef, StaticGroup};
+use drawloom::{FrameError, RecordedFrame, Renderer};
 use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::hills::GeneratedHills;
 use libtest_mimic::Failed;
@@ -23,16 +23,16 @@ impl Worlds {
         Ok(Self { scenes, moved, hills: None })
     }
 
-    /// Also hills that nodes make anew in each frame, and pieces of all other objects.
-    pub fn with_nodes_and_pieces() -> Result<Self, Failed> {
+    /// Also hills that nodes make anew in each frame, and static groups of all other objects.
+    pub fn with_nodes_and_static_groups() -> Result<Self, Failed> {
         let (mut scenes, moved) = two_scenes()?;
         let hills = GeneratedHills::new();
         for scene in &mut scenes {
             let objects: Vec<_> = scene.objects().collect();
-            // One piece has an object that moves, and one that does not.
+            // One static group has an object that moves, and one that does not.
             for (number, objects) in objects.chunks(2).enumerate() {
                 let objects = scene.object_set(objects.iter().copied())?;
-                scene.pieces.push(Piece::new(format!("piece {number}"), objects));
+                scene.static_groups.push(StaticGroup::new(format!("static group {number}"), objects));
             }
             let first = scene.object(objects[0])?;
             let mesh = scene.add(hills.mesh()?)?;
@@ -41,8 +41,8 @@ impl Worlds {
         Ok(Self { scenes, moved, hills: Some(hills) })
     }
 
-    pub fn has_pieces(&self) -> bool {
-        self.scenes.iter().any(|scene| !scene.pieces.is_empty())
+    pub fn has_static_groups(&self) -> bool {
+        self.scenes.iter().any(|scene| !scene.static_groups.is_empty())
     }
 
     /// Records one of the states.
@@ -51,7 +51,7 @@ impl Worlds {
         renderer: &mut Renderer<FaultyBackend<S>>,
         index: usize,
         changes: Changes<'_>,
-    ) -> Result<Recorded<FaultyBackend<S>>, FrameError> {
+    ) -> Result<RecordedFrame<FaultyBackend<S>>, FrameError> {
         let scene = self.state(index, changes);
         match &self.hills {
             None => renderer.record(scene),

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drawloom::fence::FenceError;
-use drawloom::{FrameError, FramePlace};
+use drawloom::{FencePoint, FrameError};
 
 use crate::{Fixture, LONG};
 
@@ -14,8 +14,8 @@ fn the_device_sets_fences_in_the_order_of_their_places() {
     let views = frame.queues().len();
     assert!(views > 1, "two cameras");
     // Asked for backwards, so that the order is that of the places.
-    let end = frame.fence_at(FramePlace::End).unwrap();
-    let of_views: Vec<_> = (0..views).rev().map(|view| frame.fence_at(FramePlace::View(view)).unwrap()).collect();
+    let end = frame.fence_at(FencePoint::End).unwrap();
+    let of_views: Vec<_> = (0..views).rev().map(|view| frame.fence_at(FencePoint::View(view)).unwrap()).collect();
     let mut passes: Vec<_> = frame.queues().iter().flat_map(|queue| &queue.passes).map(|(pass, _)| *pass).collect();
     passes.sort_by_key(|pass| pass.view_index);
     let process_of = |index: usize| fixture.renderer.plan().processes()[index].name.clone();
@@ -23,7 +23,7 @@ fn the_device_sets_fences_in_the_order_of_their_places() {
         .iter()
         .map(|pass| {
             let (process, view) = (process_of(pass.process_index), pass.view_index);
-            (*pass, frame.fence_at(FramePlace::Pass { process: &process, view }).unwrap())
+            (*pass, frame.fence_at(FencePoint::Pass { process: &process, view }).unwrap())
         })
         .collect();
     let submitted = fixture.submitter.submit(frame).unwrap();
@@ -59,9 +59,9 @@ fn a_place_that_a_frame_does_not_have_is_an_error() {
     let mut frame = fixture.record();
     let views = frame.queues().len();
     for (place, message) in [
-        (FramePlace::View(views), format!("the frame draws nothing at this place: view {views}")),
+        (FencePoint::View(views), format!("the frame draws nothing at this place: view {views}")),
         (
-            FramePlace::Pass { process: "no such process", view: 0 },
+            FencePoint::Pass { process: "no such process", view: 0 },
             "the frame draws nothing at this place: process \"no such process\" in view 0".to_owned(),
         ),
     ] {
@@ -76,7 +76,7 @@ fn a_place_that_a_frame_does_not_have_is_an_error() {
 fn the_fences_of_a_frame_that_is_dropped_are_abandoned() {
     let mut fixture = Fixture::new(Duration::ZERO);
     let mut frame = fixture.record();
-    let fences = [frame.fence_at(FramePlace::View(0)).unwrap(), frame.fence_at(FramePlace::End).unwrap()];
+    let fences = [frame.fence_at(FencePoint::View(0)).unwrap(), frame.fence_at(FencePoint::End).unwrap()];
     drop(frame);
     for fence in fences {
         assert!(matches!(fence.wait(LONG), Err(FenceError::Abandoned { .. })));
@@ -87,7 +87,7 @@ fn the_fences_of_a_frame_that_is_dropped_are_abandoned() {
 fn a_fence_of_one_frame_may_hold_up_a_later_one() {
     let mut fixture = Fixture::new(Duration::from_millis(10));
     let mut first = fixture.record();
-    let drawn = first.fence_at(FramePlace::End).unwrap();
+    let drawn = first.fence_at(FencePoint::End).unwrap();
     let mut second = fixture.record();
     second.submit_after(&drawn, LONG);
     fixture.submitter.submit(first).unwrap();

@@ -10,7 +10,7 @@ use drawloom::backend::NullBackend;
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom::{Recorded, Renderer, Submitter};
+use drawloom::{RecordedFrame, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 use drawloom_testing::simulated_device::SimulatedDevice;
 
@@ -33,7 +33,7 @@ impl Fixture {
         Self { scene: field(20), renderer, submitter }
     }
 
-    fn record(&mut self) -> Recorded<SimulatedDevice<NullBackend>> {
+    fn record(&mut self) -> RecordedFrame<SimulatedDevice<NullBackend>> {
         self.renderer.record(self.scene.as_scene_ref()).unwrap()
     }
 }

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use drawloom::fence::{Fence, FenceError, FenceSetter, FenceWait};
-use drawloom::{FramePlace, SubmitError};
+use drawloom::{FencePoint, SubmitError};
 
 use crate::{Fixture, LONG};
 
@@ -33,7 +33,7 @@ fn row_1_the_device_waits_for_a_report_that_is_not_set() {
     let mut fixture = Fixture::new(Duration::ZERO);
     let (setter, report) = Fence::new("row 1: 22");
     let mut frame = fixture.record();
-    let drawn = frame.fence_at(FramePlace::End).unwrap();
+    let drawn = frame.fence_at(FencePoint::End).unwrap();
     frame.submit_after(&report, LONG);
     let cpu = thread::spawn(move || {
         let waiter = await_waiter("row 1: 22").waiter;
@@ -55,7 +55,7 @@ fn row_2_the_cpu_sets_the_report_and_the_device_goes_on() {
     let mut fixture = Fixture::new(Duration::ZERO);
     let (setter, report) = Fence::new("row 2: 22");
     let mut frame = fixture.record();
-    let drawn = frame.fence_at(FramePlace::End).unwrap();
+    let drawn = frame.fence_at(FencePoint::End).unwrap();
     frame.submit_after(&report, LONG);
     let cpu = thread::spawn(move || {
         await_waiter("row 2: 22");
@@ -87,7 +87,7 @@ fn row_3_a_report_stays_set() {
 fn rows_4_to_6_the_cpu_waits_for_a_report_that_the_device_sets() {
     let mut fixture = Fixture::new(Duration::from_millis(5));
     let mut frame = fixture.record();
-    let report = frame.fence_at(FramePlace::End).unwrap();
+    let report = frame.fence_at(FencePoint::End).unwrap();
     let (unlocked, is_unlocked) = channel();
     let cpu = {
         let report = report.clone();
@@ -137,7 +137,7 @@ fn row_8_the_deadlock_is_found_and_both_waiters_are_named() {
     for (device_limit, cpu_limit) in [(Duration::from_millis(50), LONG), (LONG, Duration::from_millis(50))] {
         let (setter_of_22, report_22) = Fence::new("row 8: 22");
         let mut frame = fixture.record();
-        let report_33 = frame.fence_at(FramePlace::End).unwrap();
+        let report_33 = frame.fence_at(FencePoint::End).unwrap();
         frame.submit_after(&report_22, device_limit);
         // Both wait before either loses its patience: the one that has less begins when the other one waits.
         let cpu_is_patient = cpu_limit == LONG;
@@ -179,7 +179,7 @@ fn row_8_the_deadlock_is_found_and_both_waiters_are_named() {
 
         // The next frame goes on as if nothing had happened.
         let mut frame = fixture.record();
-        let drawn = frame.fence_at(FramePlace::End).unwrap();
+        let drawn = frame.fence_at(FencePoint::End).unwrap();
         fixture.submitter.submit(frame).unwrap();
         drawn.wait(LONG).unwrap();
     }

@@ -15,7 +15,7 @@ use drawloom::scene::{
     SceneError, SceneRef, VertexAttribute, ViewKind,
 };
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::{BuildError, FrameError, Granularity, Renderer, SubmitError};
 use drawloom_testing::scenes::{cube, field};
 use drawloom_testing::tinted::{TINT, Tinted};
@@ -31,12 +31,12 @@ fn error_of(scene: SceneRef<'_>) -> FrameError {
     error
 }
 
-fn rejected(scene: SceneRef<'_>) -> Vec<(RejectionReason, usize, usize)> {
+fn rejected(scene: SceneRef<'_>) -> Vec<(IssueReason, usize, usize)> {
     let (mut renderer, submitter) = renderer(2, Granularity::Chunk(5));
     let recorded = renderer.record(scene).unwrap();
     let statistics = submitter.submit(recorded).unwrap().statistics;
-    let rejections = statistics.rejections.iter();
-    rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect()
+    let scene_issues = statistics.scene_issues.iter();
+    scene_issues.map(|issue| (issue.reason, issue.count, issue.first)).collect()
 }
 
 #[test]
@@ -306,11 +306,8 @@ fn invalid_objects_are_counted_and_left_out() {
     (bounds[10].radius, scales[10]) = (1e30, Vec3::splat(1e20));
     let invalid =
         SceneRef { positions: &positions, orientations: &orientations, scales: &scales, bounds: &bounds, ..whole };
-    let expected = [
-        (RejectionReason::InvalidTransform, 4, 3),
-        (RejectionReason::InvalidBounds, 3, 8),
-        (RejectionReason::OutOfReach, 1, 5),
-    ];
+    let expected =
+        [(IssueReason::InvalidTransform, 4, 3), (IssueReason::InvalidBounds, 3, 8), (IssueReason::OutOfReach, 1, 5)];
     assert_eq!(rejected(invalid), expected);
     assert_eq!(rejected(whole), []);
 }
@@ -336,7 +333,7 @@ fn objects_of_removed_meshes_or_materials_are_counted_and_left_out() {
     scene.remove(mesh).unwrap();
     scene.remove(material).unwrap();
     // Every third object has this mesh, and every fifth of the others this material.
-    let expected = [(RejectionReason::StaleMesh, 10, 1), (RejectionReason::StaleMaterial, 4, 0)];
+    let expected = [(IssueReason::StaleMesh, 10, 1), (IssueReason::StaleMaterial, 4, 0)];
     assert_eq!(rejected(scene.as_scene_ref()), expected);
 
     // The slot is reused, and the stale handles stay invalid.
@@ -382,12 +379,12 @@ fn invalid_lights_are_counted_and_left_out() {
             casts_shadow: true,
         },
     ]);
-    assert_eq!(rejected(scene.as_scene_ref()), [(RejectionReason::InvalidLight, 11, 2)]);
+    assert_eq!(rejected(scene.as_scene_ref()), [(IssueReason::InvalidLight, 11, 2)]);
     scene.lights.truncate(2);
     scene.lights.extend([point(1.0, 1.0), spot(0.0, 0.5)]);
     assert_eq!(rejected(scene.as_scene_ref()), []);
     scene.lights.extend([point(0.0, 1.0), point(-0.0, 1.0)]);
-    assert_eq!(rejected(scene.as_scene_ref()), [(RejectionReason::DarkLight, 2, 4)]);
+    assert_eq!(rejected(scene.as_scene_ref()), [(IssueReason::DarkLight, 2, 4)]);
 }
 
 #[test]

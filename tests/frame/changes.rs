@@ -9,7 +9,7 @@ use drawloom::process::{
 };
 use drawloom::scene::{Light, Scene, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::{RejectionReason, ShadowMaps};
+use drawloom::view::{IssueReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder, Submitter};
 use drawloom_testing::scenes::field;
 
@@ -89,9 +89,9 @@ fn a_light_out_of_reach_is_counted_and_the_frame_succeeds() {
     let (mut renderer, _) = deferred(Deferred::to_picture());
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let statistics = recorded.statistics();
-    let rejections = statistics.rejections.iter();
-    let found: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
-    assert_eq!(found, [(RejectionReason::LightOutOfReach, 1, 1)]);
+    let scene_issues = statistics.scene_issues.iter();
+    let found: Vec<_> = scene_issues.map(|issue| (issue.reason, issue.count, issue.first)).collect();
+    assert_eq!(found, [(IssueReason::LightOutOfReach, 1, 1)]);
     assert_eq!(statistics.views.len(), 2);
 }
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use drawloom::backend::{Backend, NullBackend, SceneLimits};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, GeometryFormats, LightVolumes,
-    Place, PlanError, RenderProcess, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Deformation, Draws, Format, Fxaa, GeometryFormats, InjectionPoint,
+    LightVolumes, PlanError, RenderProcess, ToneMapping,
 };
 use drawloom::quality::{Quality, RadianceSum};
 use drawloom::scene::{Camera, LayerMask, Light, LightKind, Scene, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::{RejectionReason, ShadowMaps};
+use drawloom::view::{IssueReason, ShadowMaps};
 use drawloom::{BuildError, FrameError, Renderer, RendererBuilder};
 use drawloom_testing::limited::LimitedBackend;
 use drawloom_testing::scenes::everything::{dark, everything};
@@ -436,14 +436,14 @@ fn every_frame_has_every_place() {
         })
     };
     let builder = builder(Deferred::to_picture())
-        .process(at("overlay", Place::AfterPostProcessing, "picture"))
-        .process(at("bloom", Place::AfterTransparency, "radiance"))
-        .process(at("fog", Place::AfterLighting, "radiance"))
-        .process(at("decals", Place::AfterGeometry, "radiance"))
-        .process(at("sky", Place::BeforeGeometry, "before"))
+        .process(at("overlay", InjectionPoint::AfterPostProcessing, "picture"))
+        .process(at("bloom", InjectionPoint::AfterTransparency, "radiance"))
+        .process(at("fog", InjectionPoint::AfterLighting, "radiance"))
+        .process(at("decals", InjectionPoint::AfterGeometry, "radiance"))
+        .process(at("sky", InjectionPoint::BeforeGeometry, "before"))
         .process(own("haze", |declare| {
             declare.draws_over("radiance");
-            declare.at(Place::AfterLighting);
+            declare.at(InjectionPoint::AfterLighting);
             declare.after("fog");
         }));
     let mut renderer = build(builder).unwrap();
@@ -459,7 +459,8 @@ fn every_frame_has_every_place() {
         assert!(lights.clone().all(|lights| (index("decals")..index("fog")).contains(&index(lights))), "{names:?}");
         assert!(names.iter().all(|name| name != "transparency" || index("haze") < index(name)), "{names:?}");
     }
-    let error = build_error(Renderer::builder(NullBackend).process(at("fog", Place::AfterLighting, "radiance")));
+    let error =
+        build_error(Renderer::builder(NullBackend).process(at("fog", InjectionPoint::AfterLighting, "radiance")));
     assert_eq!(error, PlanError::UnknownProcess { process: "fog".into(), other: "the place after lighting".into() });
 }
 
@@ -469,7 +470,7 @@ fn a_process_after_lighting_may_draw_depth_with_every_sum_of_lights() {
         let trees = own("trees", |declare| {
             declare.draws_over("radiance");
             declare.draws_depth("depth");
-            declare.at(Place::AfterLighting);
+            declare.at(InjectionPoint::AfterLighting);
         });
         let quality = Quality { radiance_sum, ..Quality::balanced() };
         let mut renderer = build(builder(Deferred::to_picture()).quality(quality).process(trees)).unwrap();
@@ -574,9 +575,9 @@ fn dark_and_invalid_lights_require_no_process() {
     let mut renderer = build(builder(Deferred::to_picture())).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let statistics = recorded.statistics();
-    let rejections = statistics.rejections.iter();
-    let found: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
-    let mut expected = [(RejectionReason::DarkLight, 8, 0), (RejectionReason::InvalidLight, 4, 8)];
+    let scene_issues = statistics.scene_issues.iter();
+    let found: Vec<_> = scene_issues.map(|issue| (issue.reason, issue.count, issue.first)).collect();
+    let mut expected = [(IssueReason::DarkLight, 8, 0), (IssueReason::InvalidLight, 4, 8)];
     expected.sort_by_key(|(reason, ..)| *reason as usize);
     assert_eq!(found, expected);
     assert_eq!((statistics.lights, statistics.views.len(), statistics.views[0].lights), (0, 1, 0));

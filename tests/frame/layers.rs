@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::process::{CommandDraws, Declare, Draws, Format, RenderProcess};
-use drawloom::quality::{DepthCurve, DepthKey, Quality};
+use drawloom::quality::{DepthCurve, DepthPrecision, Quality};
 use drawloom::scene::{Changes, LayerMask, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer, Submitter};
@@ -76,7 +76,7 @@ proptest! {
     ) {
         let drawn = LayerMask(drawn);
         let quality = Quality {
-            opaque_order: DepthKey { bits: bits * 8, curve: DepthCurve::Logarithmic },
+            opaque_order: DepthPrecision { bits: bits * 8, curve: DepthCurve::Logarithmic },
             ..Quality::balanced()
         };
         let (mut renderer, submitter) = renderer(drawn, quality, workers);

@@ -17,7 +17,7 @@ use drawloom::quality::{Quality, RadianceSum};
 use drawloom::scene::SceneRef;
 use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 #[cfg(feature = "wgpu")]
 use drawloom_testing::adapter;
 use drawloom_testing::limited::LimitedBackend;
@@ -85,8 +85,8 @@ fn another_backend_is_asked_anew() {
         submitter = renderer.replace_backend(backend(limits));
         for _ in 0..2 {
             let statistics = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap().statistics;
-            let found = statistics.rejections.first().map_or((0, 0), |known| (known.count, known.first));
-            assert_eq!(found, expected, "{limits:?}: {:?}", statistics.rejections);
+            let found = statistics.scene_issues.first().map_or((0, 0), |known| (known.count, known.first));
+            assert_eq!(found, expected, "{limits:?}: {:?}", statistics.scene_issues);
         }
     }
     drop(submitter);
@@ -110,10 +110,10 @@ fn an_object_without_room_is_not_counted_as_drawn_in_half_floats() {
             scene.replace_object(*handle, RenderObject { material, ..object }).unwrap();
         }
         let statistics = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap().statistics;
-        let counted = |reason| statistics.rejections.iter().find(|rejection| rejection.reason == reason);
-        assert_eq!(counted(RejectionReason::ObjectLimit).map(|found| (found.count, found.first)), Some((6, 64)));
+        let counted = |reason| statistics.scene_issues.iter().find(|issue| issue.reason == reason);
+        assert_eq!(counted(IssueReason::ObjectLimit).map(|found| (found.count, found.first)), Some((6, 64)));
         let expected = blended.iter().copied().find(|object| *object < first_without_room).map(|first| (1, first));
-        let found = counted(RejectionReason::HalfFloatBlending).map(|found| (found.count, found.first));
+        let found = counted(IssueReason::HalfFloatBlending).map(|found| (found.count, found.first));
         assert_eq!(found, expected, "{blended:?}");
     }
 }

@@ -8,7 +8,7 @@ use drawloom::backend::NullBackend;
 use drawloom::command::{Batch, DrawList};
 use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::{CullingVolume, DepthCurve, DepthKey, Quality};
+use drawloom::quality::{CullingVolume, DepthCurve, DepthPrecision, Quality};
 use drawloom::scene::{
     Blend, Camera, Changes, Light, Material, Mesh, Projection, RenderObject, Scene, SceneRef, ViewKind,
 };
@@ -176,7 +176,7 @@ fn histogram(levels: &Levels) -> [usize; 3] {
 
 #[test]
 fn objects_have_the_levels_of_a_naive_model_while_cameras_and_objects_move() {
-    let by_depth = DepthKey { bits: 12, curve: DepthCurve::Logarithmic };
+    let by_depth = DepthPrecision { bits: 12, curve: DepthCurve::Logarithmic };
     for changed in [
         quality(1.0),
         Quality { opaque_order: by_depth, ..quality(1.0) },

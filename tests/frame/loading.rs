@@ -11,7 +11,7 @@ use drawloom::scene::{
     Arrivals, AssetLoader, Changes, Material, Mesh, RenderObject, Scene, SceneError, SceneRef, Texture,
 };
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason};
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use drawloom_testing::scenes::{cube, field};
 
@@ -63,8 +63,8 @@ fn cube_of(name: &str) -> impl FnOnce() -> Result<Mesh, SceneError> + Send + 'st
     }
 }
 
-fn reasons(statistics: &FrameStatistics) -> Vec<(RejectionReason, usize)> {
-    statistics.rejections.iter().map(|Rejection { reason, count, .. }| (*reason, *count)).collect()
+fn reasons(statistics: &FrameStatistics) -> Vec<(IssueReason, usize)> {
+    statistics.scene_issues.iter().map(|SceneIssue { reason, count, .. }| (*reason, *count)).collect()
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn an_object_is_drawn_from_the_frame_on_in_which_its_mesh_has_arrived() {
         let object = engine.scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
         assert!(engine.scene.assets().is_pending(mesh) && engine.scene.assets().get(mesh).is_err());
         let waiting = engine.frame();
-        assert_eq!(reasons(&waiting), [(RejectionReason::NotResident, 1)]);
+        assert_eq!(reasons(&waiting), [(IssueReason::NotResident, 1)]);
         assert_eq!(waiting.views[0].visible, before.views[0].visible);
         begin.send(()).unwrap();
         assert_eq!(engine.receive(1).meshes, [mesh]);
@@ -118,7 +118,7 @@ fn what_cannot_be_loaded_is_told_once_by_name_and_its_handle_is_stale() {
     assert!(engine.scene.receive(&engine.loader).errors.is_empty());
     assert!(!engine.scene.assets().is_pending(refused));
     let found = reasons(&engine.frame());
-    assert_eq!(found, [(RejectionReason::StaleMesh, 1), (RejectionReason::StaleMaterial, 1)]);
+    assert_eq!(found, [(IssueReason::StaleMesh, 1), (IssueReason::StaleMaterial, 1)]);
     // The next asset may have its slot, but not its handle.
     let next = engine.scene.add(cube()).unwrap();
     assert!(next != refused && engine.scene.assets().get(refused).is_err());
@@ -251,7 +251,7 @@ fn an_object_is_drawn_when_its_mesh_its_material_or_both_at_once_have_arrived() 
             false => engine.material(),
         };
         engine.scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
-        assert_eq!(reasons(&engine.frame()), [(RejectionReason::NotResident, 1)]);
+        assert_eq!(reasons(&engine.frame()), [(IssueReason::NotResident, 1)]);
         engine.receive(usize::from(loads_mesh) + usize::from(loads_material));
         // No object changed, and what they consist of did.
         let scene = SceneRef { changes: Changes::NONE, ..engine.scene.as_scene_ref() };

@@ -18,11 +18,11 @@ mod levels_of_detail;
 mod loading;
 mod mip_levels;
 mod null_backend;
-mod object_filter;
+mod view_filter;
 mod object_table;
 mod occlusion;
 mod order;
-mod pieces;
+mod static_groups;
 #[cfg(feature = "wgpu")]
 mod pipeline_library;
 mod quality;

@@ -13,7 +13,7 @@ use drawloom::quality::Quality;
 use drawloom::scene::Scene;
 use drawloom::task::{Scheduler, Worker};
 use drawloom::view::internal::{LightTable, ObjectTable};
-use drawloom::view::{Rejections, RenderView};
+use drawloom::view::{RenderView, SceneIssues};
 use drawloom_testing::scenes::field;
 
 use crate::renderer;
@@ -52,7 +52,7 @@ fn broken_rule(
         records_bundles: false,
         quality: &Quality::balanced(),
         limits: SceneLimits::NONE,
-        rejections: &Rejections::default(),
+        scene_issues: &SceneIssues::default(),
     };
     let frame = NullBackend.begin(&request).unwrap();
     let rule = std::sync::Mutex::new(String::new());

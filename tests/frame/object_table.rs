@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use drawloom::glam::{DQuat, DVec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Assets, Changes, Material, Mesh, RenderObject, Scene, SceneRef};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::view::internal::ObjectTable;
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
@@ -39,8 +39,8 @@ fn the_first_rejected_object_is_named_by_its_number_in_the_scene() {
     }
     let mut table = ObjectTable::default();
     table.update(&SceneRef { positions: &positions, ..scene });
-    let [rejection] = &table.rejections().list()[..] else { panic!("{:?}", table.rejections().list()) };
-    assert_eq!((rejection.reason, rejection.count, rejection.first), (RejectionReason::InvalidTransform, 3, 300));
+    let [issue] = &table.scene_issues().list()[..] else { panic!("{:?}", table.scene_issues().list()) };
+    assert_eq!((issue.reason, issue.count, issue.first), (IssueReason::InvalidTransform, 3, 300));
 }
 
 #[test]
@@ -51,10 +51,10 @@ fn objects_that_become_valid_are_rejected_no_more() {
     positions[3] = DVec3::NAN;
     let mut table = ObjectTable::default();
     table.update(&SceneRef { positions: &positions, ..scene });
-    assert_eq!(table.rejections().list().len(), 1);
+    assert_eq!(table.scene_issues().list().len(), 1);
     // Its packet changes as a whole.
     draw(&mut table, &SceneRef { changes: Changes::Ranges(std::slice::from_ref(&(0..16))), ..scene });
-    assert_eq!(table.rejections().list(), []);
+    assert_eq!(table.scene_issues().list(), []);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use drawloom::backend::NullBackend;
 use drawloom::command::DrawList;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::{DepthCurve, DepthKey, Quality, ShadowQuality};
+use drawloom::quality::{DepthCurve, DepthPrecision, Quality, ShadowQuality};
 use drawloom::scene::{Blend, Light, Scene};
 use drawloom::task::Scheduler;
 use drawloom_testing::scenes::field;
@@ -35,7 +35,7 @@ fn keys_have_the_configured_number_of_depth_bits() {
     let scene = field(2_000);
     for bits in [6, 12] {
         for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }] {
-            let order = DepthKey { bits, curve };
+            let order = DepthPrecision { bits, curve };
             let quality = Quality { opaque_order: order, blended_order: order, ..Quality::balanced() };
             for (process, lowest) in [("geometry buffer", 20 - bits), ("transparency", 62 - bits)] {
                 let list = drawn(&scene, quality, process, 0);
@@ -56,17 +56,18 @@ fn keys_have_the_configured_number_of_depth_bits() {
 fn blended_objects_are_out_of_order_by_at_most_one_step() {
     let scene = field(3_000);
     let (near, far) = (scene.cameras[0].near, scene.cameras[0].far);
-    let mut orders = vec![DepthKey::EXACT];
+    let mut orders = vec![DepthPrecision::EXACT];
     for bits in [4, 9, 18] {
-        orders
-            .extend([DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }].map(|curve| DepthKey { bits, curve }));
+        orders.extend(
+            [DepthCurve::Logarithmic, DepthCurve::Linear { far: 80.0 }].map(|curve| DepthPrecision { bits, curve }),
+        );
     }
     for blended_order in orders {
         let quality = Quality { blended_order, ..Quality::balanced() };
         let list = drawn(&scene, quality, "transparency", 0);
         assert!(list.commands().all(|command| command.state.blend() != Blend::None));
         let mut depths = depths(&scene, &list);
-        if blended_order == DepthKey::EXACT {
+        if blended_order == DepthPrecision::EXACT {
             assert!(depths.is_sorted_by(|one, next| one >= next));
         }
         depths.retain(|&depth| (near..=far).contains(&depth));

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Place, RenderProcess, ToneMapping};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, RenderProcess, ToneMapping};
 use drawloom::quality::Quality;
-use drawloom::scene::{Camera, MaterialPredicate, ObjectFilter, ObjectSet, Redraw, Scene, SceneError, ViewKind};
+use drawloom::scene::{Camera, MaterialPredicate, ObjectSet, Redraw, Scene, SceneError, ViewFilter, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer, Submitter};
 use drawloom_testing::scenes::field;
@@ -20,7 +20,7 @@ impl RenderProcess for Screens {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, "screen 0", "radiance");
         declare.draws_over("radiance");
     }
@@ -139,16 +139,16 @@ fn a_view_is_redrawn_if_its_filter_is_not_equal() {
     let (mut scene, mut fixture) = (scene_with(&[Redraw::OnCameraChange]), Fixture::new(2));
     let predicate = || MaterialPredicate::new(|material| material.double_sided);
     let (one, other) = (predicate(), predicate());
-    let mut is_drawn = |filter: ObjectFilter| {
+    let mut is_drawn = |filter: ViewFilter| {
         scene.cameras[1].filter = filter;
         fixture.drawn(&scene)[1]
     };
-    assert!(is_drawn(ObjectFilter::ALL) && !is_drawn(ObjectFilter::ALL));
-    assert!(is_drawn(ObjectFilter::only(ObjectSet::new([1, 7]))));
-    assert!(!is_drawn(ObjectFilter::only(ObjectSet::new([7, 1]))), "the same objects");
-    assert!(is_drawn(ObjectFilter::except(ObjectSet::new([1, 7]))));
-    assert!(is_drawn(ObjectFilter::ALL.of_materials(one.clone())) && !is_drawn(ObjectFilter::ALL.of_materials(one)));
-    assert!(is_drawn(ObjectFilter::ALL.of_materials(other)), "another function");
+    assert!(is_drawn(ViewFilter::ALL) && !is_drawn(ViewFilter::ALL));
+    assert!(is_drawn(ViewFilter::only(ObjectSet::new([1, 7]))));
+    assert!(!is_drawn(ViewFilter::only(ObjectSet::new([7, 1]))), "the same objects");
+    assert!(is_drawn(ViewFilter::except(ObjectSet::new([1, 7]))));
+    assert!(is_drawn(ViewFilter::ALL.of_materials(one.clone())) && !is_drawn(ViewFilter::ALL.of_materials(one)));
+    assert!(is_drawn(ViewFilter::ALL.of_materials(other)), "another function");
 }
 
 #[test]

@@ -6,17 +6,17 @@ use drawloom::backend::NullBackend;
 use drawloom::command::Batch;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::{CullingVolume, DepthCurve, DepthKey, Quality};
+use drawloom::quality::{CullingVolume, DepthCurve, DepthPrecision, Quality};
 use drawloom::scene::{Camera, Changes, Light, SceneError, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::view::Rejection;
+use drawloom::view::SceneIssue;
 use drawloom::{FrameError, FrameStatistics, Renderer, Submitter, ViewStatistics};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::scenes::field;
 use proptest::prelude::*;
 
 /// What a frame is made of: its statistics, and the objects and batches of each process in each view.
-type Contents = (Vec<ViewStatistics>, Vec<Rejection>, Vec<(String, usize, Vec<Batch>, Vec<u32>)>);
+type Contents = (Vec<ViewStatistics>, Vec<SceneIssue>, Vec<(String, usize, Vec<Batch>, Vec<u32>)>);
 
 fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
@@ -32,7 +32,7 @@ fn contents(renderer: &Renderer<NullBackend>, statistics: &FrameStatistics) -> C
             }
         }
     }
-    (statistics.views.clone(), statistics.rejections.clone(), lists)
+    (statistics.views.clone(), statistics.scene_issues.clone(), lists)
 }
 
 /// The contents of a frame of a new renderer, which is told nothing.
@@ -59,8 +59,8 @@ fn difference(found: &Contents, expected: &Contents) -> Option<String> {
 
 fn any_quality() -> impl Strategy<Value = Quality> {
     let order = prop_oneof![
-        3 => Just(DepthKey::UNORDERED),
-        1 => Just(DepthKey { bits: 8, curve: DepthCurve::Logarithmic }),
+        3 => Just(DepthPrecision::UNORDERED),
+        1 => Just(DepthPrecision { bits: 8, curve: DepthCurve::Logarithmic }),
     ];
     let culling = prop_oneof![2 => Just(CullingVolume::Sphere), 1 => Just(CullingVolume::OrientedBox)];
     (order, culling).prop_map(|(opaque_order, culling)| Quality { opaque_order, culling, ..Quality::balanced() })

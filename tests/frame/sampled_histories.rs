@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Place, PlanError, RenderProcess, ShadowCasters};
+use drawloom::process::{
+    CommandDraws, Declare, Deferred, Draws, InjectionPoint, PlanError, RenderProcess, ShadowCasters,
+};
 use drawloom::scene::{Camera, ClipPlane, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer, Submitter};
@@ -29,7 +31,7 @@ impl RenderProcess for Mirror {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         if self.is_previous {
             declare.samples_view_previous(self.views, "mirror", self.target);
         } else {
@@ -94,7 +96,7 @@ impl RenderProcess for Lamp {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples_view(ViewKind::Reflection, "lamp", "radiance");
         declare.draws_over("radiance");
     }

@@ -6,8 +6,8 @@ use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, Place, PlanError, PostStep, RenderProcess,
-    StorageBuffer, ToneMapping,
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, PlanError, PostStep,
+    RenderProcess, StorageBuffer, ToneMapping,
 };
 use drawloom::scene::{Camera, ClipPlane, LayerMask, Light, RenderObject, Scene, ViewKind};
 use drawloom::task::Scheduler;
@@ -23,7 +23,7 @@ pub const MIRROR: LayerMask = LayerMask::layer(3);
 /// Draws mirrors with what the view `mirror` has in a target.
 pub struct Mirror {
     target: &'static str,
-    place: Place,
+    place: InjectionPoint,
 }
 
 impl RenderProcess for Mirror {
@@ -45,7 +45,7 @@ impl RenderProcess for Mirror {
 }
 
 /// Draws mirrors with the light of their views.
-pub const RADIANCE: Mirror = Mirror { target: "radiance", place: Place::AfterLighting };
+pub const RADIANCE: Mirror = Mirror { target: "radiance", place: InjectionPoint::AfterLighting };
 
 fn renderer(mirror: Mirror) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
@@ -81,7 +81,7 @@ fn a_reflection_draws_what_is_sampled_of_it_and_comes_first() {
     let expected = [("geometry buffer", 1), ("mirror", 1), ("geometry buffer", 0), ("mirror", 0), ("tone mapping", 0)];
     assert_eq!(passes(RADIANCE, &scene), named(&expected));
 
-    let of_picture = Mirror { target: "picture", place: Place::AfterLighting };
+    let of_picture = Mirror { target: "picture", place: InjectionPoint::AfterLighting };
     let expected = [
         ("geometry buffer", 1),
         ("mirror", 1),
@@ -93,7 +93,7 @@ fn a_reflection_draws_what_is_sampled_of_it_and_comes_first() {
     assert_eq!(passes(of_picture, &scene), named(&expected));
 
     // Normals are there before the mirror's own process and lights.
-    let of_normals = Mirror { target: "normal", place: Place::AfterLighting };
+    let of_normals = Mirror { target: "normal", place: InjectionPoint::AfterLighting };
     let expected = [("geometry buffer", 1), ("geometry buffer", 0), ("mirror", 0), ("tone mapping", 0)];
     assert_eq!(passes(of_normals, &scene), named(&expected));
 }
@@ -177,7 +177,7 @@ fn a_view_shows_only_the_layers_of_its_camera() {
 #[test]
 fn a_target_that_no_process_writes_is_an_error() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let unknown = Mirror { target: "albedo", place: Place::AfterLighting };
+    let unknown = Mirror { target: "albedo", place: InjectionPoint::AfterLighting };
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(unknown);
     let error = builder.build(scheduler).err().unwrap();
     let named = matches!(
@@ -229,7 +229,7 @@ impl RenderProcess for DrawParticles {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::BeforeGeometry);
+        declare.at(InjectionPoint::BeforeGeometry);
         declare.reads_buffer(PARTICLES);
         declare.clears_color("particles", Format::Rgba8Unorm, ClearColor::Background);
         declare.keep();
@@ -318,7 +318,7 @@ impl RenderProcess for Filter {
 #[test]
 fn reflections_have_no_steps_that_nothing_samples_though_these_have_a_history() {
     let motion = |declare: &mut Declare| {
-        declare.at(Place::AfterGeometry);
+        declare.at(InjectionPoint::AfterGeometry);
         declare.clears_color("motion", Format::Rg16Float, ClearColor::Background);
     };
     let build = |mirror: Mirror| {
@@ -333,7 +333,7 @@ fn reflections_have_no_steps_that_nothing_samples_though_these_have_a_history() 
     let passes: Vec<_> = submitted.submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
     assert!(passes.contains(&("temporal filter", 0)) && !passes.contains(&("temporal filter", 1)), "{passes:?}");
     // The filter has no motion in reflections, which only main views have.
-    let error = build(Mirror { target: "picture", place: Place::AfterLighting }).err().unwrap().to_string();
+    let error = build(Mirror { target: "picture", place: InjectionPoint::AfterLighting }).err().unwrap().to_string();
     assert!(error.contains("temporal filter") && error.contains("motion"), "{error}");
 }
 
@@ -347,7 +347,7 @@ impl RenderProcess for Tint {
 
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Reflection);
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.draws_over("radiance");
     }
 

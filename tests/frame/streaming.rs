@@ -9,7 +9,7 @@ use drawloom::handle::Handle;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use drawloom_testing::adapter;
 
@@ -87,7 +87,7 @@ impl World {
     /// The number of objects that the next frame leaves out.
     fn missing(&mut self) -> usize {
         let (statistics, _) = self.frame();
-        let missing = statistics.rejections.iter().find(|rejection| rejection.reason == RejectionReason::NotResident);
+        let missing = statistics.scene_issues.iter().find(|issue| issue.reason == IssueReason::NotResident);
         missing.map_or(0, |missing| missing.count)
     }
 
@@ -158,7 +158,7 @@ fn budgets_hold_in_every_frame_of_a_flight_and_what_is_in_sight_arrives() {
         assert!(streaming.uploaded_bytes - uploaded <= budget.upload_bytes_per_frame, "{streaming:?}");
         assert_eq!(streaming.over_budget, 0);
         uploaded = streaming.uploaded_bytes;
-        arrived += usize::from(statistics.rejections.is_empty());
+        arrived += usize::from(statistics.scene_issues.is_empty());
     }
     let streaming = world.frames(1);
     assert!(streaming.evictions > 150 && streaming.uploaded_bytes > 180 * BYTES, "{streaming:?}");
@@ -371,7 +371,7 @@ fn textures_of_several_sizes_share_their_budget() {
             let streaming = world.frames(12);
             assert!(streaming.texture_bytes <= budget.texture_bytes, "{streaming:?}");
             let (statistics, _) = world.frame();
-            assert_eq!(statistics.rejections, [], "object {object} in pass {pass}");
+            assert_eq!(statistics.scene_issues, [], "object {object} in pass {pass}");
         }
     }
 }
@@ -399,9 +399,9 @@ fn textures_beyond_the_device_s_layers_are_told_as_that_and_others_make_no_room_
     world.look_at(100.0);
     world.frames(8);
     let (statistics, streaming) = world.frame();
-    let told = |reason| statistics.rejections.iter().find(|told| told.reason == reason).map(|told| told.count);
-    assert_eq!(told(RejectionReason::TextureLimit), Some(3), "{:?}", statistics.rejections);
-    assert_eq!(told(RejectionReason::TextureNotResident), Some(3), "{:?}", statistics.rejections);
+    let told = |reason| statistics.scene_issues.iter().find(|told| told.reason == reason).map(|told| told.count);
+    assert_eq!(told(IssueReason::TextureLimit), Some(3), "{:?}", statistics.scene_issues);
+    assert_eq!(told(IssueReason::TextureNotResident), Some(3), "{:?}", statistics.scene_issues);
     assert_eq!((streaming.over_budget, streaming.evictions, streaming.textures), (0, 0, layers as usize + 4));
 }
 
@@ -478,10 +478,10 @@ fn a_texture_that_goes_before_it_is_on_the_device_is_told_as_gone() {
     let material = world.scene.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
     world.scene.add_object(RenderObject::new(world.meshes[0], material, DVec3::ZERO)).unwrap();
     let reasons =
-        |world: &mut World| -> Vec<_> { world.frame().0.rejections.iter().map(|rejection| rejection.reason).collect() };
-    assert!(reasons(&mut world).contains(&RejectionReason::TextureNotResident));
+        |world: &mut World| -> Vec<_> { world.frame().0.scene_issues.iter().map(|issue| issue.reason).collect() };
+    assert!(reasons(&mut world).contains(&IssueReason::TextureNotResident));
     world.scene.remove(texture).unwrap();
     let after = reasons(&mut world);
-    assert!(after.contains(&RejectionReason::StaleTexture), "{after:?}");
-    assert!(!after.contains(&RejectionReason::TextureNotResident), "{after:?}");
+    assert!(after.contains(&IssueReason::StaleTexture), "{after:?}");
+    assert!(!after.contains(&IssueReason::TextureNotResident), "{after:?}");
 }

@@ -6,7 +6,7 @@ use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
 use drawloom::quality::{Quality, VertexFormat};
-use drawloom::scene::{Changes, Mesh, Piece, Scene, SceneRef, Topology, Vertex};
+use drawloom::scene::{Changes, Mesh, Scene, SceneRef, StaticGroup, Topology, Vertex};
 use drawloom::task::Scheduler;
 use drawloom::view::internal::GpuObject;
 use drawloom_testing::adapter;
@@ -51,24 +51,24 @@ fn statistics_and_timeline_report_the_uploaded_bytes() {
 }
 
 #[test]
-fn objects_of_pieces_are_uploaded_once() {
+fn objects_of_static_groups_are_uploaded_once() {
     let (device, queue) = adapter::noop_device().unwrap();
     let backend = WgpuBackend::new(device, queue).unwrap();
     let quality = Quality { occlusion: None, ..Quality::balanced() };
     let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
     let scene = field(600);
-    let pieces = [Piece::new("left", (0..200).collect()), Piece::new("right", (200..600).collect())];
+    let static_groups = [StaticGroup::new("left", (0..200).collect()), StaticGroup::new("right", (200..600).collect())];
     let mut draw = |changes| {
-        let lent = SceneRef { changes, pieces: &pieces, ..scene.as_scene_ref() };
+        let lent = SceneRef { changes, static_groups: &static_groups, ..scene.as_scene_ref() };
         let statistics = submitter.submit(renderer.record(lent).unwrap()).unwrap().statistics;
-        (statistics.views.iter().map(|view| view.pieces).sum::<usize>(), statistics.uploaded)
+        (statistics.views.iter().map(|view| view.static_groups).sum::<usize>(), statistics.uploaded)
     };
     draw(Changes::Unknown);
     // The frame that records them.
     draw(Changes::NONE);
     let (executed, uploaded) = draw(Changes::NONE);
-    assert!(executed > 0 && uploaded > 0, "{executed} pieces, {uploaded} bytes");
+    assert!(executed > 0 && uploaded > 0, "{executed} static groups, {uploaded} bytes");
     for _ in 0..3 {
         assert_eq!(draw(Changes::NONE), (executed, 0));
     }

@@ -9,7 +9,7 @@ use drawloom::report::{FrameReport, SchedulerCosts};
 use drawloom::scene::{Camera, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::timeline::TuningSubject;
-use drawloom::{BudgetedView, FrameStatistics, Renderer, Rung, Submitter, ViewBudget, ViewForm};
+use drawloom::{BudgetedView, FrameStatistics, QualityLevel, Renderer, Submitter, ViewBudget, ViewVariant};
 use drawloom_testing::scenes::field;
 
 use crate::reported;
@@ -20,14 +20,18 @@ const IMPOSSIBLE: f64 = 1e-6;
 
 fn views() -> Vec<BudgetedView> {
     let camera = |name: &str| Camera::looking_at(name, DVec3::new(0.0, 0.0, 30.0), DVec3::ZERO);
-    let of = |name: &str, priority, ladder| BudgetedView {
+    let of = |name: &str, priority, levels| BudgetedView {
         name: name.to_owned(),
         priority,
         cameras: vec![camera(name)],
-        ladder,
+        levels,
     };
-    let small = ViewForm { interval: 3, size: 0.5, ..ViewForm::BEST };
-    vec![of("main", 2, vec![]), of("map", 1, vec![Rung::Drawn(small)]), of("preview", 0, vec![Rung::LeftOut])]
+    let small = ViewVariant { interval: 3, size: 0.5, ..ViewVariant::BEST };
+    vec![
+        of("main", 2, vec![]),
+        of("map", 1, vec![QualityLevel::Drawn(small)]),
+        of("preview", 0, vec![QualityLevel::LeftOut]),
+    ]
 }
 
 fn frame(
@@ -59,22 +63,22 @@ fn frames_draw_what_the_budget_chooses_and_report_it() {
     let mut budget = ViewBudget::new(GENEROUS).unwrap();
     for _ in 0..12 {
         let statistics = frame(&mut budget, &mut renderer, &submitter);
-        assert_eq!(statistics.rungs().collect::<Vec<_>>(), [("map", 0), ("preview", 0)]);
+        assert_eq!(statistics.levels().collect::<Vec<_>>(), [("map", 0), ("preview", 0)]);
         assert_eq!(names(&statistics), ["main", "map", "preview"]);
     }
     assert!(!budget.is_exhausted());
     budget.set_milliseconds(IMPOSSIBLE).unwrap();
-    let shed = (0..20).find(|_| {
+    let degraded = (0..20).find(|_| {
         frame(&mut budget, &mut renderer, &submitter);
-        budget.rung("map") == Some(1)
+        budget.level("map") == Some(1)
     });
-    assert!(shed.is_some() && budget.rung("preview") == Some(1) && budget.is_exhausted());
+    assert!(degraded.is_some() && budget.level("preview") == Some(1) && budget.is_exhausted());
 
     renderer.scheduler().timeline().start();
     let ages: Vec<_> = (0..12)
         .map(|_| {
             let statistics = frame(&mut budget, &mut renderer, &submitter);
-            assert_eq!(statistics.rungs().collect::<Vec<_>>(), [("map", 1), ("preview", 1)]);
+            assert_eq!(statistics.levels().collect::<Vec<_>>(), [("map", 1), ("preview", 1)]);
             assert_eq!(names(&statistics), ["main", "map"]);
             statistics.views[1].age
         })
@@ -83,13 +87,14 @@ fn frames_draw_what_the_budget_chooses_and_report_it() {
     assert_eq!(ages[3..].iter().filter(|age| **age == 0).count(), 3, "{ages:?}");
     let log = renderer.scheduler().timeline().take();
     for (_, tuning) in &log.tuning {
-        let rungs: Vec<_> = tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::Rung).collect();
-        assert_eq!(rungs.iter().map(|choice| choice.chosen).collect::<Vec<_>>(), [1, 1]);
+        let levels: Vec<_> =
+            tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::QualityLevel).collect();
+        assert_eq!(levels.iter().map(|choice| choice.chosen).collect::<Vec<_>>(), [1, 1]);
     }
     let costs = SchedulerCosts::measure().unwrap();
     let report = FrameReport::new(&log, log.tuning.last().unwrap().0, &costs).unwrap().to_string();
-    assert!(report.contains("rung in map: every 3 frames, 50% of the size for"), "{report}");
-    assert!(report.contains("rung in preview: left out for 0.00 ns a frame; at its best"), "{report}");
+    assert!(report.contains("quality level in map: every 3 frames, 50% of the size for"), "{report}");
+    assert!(report.contains("quality level in preview: left out for 0.00 ns a frame; at its best"), "{report}");
 }
 
 #[test]
@@ -140,8 +145,8 @@ fn choices_are_those_of_one_frame_also_if_it_fails() {
     let cameras = std::mem::take(&mut scene.cameras);
     assert!(renderer.record(scene.as_scene_ref()).is_err());
     scene.cameras = cameras;
-    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().rungs().count(), 0);
+    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().levels().count(), 0);
     renderer.add_choices(budget.choices());
-    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().rungs().count(), 2);
-    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().rungs().count(), 0);
+    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().levels().count(), 2);
+    assert_eq!(renderer.record(scene.as_scene_ref()).unwrap().statistics().levels().count(), 0);
 }

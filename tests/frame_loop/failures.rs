@@ -136,7 +136,7 @@ fn a_frame_whose_callback_panics_keeps_its_slot_until_it_is_drawn() {
     let mut frames = simulated(Duration::from_millis(40), Buffering::SameFrame);
     let (slot, _) = frames.begin();
     let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
-    let drawn = recorded.fence_at(drawloom::FramePlace::End).unwrap();
+    let drawn = recorded.fence_at(drawloom::FencePoint::End).unwrap();
     slot.submit_then(recorded, |_| std::panic::resume_unwind(Box::new("as planned")));
     let (_slot, finished) = frames.begin();
     assert!(drawn.is_set(), "the slot was free while the device drew");

@@ -109,7 +109,7 @@ fn dropping_a_loop_waits_for_its_frames() {
     let mut frames = simulated(FRAME_TIME, Buffering::Double);
     let (slot, _) = frames.begin();
     let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
-    let drawn = recorded.fence_at(drawloom::FramePlace::End).unwrap();
+    let drawn = recorded.fence_at(drawloom::FencePoint::End).unwrap();
     slot.submit(recorded);
     drop(frames);
     assert!(drawn.is_set());
@@ -121,7 +121,7 @@ fn a_slot_that_outlives_its_loop_submits_nothing() {
     let mut frames = simulated(Duration::ZERO, Buffering::Double);
     let (slot, _) = frames.begin();
     let mut recorded = frames.renderer().record(scene.as_scene_ref()).unwrap();
-    let drawn = recorded.fence_at(drawloom::FramePlace::End).unwrap();
+    let drawn = recorded.fence_at(drawloom::FencePoint::End).unwrap();
     let (_renderer, finished) = frames.finish();
     assert!(finished.is_empty());
     slot.submit(recorded);

@@ -1,5 +1,5 @@
 //! A world is updated and recorded for frame N + 1 while frame N is submitted, which on the software backend is when it
-//! is drawn. The pictures are those of a loop that does one thing after the other, and has no pieces.
+//! is drawn. The pictures are those of a loop that does one thing after the other, and has no static groups.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,14 +9,14 @@ use std::thread;
 use drawloom::backend::SoftwareBackend;
 use drawloom::glam::{DVec3, Quat};
 use drawloom::process::Deferred;
-use drawloom::scene::{Changes, Piece, Scene, SceneRef};
+use drawloom::scene::{Changes, Scene, SceneRef, StaticGroup};
 use drawloom::task::Scheduler;
 use drawloom::{Buffering, FrameLoop, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 
 const FRAMES: usize = 12;
 const OBJECTS: usize = 60;
-/// Of these. The others stand in pieces.
+/// Of these. The others stand in static groups.
 const MOVING: usize = 30;
 
 fn world() -> Scene {
@@ -25,12 +25,14 @@ fn world() -> Scene {
         camera.size = [48, 32];
     }
     for first in (MOVING..OBJECTS).step_by(10) {
-        scene.pieces.push(Piece::new(format!("from {first}"), (first as u32..first as u32 + 10).collect()));
+        scene
+            .static_groups
+            .push(StaticGroup::new(format!("from {first}"), (first as u32..first as u32 + 10).collect()));
     }
     scene
 }
 
-/// Moves the first half of the objects, differently in each frame. Now and then another one, so that a piece is
+/// Moves the first half of the objects, differently in each frame. Now and then another one, so that a static group is
 /// recorded anew. Returns what moved.
 fn update(scene: &mut Scene, frame: usize) -> Vec<u32> {
     let handles: Vec<_> = scene.objects().collect();
@@ -65,7 +67,7 @@ fn serial_pictures() -> Vec<Vec<u8>> {
     (0..FRAMES)
         .map(|frame| {
             let moved = update(&mut scene, frame);
-            let scene = SceneRef { changes: changes(frame, &moved), pieces: &[], ..scene.as_scene_ref() };
+            let scene = SceneRef { changes: changes(frame, &moved), static_groups: &[], ..scene.as_scene_ref() };
             let recorded = renderer.record(scene).unwrap();
             let submitted = submitter.submit(recorded).unwrap();
             (0..2).flat_map(|view| submitted.submission.read(view, "picture").unwrap().bytes).collect()
@@ -84,7 +86,7 @@ fn overlapped_pictures(workers: usize, buffering: Buffering) -> Vec<Vec<u8>> {
         let moved = update(&mut scene, frame);
         let scene = SceneRef { changes: changes(frame, &moved), ..scene.as_scene_ref() };
         let recorded = frames.renderer().record(scene).unwrap();
-        executed += recorded.statistics().views.iter().map(|view| view.objects_of_pieces).sum::<usize>();
+        executed += recorded.statistics().views.iter().map(|view| view.objects_of_static_groups).sum::<usize>();
         let pictures = pictures.clone();
         slot.submit_then(recorded, move |submitted| {
             let of_view = |view| submitted.submission.read(view, "picture").unwrap().bytes;
@@ -93,7 +95,7 @@ fn overlapped_pictures(workers: usize, buffering: Buffering) -> Vec<Vec<u8>> {
     }
     let (_, finished) = frames.finish();
     assert!(finished.iter().all(|frame| frame.outcome.is_ok()));
-    assert!(executed > FRAMES, "pieces are executed");
+    assert!(executed > FRAMES, "static groups are executed");
     drop(pictures);
     drawn.iter().collect()
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::graph::NodeError;
 use drawloom::task::Worker;
-use drawloom::{CpuNode, FrameData, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
 
 /// Counts what the first view sees.
 #[derive(Default)]
@@ -22,7 +22,7 @@ impl CpuNode for SeenObjects {
         accesses.reads(FrameData::VisibleObjects);
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         self.count.store(frame.visible_objects(0)?.count(), Ordering::Relaxed);
         Ok(())
     }

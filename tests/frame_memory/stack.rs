@@ -87,7 +87,7 @@ fn phase(own_frames: &[&Frame<'_>]) -> Phase {
         Phase::Jobs
     } else if visits("src/frame/renderer.rs") {
         Phase::Around
-    } else if visits("src/frame/recorded.rs") {
+    } else if visits("src/frame/recorded_frame.rs") {
         Phase::Submit
     } else {
         Phase::Unknown

@@ -165,7 +165,7 @@ impl Engine {
         self.world.forget_changes();
         let mut recorded = recorded?;
         self.bloom.read_back(&mut recorded);
-        self.totals.static_groups += u64::from(recorded.statistics().views.iter().any(|view| view.pieces > 0));
+        self.totals.static_groups += u64::from(recorded.statistics().views.iter().any(|view| view.static_groups > 0));
         self.totals.results += u64::from(self.bloom.statistics().iter().any(|view| view.result.is_some()));
         slot.submit(recorded);
         self.in_flight += 1;

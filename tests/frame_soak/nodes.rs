@@ -6,7 +6,7 @@ use drawloom::glam::DVec3;
 use drawloom::graph::NodeError;
 use drawloom::scene::{GeneratedBuffer, NodeColumn, WrittenColumns};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, FrameData, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
 
 /// Lets some objects rise and fall, before the frame reads where they are.
 pub struct Movement<'a> {
@@ -35,11 +35,11 @@ impl CpuNode for Movement<'_> {
         accesses.writes(FrameData::Transforms);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.positions.chunk_count()
     }
 
-    fn run(&self, _: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, _: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             for (object, position) in self.positions.write(chunk)?.objects() {
                 if self.moving.binary_search(&(object as u32)).is_ok() {
@@ -71,11 +71,11 @@ impl CpuNode for Sparks {
         accesses.fills(&self.sparks);
     }
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.sparks.chunk_count()
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         for chunk in chunks {
             frame.fill(&self.sparks, chunk)?.fill([1.0; 4]);
         }

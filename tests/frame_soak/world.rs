@@ -3,7 +3,7 @@
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{
-    Blend, Camera, Changes, Light, Material, Mesh, ObjectHandle, Piece, RenderObject, Scene, SceneRef, Texture,
+    Blend, Camera, Changes, Light, Material, Mesh, ObjectHandle, RenderObject, Scene, SceneRef, StaticGroup, Texture,
 };
 use drawloom_testing::random::Random;
 
@@ -64,7 +64,7 @@ impl World {
     pub fn report<'a>(&'a mut self, moving: &'a [u32]) -> SceneRef<'a> {
         // Objects that are removed move others to their index.
         let room = self.scene.object_set(self.room.iter().copied()).unwrap();
-        self.scene.pieces = vec![Piece::new("room", room)];
+        self.scene.static_groups = vec![StaticGroup::new("room", room)];
         let changes = match &mut self.changed {
             None => Changes::Unknown,
             Some(changed) => {

@@ -7,7 +7,7 @@ use drawloom::process::Deferred;
 use drawloom::quality::Quality;
 use drawloom::scene::{Changes, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason, ShadowMaps};
+use drawloom::view::{IssueReason, SceneIssue, ShadowMaps};
 use drawloom::{Renderer, Submitter};
 use drawloom_testing::adapter;
 use drawloom_testing::limited::LimitedBackend;
@@ -70,7 +70,7 @@ pub enum Process {
 #[derive(Debug)]
 pub struct Frame {
     pub pictures: Vec<Picture>,
-    pub rejections: Vec<Rejection>,
+    pub scene_issues: Vec<SceneIssue>,
 }
 
 /// A renderer on any backend.
@@ -96,11 +96,10 @@ impl<B: Backend> Frames for Fixture<B> {
         let submitted = self.submitter.submit(recorded)?;
         let pictures = read_backs.iter().map(|read_back| read_back.read()).collect::<Result<_, _>>()?;
         // What is streamed is yet to arrive.
-        let is_expected = |known: &Rejection| {
-            !matches!(known.reason, RejectionReason::NotResident | RejectionReason::TextureNotResident)
-        };
-        let rejections = submitted.statistics.rejections.into_iter().filter(is_expected).collect();
-        Ok(Frame { pictures, rejections })
+        let is_expected =
+            |known: &SceneIssue| !matches!(known.reason, IssueReason::NotResident | IssueReason::TextureNotResident);
+        let scene_issues = submitted.statistics.scene_issues.into_iter().filter(is_expected).collect();
+        Ok(Frame { pictures, scene_issues })
     }
 }
 
@@ -169,14 +168,14 @@ pub fn expect_same(
     device: Device,
     options: Options,
     [scene, expected]: [SceneRef<'_>; 2],
-) -> Result<Vec<Rejection>, Failed> {
+) -> Result<Vec<SceneIssue>, Failed> {
     let expected = renderer(device, Options { limits: None, ..options })?.frame(expected)?;
     let first = frames.frame(scene)?;
     expect_pictures(&first, &expected)?;
     let second = frames.frame(SceneRef { changes: Changes::NONE, ..scene })?;
     expect_pictures(&second, &expected).map_err(|failed| format!("in the second frame: {failed:?}"))?;
-    let changed = || format!("{:?}, and then {:?}", first.rejections, second.rejections);
-    if first.rejections == second.rejections { Ok(first.rejections) } else { Err(changed().into()) }
+    let changed = || format!("{:?}, and then {:?}", first.scene_issues, second.scene_issues);
+    if first.scene_issues == second.scene_issues { Ok(first.scene_issues) } else { Err(changed().into()) }
 }
 
 /// # Errors
@@ -200,12 +199,12 @@ pub fn small(mut scene: Scene) -> Scene {
 }
 
 /// # Errors
-/// If the rejections are not these: of each reason how many, the first, and its name.
-pub fn expect_rejections(
-    found: &[Rejection],
-    expected: &[(RejectionReason, usize, usize, Option<&str>)],
+/// If the scene issues are not these: of each reason how many, the first, and its name.
+pub fn expect_scene_issues(
+    found: &[SceneIssue],
+    expected: &[(IssueReason, usize, usize, Option<&str>)],
 ) -> Result<(), Failed> {
-    let of = |known: &Rejection| (known.reason, known.count, known.first);
+    let of = |known: &SceneIssue| (known.reason, known.count, known.first);
     let is_same = found
         .iter()
         .map(|known| (of(known), known.name.as_deref()))

@@ -3,13 +3,13 @@
 use drawloom::backend::SceneLimits;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Light, Scene};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::view::internal::GpuLight;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, binding, expect_pictures, expect_rejections, expect_same, renderer, small};
+use crate::fixture::{Device, Options, binding, expect_pictures, expect_same, expect_scene_issues, renderer, small};
 
 pub const CASES: &[Case] = &[
     ("lights_beyond_a_buffer_are_left_out", Device::ALL, beyond_a_buffer),
@@ -54,12 +54,12 @@ fn beyond_a_buffer(device: Device) -> Result<(), Failed> {
         let mut frames = renderer(device, options)?;
         let valid = lights.iter().enumerate().filter(|(index, _)| *index != 3).map(|(_, light)| *light);
         let expected = lit_by(valid.take(capacity).collect());
-        let invalid = (RejectionReason::InvalidLight, 1, 3, None);
+        let invalid = (IssueReason::InvalidLight, 1, 3, None);
         // The invalid one is before them.
-        let limit = (RejectionReason::LightLimit, 40 - capacity.min(40), capacity + 1, None);
+        let limit = (IssueReason::LightLimit, 40 - capacity.min(40), capacity + 1, None);
         let pictures = [scene.as_scene_ref(), expected.as_scene_ref()];
-        let rejections = expect_same(&mut *frames, device, options, pictures)?;
-        expect_rejections(&rejections, &[invalid, limit][..if capacity < 40 { 2 } else { 1 }])?;
+        let scene_issues = expect_same(&mut *frames, device, options, pictures)?;
+        expect_scene_issues(&scene_issues, &[invalid, limit][..if capacity < 40 { 2 } else { 1 }])?;
     }
     Ok(())
 }
@@ -71,8 +71,8 @@ fn out_of_reach(device: Device) -> Result<(), Failed> {
         let (scene, expected) = (lit_by(lights(near)), lit_by(lights(near.min(12))));
         let mut frames = renderer(device, options)?;
         let pictures = [scene.as_scene_ref(), expected.as_scene_ref()];
-        let rejections = expect_same(&mut *frames, device, options, pictures)?;
-        expect_rejections(&rejections, &[(RejectionReason::LightLimit, 1, 42, None)][..near / 13])?;
+        let scene_issues = expect_same(&mut *frames, device, options, pictures)?;
+        expect_scene_issues(&scene_issues, &[(IssueReason::LightLimit, 1, 42, None)][..near / 13])?;
     }
     Ok(())
 }
@@ -94,8 +94,8 @@ fn shared_buffer(device: Device) -> Result<(), Failed> {
             }
         }
         let least = of_views.into_iter().min().unwrap_or(0);
-        let expected = [(RejectionReason::LightLimit, 40 - least, least, None)];
-        expect_rejections(&found.rejections, &expected[..usize::from(least < 40)])?;
+        let expected = [(IssueReason::LightLimit, 40 - least, least, None)];
+        expect_scene_issues(&found.scene_issues, &expected[..usize::from(least < 40)])?;
         expect_pictures(&frames.frame(scene.as_scene_ref())?, &found)?;
     }
     Ok(())
@@ -111,8 +111,8 @@ fn layers(device: Device) -> Result<(), Failed> {
     let options = Options { shadows: true, limits: binding(20 * LIGHT), ..Options::default() };
     let mut frames = renderer(device, options)?;
     let expected = lit_by(lights[..14].to_vec());
-    let rejections = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected.as_scene_ref()])?;
-    expect_rejections(&rejections, &[(RejectionReason::LightLimit, 6, 14, None)])
+    let scene_issues = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected.as_scene_ref()])?;
+    expect_scene_issues(&scene_issues, &[(IssueReason::LightLimit, 6, 14, None)])
 }
 
 fn changing(device: Device) -> Result<(), Failed> {
@@ -122,9 +122,9 @@ fn changing(device: Device) -> Result<(), Failed> {
         let lights = |count: usize| lit_by((0..count).map(lamp).collect());
         let (scene, expected) = (lights(count), lights(count.min(16)));
         let pictures = [scene.as_scene_ref(), expected.as_scene_ref()];
-        let rejections = expect_same(&mut *frames, device, options, pictures)?;
-        let expected = [(RejectionReason::LightLimit, count.saturating_sub(16), 16, None)];
-        expect_rejections(&rejections, &expected[..usize::from(count > 16)])?;
+        let scene_issues = expect_same(&mut *frames, device, options, pictures)?;
+        let expected = [(IssueReason::LightLimit, count.saturating_sub(16), 16, None)];
+        expect_scene_issues(&scene_issues, &expected[..usize::from(count > 16)])?;
     }
     Ok(())
 }

@@ -2,12 +2,12 @@
 
 use drawloom::backend::SceneLimits;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::scene::{Changes, Light, ObjectSet, Piece, SceneRef};
+use drawloom::scene::{Changes, Light, ObjectSet, SceneRef, StaticGroup};
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, expect_rejections, expect_same, renderer, small};
+use crate::fixture::{Device, Options, expect_same, expect_scene_issues, renderer, small};
 
 pub const CASES: &[Case] = &[
     ("lists_that_no_single_buffer_holds_lie_in_several", &[Device::Adapter, Device::Noop], several_buffers),
@@ -24,8 +24,9 @@ fn several_buffers(device: Device) -> Result<(), Failed> {
         range: 40.0,
         casts_shadow: true,
     });
-    for has_pieces in [false, true] {
-        scene.pieces = if has_pieces { vec![Piece::new("some", ObjectSet::new(10..60))] } else { Vec::new() };
+    for has_static_groups in [false, true] {
+        scene.static_groups =
+            if has_static_groups { vec![StaticGroup::new("some", ObjectSet::new(10..60))] } else { Vec::new() };
         for buffer_bytes in [80 * 64, 6 * 1024, 8 * 1024, 1 << 20] {
             let limits = SceneLimits { buffer_bytes, binding_bytes: 80 * 64, ..SceneLimits::NONE };
             let options = Options { shadows: true, limits: Some(limits), ..Options::default() };
@@ -34,9 +35,9 @@ fn several_buffers(device: Device) -> Result<(), Failed> {
                 let changes = if frame == 0 { Changes::Unknown } else { Changes::NONE };
                 let scene = SceneRef { changes, ..scene.as_scene_ref() };
                 let expected = SceneRef { changes: Changes::Unknown, ..scene };
-                let rejections = expect_same(&mut *frames, device, options, [scene, expected])
+                let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])
                     .map_err(|failed| format!("{buffer_bytes}, frame {frame}: {failed:?}"))?;
-                expect_rejections(&rejections, &[])?;
+                expect_scene_issues(&scene_issues, &[])?;
             }
         }
     }
@@ -71,5 +72,5 @@ fn of_the_device(device: Device) -> Result<(), Failed> {
         ..lent
     };
     let mut frames = renderer(device, Options { shadows: true, ..Options::default() })?;
-    expect_rejections(&frames.frame(scene)?.rejections, &[])
+    expect_scene_issues(&frames.frame(scene)?.scene_issues, &[])
 }

@@ -3,12 +3,12 @@
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::scene::{Bounds, Material, MaterialType, Mesh, RenderObject, Scene, SceneRef, Topology};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{field, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, binding, expect_rejections, expect_same, renderer, small};
+use crate::fixture::{Device, Options, binding, expect_same, expect_scene_issues, renderer, small};
 
 pub const CASES: &[Case] = &[
     ("materials_beyond_a_buffer_are_left_out", Device::ALL, beyond_a_buffer),
@@ -73,11 +73,11 @@ fn beyond_a_buffer(device: Device) -> Result<(), Failed> {
         let expected = only(scene, drawn, |object| slot_of(scene, object) < capacity);
         let left_out = scene.object_count() - expected.object_count();
         let mut frames = renderer(device, options)?;
-        let rejections = expect_same(&mut *frames, device, options, [scene, expected])?;
+        let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])?;
         let first = (0..scene.object_count()).find(|object| slot_of(scene, *object) >= capacity).unwrap_or(0);
         let name = format!("number {}", slot_of(scene, first));
-        let expected = [(RejectionReason::MaterialLimit, left_out, first, Some(name.as_str()))];
-        expect_rejections(&rejections, &expected[..usize::from(left_out > 0)])
+        let expected = [(IssueReason::MaterialLimit, left_out, first, Some(name.as_str()))];
+        expect_scene_issues(&scene_issues, &expected[..usize::from(left_out > 0)])
             .map_err(|failed| format!("{capacity}: {failed:?}"))?;
     }
     Ok(())
@@ -95,8 +95,8 @@ fn values(device: Device) -> Result<(), Failed> {
     let options = Options { limits: binding(64 * 64), ..Options::default() };
     let mut columns = Columns::default();
     let expected = only(scene, &mut columns, |object| object % 3 != 0 || object < 16);
-    let rejections = expect_same(&mut *renderer(device, options)?, device, options, [scene, expected])?;
-    expect_rejections(&rejections, &[(RejectionReason::MaterialLimit, 4, 18, Some("number 18"))])
+    let scene_issues = expect_same(&mut *renderer(device, options)?, device, options, [scene, expected])?;
+    expect_scene_issues(&scene_issues, &[(IssueReason::MaterialLimit, 4, 18, Some("number 18"))])
 }
 
 fn replaced(device: Device) -> Result<(), Failed> {
@@ -111,9 +111,9 @@ fn replaced(device: Device) -> Result<(), Failed> {
         let mut columns = Columns::default();
         let scene = scene.as_scene_ref();
         let expected = only(scene, &mut columns, |object| object != 20 || !is_wide);
-        let rejections = expect_same(&mut *frames, device, options, [scene, expected])?;
-        let expected = [(RejectionReason::MaterialLimit, 1, 20, Some("number 20"))];
-        expect_rejections(&rejections, &expected[..usize::from(is_wide)])?;
+        let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])?;
+        let expected = [(IssueReason::MaterialLimit, 1, 20, Some("number 20"))];
+        expect_scene_issues(&scene_issues, &expected[..usize::from(is_wide)])?;
     }
     Ok(())
 }

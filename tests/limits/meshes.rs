@@ -8,14 +8,14 @@ use drawloom::scene::{
     Blend, Camera, GeneratedBuffer, IndexBuffer, LevelOfDetail, Light, Material, Mesh, MeshBuffers, RenderObject,
     Scene, StreamAttribute, StreamLayout, Topology, Vertex, VertexStream,
 };
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::wgpu;
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::{field, sized, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, expect_pictures, expect_rejections, expect_same, renderer, small};
+use crate::fixture::{Device, Options, expect_pictures, expect_same, expect_scene_issues, renderer, small};
 
 pub const CASES: &[Case] = &[
     ("a_mesh_beyond_a_buffer_is_left_out", Device::ALL, beyond_a_buffer),
@@ -77,9 +77,9 @@ fn beyond_a_buffer(device: Device) -> Result<(), Failed> {
             let (scene, _) = with_mesh(mesh.clone(), is_seen)?;
             let expected = if fits { scene.as_scene_ref() } else { without_last(&scene) };
             let mut frames = renderer(device, options)?;
-            let rejections = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected])?;
-            let left_out = [(RejectionReason::UndrawableMesh, 3, 20, Some("statue"))];
-            expect_rejections(&rejections, &left_out[..usize::from(!fits)])
+            let scene_issues = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected])?;
+            let left_out = [(IssueReason::UndrawableMesh, 3, 20, Some("statue"))];
+            expect_scene_issues(&scene_issues, &left_out[..usize::from(!fits)])
                 .map_err(|failed| format!("mesh {index}, seen: {is_seen}: {failed:?}"))?;
         }
     }
@@ -95,10 +95,10 @@ fn replaced(device: Device) -> Result<(), Failed> {
         scene.replace(mesh, sized(vertices))?;
         let fits = vertices <= 128;
         let expected = if fits { scene.as_scene_ref() } else { without_last(&scene) };
-        let rejections = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected])?;
-        let is_undrawable = rejections.iter().any(|known| known.reason == RejectionReason::UndrawableMesh);
+        let scene_issues = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), expected])?;
+        let is_undrawable = scene_issues.iter().any(|known| known.reason == IssueReason::UndrawableMesh);
         if is_undrawable == fits {
-            return Err(format!("{vertices} vertices: {rejections:?}").into());
+            return Err(format!("{vertices} vertices: {scene_issues:?}").into());
         }
     }
     Ok(())
@@ -123,9 +123,9 @@ fn of_the_device(device: Device) -> Result<(), Failed> {
     let mut frames = renderer(device, Options::default())?;
     for (index, mesh) in meshes.into_iter().enumerate() {
         let (scene, _) = with_mesh(mesh, index % 2 == 0)?;
-        let rejections = frames.frame(scene.as_scene_ref())?.rejections;
-        let expected = [(RejectionReason::UndrawableMesh, 3, 20, Some("statue"))];
-        expect_rejections(&rejections, &expected).map_err(|failed| format!("mesh {index}: {failed:?}"))?;
+        let scene_issues = frames.frame(scene.as_scene_ref())?.scene_issues;
+        let expected = [(IssueReason::UndrawableMesh, 3, 20, Some("statue"))];
+        expect_scene_issues(&scene_issues, &expected).map_err(|failed| format!("mesh {index}: {failed:?}"))?;
     }
     Ok(())
 }
@@ -137,7 +137,7 @@ fn packed(device: Device) -> Result<(), Failed> {
     for (vertices, count) in [(VertexFormat::Full, 3), (VertexFormat::Packed, 0)] {
         let quality = Some(Quality { vertices, ..Quality::default() });
         let frame = renderer(device, Options { quality, ..Options::default() })?.frame(scene.as_scene_ref())?;
-        let reasons = frame.rejections.iter().filter(|known| known.reason == RejectionReason::UndrawableMesh);
+        let reasons = frame.scene_issues.iter().filter(|known| known.reason == IssueReason::UndrawableMesh);
         let found = reasons.map(|known| known.count).sum::<usize>();
         if found != count {
             return Err(format!("{vertices:?}: {found} objects are left out").into());
@@ -166,9 +166,9 @@ fn subdivided(_: Device) -> Result<(), Failed> {
     let (limited, free) = (draw(Some(ROOM))?, draw(None)?);
     // A floor shades nothing that is in sight.
     expect_pictures(&limited, &free)?;
-    let expected = [(RejectionReason::UndrawableMesh, 1, 0, Some("square"))];
-    expect_rejections(&free.rejections, &[])?;
-    expect_rejections(&limited.rejections, &expected)
+    let expected = [(IssueReason::UndrawableMesh, 1, 0, Some("square"))];
+    expect_scene_issues(&free.scene_issues, &[])?;
+    expect_scene_issues(&limited.scene_issues, &expected)
 }
 
 fn foreign_buffers(device: Device) -> Result<(), Failed> {
@@ -207,8 +207,9 @@ fn foreign_buffers(device: Device) -> Result<(), Failed> {
         for is_seen in [true, false] {
             let (scene, _) = with_mesh(mesh.clone(), is_seen)?;
             let mut frames = renderer(device, options)?;
-            let rejections = expect_same(&mut *frames, device, options, [scene.as_scene_ref(), without_last(&scene)])?;
-            expect_rejections(&rejections, &[(RejectionReason::UndrawableMesh, 3, 20, Some("statue"))])?;
+            let scene_issues =
+                expect_same(&mut *frames, device, options, [scene.as_scene_ref(), without_last(&scene)])?;
+            expect_scene_issues(&scene_issues, &[(IssueReason::UndrawableMesh, 3, 20, Some("statue"))])?;
         }
     }
     Ok(())

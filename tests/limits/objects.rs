@@ -1,19 +1,19 @@
 //! Objects beyond the capacity of a buffer.
 
-use drawloom::scene::{Changes, ObjectFilter, ObjectSet, Piece, Scene, SceneRef};
-use drawloom::view::{Rejection, RejectionReason};
+use drawloom::scene::{Changes, ObjectSet, Scene, SceneRef, StaticGroup, ViewFilter};
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, Process, binding, expect_rejections, expect_same, renderer, small};
+use crate::fixture::{Device, Options, Process, binding, expect_same, expect_scene_issues, renderer, small};
 use crate::wide_tints::{STRIDE, TINTS};
 
 pub const CASES: &[Case] = &[
     ("objects_beyond_a_buffer_are_left_out", Device::ALL, beyond_a_buffer),
     ("objects_that_change_beyond_a_buffer_are_left_out_until_they_fit", Device::ALL, changing),
-    ("pieces_and_filters_may_list_objects_beyond_a_buffer", Device::DRAWING, pieces_and_filters),
+    ("static_groups_and_filters_may_list_objects_beyond_a_buffer", Device::DRAWING, static_groups_and_filters),
     ("a_column_that_is_read_decides_how_many_objects_there_are", Device::DRAWING, columns),
 ];
 
@@ -44,21 +44,20 @@ fn beyond_a_buffer(device: Device) -> Result<(), Failed> {
         let options = Options { limits: binding(capacity * 64 + 63), ..Options::default() };
         let mut frames = renderer(device, options)?;
         let expected = first_objects(scene, capacity);
-        let rejections = expect_same(&mut *frames, device, options, [scene, expected])?;
-        expect_object_limit(&rejections, scene, capacity).map_err(|failed| format!("{capacity}: {failed:?}"))?;
+        let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])?;
+        expect_object_limit(&scene_issues, scene, capacity).map_err(|failed| format!("{capacity}: {failed:?}"))?;
     }
     Ok(())
 }
 
 /// # Errors
 /// If the objects from `capacity` on are not those that are left out.
-fn expect_object_limit(found: &[Rejection], scene: SceneRef<'_>, capacity: usize) -> Result<(), Failed> {
+fn expect_object_limit(found: &[SceneIssue], scene: SceneRef<'_>, capacity: usize) -> Result<(), Failed> {
     let beyond = scene.object_count().saturating_sub(capacity);
-    let found: Vec<_> =
-        found.iter().filter(|rejection| rejection.reason == RejectionReason::ObjectLimit).cloned().collect();
+    let found: Vec<_> = found.iter().filter(|issue| issue.reason == IssueReason::ObjectLimit).cloned().collect();
     let name = scene.meshes.get(capacity).and_then(|mesh| scene.assets.get(*mesh).ok()).map(|mesh| mesh.name());
-    let expected = [(RejectionReason::ObjectLimit, beyond, capacity, name)];
-    expect_rejections(&found, &expected[..usize::from(beyond > 0)])
+    let expected = [(IssueReason::ObjectLimit, beyond, capacity, name)];
+    expect_scene_issues(&found, &expected[..usize::from(beyond > 0)])
 }
 
 fn changing(device: Device) -> Result<(), Failed> {
@@ -74,9 +73,9 @@ fn changing(device: Device) -> Result<(), Failed> {
         for step in 0..12 {
             let scene = world.as_scene_ref();
             most = most.max(scene.object_count());
-            let rejections = expect_same(&mut *frames, device, options, [scene, first_objects(scene, CAPACITY)])
+            let scene_issues = expect_same(&mut *frames, device, options, [scene, first_objects(scene, CAPACITY)])
                 .map_err(|failed| format!("seed {seed}, step {step}: {failed:?}"))?;
-            expect_object_limit(&rejections, scene, CAPACITY)?;
+            expect_object_limit(&scene_issues, scene, CAPACITY)?;
             world.step()?;
         }
         if most <= CAPACITY {
@@ -86,32 +85,32 @@ fn changing(device: Device) -> Result<(), Failed> {
     Ok(())
 }
 
-fn pieces_and_filters(device: Device) -> Result<(), Failed> {
+fn static_groups_and_filters(device: Device) -> Result<(), Failed> {
     const CAPACITY: usize = 100;
     let options = Options { limits: binding(CAPACITY * 64), ..Options::default() };
     let with_sets = |last: u32| {
         let mut scene = small(field(150));
-        let piece = |name, objects: std::ops::Range<u32>| {
-            Piece::new(name, ObjectSet::new(objects.filter(|object| *object < last)))
+        let static_group = |name, objects: std::ops::Range<u32>| {
+            StaticGroup::new(name, ObjectSet::new(objects.filter(|object| *object < last)))
         };
-        scene.pieces = vec![piece("within", 5..40), piece("across", 90..120), piece("beyond", 120..160)];
-        scene.cameras[1].filter = ObjectFilter::except(ObjectSet::new((80..130).chain([700]).filter(|at| *at < last)));
+        scene.static_groups =
+            vec![static_group("within", 5..40), static_group("across", 90..120), static_group("beyond", 120..160)];
+        scene.cameras[1].filter = ViewFilter::except(ObjectSet::new((80..130).chain([700]).filter(|at| *at < last)));
         scene
     };
     let (scene, reduced) = (with_sets(u32::MAX), with_sets(CAPACITY as u32));
     let mut frames = renderer(device, options)?;
-    // Pieces are recorded in the second frame, and executed from the third on.
+    // Static groups are recorded in the second frame, and executed from the third on.
     for frame in 0..4 {
         let changes = if frame == 0 { Changes::Unknown } else { Changes::NONE };
         let scene = SceneRef { changes, ..scene.as_scene_ref() };
         let expected = first_objects(reduced.as_scene_ref(), CAPACITY);
-        let rejections = expect_same(&mut *frames, device, options, [scene, expected])?;
+        let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])?;
         let square = Some("square");
         let name = scene.assets.get(scene.meshes[CAPACITY]).ok().map(|mesh| mesh.name()).or(square);
         // What the scene has is not unknown because it is beyond.
-        let expected =
-            [(RejectionReason::ObjectLimit, 50, CAPACITY, name), (RejectionReason::UnknownObject, 11, 150, None)];
-        expect_rejections(&rejections, &expected)?;
+        let expected = [(IssueReason::ObjectLimit, 50, CAPACITY, name), (IssueReason::UnknownObject, 11, 150, None)];
+        expect_scene_issues(&scene_issues, &expected)?;
     }
     Ok(())
 }
@@ -139,9 +138,9 @@ fn columns(device: Device) -> Result<(), Failed> {
         let room = if is_blended { capacity } else { tints.len() };
         let some = [TINTS.values(&tints[..room])];
         let expected = SceneRef { columns: &some, ..first_objects(scene, room) };
-        let rejections = expect_same(&mut *frames, device, options, [scene, expected])
+        let scene_issues = expect_same(&mut *frames, device, options, [scene, expected])
             .map_err(|failed| format!("blended: {is_blended}: {failed:?}"))?;
-        expect_object_limit(&rejections, scene, room)?;
+        expect_object_limit(&scene_issues, scene, room)?;
     }
     Ok(())
 }

@@ -2,12 +2,12 @@
 
 use drawloom::glam::DVec3;
 use drawloom::scene::{Material, RenderObject, Texture, Topology};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{field, square};
 use libtest_mimic::Failed;
 
 use crate::Case;
-use crate::fixture::{Device, Options, expect_rejections, renderer, small};
+use crate::fixture::{Device, Options, expect_scene_issues, renderer, small};
 
 /// The null backend has no textures.
 pub const CASES: &[Case] = &[(
@@ -33,9 +33,9 @@ fn reduced(device: Device) -> Result<(), Failed> {
     let mut frames = renderer(device, Options::default())?;
     let mut expect = |scene: &drawloom::scene::Scene, count, first, name: Option<&str>| {
         for _ in 0..2 {
-            let found = frames.frame(scene.as_scene_ref())?.rejections;
-            let expected = [(RejectionReason::ReducedTexture, count, first, name)];
-            expect_rejections(&found, &expected[..usize::from(count > 0)])?;
+            let found = frames.frame(scene.as_scene_ref())?.scene_issues;
+            let expected = [(IssueReason::ReducedTexture, count, first, name)];
+            expect_scene_issues(&found, &expected[..usize::from(count > 0)])?;
         }
         Ok::<_, Failed>(())
     };
@@ -44,7 +44,7 @@ fn reduced(device: Device) -> Result<(), Failed> {
     scene.replace(textures[1], small)?;
     expect(&scene, 1, 3, Some("1 by 8192"))?;
     scene.remove(textures[3])?;
-    let stale = frames.frame(scene.as_scene_ref())?.rejections;
-    let is_reduced = stale.iter().any(|known| known.reason == RejectionReason::ReducedTexture);
+    let stale = frames.frame(scene.as_scene_ref())?.scene_issues;
+    let is_reduced = stale.iter().any(|known| known.reason == IssueReason::ReducedTexture);
     if is_reduced { Err(format!("{stale:?}").into()) } else { Ok(()) }
 }

@@ -14,7 +14,7 @@ use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen
 use drawloom::scene::{Mesh, Texture};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Timeline;
-use drawloom::{FramePlace, Renderer, Submitter};
+use drawloom::{FencePoint, Renderer, Submitter};
 use drawloom_async_post::{AsyncPost, AsyncStep, StepFrame, StepSource};
 use libtest_mimic::Failed;
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
@@ -225,7 +225,7 @@ fn asked(backend: WgpuBackend, process: Option<Unused>) -> Result<Renderer<WgpuB
     Ok(renderer)
 }
 
-fn submit(recorded: drawloom::Recorded<WgpuBackend>) -> Result<(), Failed> {
+fn submit(recorded: drawloom::RecordedFrame<WgpuBackend>) -> Result<(), Failed> {
     // Taken out, so that callbacks of the submission ask nobody.
     let submitter = ASKED.take().ok_or("it is there")?;
     submitter.submit(recorded)?;
@@ -302,7 +302,7 @@ fn uploads() -> Result<(), Failed> {
             // The uploads of a frame call back for the frame before.
             let what = format_args!("answers in frame {number}, streamed: {streams}");
             same(ANSWERS.get(), usize::from(number), what)?;
-            recorded.fence_at(FramePlace::End)?.on_set(|_| ask());
+            recorded.fence_at(FencePoint::End)?.on_set(|_| ask());
             submit(recorded)?;
         }
         // The callback of the last frame runs when the queue is dropped, and asks nobody.

@@ -10,7 +10,7 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
-use drawloom::{FrameError, Recorded, Renderer, Submitted, Submitter};
+use drawloom::{FrameError, RecordedFrame, Renderer, SubmittedFrame, Submitter};
 use drawloom_testing::adapter::noop_device;
 use libtest_mimic::Failed;
 
@@ -128,11 +128,11 @@ impl<B: Backend> Fixture<B> {
         Ok(Self { renderer, submitter })
     }
 
-    pub fn record(&mut self, scene: &Scene) -> Result<Recorded<B>, FrameError> {
+    pub fn record(&mut self, scene: &Scene) -> Result<RecordedFrame<B>, FrameError> {
         self.renderer.record(scene.as_scene_ref())
     }
 
-    pub fn draw(&mut self, scene: &Scene) -> Result<Submitted<B>, Failed> {
+    pub fn draw(&mut self, scene: &Scene) -> Result<SubmittedFrame<B>, Failed> {
         let recorded = self.record(scene)?;
         Ok(self.submitter.submit(recorded)?)
     }

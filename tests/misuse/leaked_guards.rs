@@ -13,7 +13,7 @@ use drawloom::graph::NodeError;
 use drawloom::process::Deferred;
 use drawloom::scene::{GeneratedBuffer, NodeColumn, SceneRef, WrittenColumns};
 use drawloom::task::{Scheduler, Worker};
-use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeContext};
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -73,7 +73,7 @@ struct Node<D, R>(D, R);
 impl<D, R> CpuNode for Node<D, R>
 where
     D: Fn(&mut NodeAccesses) + Send + Sync,
-    R: Fn(&NodeFrame<'_>) -> Result<(), NodeError> + Send + Sync,
+    R: Fn(&NodeContext<'_>) -> Result<(), NodeError> + Send + Sync,
 {
     fn name(&self) -> &str {
         "leaks"
@@ -83,7 +83,7 @@ where
         (self.0)(accesses);
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         (self.1)(frame)
     }
 }
@@ -98,7 +98,7 @@ fn node_draw_lists() -> Result<(), Failed> {
         let declare = |accesses: &mut NodeAccesses| {
             accesses.reads(FrameData::DrawLists).reads(FrameData::VisibleObjects);
         };
-        let node = Node(declare, |frame: &NodeFrame<'_>| {
+        let node = Node(declare, |frame: &NodeContext<'_>| {
             for view in 0..frame.views().len() {
                 for process in PROCESSES {
                     mem::forget(frame.draw_list(process, view)?);
@@ -124,7 +124,7 @@ fn generated() -> Result<(), Failed> {
         };
         let fill = |leaked: Option<usize>| {
             let buffer = &buffer;
-            Node(declare, move |frame: &NodeFrame<'_>| {
+            Node(declare, move |frame: &NodeContext<'_>| {
                 for chunk in 0..2 {
                     let mut filled = frame.fill(buffer, chunk)?;
                     filled.fill(7);
@@ -159,7 +159,7 @@ fn columns() -> Result<(), Failed> {
         let declare = |accesses: &mut NodeAccesses| {
             accesses.writes(FrameData::Transforms);
         };
-        let node = Node(declare, |_: &NodeFrame<'_>| {
+        let node = Node(declare, |_: &NodeContext<'_>| {
             let mut chunk = column.write(0)?;
             chunk[0] = DVec3::X;
             mem::forget(chunk);

@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Blend, Material, Mesh, RenderObject, Scene, Texture, Topology};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{cube, field, square, textured};
 use libtest_mimic::Failed;
 
@@ -146,10 +146,10 @@ fn removed_texture() -> Result<(), Failed> {
     scene.remove(textures[1])?;
     for _ in 0..2 {
         let recorded = fixture.record(&scene)?;
-        let rejections = recorded.statistics().rejections.iter();
-        let rejections: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count)).collect();
-        if rejections != [(RejectionReason::StaleTexture, 1)] {
-            return Err(format!("{rejections:?}").into());
+        let scene_issues = recorded.statistics().scene_issues.iter();
+        let scene_issues: Vec<_> = scene_issues.map(|issue| (issue.reason, issue.count)).collect();
+        if scene_issues != [(IssueReason::StaleTexture, 1)] {
+            return Err(format!("{scene_issues:?}").into());
         }
     }
     Ok(())

@@ -8,7 +8,7 @@ use drawloom::graph::NodeError;
 use drawloom::process::{ClearColor, Declare, DrawCount, Draws, Format, ProceduralDraws, RenderProcess, StorageBuffer};
 use drawloom::scene::{Camera, GeneratedBuffer, Scene};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 use drawloom_testing::hills::{self, GeneratedHills};
 use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
@@ -127,7 +127,7 @@ impl CpuNode for Columns {
         accesses.fills(&self.colors).fills(&self.arguments);
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         let green = self.count as f32 / 255.0;
         frame.fill(&self.colors, 0)?.fill([1.0, green, 0.0, 1.0]);
         frame.set_count(&self.colors, self.count)?;

@@ -15,7 +15,7 @@ use drawloom::process::{
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::DeviceLog;
-use drawloom::{Recorded, Renderer, wgpu};
+use drawloom::{RecordedFrame, Renderer, wgpu};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -43,7 +43,7 @@ fn timing() -> Result<WgpuBackend, Failed> {
 }
 
 /// The names of process and view of every pass of a frame, in submission order.
-fn names_of(fixture: &Fixture, recorded: &Recorded<WgpuBackend>) -> Vec<(String, String)> {
+fn names_of(fixture: &Fixture, recorded: &RecordedFrame<WgpuBackend>) -> Vec<(String, String)> {
     let views = &recorded.statistics().views;
     // One view after the other, in the order of their groups.
     let groups = fixture.renderer.plan().view_groups();

@@ -10,7 +10,7 @@ use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Light, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason, ShadowMaps};
+use drawloom::view::{IssueReason, SceneIssue, ShadowMaps};
 use drawloom::{FrameError, Granularity, Renderer, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::{field, textured};
@@ -122,11 +122,11 @@ fn many_objects() -> Result<(), Failed> {
         let first_beyond = scene.as_scene_ref().meshes.get(capacity);
         let name = first_beyond.and_then(|mesh| Some(scene.assets().get(*mesh).ok()?.name()));
         let found: Vec<_> = statistics
-            .rejections
+            .scene_issues
             .iter()
             .map(|known| (known.reason, known.count, known.first, known.name.as_deref()))
             .collect();
-        let expected = [(RejectionReason::ObjectLimit, beyond, capacity, name)];
+        let expected = [(IssueReason::ObjectLimit, beyond, capacity, name)];
         if found != expected[..usize::from(beyond > 0)] || statistics.objects != scene.object_count() {
             return Err(format!("{} objects: {found:?}", scene.object_count()).into());
         }
@@ -204,11 +204,11 @@ fn count_shadow_maps<B: Backend>(backend: B, layers: usize) -> Result<(), Failed
         let statistics = recorded.statistics();
         let found = statistics.views.iter().filter(|view| view.kind == ViewKind::Shadow).count();
         let expected: Vec<_> =
-            without.first().map(|first| (RejectionReason::ShadowMapLimit, without.len(), *first)).into_iter().collect();
-        let rejections = statistics.rejections.iter().map(|found| (found.reason, found.count, found.first));
-        let rejections: Vec<_> = rejections.collect();
-        if found != layers - room || rejections != expected {
-            return Err(format!("case {index}: {found} of {} maps, {rejections:?}", layers - room).into());
+            without.first().map(|first| (IssueReason::ShadowMapLimit, without.len(), *first)).into_iter().collect();
+        let scene_issues = statistics.scene_issues.iter().map(|found| (found.reason, found.count, found.first));
+        let scene_issues: Vec<_> = scene_issues.collect();
+        if found != layers - room || scene_issues != expected {
+            return Err(format!("case {index}: {found} of {} maps, {scene_issues:?}", layers - room).into());
         }
         if statistics.lights != scene.lights.len() {
             return Err(format!("case {index}: {} lights", statistics.lights).into());
@@ -262,8 +262,8 @@ fn many_textures() -> Result<(), Failed> {
     let (mut renderer, _) =
         Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
     let recorded = renderer.record(textured(layers + 2).0.as_scene_ref())?;
-    match recorded.statistics().rejections.as_slice() {
-        [Rejection { reason: RejectionReason::TextureLimit, count: 2, .. }] => Ok(()),
+    match recorded.statistics().scene_issues.as_slice() {
+        [SceneIssue { reason: IssueReason::TextureLimit, count: 2, .. }] => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }

@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::scene::{Camera, Light, Material, RenderObject, Scene, Topology};
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{sized, square};
 use libtest_mimic::Failed;
 
@@ -90,9 +90,9 @@ fn expect_coarse(scene: &Scene, object: usize) -> Result<(), Failed> {
     let mut fixture = Fixture::new()?;
     for _ in 0..2 {
         let recorded = fixture.record(scene)?;
-        let rejections = recorded.statistics().rejections.iter();
-        let counts: Vec<_> = rejections.map(|rejection| (rejection.reason, rejection.count, rejection.first)).collect();
-        if counts != [(RejectionReason::CoarseEdges, 1, object)] {
+        let scene_issues = recorded.statistics().scene_issues.iter();
+        let counts: Vec<_> = scene_issues.map(|issue| (issue.reason, issue.count, issue.first)).collect();
+        if counts != [(IssueReason::CoarseEdges, 1, object)] {
             return Err(format!("{counts:?}").into());
         }
         fixture.submit(recorded)?;

@@ -7,7 +7,7 @@ use drawloom::backend::BackendError;
 use drawloom::fence::FenceError;
 use drawloom::glam::DVec3;
 use drawloom::scene::Scene;
-use drawloom::{Buffering, FrameLoop, FramePlace};
+use drawloom::{Buffering, FencePoint, FrameLoop};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -37,11 +37,11 @@ fn every_place() -> Result<(), Failed> {
     let expected = fixture.draw(&scene)?;
     let mut recorded = fixture.record(&scene)?;
     let passes: Vec<_> = recorded.queues().iter().flat_map(|queue| &queue.passes).map(|(pass, _)| *pass).collect();
-    let mut fences = vec![recorded.fence_at(FramePlace::End)?];
+    let mut fences = vec![recorded.fence_at(FencePoint::End)?];
     for pass in passes {
         let process = &fixture.renderer.plan().processes()[pass.process_index].name;
-        fences.push(recorded.fence_at(FramePlace::Pass { process, view: pass.view_index })?);
-        fences.push(recorded.fence_at(FramePlace::View(pass.view_index))?);
+        fences.push(recorded.fence_at(FencePoint::Pass { process, view: pass.view_index })?);
+        fences.push(recorded.fence_at(FencePoint::View(pass.view_index))?);
     }
     let (calls, called) = channel();
     for fence in &fences {
@@ -70,7 +70,7 @@ fn read_back_after_fence() -> Result<(), Failed> {
     for _ in 0..5 {
         let mut recorded = fixture.record(&scene)?;
         let picture = recorded.read_back(0, "picture", [0, 0], [64, 48])?;
-        let drawn = recorded.fence_at(FramePlace::End)?;
+        let drawn = recorded.fence_at(FencePoint::End)?;
         fixture.submit(recorded)?;
         drawn.wait(LONG)?;
         if picture.try_read()?.is_none() {
@@ -86,9 +86,9 @@ fn lost_device() -> Result<(), Failed> {
         Fixture::on((device.clone(), queue), 2, |builder| builder.deferred(drawloom::process::Deferred::to_picture()))?;
     let scene = scene();
     let mut submitted = fixture.record(&scene)?;
-    let in_flight = submitted.fence_at(FramePlace::End)?;
+    let in_flight = submitted.fence_at(FencePoint::End)?;
     let mut recorded = fixture.record(&scene)?;
-    let never_drawn = [recorded.fence_at(FramePlace::View(0))?, recorded.fence_at(FramePlace::End)?];
+    let never_drawn = [recorded.fence_at(FencePoint::View(0))?, recorded.fence_at(FencePoint::End)?];
     fixture.submit(submitted)?;
     device.destroy();
     // The device may have drawn that frame before. If it has not, that is an error, and nobody waits for ever.

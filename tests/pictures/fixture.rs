@@ -6,7 +6,7 @@ use drawloom::backend::{Picture, SoftwareBackend, WgpuBackend, WgpuSubmission};
 use drawloom::process::Deferred;
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
-use drawloom::{Recorded, Renderer, RendererBuilder, Submitter, wgpu};
+use drawloom::{RecordedFrame, Renderer, RendererBuilder, Submitter, wgpu};
 use drawloom_testing::adapter;
 use half::f16;
 use libtest_mimic::Failed;
@@ -69,11 +69,11 @@ impl Fixture {
         Ok(Self { renderer, submitter })
     }
 
-    pub fn record(&mut self, scene: &Scene) -> Result<Recorded<WgpuBackend>, Failed> {
+    pub fn record(&mut self, scene: &Scene) -> Result<RecordedFrame<WgpuBackend>, Failed> {
         Ok(self.renderer.record(scene.as_scene_ref())?)
     }
 
-    pub fn submit(&self, recorded: Recorded<WgpuBackend>) -> Result<WgpuSubmission, Failed> {
+    pub fn submit(&self, recorded: RecordedFrame<WgpuBackend>) -> Result<WgpuSubmission, Failed> {
         Ok(self.submitter.submit(recorded)?.submission)
     }
 

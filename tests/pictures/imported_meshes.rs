@@ -11,7 +11,7 @@ use drawloom::scene::{
     Vertex, VertexAttribute, VertexStream,
 };
 use drawloom::task::Scheduler;
-use drawloom::view::{Rejection, RejectionReason};
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom::wgpu::util::DeviceExt;
 use drawloom::wgpu::{BufferUsages, IndexFormat, VertexFormat as Format};
 use drawloom::{Renderer, wgpu};
@@ -422,11 +422,10 @@ fn another_kind() -> Result<(), Failed> {
     let refused = with_meshes(field(30), |_| with_color(Format::Uint8x4));
     for _ in 0..2 {
         let recorded = fixture.record(&refused)?;
-        let rejections = &recorded.statistics().rejections;
-        let is_it = |known: &Rejection| {
-            (known.reason, known.name.as_deref()) == (RejectionReason::UndrawableMesh, Some("rock"))
-        };
-        expect(rejections.len() == 1 && is_it(&rejections[0]), || format!("{rejections:?}"))?;
+        let scene_issues = &recorded.statistics().scene_issues;
+        let is_it =
+            |known: &SceneIssue| (known.reason, known.name.as_deref()) == (IssueReason::UndrawableMesh, Some("rock"));
+        expect(scene_issues.len() == 1 && is_it(&scene_issues[0]), || format!("{scene_issues:?}"))?;
         let found = pictures(&mut fixture, &refused)?;
         for (index, picture) in found.iter().enumerate() {
             let of_both = if index % 2 == 0 { &expected } else { &nothing };
@@ -478,10 +477,10 @@ fn too_large() -> Result<(), Failed> {
 /// If its 30 objects are not counted, with the name of the first mesh.
 fn expect_left_out(fixture: &mut Fixture, scene: &Scene, name: &str) -> Result<(), Failed> {
     let recorded = fixture.renderer.record(scene.as_scene_ref())?;
-    let rejections = recorded.statistics().rejections.clone();
-    let expected = [(RejectionReason::UndrawableMesh, 30, 0, Some(name))];
-    let found = rejections.iter().map(|known| (known.reason, known.count, known.first, known.name.as_deref()));
-    expect(found.eq(expected), || format!("{rejections:?}"))?;
+    let scene_issues = recorded.statistics().scene_issues.clone();
+    let expected = [(IssueReason::UndrawableMesh, 30, 0, Some(name))];
+    let found = scene_issues.iter().map(|known| (known.reason, known.count, known.first, known.name.as_deref()));
+    expect(found.eq(expected), || format!("{scene_issues:?}"))?;
     fixture.submit(recorded).map(drop)
 }
 
@@ -578,16 +577,16 @@ fn on_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
     let (mut renderer, _) = builder.build(scheduler)?;
-    let mut rejections = |scene: Scene| {
+    let mut scene_issues = |scene: Scene| {
         let recorded = renderer.record(scene.as_scene_ref())?;
-        Ok::<_, Failed>(recorded.statistics().rejections.clone())
+        Ok::<_, Failed>(recorded.statistics().scene_issues.clone())
     };
-    let found = rejections(moved_to_device(field(30), BufferLayout::SeparateStreams, 2)?)?;
+    let found = scene_issues(moved_to_device(field(30), BufferLayout::SeparateStreams, 2)?)?;
     let names: Vec<_> = found.iter().map(|known| (known.reason, known.count, known.name.as_deref())).collect();
-    expect(names == [(RejectionReason::UndrawableMesh, 10, Some("square"))], || format!("{found:?}"))?;
+    expect(names == [(IssueReason::UndrawableMesh, 10, Some("square"))], || format!("{found:?}"))?;
     // No object of this one has the mesh in buffers.
     for scene in [moved_to_device(field(2), BufferLayout::SeparateStreams, 2)?, field(30)] {
-        let found = rejections(scene)?;
+        let found = scene_issues(scene)?;
         expect(found.is_empty(), || format!("{found:?}"))?;
     }
     Ok(())

@@ -3,7 +3,7 @@
 use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy, WgpuBackend};
 use drawloom::process::{Deferred, Format, GeometryFormats, ToneMapping};
 use drawloom::scene::{Scene, SceneRef};
-use drawloom::{FrameError, Recorded, wgpu};
+use drawloom::{FrameError, RecordedFrame, wgpu};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 use libtest_mimic::Failed;
@@ -56,7 +56,7 @@ fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<Picture>, Failed> {
     pictures(fixture, recorded, scene.cameras.len())
 }
 
-fn pictures(fixture: &Fixture, recorded: Recorded<WgpuBackend>, views: usize) -> Result<Vec<Picture>, Failed> {
+fn pictures(fixture: &Fixture, recorded: RecordedFrame<WgpuBackend>, views: usize) -> Result<Vec<Picture>, Failed> {
     let submission = fixture.submit(recorded)?;
     (0..views).map(|view| Ok(submission.read(view, "picture")?)).collect()
 }

@@ -12,7 +12,7 @@ use drawloom::scene::{Blend, Material, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
 use drawloom::view::internal::LightClass;
-use drawloom::{Recorded, Renderer, RendererBuilder, Submitter};
+use drawloom::{RecordedFrame, Renderer, RendererBuilder, Submitter};
 use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror, glasses, without_shadow};
 use libtest_mimic::Failed;
 
@@ -79,7 +79,7 @@ struct Drawer<B: Backend> {
 }
 
 impl<B: Backend> Drawer<B> {
-    fn record(&mut self, scene: &Scene) -> Result<Recorded<B>, Failed> {
+    fn record(&mut self, scene: &Scene) -> Result<RecordedFrame<B>, Failed> {
         Ok(self.renderer.record(scene.as_scene_ref())?)
     }
 

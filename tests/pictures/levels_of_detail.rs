@@ -4,7 +4,7 @@
 use drawloom::backend::{EncodingStrategy, Picture, RecordingStrategy};
 use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
-use drawloom::quality::{DepthCurve, DepthKey, Quality, ShadowQuality};
+use drawloom::quality::{DepthCurve, DepthPrecision, Quality, ShadowQuality};
 use drawloom::scene::{Camera, Material, RenderObject, Scene};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::leveled::{coarsest, distance_from_edges, globe, halved, plates, whole};
@@ -110,7 +110,7 @@ fn changing_levels() -> Result<(), Failed> {
         let found = frames(strategies, quality(0.7))?;
         expect(found == (expected.clone(), triangles.clone()), || format!("a picture differs with {strategies:?}"))?;
     }
-    let opaque_order = DepthKey { bits: 20, curve: DepthCurve::Logarithmic };
+    let opaque_order = DepthPrecision { bits: 20, curve: DepthCurve::Logarithmic };
     let (by_depth, _) = frames(PLAIN, Quality { opaque_order, ..quality(0.7) })?;
     expect(by_depth == expected, || "a picture differs with another order".to_owned())
 }

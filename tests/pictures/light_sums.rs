@@ -2,12 +2,14 @@
 
 use drawloom::backend::WgpuBackend;
 use drawloom::glam::{DVec3, Vec2, Vec3};
-use drawloom::process::{Declare, Deferred, Deformation, Draws, GeometryFormats, LightVolumes, Place, RenderProcess};
+use drawloom::process::{
+    Declare, Deferred, Deformation, Draws, GeometryFormats, InjectionPoint, LightVolumes, RenderProcess,
+};
 use drawloom::quality::{DiffuseFormat, NormalFormat, Quality, RadianceSum};
 use drawloom::scene::{
     Blend, Camera, LayerMask, Light, LightKind, Material, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
 };
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::view::internal::LightClass;
 use drawloom_testing::adapter;
 use drawloom_testing::light_sums::{SUMS, SumScene, blended_scenes, light_scenes, quality};
@@ -85,9 +87,9 @@ fn without_float_blending() -> Result<(), Failed> {
             light_scenes().iter().chain(&blended_scenes()).filter(|scene| scene.lights.max(scene.objects) <= 100)
         {
             let recorded = fixture.record(&scene.scene)?;
-            let reported = recorded.statistics().rejections.iter().map(|rejection| rejection.reason);
+            let reported = recorded.statistics().scene_issues.iter().map(|issue| issue.reason);
             let reported: Vec<_> = reported.collect();
-            let expected = if scene.objects == 0 { &[][..] } else { &[RejectionReason::HalfFloatBlending] };
+            let expected = if scene.objects == 0 { &[][..] } else { &[IssueReason::HalfFloatBlending] };
             if reported != expected {
                 return Err(format!("{sum:?}: {}: {reported:?}", scene.name).into());
             }
@@ -117,9 +119,9 @@ fn own_without_float_blending() -> Result<(), Failed> {
             builder.deferred(deferred).quality(quality(RadianceSum::Float))
         };
         let recorded = Fixture::on(device, 2, build)?.record(&scene.scene)?;
-        let mut rejections = recorded.statistics().rejections.iter();
-        if rejections.any(|rejection| rejection.reason == RejectionReason::HalfFloatBlending) != is_counted {
-            return Err(format!("{name}: {:?}", recorded.statistics().rejections).into());
+        let mut scene_issues = recorded.statistics().scene_issues.iter();
+        if scene_issues.any(|issue| issue.reason == IssueReason::HalfFloatBlending) != is_counted {
+            return Err(format!("{name}: {:?}", recorded.statistics().scene_issues).into());
         }
     }
     Ok(())
@@ -273,7 +275,7 @@ impl RenderProcess for Shown {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterTransparency);
+        declare.at(InjectionPoint::AfterTransparency);
         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
         declare.draws_over("radiance");
     }

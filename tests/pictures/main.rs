@@ -42,8 +42,8 @@ mod masks;
 mod materials;
 mod mip_levels;
 mod multisampling;
-mod object_filter;
-mod pieces;
+mod view_filter;
+mod static_groups;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -125,8 +125,8 @@ fn main() {
         (materials::CASES, Needs::Adapter),
         (mip_levels::CASES, Needs::Adapter),
         (multisampling::CASES, Needs::Adapter),
-        (object_filter::CASES, Needs::Adapter),
-        (pieces::CASES, Needs::Adapter),
+        (view_filter::CASES, Needs::Adapter),
+        (static_groups::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),

@@ -7,8 +7,8 @@ use drawloom::backend::{Backend, EncodingStrategy, RecordingStrategy, SoftwareBa
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    BlendEquation, CommandDraws, CpuShader, Declare, Deferred, Draws, GeometryBuffer, GeometryFormats, ObjectCpuShader,
-    ObjectPixel, PassInputs, Place, RawPass, RawPassResources, RenderProcess, ShaderObject, ShaderResource,
+    BlendEquation, CommandDraws, CpuShader, Declare, Deferred, Draws, GeometryBuffer, GeometryFormats, InjectionPoint,
+    ObjectCpuShader, ObjectPixel, PassInputs, RawPass, RawPassResources, RenderProcess, ShaderObject, ShaderResource,
     Transparency, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector4};
@@ -162,7 +162,7 @@ impl RenderProcess for Colored {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.draws_over("radiance");
         declare.draws_depth("depth");
         match (&self.layer, self.is_striped) {

@@ -1,7 +1,7 @@
 //! Views that show what other views, and they themselves, held in the frame before.
 
 use drawloom::glam::DVec3;
-use drawloom::process::{CpuShader, Declare, Deferred, Draws, Place, RenderProcess};
+use drawloom::process::{CpuShader, Declare, Deferred, Draws, InjectionPoint, RenderProcess};
 use drawloom::scene::{Camera, LayerMask, ViewKind};
 use drawloom_testing::feedback::{DrawnView, check, with_feedback};
 use libtest_mimic::Failed;
@@ -58,7 +58,7 @@ impl RenderProcess for LateMirror {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view_previous(ViewKind::Reflection, "mirror", "radiance");
         declare.draws_over("radiance");
         declare.matches_depth("depth");

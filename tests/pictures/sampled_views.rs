@@ -6,8 +6,8 @@ use drawloom::backend::{Picture, SoftwareBackend, WgpuSubmission};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Deferred, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
-    ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    CommandDraws, CpuShader, Declare, Deferred, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs,
+    RenderProcess, ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{
@@ -54,7 +54,7 @@ impl RenderProcess for Surface {
 
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, self.view, "radiance");
         declare.draws_over("radiance");
         declare.matches_depth("depth");

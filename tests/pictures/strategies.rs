@@ -9,7 +9,7 @@ use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen
 use drawloom::scene::{Blend, Camera, Material, RenderObject, Scene, Texture};
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
-use drawloom::{Granularity, Recorded, Renderer, SubmitError};
+use drawloom::{Granularity, RecordedFrame, Renderer, SubmitError};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::{cube, field};
@@ -83,7 +83,11 @@ fn fixture_alone(encoding: EncodingStrategy) -> Result<Fixture, Failed> {
 }
 
 /// The picture and the radiance of every main view.
-pub fn pictures(fixture: &Fixture, recorded: Recorded<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+pub fn pictures(
+    fixture: &Fixture,
+    recorded: RecordedFrame<WgpuBackend>,
+    scene: &Scene,
+) -> Result<Vec<Picture>, Failed> {
     let submission = fixture.submit(recorded)?;
     let targets = (0..scene.cameras.len()).flat_map(|view| [(view, "picture"), (view, "radiance")]);
     Ok(targets.map(|(view, target)| submission.read(view, target)).collect::<Result<_, _>>()?)

@@ -11,8 +11,8 @@ use drawloom::process::Deferred;
 use drawloom::quality::{Quality, VertexFormat};
 use drawloom::scene::{LevelOfDetail, Material, Mesh, RenderObject, Scene, Texture, Topology, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
-use drawloom::{Renderer, Submitted};
+use drawloom::view::IssueReason;
+use drawloom::{Renderer, SubmittedFrame};
 use drawloom_testing::scenes::everything::everything;
 use drawloom_testing::scenes::field;
 use drawloom_testing::scenes::leveled::plates;
@@ -26,7 +26,7 @@ pub const CASES: &[Case] = &[
     ("memory_of_meshes_is_not_written_while_a_recorded_frame_may_read_it", recorded_frames),
     ("memory_of_meshes_and_textures_is_used_again", used_again),
     ("streamed_scenes_look_the_same_once_everything_is_there", streamed),
-    ("a_mesh_and_a_texture_larger_than_a_frame_may_upload_arrive_in_pieces", pieces),
+    ("a_mesh_and_a_texture_larger_than_a_frame_may_upload_arrive_in_parts", parts),
     ("a_streamed_mesh_that_is_replaced_never_vanishes", replaced),
     ("a_mesh_that_is_replaced_while_the_budget_is_full_is_drawn_until_the_next_one_arrives", replaced_when_full),
 ];
@@ -50,7 +50,7 @@ fn expected(scene: &Scene) -> Result<Vec<Picture>, Failed> {
     pictures(&fixture.submitter.submit(recorded)?, scene)
 }
 
-fn pictures(submitted: &Submitted<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
+fn pictures(submitted: &SubmittedFrame<WgpuBackend>, scene: &Scene) -> Result<Vec<Picture>, Failed> {
     let views = 0..scene.cameras.len();
     views.map(|view| Ok(submitted.submission.read(view, "picture")?)).collect()
 }
@@ -173,7 +173,7 @@ fn used_again() -> Result<(), Failed> {
 }
 
 /// Draws until everything that is used is on the device, and returns the last frame.
-fn draw_until_resident(fixture: &mut Fixture, scene: &Scene) -> Result<Submitted<WgpuBackend>, Failed> {
+fn draw_until_resident(fixture: &mut Fixture, scene: &Scene) -> Result<SubmittedFrame<WgpuBackend>, Failed> {
     for _frame in 0..2000 {
         let recorded = fixture.record(scene)?;
         let submitted = fixture.submitter.submit(recorded)?;
@@ -204,17 +204,19 @@ fn streamed() -> Result<(), Failed> {
         for workers in [1, 2] {
             let mut fixture = streamed_fixture(budget, workers)?;
             let recorded = fixture.record(&scene)?;
-            let reasons: Vec<_> = recorded.statistics().rejections.iter().map(|rejection| rejection.reason).collect();
-            if !reasons.contains(&RejectionReason::NotResident) {
+            let reasons: Vec<_> = recorded.statistics().scene_issues.iter().map(|issue| issue.reason).collect();
+            if !reasons.contains(&IssueReason::NotResident) {
                 return Err(format!("{name}: the first frame has {reasons:?}").into());
             }
             drop(recorded);
             let submitted = draw_until_resident(&mut fixture, &scene)?;
-            let missing = submitted.statistics.rejections.iter().any(|rejection| {
-                [RejectionReason::NotResident, RejectionReason::TextureNotResident].contains(&rejection.reason)
-            });
+            let missing = submitted
+                .statistics
+                .scene_issues
+                .iter()
+                .any(|issue| [IssueReason::NotResident, IssueReason::TextureNotResident].contains(&issue.reason));
             if missing {
-                return Err(format!("{name}: {:?}", submitted.statistics.rejections).into());
+                return Err(format!("{name}: {:?}", submitted.statistics.scene_issues).into());
             }
             expect_same(&pictures(&submitted, &scene)?, &expected(&scene)?, name)?;
         }
@@ -222,7 +224,7 @@ fn streamed() -> Result<(), Failed> {
     Ok(())
 }
 
-fn pieces() -> Result<(), Failed> {
+fn parts() -> Result<(), Failed> {
     let mut scene = field(20);
     let texture = scene.add(checker("large", 512, [90, 200, 255]))?;
     let material = scene.add(Material { texture: Some(texture), ..Material::default() })?;
@@ -273,7 +275,7 @@ fn replaced() -> Result<(), Failed> {
         expect_same(&pictures(&submitted, &scene)?, &expected(&scene)?, &format!("mesh {round}"))?;
         scene.replace(texture, checker("next", 64, [20, 40 * round as u8, 200]))?;
         let recorded = fixture.record(&scene)?;
-        if recorded.statistics().rejections.iter().any(|found| found.reason == RejectionReason::TextureNotResident) {
+        if recorded.statistics().scene_issues.iter().any(|found| found.reason == IssueReason::TextureNotResident) {
             return Err("the texture before is drawn until the new one arrives".into());
         }
         fixture.submitter.submit(recorded)?;
@@ -310,7 +312,7 @@ fn replaced_when_full() -> Result<(), Failed> {
     let mut frame = |scene: &Scene| -> Result<_, Failed> {
         let recorded = fixture.record(scene)?;
         let submitted = fixture.submitter.submit(recorded)?;
-        let is_missing = submitted.statistics.rejections.iter().any(|told| told.reason == RejectionReason::NotResident);
+        let is_missing = submitted.statistics.scene_issues.iter().any(|told| told.reason == IssueReason::NotResident);
         let statistics = fixture.renderer.backend().streaming_statistics().ok_or("it streams")?;
         Ok((pictures(&submitted, scene)?, is_missing, statistics))
     };

@@ -6,7 +6,7 @@ use drawloom::process::internal::ViewOrder;
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, RenderProcess, ToneMapping};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Scene, ViewKind};
-use drawloom::{Recorded, RendererBuilder, wgpu};
+use drawloom::{RecordedFrame, RendererBuilder, wgpu};
 use drawloom_testing::scenes::{field, sized};
 use libtest_mimic::Failed;
 
@@ -36,12 +36,12 @@ impl Both {
         Ok(Self([Fixture::with_transient_targets(2, &build)?, Fixture::with(2, &build)?]))
     }
 
-    fn record(&mut self, scene: &Scene) -> Result<[Recorded<WgpuBackend>; 2], Failed> {
+    fn record(&mut self, scene: &Scene) -> Result<[RecordedFrame<WgpuBackend>; 2], Failed> {
         let [transient, dedicated] = &mut self.0;
         Ok([transient.record(scene)?, dedicated.record(scene)?])
     }
 
-    fn submit(&self, [transient, dedicated]: [Recorded<WgpuBackend>; 2]) -> Result<[WgpuSubmission; 2], Failed> {
+    fn submit(&self, [transient, dedicated]: [RecordedFrame<WgpuBackend>; 2]) -> Result<[WgpuSubmission; 2], Failed> {
         Ok([self.0[0].submit(transient)?, self.0[1].submit(dedicated)?])
     }
 

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use drawloom::Recorded;
+use drawloom::RecordedFrame;
 use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend};
 use drawloom::glam::DVec3;
 use drawloom::quality::{Quality, TransformPrecision};
@@ -83,7 +83,7 @@ fn all_strategies() -> Result<(), Failed> {
     Ok(())
 }
 
-fn culled_in(recorded: &Recorded<WgpuBackend>) -> usize {
+fn culled_in(recorded: &RecordedFrame<WgpuBackend>) -> usize {
     recorded.statistics().views.iter().map(|view| view.culled_triangles.culled()).sum()
 }
 

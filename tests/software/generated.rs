@@ -7,8 +7,8 @@ use drawloom::graph::NodeError;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, GeneratedBuffer, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 use drawloom::task::Worker;
-use drawloom::view::RejectionReason;
-use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+use drawloom::view::IssueReason;
+use drawloom::{CpuNode, NodeAccesses, NodeContext};
 use drawloom_testing::scenes::{sized, square};
 
 use crate::Fixture;
@@ -30,7 +30,7 @@ impl CpuNode for Fill<'_> {
         accesses.fills(self.vertices).fills(self.indices[0]).fills(self.indices[1]);
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         let corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
         for (vertex, position) in frame.fill(self.vertices, 0)?.iter_mut().zip(corners) {
             *vertex = Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
@@ -63,11 +63,11 @@ fn objects_with_a_mesh_that_is_filled_wrongly_are_counted_until_it_is_filled_wel
     let mut frame = |is_wrong: [bool; 2], (count, first): (usize, usize)| {
         let node = Fill { vertices: &vertices, indices: indices.each_ref(), is_wrong };
         let recorded = fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&node]).unwrap();
-        let rejections = recorded.statistics().rejections.clone();
-        let found: Vec<_> = rejections.iter().map(|known| (known.reason, known.count, known.first)).collect();
-        let expected = (count > 0).then_some((RejectionReason::UndrawableMesh, count, first));
+        let scene_issues = recorded.statistics().scene_issues.clone();
+        let found: Vec<_> = scene_issues.iter().map(|known| (known.reason, known.count, known.first)).collect();
+        let expected = (count > 0).then_some((IssueReason::UndrawableMesh, count, first));
         assert_eq!(found, expected.into_iter().collect::<Vec<_>>(), "{is_wrong:?}");
-        assert!(rejections.iter().all(|known| known.name.as_deref() == Some("made")));
+        assert!(scene_issues.iter().all(|known| known.name.as_deref() == Some("made")));
         fixture.submitter.submit(recorded).unwrap();
     };
     // Each frame counts what the one before has drawn.

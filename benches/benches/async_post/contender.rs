@@ -13,7 +13,7 @@ use drawloom::process::{
 };
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
-use drawloom::{Buffering, FrameLoop, FramePlace, Renderer, Submitter, wgpu};
+use drawloom::{Buffering, FencePoint, FrameLoop, Renderer, Submitter, wgpu};
 use drawloom_async_post::{
     AsyncPost, AsyncPostStatistics, AsyncStep, Bloom, LayerSettings, StepFrame, StepSource, UploadPicture,
 };
@@ -318,7 +318,7 @@ impl<B: Backend> Presenter<B> {
     fn draw(&mut self, shown: Option<u64>) -> Result<Option<(u64, Fence)>, Box<dyn Error>> {
         let Some(number) = shown.filter(|&number| number > self.latest) else { return Ok(None) };
         let mut recorded = self.renderer.record(self.scene.as_scene_ref())?;
-        let drawn = recorded.fence_at(FramePlace::End)?;
+        let drawn = recorded.fence_at(FencePoint::End)?;
         self.submitter.submit(recorded)?;
         self.latest = number;
         Ok(Some((number, drawn)))
@@ -354,7 +354,7 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Waiting<B> {
     ) -> Result<(Instant, Duration), Box<dyn Error>> {
         let mut recorded = renderer.record(world.as_scene_ref())?;
         let source = recorded.read_back_whole(0, "bloom source")?;
-        let drawn = recorded.fence_at(FramePlace::End)?;
+        let drawn = recorded.fence_at(FencePoint::End)?;
         let submitted = submitter.submit(recorded)?;
         drawn.wait(LONG)?;
         let start = Instant::now();
@@ -369,7 +369,7 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Waiting<B> {
         *self.compose.0.lock().expect("no thread panics") = vec![layer.ok_or("wgpu has textures")?, radiance];
         let (renderer, submitter) = &mut self.composition;
         let mut recorded = renderer.record(self.scene.as_scene_ref())?;
-        let drawn = recorded.fence_at(FramePlace::End)?;
+        let drawn = recorded.fence_at(FencePoint::End)?;
         submitter.submit(recorded)?;
         drawn.wait(LONG)?;
         Ok((drawn.set_at().ok_or("it is set")?, took))

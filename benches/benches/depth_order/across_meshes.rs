@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use drawloom::glam::DVec3;
 use drawloom::handle::Handle;
-use drawloom::quality::DepthKey;
+use drawloom::quality::DepthPrecision;
 use drawloom::scene::{Blend, Camera, Material, Mesh, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom_testing::random::Random;
@@ -39,7 +39,7 @@ impl AcrossMeshes {
         let source = scene.as_scene_ref();
         let objects = self.objects(&source, camera)?;
         let mut counter = FragmentCounter::new(scheduler)?;
-        let counts = counter.count(&with_a_mesh_each(&source, &objects)?, camera, DepthKey::UNORDERED)?;
+        let counts = counter.count(&with_a_mesh_each(&source, &objects)?, camera, DepthPrecision::UNORDERED)?;
         let list = counter.renderer.draw_list(SURFACES, 0).ok_or("the process draws no commands")?;
         // Meshes were added in the objects' order, so a mesh's slot is the object's position in it.
         let mesh = |slot: u32| source.meshes[objects[slot as usize]];

@@ -10,7 +10,7 @@ use drawloom::process::{
     ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, ObjectCpuShader, ObjectPixel, PassInputs,
     RenderProcess, ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
-use drawloom::quality::{DepthKey, Quality};
+use drawloom::quality::{DepthPrecision, Quality};
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{Camera, Scene, SceneRef};
 use drawloom::task::Scheduler;
@@ -109,7 +109,7 @@ impl FragmentCounter {
     ///
     /// # Errors
     /// Returns an error if the frame cannot be drawn.
-    pub fn count(&mut self, scene: &Scene, camera: &Camera, order: DepthKey) -> Result<Counts, Box<dyn Error>> {
+    pub fn count(&mut self, scene: &Scene, camera: &Camera, order: DepthPrecision) -> Result<Counts, Box<dyn Error>> {
         self.renderer.set_quality(Quality { opaque_order: order, ..Quality::default() })?;
         self.fragments.store(0, Ordering::Relaxed);
         let scene = SceneRef { cameras: std::slice::from_ref(camera), ..scene.as_scene_ref() };

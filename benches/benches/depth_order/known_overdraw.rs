@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::quality::DepthKey;
+use drawloom::quality::DepthPrecision;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene};
 use drawloom::task::Scheduler;
 
@@ -32,7 +32,7 @@ pub fn check() -> Result<(), Box<dyn Error>> {
     ] {
         let walls = walls(distances, meshes)?;
         for (order, expected) in
-            [(DepthKey::UNORDERED, unordered), (logarithmic(16), ordered), (DepthKey::UNORDERED, unordered)]
+            [(DepthPrecision::UNORDERED, unordered), (logarithmic(16), ordered), (DepthPrecision::UNORDERED, unordered)]
         {
             expect(name, counter.count(&walls, &camera, order)?, expected, meshes)?;
         }

@@ -31,23 +31,23 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use drawloom::quality::{DepthCurve, DepthKey};
+use drawloom::quality::{DepthCurve, DepthPrecision};
 use drawloom_benches::arguments::ExtentArguments;
 use drawloom_benches::harness::{Rounds, progress_bar};
 use drawloom_benches::results;
 use serde::Serialize;
 
 /// The orders that `Quality::opaque_order` is set to.
-const ORDERS: [(&str, DepthKey); 5] = [
-    ("none", DepthKey::UNORDERED),
+const ORDERS: [(&str, DepthPrecision); 5] = [
+    ("none", DepthPrecision::UNORDERED),
     ("1 bit", logarithmic(1)),
     ("8 bits", logarithmic(8)),
     ("16 bits", logarithmic(16)),
-    ("20 bits, the most", logarithmic(DepthKey::MAX_OPAQUE_BITS)),
+    ("20 bits, the most", logarithmic(DepthPrecision::MAX_OPAQUE_BITS)),
 ];
 
-const fn logarithmic(bits: u32) -> DepthKey {
-    DepthKey { bits, curve: DepthCurve::Logarithmic }
+const fn logarithmic(bits: u32) -> DepthPrecision {
+    DepthPrecision { bits, curve: DepthCurve::Logarithmic }
 }
 
 /// The size of the measurement.

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::thread::available_parallelism;
 
-use drawloom::quality::DepthKey;
+use drawloom::quality::DepthPrecision;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
 use drawloom_benches::city;
@@ -38,7 +38,7 @@ pub struct Row {
 #[derive(Clone, Copy)]
 enum Order {
     /// `Quality::opaque_order`.
-    SortKey(DepthKey),
+    SortKey(DepthPrecision),
     AcrossMeshes(AcrossMeshes),
 }
 

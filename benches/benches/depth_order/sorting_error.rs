@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use drawloom::quality::{DepthCurve, DepthKey};
+use drawloom::quality::{DepthCurve, DepthPrecision};
 use drawloom_benches::table::Table;
 use drawloom_testing::random::Random;
 
@@ -32,7 +32,7 @@ pub fn print() -> Result<(), Box<dyn Error>> {
             [("linear", DepthCurve::Linear { far: FAR }), ("logarithmic", DepthCurve::Logarithmic)]
         {
             for bits in [8, 12, 16, 18, 20, 24, 32] {
-                let Order { ties, inversions, worst } = Order::of(DepthKey { bits, curve }, distances);
+                let Order { ties, inversions, worst } = Order::of(DepthPrecision { bits, curve }, distances);
                 within &= worst <= 1.0;
                 let percent = |share: f64| format!("{:.3}", share * 100.0);
                 let cells = [(*name).to_owned(), curve_name.to_owned(), bits.to_string(), percent(ties)];
@@ -56,7 +56,7 @@ struct Order {
 }
 
 impl Order {
-    fn of(key: DepthKey, distances: &[f32]) -> Self {
+    fn of(key: DepthPrecision, distances: &[f32]) -> Self {
         let code = |distance: f32| key.quantize(distance, NEAR, FAR);
         let share = |count: usize| count as f64 / (distances.len() - 1) as f64;
 

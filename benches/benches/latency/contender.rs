@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::Backend;
 use drawloom::fence::Fence;
-use drawloom::{Buffering, FrameLoop, FramePlace, FrameTimes, Renderer, Submitter};
+use drawloom::{Buffering, FencePoint, FrameLoop, FrameTimes, Renderer, Submitter};
 use drawloom_benches::moving::Moving;
 
 /// Longer than any frame.
@@ -105,7 +105,7 @@ where
                     let begun = Instant::now();
                     world.step_for(update);
                     let mut recorded = renderer.record(world.as_scene_ref())?;
-                    let drawn = recorded.fence_at(FramePlace::End)?;
+                    let drawn = recorded.fence_at(FencePoint::End)?;
                     let recorded_at = Instant::now();
                     submitter.submit(recorded)?;
                     let submitted = Instant::now();

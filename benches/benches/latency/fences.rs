@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
-use drawloom::{FramePlace, Renderer};
+use drawloom::{FencePoint, Renderer};
 use drawloom_benches::backends::BackendName;
 use drawloom_benches::city;
 use drawloom_benches::moving::{Motion, Moving};
@@ -21,8 +21,8 @@ pub struct Row {
     pub frame_us: f64,
 }
 
-const PLACES: [(&str, Option<FramePlace<'static>>); 3] =
-    [("none", None), ("at the end", Some(FramePlace::End)), ("after the shadow map", Some(FramePlace::View(1)))];
+const PLACES: [(&str, Option<FencePoint<'static>>); 3] =
+    [("none", None), ("at the end", Some(FencePoint::End)), ("after the shadow map", Some(FencePoint::View(1)))];
 
 pub fn measure(quick: bool, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn Error>> {
     let frames = if quick { 20 } else { 20_000 };

@@ -1,7 +1,7 @@
 //! The scenes.
 
 use clap::ValueEnum;
-use drawloom::quality::{DepthCurve, DepthKey, Quality};
+use drawloom::quality::{DepthCurve, DepthPrecision, Quality};
 use drawloom::scene::{Blend, Scene, SceneError};
 use drawloom_benches::clouds::{around_one, back_to_back};
 use serde::Serialize;
@@ -108,7 +108,7 @@ pub fn all(divisor: usize) -> Result<Vec<Case>, SceneError> {
         cases.push(Case { is_large: true, ..round(single_large, kind, 1, of(400_000))? });
     }
     let quality =
-        Quality { opaque_order: DepthKey { bits: 20, curve: DepthCurve::Logarithmic }, ..Quality::balanced() };
+        Quality { opaque_order: DepthPrecision { bits: 20, curve: DepthCurve::Logarithmic }, ..Quality::balanced() };
     cases.push(Case { quality, ..round(by_depth, Kind::Ordered, 4, of(10_000))? });
     cases.push(turned(blended, Kind::Ordered, Blend::Alpha)?);
     cases.push(Case { quality, instancing: false, ..round(not_instanced, Kind::Ordered, 4, of(2_500))? });

@@ -3,7 +3,7 @@
 use drawloom::quality::Quality;
 use drawloom::scene::LayerMask;
 use drawloom::view::ShadowMaps;
-use drawloom::{Rung, ViewForm};
+use drawloom::{QualityLevel, ViewVariant};
 
 use crate::subject::NO_CASTER;
 
@@ -15,7 +15,7 @@ pub struct Configuration {
     /// Of the deferred pipeline. [`Configuration::quality`] sets the side, the bias and the filter.
     pub maps: ShadowMaps,
     /// The form of the mirrors' views.
-    pub mirrors: ViewForm,
+    pub mirrors: ViewVariant,
     /// Whether the mirrors' views are drawn at all.
     pub draws_mirrors: bool,
     /// The `max_angle` of [`Camera::impostor`](drawloom::scene::Camera::impostor), in degrees. `None` draws the
@@ -27,7 +27,7 @@ impl Configuration {
     /// The most accurate one.
     pub fn exact() -> Self {
         let maps = ShadowMaps { cascades: ShadowMaps::MAX_CASCADES, ..default_maps() };
-        Self { quality: Quality::exact(), maps, mirrors: ViewForm::BEST, draws_mirrors: true, impostor: None }
+        Self { quality: Quality::exact(), maps, mirrors: ViewVariant::BEST, draws_mirrors: true, impostor: None }
     }
 
     /// A preset of [`Quality`], with what an engine gets that sets nothing else.
@@ -35,9 +35,9 @@ impl Configuration {
         Self { quality, maps: default_maps(), ..Self::exact() }
     }
 
-    /// The rung of the mirrors' views.
-    pub fn rung(&self) -> Rung {
-        if self.draws_mirrors { Rung::Drawn(self.mirrors) } else { Rung::LeftOut }
+    /// The quality level of the mirrors' views.
+    pub fn level(&self) -> QualityLevel {
+        if self.draws_mirrors { QualityLevel::Drawn(self.mirrors) } else { QualityLevel::LeftOut }
     }
 }
 

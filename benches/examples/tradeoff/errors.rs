@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use drawloom::command::RenderCommand;
-use drawloom::quality::{DepthKey, Quality, TransformPrecision};
+use drawloom::quality::{DepthPrecision, Quality, TransformPrecision};
 use drawloom::scene::{Blend, Camera, Light, Material, Scene};
 
 use crate::measure::{Measurement, Measurements};
@@ -151,9 +151,9 @@ impl Case<'_> {
     }
 
     /// The greatest depth difference of two objects in the wrong order. The order applies to opaque objects of one mesh
-    /// and state, and to all blended objects. The bound is [`DepthKey::step`], plus the error of f32 distances: about
-    /// ten roundings of 2⁻²⁴ each.
-    fn order(&self, key: DepthKey, commands: &[RenderCommand], blend: Blend) -> KnobError {
+    /// and state, and to all blended objects. The bound is [`DepthPrecision::step`], plus the error of f32 distances:
+    /// about ten roundings of 2⁻²⁴ each.
+    fn order(&self, key: DepthPrecision, commands: &[RenderCommand], blend: Blend) -> KnobError {
         let (metric, oracle) = ("of the key's step in the wrong order", "f64 distances along the view's axis");
         if key.bits == 0 {
             // Any order is right.

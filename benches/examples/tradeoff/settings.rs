@@ -1,6 +1,6 @@
 //! The settings that are measured: each knob alone at each of its settings, and the presets.
 
-use drawloom::ViewForm;
+use drawloom::ViewVariant;
 use drawloom::quality::{self, Quality};
 use drawloom::view::ShadowMaps;
 
@@ -66,10 +66,10 @@ impl Knob {
             Self::Cascades => "ShadowMaps.cascades",
             Self::MaxDistance => "ShadowMaps.max_distance",
             Self::Redraw => "Camera.redraw",
-            Self::ViewSize => "ViewForm.size",
-            Self::ViewLevelOfDetail => "ViewForm.level_of_detail_scale",
-            Self::ViewCameras => "ViewForm.max_cameras",
-            Self::ViewLeftOut => "Rung.LeftOut",
+            Self::ViewSize => "ViewVariant.size",
+            Self::ViewLevelOfDetail => "ViewVariant.level_of_detail_scale",
+            Self::ViewCameras => "ViewVariant.max_cameras",
+            Self::ViewLeftOut => "QualityLevel.LeftOut",
             Self::ImpostorAngle => "Camera.impostor",
         }
     }
@@ -129,21 +129,21 @@ fn add_of_maps(mut add: impl FnMut(Knob, &str, ShadowMaps)) {
 
 fn add_of_mirrors(mut add: impl FnMut(Knob, &str, Configuration)) {
     let exact = Configuration::exact();
-    let best = ViewForm::BEST;
+    let best = ViewVariant::BEST;
     let drawn = |mirrors| Configuration { mirrors, ..exact };
     for interval in [2, 4] {
-        add(Knob::Redraw, &format!("{interval} frames"), drawn(ViewForm { interval, ..best }));
+        add(Knob::Redraw, &format!("{interval} frames"), drawn(ViewVariant { interval, ..best }));
     }
     for size in [0.5, 0.25] {
-        add(Knob::ViewSize, &size.to_string(), drawn(ViewForm { size, ..best }));
+        add(Knob::ViewSize, &size.to_string(), drawn(ViewVariant { size, ..best }));
     }
     for level_of_detail_scale in [2.0, 4.0] {
         // There is nothing to scale in `exact`.
         let quality = Quality { level_of_detail: 1.0, ..exact.quality };
-        let configuration = Configuration { quality, ..drawn(ViewForm { level_of_detail_scale, ..best }) };
+        let configuration = Configuration { quality, ..drawn(ViewVariant { level_of_detail_scale, ..best }) };
         add(Knob::ViewLevelOfDetail, &format!("{level_of_detail_scale} × 1 pixel"), configuration);
     }
-    add(Knob::ViewCameras, "1 of 2", drawn(ViewForm { max_cameras: 1, ..best }));
+    add(Knob::ViewCameras, "1 of 2", drawn(ViewVariant { max_cameras: 1, ..best }));
     add(Knob::ViewLeftOut, "left out", Configuration { draws_mirrors: false, ..exact });
 }
 

@@ -2,7 +2,7 @@
 
 use drawloom::command::Selection;
 use drawloom::process::{
-    CommandDraws, CpuShader, Declare, Draws, ObjectCpuShader, ObjectPixel, PassInputs, Place, RenderProcess,
+    CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
     ShaderObject, VARYINGS, VertexInput, VertexOutput,
 };
 use drawloom::raster::{Real, Vector, Vector4};
@@ -26,7 +26,7 @@ impl RenderProcess for Mirror {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, self.view, "radiance");
         declare.draws_over("radiance");
         // The pipeline has drawn the surface as a black object.
@@ -84,7 +84,7 @@ impl RenderProcess for Impostor {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, IMPOSTOR, "radiance");
         declare.samples_view(ViewKind::Reflection, IMPOSTOR, "depth");
         declare.draws_over("radiance");

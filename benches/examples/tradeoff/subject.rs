@@ -85,7 +85,7 @@ impl Subject {
         let hidden = if picture.is_some() { ORIGINAL } else { SQUARE };
         let layers = if self.impostor.is_some() { LayerMask(camera.layers.0 & !hidden.0) } else { camera.layers };
         let mut cameras = vec![Camera { layers, ..camera.clone() }];
-        cameras.extend(configuration.rung().cameras(&self.mirror_cameras(camera)));
+        cameras.extend(configuration.level().cameras(&self.mirror_cameras(camera)));
         if let Some((impostor, picture)) = self.impostor.as_ref().zip(picture.as_ref()) {
             let mut square = self.scene.object(impostor.square)?;
             square.orientation = picture.orientation;

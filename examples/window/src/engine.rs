@@ -10,7 +10,7 @@ use drawloom::backend::{Picture, SurfaceFrame, WgpuBackend, WindowDevice};
 use drawloom::glam::DVec3;
 use drawloom::process::Format;
 use drawloom::task::{JobPanic, Scheduler};
-use drawloom::{Recorded, SubmitError};
+use drawloom::{RecordedFrame, SubmitError};
 use drawloom_egui::Inspector;
 use drawloom_output::{path_text, print_line};
 use winit::application::ApplicationHandler;
@@ -256,7 +256,7 @@ impl Engine {
 /// Submits and presents a frame on this thread, the device thread, while workers update the world for the next one.
 fn submit_and_update(
     graphics: &mut Graphics,
-    recorded: Recorded<WgpuBackend>,
+    recorded: RecordedFrame<WgpuBackend>,
     frames: Vec<(&mut ViewWindow, SurfaceFrame)>,
     inspector: &mut Inspector,
     update: impl FnOnce(&Scheduler) -> Result<(), JobPanic> + Send,

@@ -2,7 +2,8 @@
 
 use drawloom::command::Selection;
 use drawloom::process::{
-    CommandDraws, Declare, Deformation, Draws, ILLUMINATION_SHADER, Place, RenderProcess, ShaderResource, ShadowCasters,
+    CommandDraws, Declare, Deformation, Draws, ILLUMINATION_SHADER, InjectionPoint, RenderProcess, ShaderResource,
+    ShadowCasters,
 };
 use drawloom::scene::ViewKind;
 
@@ -59,7 +60,7 @@ impl RenderProcess for Surfaces {
     fn declare(&self, declare: &mut Declare) {
         match self.kind {
             SurfaceKind::Blended => {
-                declare.at(Place::AfterTransparency);
+                declare.at(InjectionPoint::AfterTransparency);
                 declare.tests_depth("depth");
             }
             SurfaceKind::MaskedCasters => {
@@ -67,7 +68,7 @@ impl RenderProcess for Surfaces {
                 declare.draws_depth(ShadowCasters::TARGET);
             }
             SurfaceKind::Opaque | SurfaceKind::Masked => {
-                declare.at(Place::AfterLighting);
+                declare.at(InjectionPoint::AfterLighting);
                 declare.draws_depth("depth");
             }
         }

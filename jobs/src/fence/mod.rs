@@ -1,13 +1,13 @@
 //! Fences order work of the CPU and work of a device (S 9.4, which calls them reports).
 //!
 //! A [`Fence`] is set once: by the CPU through its [`FenceSetter`], or by the device at a place in a frame that
-//! `Recorded::fence_at` names. Whoever has the fence can ask whether it is set, wait for it, or be called back.
-//! `Recorded::submit_after` makes the submission of a frame wait for a fence that the CPU sets.
+//! `RecordedFrame::fence_at` names. Whoever has the fence can ask whether it is set, wait for it, or be called back.
+//! `RecordedFrame::submit_after` makes the submission of a frame wait for a fence that the CPU sets.
 //!
 //! | S table 9.1 | here |
 //! | --- | --- |
-//! | the device waits for a report that the CPU sets | `Recorded::submit_after`, then [`FenceSetter::set`] |
-//! | the CPU waits for a report that the device sets | `Recorded::fence_at`, then [`Fence::wait`] |
+//! | the device waits for a report that the CPU sets | `RecordedFrame::submit_after`, then [`FenceSetter::set`] |
+//! | the CPU waits for a report that the device sets | `RecordedFrame::fence_at`, then [`Fence::wait`] |
 //! | both set one report: a race | does not compile: a fence has one setter, which cannot be cloned, and which setting consumes |
 //! | each waits for a report that the other would set next: a deadlock | every wait has a limit, and its [error](FenceError::TimedOut) names all who wait and what each waits for |
 //!

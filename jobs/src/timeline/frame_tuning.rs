@@ -44,7 +44,7 @@ pub enum TuningSubject {
     /// How a pass is recorded and encoded.
     Recording,
     /// The form in which a view is drawn to keep a `ViewBudget`.
-    Rung,
+    QualityLevel,
 }
 
 impl TuningSubject {
@@ -54,7 +54,7 @@ impl TuningSubject {
             Self::RunMode => "run mode",
             Self::OcclusionTest => "occlusion test",
             Self::Recording => "recording",
-            Self::Rung => "rung",
+            Self::QualityLevel => "level",
         }
     }
 
@@ -64,7 +64,7 @@ impl TuningSubject {
             Self::RunMode => "run",
             Self::OcclusionTest => "object",
             Self::Recording => "batch",
-            Self::Rung => "frame",
+            Self::QualityLevel => "frame",
         }
     }
 }

@@ -12,7 +12,7 @@
 //! | `FrameGaps` (`task/frame_gaps.rs`) | whether workers look for jobs between frames | each frame: the time since the one before, at most twice the longest search | 8 frames | searching costs more, or less, than a wake-up |
 //! | [`Tuner`] of recording (`drawloom`'s `backend/wgpu/strategy`) | how a pass is recorded and encoded | each frame: thread time a batch, and the time that other workers wait for it | 8 frames | another way is cheaper by 1.11 |
 //! | [`Tuner`] of occlusion tests (`drawloom`'s `frame/occlusion_control.rs`) | whether a view tests for occlusion | each frame: thread time an object | 8 frames | the other way is cheaper by 1.11 |
-//! | `ViewBudget` (`drawloom`'s `frame/view_budget.rs`) | the forms in which views are drawn | each frame: thread or device time of a drawn camera, and of the rest | 8 frames | 4 frames in a row are predicted to exceed the budget, or one rung more is predicted to fit by 1.15 |
+//! | `ViewBudget` (`drawloom`'s `frame/view_budget.rs`) | the forms in which views are drawn | each frame: thread or device time of a drawn camera, and of the rest | 8 frames | 4 frames in a row are predicted to exceed the budget, or one quality level more is predicted to fit by 1.15 |
 //!
 //! Three of them divide work, each at another scale, and none can replace another. `CostModel` decides how many items
 //! one call of a stage gets: items of a chunk share what the call sets up. `TicketSize` decides how many such calls a

@@ -9,7 +9,7 @@ use super::meshes::Meshes;
 use crate::backend::FrameRequest;
 use crate::scene::{GeneratedContents, Mesh, SceneError};
 use crate::unwind::emit_unlocked;
-use crate::view::RejectionReason;
+use crate::view::IssueReason;
 
 /// What nodes have filled in the frames that were drawn.
 #[derive(Default)]
@@ -93,6 +93,6 @@ impl UndrawableMeshes {
             let known = known.get(slot).and_then(Option::as_ref).filter(|_| used.contains(**handle));
             known.zip(meshes.get(&slot)).is_some_and(|(known, undrawable)| Arc::ptr_eq(known, undrawable))
         });
-        request.rejections.count_all_once(RejectionReason::UndrawableMesh, undrawable.map(|(object, _)| object));
+        request.scene_issues.count_all_once(IssueReason::UndrawableMesh, undrawable.map(|(object, _)| object));
     }
 }

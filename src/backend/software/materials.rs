@@ -9,7 +9,7 @@ use crate::backend::mip_generation::reduced_textures;
 use crate::process::{Materials, ShaderMaterial};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Assets, Blend, Material, MaterialValues};
-use crate::view::{RejectionReason, Rejections};
+use crate::view::{IssueReason, SceneIssues};
 
 /// Keeps the materials of the last frame, and the mip chains of their textures.
 #[derive(Default)]
@@ -23,13 +23,13 @@ pub(super) struct MaterialCache {
     table: Arc<MaterialTable>,
     /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures of less
     /// detail than they were given with.
-    rejected: Vec<(RejectionReason, usize)>,
+    rejected: Vec<(IssueReason, usize)>,
 }
 
 impl MaterialCache {
     /// The materials of these assets. Mip chains are built only for textures that a material uses and that changed
     /// since the last frame; if nothing changed, the same table is returned.
-    pub(super) fn update(&mut self, assets: &Assets, rejections: &Rejections) -> Arc<MaterialTable> {
+    pub(super) fn update(&mut self, assets: &Assets, scene_issues: &SceneIssues) -> Arc<MaterialTable> {
         let wanted = [
             (assets.materials.identity(), assets.materials.revision()),
             (assets.textures.identity(), assets.textures.revision()),
@@ -39,7 +39,7 @@ impl MaterialCache {
             self.current = Some(wanted);
         }
         for &(reason, slot) in &self.rejected {
-            rejections.count(reason, slot);
+            scene_issues.count(reason, slot);
         }
         Arc::clone(&self.table)
     }
@@ -55,15 +55,14 @@ impl MaterialCache {
             chain.take_if(|(kept, _)| Some(*kept) != revision);
         }
         self.rejected.clear();
-        self.rejected.extend(reduced_textures(assets).map(|texture| (RejectionReason::ReducedTexture, texture)));
+        self.rejected.extend(reduced_textures(assets).map(|texture| (IssueReason::ReducedTexture, texture)));
         let mut slots = vec![None; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let slot = handle.index() as usize;
             let chain = material.texture.and_then(|texture| {
                 if assets.get(texture).is_err() {
                     let is_pending = assets.is_pending(texture);
-                    let reason =
-                        if is_pending { RejectionReason::TextureNotResident } else { RejectionReason::StaleTexture };
+                    let reason = if is_pending { IssueReason::TextureNotResident } else { IssueReason::StaleTexture };
                     self.rejected.push((reason, slot));
                     return None;
                 }
@@ -160,17 +159,17 @@ mod tests {
         let chains = |table: &MaterialTable| {
             [0, 1].map(|slot: usize| table.slots[slot].as_ref().and_then(|entry| entry.chain.as_ref().map(Arc::as_ptr)))
         };
-        let first = cache.update(&assets, &Rejections::default());
-        assert!(Arc::ptr_eq(&first, &cache.update(&assets, &Rejections::default())));
+        let first = cache.update(&assets, &SceneIssues::default());
+        assert!(Arc::ptr_eq(&first, &cache.update(&assets, &SceneIssues::default())));
 
         assets.replace(textures[1], noise(30)).unwrap();
-        let second = cache.update(&assets, &Rejections::default());
+        let second = cache.update(&assets, &SceneIssues::default());
         assert_eq!(chains(&second)[0], chains(&first)[0]);
         assert_ne!(chains(&second)[1], chains(&first)[1]);
 
         let plain = Material { diffuse: Vec3::new(1.0, 0.5, 0.25), double_sided: true, ..Material::default() };
         assets.replace(materials[0], plain).unwrap();
-        let third = cache.update(&assets, &Rejections::default());
+        let third = cache.update(&assets, &SceneIssues::default());
         assert_eq!([chains(&third)[0], chains(&third)[1]], [None, chains(&second)[1]]);
         let values: ShaderMaterial<f32> = third.get(0);
         assert!(values.double_sided && values.diffuse == Vector([1.0, 0.5, 0.25]) && values.opacity == 1.0);
@@ -178,8 +177,8 @@ mod tests {
         assert!(chains(&first)[0].is_some(), "a frame keeps what it began with");
 
         let other = Assets::default();
-        assert!(cache.update(&other, &Rejections::default()).slots.is_empty());
-        let free: ShaderMaterial<f32> = cache.update(&other, &Rejections::default()).get(7);
+        assert!(cache.update(&other, &SceneIssues::default()).slots.is_empty());
+        let free: ShaderMaterial<f32> = cache.update(&other, &SceneIssues::default()).get(7);
         assert_eq!(free.opacity, 0.0);
     }
 
@@ -191,20 +190,17 @@ mod tests {
         assets.add(Material { texture: Some(texture), ..Material::default() }).unwrap();
         let mut cache = MaterialCache::default();
         let mut rejected = |assets: &Assets| {
-            let rejections = Rejections::default();
-            let table = cache.update(assets, &rejections);
-            let counts: Vec<_> = rejections
-                .list()
-                .iter()
-                .map(|rejection| (rejection.reason, rejection.count, rejection.first))
-                .collect();
+            let scene_issues = SceneIssues::default();
+            let table = cache.update(assets, &scene_issues);
+            let counts: Vec<_> =
+                scene_issues.list().iter().map(|issue| (issue.reason, issue.count, issue.first)).collect();
             (counts, Materials::<f32>::sample(&*table, 1, Vector::zero(), Vector::zero(), Vector::zero()))
         };
         assert!(rejected(&assets).0.is_empty());
         assets.remove(texture).unwrap();
         for _ in 0..2 {
             let (counts, color) = rejected(&assets);
-            assert_eq!(counts, [(RejectionReason::StaleTexture, 1, 1)]);
+            assert_eq!(counts, [(IssueReason::StaleTexture, 1, 1)]);
             assert_eq!(color, Vector::splat(1.0));
         }
     }

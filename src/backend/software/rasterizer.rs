@@ -59,7 +59,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         request: &FrameRequest<'_>,
         shaders: &[CpuShader],
     ) -> Result<Box<dyn FrameRecording>, BackendError> {
-        let FrameRequest { plan, views, passes, scene, rejections, .. } = *request;
+        let FrameRequest { plan, views, passes, scene, scene_issues, .. } = *request;
         let transforms = request.quality.transforms;
         let view_state = |view| ViewState::new(&request.view(view), transforms);
         let view_states = (0..views.len()).map(view_state).collect::<Result<_, _>>()?;
@@ -78,7 +78,7 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let vertices = if R::ROUNDS { request.quality.vertices } else { VertexFormat::Full };
         let meshes = self.meshes.lock().update(scene.assets, request.objects.used_meshes(), vertices);
         self.context.undrawable.count_objects(request, &meshes);
-        let materials = self.materials.lock().update(scene.assets, rejections);
+        let materials = self.materials.lock().update(scene.assets, scene_issues);
         let column = |&layout: &_| Some((layout, Box::from(scene.column(layout)?.bytes())));
         let columns = plan.columns().iter().filter_map(column).collect();
         Ok(Box::new(TypedFrame {

@@ -9,8 +9,8 @@ use super::error_scope::with_error_scope;
 use super::frame::{BufferPool, WgpuPassStatistics};
 use super::pipelines::{PipelineCache, SharedPipelines};
 use super::resources::{
-    BindGroupLayouts, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers, SubdividedMesh,
-    TargetCache, UploadQueue, shares_memory,
+    BindGroupLayouts, CountedQueue, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers,
+    SubdividedMesh, TargetCache, shares_memory,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy, StrategySet};
 use super::streaming::{Streamer, StreamingBudget, StreamingStatistics};
@@ -36,7 +36,7 @@ use crate::timeline::Timeline;
 /// [`Renderer::replace_backend`](crate::Renderer::replace_backend) goes on with a new device.
 pub struct WgpuBackend {
     pub(super) device: wgpu::Device,
-    pub(super) uploads: UploadQueue,
+    pub(super) uploads: CountedQueue,
     pub(super) layouts: BindGroupLayouts,
     pub(super) pipelines: Mutex<PipelineCache>,
     /// What is shared with other backends, if the backend is of a [`PipelineLibrary`](super::PipelineLibrary).
@@ -126,7 +126,7 @@ impl WgpuBackend {
         let maps_memory = device.features().contains(Self::MAPPING_FEATURES) && shares_memory(&device.adapter_info());
         Ok(Self {
             device,
-            uploads: UploadQueue::new(queue),
+            uploads: CountedQueue::new(queue),
             layouts,
             pipelines: Mutex::default(),
             library: None,
@@ -196,8 +196,8 @@ impl WgpuBackend {
     ///
     /// Without it, a frame uploads all that it needs when it begins, however long that takes. With it, a frame takes
     /// over what jobs have uploaded since the frame before. Objects whose mesh is not on the device are not drawn, and
-    /// counted as [`NotResident`](crate::view::RejectionReason::NotResident); materials whose texture is not are drawn
-    /// without it, and counted as [`TextureNotResident`](crate::view::RejectionReason::TextureNotResident).
+    /// counted as [`NotResident`](crate::view::IssueReason::NotResident); materials whose texture is not are drawn
+    /// without it, and counted as [`TextureNotResident`](crate::view::IssueReason::TextureNotResident).
     ///
     /// First comes what the latest frame would have drawn, then all else that objects use, so that it is there before
     /// it comes into sight; in both the [priority](crate::scene::Assets::set_priority) decides. If the budget is spent,

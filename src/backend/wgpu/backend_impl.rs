@@ -26,7 +26,7 @@ use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
 use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
-use crate::view::RejectionReason;
+use crate::view::IssueReason;
 
 impl Backend for WgpuBackend {
     type Frame = WgpuFrame;
@@ -365,12 +365,12 @@ fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
         frame_use.mark_mesh(batch.mesh);
         if meshes.is_missing(batch) && batch.state.subdivision_level() == 0 {
             let objects = objects.iter().map(|object| *object as usize);
-            request.rejections.count_all_once(RejectionReason::NotResident, objects);
+            request.scene_issues.count_all_once(IssueReason::NotResident, objects);
         }
         for &object in objects {
             let material = request.scene.materials[object as usize].index();
             if frame_use.mark_material(material) {
-                request.rejections.count_once(RejectionReason::TextureNotResident, material as usize);
+                request.scene_issues.count_once(IssueReason::TextureNotResident, material as usize);
             }
         }
     }
@@ -386,7 +386,7 @@ fn count_unreadable(
         if pipelines.is_unreadable(&PipelineVariant::of_batch(&frame.meshes, batch).clamping(clamps_depth)) {
             let objects = &list.objects[batch.first as usize..][..batch.count as usize];
             let objects = objects.iter().map(|object| *object as usize);
-            request.rejections.count_all_once(RejectionReason::UndrawableMesh, objects);
+            request.scene_issues.count_all_once(IssueReason::UndrawableMesh, objects);
         }
     }
 }

@@ -10,7 +10,7 @@ use super::pass_bind_groups::update_bind_groups;
 use super::pipelines::ProcessPipelines;
 use super::resources::{LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets, fits_in_buffers};
 use super::strategy::{EncodingStrategy, RecordingStrategy};
-use super::streaming::{FrameUse, OnDevice, StreamedResources};
+use super::streaming::{FrameUse, Residency, StreamedResources};
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
@@ -93,17 +93,17 @@ impl WgpuBackend {
     /// # Errors
     /// If the device has no room.
     fn update_resources(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
-        let FrameRequest { plan, scene, limits, rejections, .. } = *request;
+        let FrameRequest { plan, scene, limits, scene_issues, .. } = *request;
         let (mut meshes, mut materials) = (self.meshes.lock(), self.materials.lock());
         if let Some(streamer) = &self.streamer {
             let (device, uploads) = (&self.device, &self.uploads);
-            let on_device = OnDevice { device, uploads, meshes: &mut meshes, materials: &mut materials };
+            let on_device = Residency { device, uploads, meshes: &mut meshes, materials: &mut materials };
             return streamer.begin_frame(on_device, request);
         }
         let (used, vertices) = (request.objects.used_meshes(), request.quality.vertices);
         let meshes = meshes.update(&self.device, &self.uploads, scene.assets, used, vertices)?;
         let types = plan.material_types();
-        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, (limits, rejections))?;
+        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, (limits, scene_issues))?;
         Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
     }
 

@@ -109,7 +109,8 @@ impl WindowDevice {
     /// see [`wgpu::Device::on_uncaptured_error`].
     ///
     /// # Errors
-    /// If Drawloom was built without a backend of wgpu, no adapter presents in the window, or the adapter lacks what Drawloom requires.
+    /// If Drawloom was built without a backend of wgpu, no adapter presents in the window, or the adapter lacks what
+    /// Drawloom requires.
     ///
     /// # Panics
     /// As [`wgpu::Instance::create_surface`]: on macOS, unless this is the main thread.

@@ -93,7 +93,7 @@ impl OcclusionControls {
         {
             let occlusion = &tables.culling.occlusion[view];
             let visibility = &tables.visibility[view];
-            let objects = visibility.set.count() + visibility.pieces.object_count() + occlusion.hidden();
+            let objects = visibility.set.count() + visibility.static_groups.object_count() + occlusion.hidden();
             control.update(occlusion.nanoseconds(), objects, occlusion.is_on(), &mut may_try);
         }
     }

@@ -5,14 +5,14 @@ use std::time::{Duration, Instant};
 
 use crate::backend::{Backend, BackendError};
 use crate::fence::FenceError;
-use crate::frame::{FrameError, SubmitError, Submitted};
+use crate::frame::{FrameError, SubmitError, SubmittedFrame};
 
 /// A frame that the device has drawn, or that failed after it was recorded.
 pub struct FinishedFrame<B: Backend> {
     /// The number of its [slot](super::FrameSlot::number).
     pub number: u64,
     /// What was submitted, or why the frame is lost.
-    pub outcome: Result<Submitted<B>, FrameLoopError>,
+    pub outcome: Result<SubmittedFrame<B>, FrameLoopError>,
     /// When what happened.
     pub times: FrameTimes,
 }

@@ -7,7 +7,7 @@ use super::finished_frame::{FinishedFrame, FrameLoopError};
 use super::queues::LoopQueues;
 use crate::backend::{Backend, GuardedBackend};
 use crate::fence::Fence;
-use crate::frame::{Recorded, Submitted};
+use crate::frame::{RecordedFrame, SubmittedFrame};
 use crate::timeline::Timeline;
 use crate::unwind::Contained;
 
@@ -51,17 +51,17 @@ where
     }
 
     /// Hands a recorded frame to the device thread, and does not wait.
-    pub fn submit(self, recorded: Recorded<B>) {
+    pub fn submit(self, recorded: RecordedFrame<B>) {
         self.submit_then(recorded, |_| ());
     }
 
     /// Hands a recorded frame to the device thread, which calls `after` when the frame is submitted: to present it, for
     /// example. If `after` panics, the frame is [reported](super::FrameLoopError::Panicked) as failed.
-    pub fn submit_then(self, recorded: Recorded<B>, after: impl FnOnce(&Submitted<B>) + Send + 'static) {
+    pub fn submit_then(self, recorded: RecordedFrame<B>, after: impl FnOnce(&SubmittedFrame<B>) + Send + 'static) {
         let queues = Arc::clone(&self.queues);
         let after: AfterSubmission<B> = Box::new(after);
         let after = Contained::new(after);
-        let frame = RecordedFrame { slot: self, recorded, after, recorded_at: Instant::now() };
+        let frame = QueuedFrame { slot: self, recorded, after, recorded_at: Instant::now() };
         queues.add_task(DeviceTask::Submit(Box::new(frame)));
     }
 }
@@ -76,25 +76,25 @@ where
 }
 
 /// What the engine does when a frame is submitted.
-pub(super) type AfterSubmission<B> = Box<dyn FnOnce(&Submitted<B>) + Send>;
+pub(super) type AfterSubmission<B> = Box<dyn FnOnce(&SubmittedFrame<B>) + Send>;
 
 /// What the device thread does next.
 pub(super) enum DeviceTask<B: Backend>
 where
     B::Submission: Send,
 {
-    Submit(Box<RecordedFrame<B>>),
+    Submit(Box<QueuedFrame<B>>),
     /// Go on with another backend: what a submitter on that thread is made of.
     ReplaceBackend(GuardedBackend<B>, Arc<Timeline>),
 }
 
 /// A frame on its way to the device thread.
-pub(super) struct RecordedFrame<B: Backend>
+pub(super) struct QueuedFrame<B: Backend>
 where
     B::Submission: Send,
 {
     pub(super) slot: FrameSlot<B>,
-    pub(super) recorded: Recorded<B>,
+    pub(super) recorded: RecordedFrame<B>,
     pub(super) after: Contained<AfterSubmission<B>>,
     pub(super) recorded_at: Instant,
 }
@@ -113,4 +113,4 @@ where
 }
 
 /// A frame that was submitted, the fence at its end, and whether the engine's code panicked after its submission.
-pub(super) type Submission<B> = (Submitted<B>, Fence, Result<(), FrameLoopError>);
+pub(super) type Submission<B> = (SubmittedFrame<B>, Fence, Result<(), FrameLoopError>);

@@ -6,7 +6,7 @@ use super::super::stage_clock::StageGroup;
 use crate::backend::{Backend, BackendError};
 use crate::command::Selection;
 use crate::scene::Blend;
-use crate::view::SelectionFilter;
+use crate::view::DrawFilter;
 
 /// Chooses the visible objects that may occlude others.
 pub(super) struct Occluders {
@@ -46,7 +46,7 @@ impl<B: Backend> Stage<B> for Occluders {
                 let blend = draw.state.blend();
                 let is_drawn = |selection: &Selection| {
                     selection.contains(blend, draw.material)
-                        && SelectionFilter::new(&tables.objects, scene, *selection).passes(object)
+                        && DrawFilter::new(&tables.objects, scene, *selection).passes(object)
                 };
                 // Only the mesh itself is known to cover its convex parts, and a mask has holes.
                 let is_whole = !draw.state.is_masked()

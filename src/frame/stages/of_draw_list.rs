@@ -12,7 +12,7 @@ use super::super::stage_clock::StageGroup;
 use super::super::tables::MAX_SEGMENTS;
 use crate::backend::{Backend, BackendError};
 use crate::command::{instance, sort};
-use crate::view::{self, SelectionFilter};
+use crate::view::{self, DrawFilter};
 
 /// Makes a command for each visible object (M 10.3).
 pub(super) struct Fill {
@@ -47,7 +47,7 @@ impl<B: Backend> Stage<B> for Fill {
             view: &frame.request.views[view_index],
             visible: &frame.tables.visibility[view_index].set,
             selection,
-            filter: SelectionFilter::new(&frame.tables.objects, frame.request.scene, selection),
+            filter: DrawFilter::new(&frame.tables.objects, frame.request.scene, selection),
             levels: frame.levels_of_detail(view_index),
             scene: frame.request.scene,
             quality: frame.request.quality,
@@ -216,7 +216,7 @@ impl<B: Backend> Stage<B> for Bin {
         let view_index = frame.view_index_of(self.pass);
         let (visible, levels) = (&frame.tables.visibility[view_index].set, frame.levels_of_detail(view_index));
         let selection = table.selection.unwrap_or_default();
-        let filter = SelectionFilter::new(objects, frame.request.scene, selection);
+        let filter = DrawFilter::new(objects, frame.request.scene, selection);
         for index in job.items {
             let range = frame.range_of_segment(self.pass, index);
             let mut segment = table.segments[index].write();
@@ -240,7 +240,7 @@ impl<B: Backend> Stage<B> for Join {
     fn info(&self) -> &'static StageInfo {
         &StageInfo {
             name: "join",
-            after: &["instance", "execute pieces", "bin"],
+            after: &["instance", "execute static groups", "bin"],
             group: StageGroup::Instance,
             chunking: Chunking::PerItem,
             cost_kind: "join",
@@ -257,7 +257,7 @@ impl<B: Backend> Stage<B> for Join {
         let can_merge = |mesh| frame.can_merge(self.pass, mesh);
         let mut list = table.list.write();
         list.set_batches_per_bundle(frame.granularity.batches_per_bundle());
-        if frame.has_pieces(self.pass) {
+        if frame.has_static_groups(self.pass) {
             list.clear_own();
         } else {
             list.clear();

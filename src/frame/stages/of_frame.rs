@@ -55,8 +55,9 @@ impl<B: Backend> Stage<B> for Bins {
     fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
         let objects = &frame.tables.objects;
         objects.finish();
-        let may_walk = |table: &PassTable| table.orders_by_bin && table.selection.is_some_and(view::may_walk);
-        if frame.tables.passes.iter().any(may_walk) {
+        let can_scan_bin_order =
+            |table: &PassTable| table.orders_by_bin && table.selection.is_some_and(view::can_scan_bin_order);
+        if frame.tables.passes.iter().any(can_scan_bin_order) {
             objects.order_by_bin();
         }
         Ok(())

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::deformation::{Deformation, split_by_deformation, undeformed, undeformed_name};
 use super::{
-    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, LightClasses, LightSum, LightTiles, LightVolumes, Place,
-    Requirements, ShadowCasters, Transparency,
+    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, InjectionPoint, LightClasses, LightSum, LightTiles,
+    LightVolumes, Requirements, ShadowCasters, Transparency,
 };
 use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
@@ -260,11 +260,11 @@ impl Deferred {
             let process = process.filter(|_| !self.left_out.contains(&name) && !self.is_summed_in_shader(&name));
             ChainSlot { process, keep: self.kept.contains(&name), name }
         };
-        let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, Place)| {
+        let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, InjectionPoint)| {
             let names = processes.into_iter().map(|process| process.name().to_owned());
             names.chain(place.slots().map(str::to_owned)).collect::<Vec<_>>()
         };
-        self.build(&Requirements::all()).into_iter().zip(Place::ALL).flat_map(with_place).map(slot).collect()
+        self.build(&Requirements::all()).into_iter().zip(InjectionPoint::ALL).flat_map(with_place).map(slot).collect()
     }
 
     /// # Errors
@@ -293,8 +293,8 @@ impl Deferred {
         }
     }
 
-    /// The shipped processes that a scene requires, in order: those before each of [`Place::ALL`].
-    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; Place::ALL.len()] {
+    /// The shipped processes that a scene requires, in order: those before each of [`InjectionPoint::ALL`].
+    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; InjectionPoint::ALL.len()] {
         [
             self.shadows(requirements),
             self.geometry(),

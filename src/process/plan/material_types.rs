@@ -1,7 +1,7 @@
 //! The material types that a plan's processes read.
 
 use super::{PlanError, PlannedProcess, ProcessError};
-use crate::command::MaterialTypeFilter;
+use crate::command::MaterialTypes;
 use crate::process::Draws;
 use crate::scene::MaterialLayout;
 
@@ -42,8 +42,8 @@ pub(super) fn check_material_types(
 ) -> Result<(), ProcessError> {
     for (planned, draws) in processes.iter().zip(draws) {
         let selected = draws.selection().and_then(|selection| match selection.material_types {
-            MaterialTypeFilter::Only(selected) => Some(selected),
-            MaterialTypeFilter::Any | MaterialTypeFilter::Shipped => None,
+            MaterialTypes::Only(selected) => Some(selected),
+            MaterialTypes::Any | MaterialTypes::Shipped => None,
         });
         for declared in planned.declaration.material_types.iter().chain(&selected) {
             let other = found.iter().find(|found| found.name == declared.name && found.stride != declared.stride);

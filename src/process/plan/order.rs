@@ -2,7 +2,7 @@
 
 use super::PlanError;
 use crate::graph::NodeId;
-use crate::process::{Declaration, Place};
+use crate::process::{Declaration, InjectionPoint};
 use crate::scene::ViewKind;
 
 /// A process that was added to the graph.
@@ -58,7 +58,7 @@ pub(super) fn order_constraints(
         for later in added.iter().filter(|later| later.id != earlier.id && is_for(added, earlier, later)) {
             // An empty slot of a place orders only processes that draw in views of one kind.
             let share_places = earlier.declaration.views == later.declaration.views;
-            let slot = |name: &String| empty_slot(name).filter(|_| share_places || !Place::is_slot(name));
+            let slot = |name: &String| empty_slot(name).filter(|_| share_places || !InjectionPoint::is_slot(name));
             let Some(before) = before.iter().copied().filter_map(slot).min() else { continue };
             if later.declaration.after.iter().filter_map(slot).any(|after| before <= after) {
                 orders.push((earlier.id, later.id));

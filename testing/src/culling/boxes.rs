@@ -129,7 +129,7 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
             .collect();
         for (volume, table) in tables.iter_mut().enumerate() {
             table.update(&objects.as_scene_ref(shapes));
-            tallies.rejected += table.rejections().list().iter().map(|rejection| rejection.count as u64).sum::<u64>();
+            tallies.rejected += table.scene_issues().list().iter().map(|issue| issue.count as u64).sum::<u64>();
             let block = table.block(0);
             for first in (0..ObjectTable::BLOCK_SIZE).step_by(Frustum::WORD) {
                 let visible = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);

@@ -17,5 +17,5 @@ pub(super) fn draw_whole(scene: SceneRef<'_>) {
     let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let submitted = submitter.submit(renderer.record(scene).unwrap()).unwrap();
-    assert!(submitted.statistics.rejections.is_empty(), "{:?}", submitted.statistics.rejections);
+    assert!(submitted.statistics.scene_issues.is_empty(), "{:?}", submitted.statistics.scene_issues);
 }

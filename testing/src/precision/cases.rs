@@ -171,7 +171,7 @@ impl GpuObjects {
             columns: &[],
             ..scene
         });
-        assert!(self.table.rejections().list().is_empty(), "an object was left out");
+        assert!(self.table.scene_issues().list().is_empty(), "an object was left out");
         for block in 0..self.table.block_count() {
             let (first, gpu_objects) = self.table.gpu_objects(block);
             for (index, gpu_object) in gpu_objects.iter().enumerate() {

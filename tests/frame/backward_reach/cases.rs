@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
-use drawloom::process::{ClearColor, Declare, Deferred, Format, Place};
+use drawloom::process::{ClearColor, Declare, Deferred, Format, InjectionPoint};
 use drawloom::scene::{Camera, Scene, ViewKind};
 use drawloom::task::Scheduler;
 
@@ -36,7 +36,7 @@ fn planned(own: Vec<Declaring>) -> (Vec<String>, Vec<String>) {
 
 fn mirror() -> Declaring {
     Declaring::new("mirror", |declare| {
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
         declare.draws_over("radiance");
     })
@@ -81,12 +81,12 @@ fn a_dropped_process_needs_no_empty_shadow_map() {
 #[test]
 fn a_place_orders_processes_in_views_of_one_kind_alone() {
     let main = |declare: &mut Declare| {
-        declare.at(Place::AfterGeometry);
+        declare.at(InjectionPoint::AfterGeometry);
         declare.draws_over("radiance");
     };
     let in_mirrors = |declare: &mut Declare| {
         declare.views(ViewKind::Reflection);
-        declare.at(Place::AfterLighting);
+        declare.at(InjectionPoint::AfterLighting);
         declare.draws_over("radiance");
     };
     let (processes, _) =

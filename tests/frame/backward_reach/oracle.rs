@@ -1,7 +1,7 @@
 //! The oracle: every process that could exist, with what it reads and writes, and a walk backwards from the outputs to
 //! a fixpoint.
 
-use drawloom::process::Place;
+use drawloom::process::InjectionPoint;
 
 use super::spec::{CameraSpec, LightKindSpec, LightSpec, OwnProcess, PLACES, Pipeline, World};
 
@@ -103,9 +103,9 @@ fn nodes_of(pipeline: &Pipeline, world: &World) -> Vec<Node> {
     let draws_maps = has_maps && (is_kept("shadow casters") || lights.iter().any(|(_, shadowed)| *shadowed));
     let has_glass = world.objects.iter().any(|object| object.blended && !object.has_type);
 
-    let mut shipped: Vec<(Place, Node)> = Vec::new();
+    let mut shipped: Vec<(InjectionPoint, Node)> = Vec::new();
     let node = |name: &str| Node { name: name.to_owned(), is_kept: is_kept(name), ..Node::default() };
-    let geometry = Place::BeforeGeometry;
+    let geometry = InjectionPoint::BeforeGeometry;
     if pipeline.depth_pre_pass {
         shipped.push((geometry, Node { creates: named(&["depth"]), ..node("depth pre-pass") }));
     }
@@ -123,17 +123,26 @@ fn nodes_of(pipeline: &Pipeline, world: &World) -> Vec<Node> {
     }
     for (name, reads_maps) in lights.iter().filter(|(name, _)| !is_left_out(name)) {
         let (reads, changes) = (named(&["depth", "normal", "diffuse"]), named(&["radiance"]));
-        shipped.push((Place::AfterGeometry, Node { reads, changes, reads_maps: *reads_maps, ..node(name) }));
+        shipped.push((InjectionPoint::AfterGeometry, Node { reads, changes, reads_maps: *reads_maps, ..node(name) }));
     }
     if (has_glass || is_kept("transparency")) && !is_left_out("transparency") {
         let (reads, changes) = (named(&["depth"]), named(&["radiance"]));
-        shipped.push((Place::AfterLighting, Node { reads, changes, reads_maps: draws_maps, ..node("transparency") }));
+        shipped.push((
+            InjectionPoint::AfterLighting,
+            Node { reads, changes, reads_maps: draws_maps, ..node("transparency") },
+        ));
     }
     let shown = named(&[if pipeline.shows_diffuse { "diffuse" } else { "radiance" }]);
     let first = named(&[if pipeline.anti_aliasing { "post-processed 1" } else { "picture" }]);
-    shipped.push((Place::AfterTransparency, Node { reads: shown, creates: first.clone(), ..node("tone mapping") }));
+    shipped.push((
+        InjectionPoint::AfterTransparency,
+        Node { reads: shown, creates: first.clone(), ..node("tone mapping") },
+    ));
     if pipeline.anti_aliasing {
-        shipped.push((Place::AfterTransparency, Node { reads: first, creates: named(&["picture"]), ..node("fxaa") }));
+        shipped.push((
+            InjectionPoint::AfterTransparency,
+            Node { reads: first, creates: named(&["picture"]), ..node("fxaa") },
+        ));
     }
 
     let mut nodes = Vec::new();

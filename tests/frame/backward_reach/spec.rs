@@ -1,6 +1,6 @@
 //! Random pipelines and worlds, as plain data.
 
-use drawloom::process::Place;
+use drawloom::process::InjectionPoint;
 use drawloom_testing::random::Random;
 
 /// A deferred pipeline and an engine's own processes.
@@ -23,7 +23,7 @@ pub struct OwnProcess {
     pub index: usize,
     pub in_main: bool,
     pub in_reflections: bool,
-    pub place: Place,
+    pub place: InjectionPoint,
     pub samples: Vec<String>,
     pub draws_over: Vec<String>,
     /// The targets whose content of the frame before it reads.
@@ -45,12 +45,12 @@ impl OwnProcess {
     }
 }
 
-pub const PLACES: [Place; 5] = [
-    Place::BeforeGeometry,
-    Place::AfterGeometry,
-    Place::AfterLighting,
-    Place::AfterTransparency,
-    Place::AfterPostProcessing,
+pub const PLACES: [InjectionPoint; 5] = [
+    InjectionPoint::BeforeGeometry,
+    InjectionPoint::AfterGeometry,
+    InjectionPoint::AfterLighting,
+    InjectionPoint::AfterTransparency,
+    InjectionPoint::AfterPostProcessing,
 ];
 
 /// Those that a scene may lack.
@@ -134,8 +134,8 @@ impl OwnProcess {
                 _ => {}
             }
         }
-        let is_after_geometry = own.place != Place::BeforeGeometry;
-        let is_last = own.place == Place::AfterPostProcessing;
+        let is_after_geometry = own.place != InjectionPoint::BeforeGeometry;
+        let is_last = own.place == InjectionPoint::AfterPostProcessing;
         for target in ["depth", "normal", "diffuse"] {
             if is_after_geometry && random.below(8) == 0 {
                 own.samples.push(target.to_owned());

@@ -6,7 +6,9 @@ use drawloom::graph::NodeError;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Redraw};
 use drawloom::task::{Scheduler, Worker};
-use drawloom::{BudgetedView, CpuNode, Granularity, NodeAccesses, NodeFrame, Renderer, Rung, ViewBudget, ViewForm};
+use drawloom::{
+    BudgetedView, CpuNode, Granularity, NodeAccesses, NodeContext, QualityLevel, Renderer, ViewBudget, ViewVariant,
+};
 use libtest_mimic::Failed;
 use std::ops::Range;
 use std::sync::Arc;
@@ -25,10 +27,10 @@ pub const CASES: &[NumberCase] = &[
         name: "forms_of_views_of_any_numbers",
         numbers: &[
             "BudgetedView::priority",
-            "ViewForm::interval",
-            "ViewForm::level_of_detail_scale",
-            "ViewForm::max_cameras",
-            "ViewForm::size",
+            "ViewVariant::interval",
+            "ViewVariant::level_of_detail_scale",
+            "ViewVariant::max_cameras",
+            "ViewVariant::size",
             "scene::Redraw::Interval",
             "scene::Camera::level_of_detail_scale",
         ],
@@ -53,14 +55,14 @@ fn times() -> Result<(), Failed> {
 
 fn forms() -> Result<(), Failed> {
     let camera = |name: &str| Camera { size: [16, 16], ..Camera::looking_at(name, DVec3::Z * 3.0, DVec3::ZERO) };
-    let draw = |form: ViewForm, priority: i32| -> Result<(), Failed> {
-        // Next to nothing, so that the last rung is taken.
+    let draw = |form: ViewVariant, priority: i32| -> Result<(), Failed> {
+        // Next to nothing, so that the last quality level is taken.
         let mut budget = ViewBudget::new(1e-6)?;
         let view = BudgetedView {
             name: "view".to_owned(),
             priority,
             cameras: vec![camera("main"), camera("other")],
-            ladder: vec![Rung::Drawn(form)],
+            levels: vec![QualityLevel::Drawn(form)],
         };
         let mut fixture = Fixture::null(1);
         for _ in 0..30 {
@@ -72,22 +74,22 @@ fn forms() -> Result<(), Failed> {
         }
         Ok(())
     };
-    let best = ViewForm::BEST;
+    let best = ViewVariant::BEST;
     for priority in [i32::MIN, 0, i32::MAX] {
         draw(best, priority)?;
     }
     for interval in COUNTS {
-        let drawn = draw(ViewForm { interval, ..best }, 0);
+        let drawn = draw(ViewVariant { interval, ..best }, 0);
         ensure(drawn.is_ok() == (interval > 0), format_args!("an interval of {interval}: {drawn:?}"))?;
     }
     for max_cameras in SIZES {
-        let drawn = draw(ViewForm { max_cameras, ..best }, 0);
+        let drawn = draw(ViewVariant { max_cameras, ..best }, 0);
         ensure(drawn.is_ok() == (max_cameras > 0), format_args!("{max_cameras} cameras: {drawn:?}"))?;
     }
     for number in FLOATS {
-        let drawn = draw(ViewForm { size: number, ..best }, 0);
+        let drawn = draw(ViewVariant { size: number, ..best }, 0);
         ensure(drawn.is_ok() == (number > 0.0 && number <= 1.0), format_args!("a size of {number}: {drawn:?}"))?;
-        let drawn = draw(ViewForm { level_of_detail_scale: number, ..best }, 0);
+        let drawn = draw(ViewVariant { level_of_detail_scale: number, ..best }, 0);
         let is_valid = number >= 1.0 && number.is_finite();
         ensure(drawn.is_ok() == is_valid, format_args!("levels coarser by {number}: {drawn:?}"))?;
         let mut scene = scene();
@@ -138,7 +140,7 @@ impl CpuNode for Counts {
 
     fn declare(&self, _: &mut NodeAccesses) {}
 
-    fn width(&self, _: &NodeFrame<'_>) -> usize {
+    fn width(&self, _: &NodeContext<'_>) -> usize {
         self.width
     }
 
@@ -146,7 +148,7 @@ impl CpuNode for Counts {
         self.items_per_job
     }
 
-    fn run(&self, _: &NodeFrame<'_>, items: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, _: &NodeContext<'_>, items: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         self.done.fetch_add(items.len(), Ordering::Relaxed);
         Ok(())
     }

@@ -7,8 +7,8 @@ use drawloom::graph::NodeError;
 use drawloom::process::{Deferred, StorageBuffer};
 use drawloom::scene::{GeneratedBuffer, Mesh, NodeColumn, Topology, Vertex};
 use drawloom::task::Worker;
-use drawloom::view::{Rejection, RejectionReason};
-use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeFrame};
+use drawloom::view::{IssueReason, SceneIssue};
+use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeContext};
 use libtest_mimic::Failed;
 
 use super::NumberCase;
@@ -29,11 +29,11 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "nodes_ask_for_any_chunk_and_view",
         numbers: &[
-            "NodeFrame::fill",
-            "NodeFrame::filled",
-            "NodeFrame::set_count",
-            "NodeFrame::draw_list",
-            "NodeFrame::visible_objects",
+            "NodeContext::fill",
+            "NodeContext::filled",
+            "NodeContext::set_count",
+            "NodeContext::draw_list",
+            "NodeContext::visible_objects",
             "Renderer::draw_list",
         ],
         check: chunks,
@@ -56,7 +56,7 @@ struct Node<'a, F> {
     run: F,
 }
 
-impl<F: Fn(&NodeFrame<'_>) -> Result<(), NodeError> + Send + Sync> CpuNode for Node<'_, F> {
+impl<F: Fn(&NodeContext<'_>) -> Result<(), NodeError> + Send + Sync> CpuNode for Node<'_, F> {
     fn name(&self) -> &str {
         "a node"
     }
@@ -65,7 +65,7 @@ impl<F: Fn(&NodeFrame<'_>) -> Result<(), NodeError> + Send + Sync> CpuNode for N
         accesses.fills(self.fills).reads(FrameData::DrawLists).reads(FrameData::VisibleObjects);
     }
 
-    fn run(&self, frame: &NodeFrame<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+    fn run(&self, frame: &NodeContext<'_>, _: Range<usize>, _: &Worker) -> Result<(), NodeError> {
         (self.run)(frame)
     }
 }
@@ -73,7 +73,7 @@ impl<F: Fn(&NodeFrame<'_>) -> Result<(), NodeError> + Send + Sync> CpuNode for N
 fn record(
     fixture: &mut Fixture<drawloom::backend::NullBackend>,
     buffer: &GeneratedBuffer<[u32; 4]>,
-    run: impl Fn(&NodeFrame<'_>) -> Result<(), NodeError> + Send + Sync,
+    run: impl Fn(&NodeContext<'_>) -> Result<(), NodeError> + Send + Sync,
 ) -> Result<(), FrameError> {
     let node = Node { fills: buffer, run };
     fixture.renderer.record_with_nodes(scene().as_scene_ref(), &[&node]).map(drop)
@@ -105,11 +105,10 @@ fn capacities() -> Result<(), Failed> {
         let (object, mesh) = (scene.object(object)?, scene.add(mesh)?);
         scene.add_object(drawloom::scene::RenderObject { mesh, ..object })?;
         let drawn = Fixture::noop(1, Deferred::to_picture())?.draw(&scene)?;
-        let is_named = |rejection: &Rejection| {
-            rejection.reason == RejectionReason::UndrawableMesh && rejection.name.as_deref() == Some("made")
-        };
-        let rejections = &drawn.statistics.rejections;
-        ensure(rejections.iter().any(is_named), format_args!("{capacity} elements: {rejections:?}"))?;
+        let is_named =
+            |issue: &SceneIssue| issue.reason == IssueReason::UndrawableMesh && issue.name.as_deref() == Some("made");
+        let scene_issues = &drawn.statistics.scene_issues;
+        ensure(scene_issues.iter().any(is_named), format_args!("{capacity} elements: {scene_issues:?}"))?;
         Fixture::software(Deferred::to_picture())?.draw(&scene)?;
     }
     Ok(())

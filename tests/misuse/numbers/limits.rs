@@ -5,10 +5,10 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::{Backend, NullBackend, PipelineLibrary, SceneLimits, SoftwareBackend};
 use drawloom::process::Deferred;
-use drawloom::quality::{DepthCurve, DepthKey, RadianceSum, VertexFormat};
+use drawloom::quality::{DepthCurve, DepthPrecision, RadianceSum, VertexFormat};
 use drawloom::scene::Vertex;
 use drawloom::task::Scheduler;
-use drawloom::view::RejectionReason;
+use drawloom::view::IssueReason;
 use drawloom::view::internal::{GpuLight, GpuObject};
 use drawloom_testing::adapter::noop_device;
 use drawloom_testing::limited::LimitedBackend;
@@ -31,8 +31,8 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "qualities_are_asked_for_any_error",
         numbers: &[
-            "quality::DepthKey::quantize",
-            "quality::DepthKey::step",
+            "quality::DepthPrecision::quantize",
+            "quality::DepthPrecision::step",
             "quality::RadianceSum::max_blended_error",
             "quality::RadianceSum::max_light_error",
             "quality::VertexFormat::max_uv_error",
@@ -76,26 +76,26 @@ fn expect_within<B: Backend>(backend: B, limits: SceneLimits, scheduler: &Arc<Sc
     let has_maps = limits.texture_layers >= maps;
     let lights = if has_maps { 1 + u64::from(maps) } else { 1 };
     let expected: Vec<_> = [
-        (limits.binding_bytes < object, RejectionReason::ObjectLimit),
+        (limits.binding_bytes < object, IssueReason::ObjectLimit),
         // Nothing asks what no object of the frame has.
         (
             limits.buffer_bytes < 24 * size_of::<Vertex>() as u64 && limits.binding_bytes >= object,
-            RejectionReason::UndrawableMesh,
+            IssueReason::UndrawableMesh,
         ),
-        (limits.binding_bytes.min(limits.buffer_bytes) < lights * light, RejectionReason::LightLimit),
-        (!has_maps, RejectionReason::ShadowMapLimit),
+        (limits.binding_bytes.min(limits.buffer_bytes) < lights * light, IssueReason::LightLimit),
+        (!has_maps, IssueReason::ShadowMapLimit),
     ]
     .into_iter()
     .filter_map(|(is_left_out, reason)| is_left_out.then_some(reason))
     .collect();
     let is_drawn =
-        !expected.iter().any(|reason| [RejectionReason::ObjectLimit, RejectionReason::UndrawableMesh].contains(reason));
+        !expected.iter().any(|reason| [IssueReason::ObjectLimit, IssueReason::UndrawableMesh].contains(reason));
     let builder = Renderer::builder(LimitedBackend::new(backend, limits)).deferred(Deferred::to_picture());
     let (renderer, submitter) = builder.shadow_maps(small_maps()).build(Arc::clone(scheduler))?;
     let mut fixture = Fixture { renderer, submitter };
     for _ in 0..2 {
         let statistics = fixture.draw(&scene()).map_err(|failed| format!("{limits:?}: {failed:?}"))?.statistics;
-        let found: Vec<_> = statistics.rejections.iter().map(|rejection| rejection.reason).collect();
+        let found: Vec<_> = statistics.scene_issues.iter().map(|issue| issue.reason).collect();
         let is_same = found.len() == expected.len() && expected.iter().all(|reason| found.contains(reason));
         ensure(is_same, format_args!("{limits:?}: {found:?} instead of {expected:?}"))?;
         same(statistics.views[0].visible, usize::from(is_drawn), format_args!("objects within {limits:?}"))?;
@@ -124,7 +124,7 @@ fn errors() -> Result<(), Failed> {
     for (near, far) in FLOATS.into_iter().flat_map(|near| FLOATS.map(|far| (near, far))) {
         for curve in [DepthCurve::Logarithmic, DepthCurve::Linear { far }] {
             for bits in [0, 1, 20, 31, 32, 33, u32::MAX] {
-                let key = DepthKey { bits, curve };
+                let key = DepthPrecision { bits, curve };
                 let mut depths = FLOATS.map(|depth| if depth.is_nan() { f32::NEG_INFINITY } else { depth });
                 depths.sort_by(f32::total_cmp);
                 let codes = depths.map(|depth| key.quantize(depth, near, far));

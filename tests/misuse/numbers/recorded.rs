@@ -1,6 +1,6 @@
 //! Indices of views, rectangles and places of recorded and submitted frames.
 
-use drawloom::FramePlace;
+use drawloom::FencePoint;
 use drawloom::glam::Vec2;
 use drawloom::process::Deferred;
 use libtest_mimic::Failed;
@@ -12,11 +12,11 @@ pub const CASES: &[NumberCase] = &[
     NumberCase {
         name: "frames_are_asked_for_any_view_and_rectangle",
         numbers: &[
-            "FramePlace::Pass::view",
-            "FramePlace::View",
-            "Recorded::camera",
-            "Recorded::read_back",
-            "Recorded::read_back_whole",
+            "FencePoint::Pass::view",
+            "FencePoint::View",
+            "RecordedFrame::camera",
+            "RecordedFrame::read_back",
+            "RecordedFrame::read_back_whole",
             "backend::WgpuSubmission::read",
             "backend::WgpuSubmission::texture",
         ],
@@ -59,8 +59,8 @@ fn recorded() -> Result<(), Failed> {
         ensure(recorded.camera(view).is_none(), "there is no such view")?;
         refused(recorded.read_back(view, "picture", [0; 2], [1; 2]), "picture")?;
         refused(recorded.read_back_whole(view, "picture"), "picture")?;
-        refused(recorded.fence_at(FramePlace::View(view)), "place")?;
-        refused(recorded.fence_at(FramePlace::Pass { process: "geometry buffer", view }), "place")?;
+        refused(recorded.fence_at(FencePoint::View(view)), "place")?;
+        refused(recorded.fence_at(FencePoint::Pass { process: "geometry buffer", view }), "place")?;
     }
     for number in COUNTS {
         for other in COUNTS {

@@ -2,7 +2,7 @@
 
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::scene::{
-    Bounds, Camera, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Mesh, MeshBuffers, ObjectSet, Piece,
+    Bounds, Camera, Changes, IndexBuffer, LayerMask, LevelOfDetail, Light, Mesh, MeshBuffers, ObjectSet, StaticGroup,
     StreamAttribute, StreamLayout, Texture, Topology, Vertex, VertexStream,
 };
 use drawloom::wgpu;
@@ -164,9 +164,9 @@ fn sets() -> Result<(), Failed> {
         ensure(set.contains(index as usize) && !set.contains(usize::MAX), "what it was made of")?;
         same(set.iter().last(), Some(index), "the last one")?;
         let mut scene = scene();
-        scene.pieces.push(Piece::new("a piece", set));
+        scene.static_groups.push(StaticGroup::new("a static group", set));
         let drawn = Fixture::null(2).draw(&scene)?;
-        ensure(!drawn.statistics.rejections.is_empty(), "an object that is not there is counted")?;
+        ensure(!drawn.statistics.scene_issues.is_empty(), "an object that is not there is counted")?;
         let mut fixture = Fixture::null(2);
         fixture.expect_usual("the first frame")?;
         let scene = self::scene();

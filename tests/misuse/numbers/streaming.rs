@@ -77,7 +77,7 @@ fn expect_streamed(backend: WgpuBackend, budget: StreamingBudget, workers: usize
             thread::sleep(Duration::from_micros(200));
             continue;
         };
-        return ensure(submitted.statistics.rejections.is_empty(), "everything is drawn");
+        return ensure(submitted.statistics.scene_issues.is_empty(), "everything is drawn");
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use drawloom::backend::WgpuBackend;
 use drawloom::fence::{DeviceProgress, Fence, FenceSetter};
 use drawloom::process::Deferred;
-use drawloom::{Buffering, FrameLoop, FramePlace};
+use drawloom::{Buffering, FencePoint, FrameLoop};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
@@ -16,7 +16,11 @@ use crate::fixture::{DURATIONS, Fixture, LONG, ensure, refused, scene};
 
 pub const CASES: &[NumberCase] = &[
     NumberCase { name: "fences_are_waited_for_without_a_limit", numbers: &["fence::Fence::wait"], check: fences },
-    NumberCase { name: "submissions_wait_without_a_limit", numbers: &["Recorded::submit_after"], check: submissions },
+    NumberCase {
+        name: "submissions_wait_without_a_limit",
+        numbers: &["RecordedFrame::submit_after"],
+        check: submissions,
+    },
     NumberCase {
         name: "frame_loops_wait_without_a_limit",
         numbers: &["FrameLoop::set_device_limit"],
@@ -65,7 +69,7 @@ fn fences() -> Result<(), Failed> {
     let mut fixture = Fixture::noop(1, Deferred::to_picture())?;
     for limit in DURATIONS.into_iter().filter(|limit| is_long(*limit)) {
         let mut recorded = fixture.record(&scene())?;
-        let end = recorded.fence_at(FramePlace::End)?;
+        let end = recorded.fence_at(FencePoint::End)?;
         fixture.submitter.submit(recorded)?;
         end.wait(limit)?;
     }

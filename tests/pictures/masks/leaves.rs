@@ -12,7 +12,7 @@ use drawloom::process::{
 use drawloom::quality::Quality;
 use drawloom::raster::Real;
 use drawloom::scene::{
-    Blend, Camera, LayerMask, LevelOfDetail, Material, Mesh, Piece, Projection, RenderObject, Scene, Topology,
+    Blend, Camera, LayerMask, LevelOfDetail, Material, Mesh, Projection, RenderObject, Scene, StaticGroup, Topology,
     VERTEX_COLOR, Vertex,
 };
 use drawloom_testing::scenes::{cube, culled, sized, with_meshes};
@@ -401,16 +401,16 @@ pub(super) fn culled_in_pieces_and_deformed() -> Result<(), Failed> {
     let plain = leaf_objects(&leaves)?;
     let expected = Fixture::with(2, |builder| builder.deferred(colored()))?.draw(&plain)?;
     let culled = with_meshes(leaf_objects(&leaves)?, culled);
-    let mut in_pieces = leaf_objects(&leaves)?;
-    let objects: Vec<_> = in_pieces.objects().collect();
-    in_pieces.pieces = vec![Piece::new("leaves", in_pieces.object_set(objects)?)];
+    let mut in_static_groups = leaf_objects(&leaves)?;
+    let objects: Vec<_> = in_static_groups.objects().collect();
+    in_static_groups.static_groups = vec![StaticGroup::new("leaves", in_static_groups.object_set(objects)?)];
     for deferred in [colored(), colored().depth_pre_pass(true)] {
         let expected = on_each_backend(&deferred, &plain)?;
         if on_each_backend(&deferred.deformation(Still), &plain)? != expected {
             return Err("a deformation that moves nothing changes the picture".into());
         }
     }
-    for (what, scene) in [("triangle culling", culled), ("a piece", in_pieces)] {
+    for (what, scene) in [("triangle culling", culled), ("a static group", in_static_groups)] {
         let mut fixture = Fixture::with(2, |builder| builder.deferred(colored()).granularity(Granularity::Chunk(7)))?;
         for frame in 0..4 {
             if fixture.draw(&scene)? != expected {

@@ -66,7 +66,7 @@ impl Surroundings {
             columns: &[],
             written: WrittenColumns::default(),
             changes: Changes::Unknown,
-            pieces: &[],
+            static_groups: &[],
             assets: &self.assets,
             lights: &self.lights,
             cameras: &self.cameras,

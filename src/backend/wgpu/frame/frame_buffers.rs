@@ -17,7 +17,7 @@ use super::view_ranges::ViewRanges;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
-    ALIGNMENT, BindGroupLayouts, GrowingBuffer, MaterialSnapshot, MirroredBuffer, SubdividedMesh, UploadQueue,
+    ALIGNMENT, BindGroupLayouts, CountedQueue, GrowingBuffer, MaterialSnapshot, MirroredBuffer, SubdividedMesh,
     check_storage_binding_size, size_with_headroom,
 };
 use crate::backend::wgpu::timing::Timestamps;
@@ -145,7 +145,7 @@ impl FrameBuffers {
     pub(crate) fn begin(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         layouts: &BindGroupLayouts,
         materials: &MaterialSnapshot,
         request: &FrameRequest<'_>,
@@ -274,7 +274,7 @@ impl FrameBuffers {
     /// If wgpu refuses.
     pub(crate) fn write_objects(
         &self,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
@@ -282,14 +282,15 @@ impl FrameBuffers {
     }
 
     /// Uploads the objects that a pass draws, in the order of instances, unless the buffer holds them already.
-    pub(crate) fn write_object_indices(&self, uploads: &UploadQueue, pass: usize, list: &DrawList) {
+    pub(crate) fn write_object_indices(&self, uploads: &CountedQueue, pass: usize, list: &DrawList) {
         let state = &self.buffers.passes[pass];
         if !state.draws_commands {
             return;
         }
         let mut uploaded = state.uploaded_lists.write();
         let start = state.frame_ranges.object_indices.start;
-        let parts = [(list.pieces().version(), 0..list.own_objects().start), (list.version(), list.own_objects())];
+        let parts =
+            [(list.static_groups().version(), 0..list.own_objects().start), (list.version(), list.own_objects())];
         for (uploaded, (version, objects)) in uploaded.iter_mut().zip(parts) {
             if version == Version::default() || *uploaded != version {
                 *uploaded = version;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, BindingResource, CachedBindGroup, MaterialSnapshot, MaterialTextures, MirroredBuffer,
-    UploadQueue, check_storage_binding_size,
+    BindGroupLayouts, BindingResource, CachedBindGroup, CountedQueue, MaterialSnapshot, MaterialTextures,
+    MirroredBuffer, check_storage_binding_size,
 };
 
 /// The materials of a frame in flight. Of materials that change, only what changed is uploaded, and the bind group
@@ -30,7 +30,7 @@ impl MaterialBuffer {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         layouts: &BindGroupLayouts,
         MaterialSnapshot { materials, textures, .. }: &MaterialSnapshot,
     ) -> Result<(), BackendError> {

@@ -4,7 +4,7 @@ use std::num::NonZeroU64;
 use std::ops::Range;
 
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{ObjectBuffer, UploadQueue, check_storage_binding_size};
+use crate::backend::wgpu::resources::{CountedQueue, ObjectBuffer, check_storage_binding_size};
 use crate::scene::{ColumnLayout, SceneRef};
 use crate::view::{GpuObject, ObjectTable};
 
@@ -100,7 +100,7 @@ impl ObjectBuffers {
     /// If wgpu refuses.
     pub(crate) fn write(
         &self,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         objects: &ObjectTable,
         scene: &SceneRef<'_>,
         blocks: Range<usize>,
@@ -146,7 +146,7 @@ impl Changed<'_> {
     /// a run of objects, in one part or several.
     fn write(
         &self,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         buffer: &ObjectBuffer,
         stride: usize,
         for_each_part: impl Fn(Range<usize>, Visit<'_>),

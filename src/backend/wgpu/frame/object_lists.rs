@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::backend::wgpu::resources::{ALIGNMENT, GrowingBuffer, UploadQueue, size_with_headroom};
+use crate::backend::wgpu::resources::{ALIGNMENT, CountedQueue, GrowingBuffer, size_with_headroom};
 use crate::backend::{BackendError, SceneLimits};
 
 /// The lists of objects that passes of commands draw, one after the other: in one buffer, or in several of equal size
@@ -66,7 +66,7 @@ impl ObjectLists {
     }
 
     /// Writes to a list that begins at `start`.
-    pub(super) fn write(&self, uploads: &UploadQueue, start: usize, offset: usize, bytes: &[u8]) {
+    pub(super) fn write(&self, uploads: &CountedQueue, start: usize, offset: usize, bytes: &[u8]) {
         let (buffer, start) = self.position(start);
         if let Some(buffer) = self.buffers.get(buffer) {
             buffer.write(uploads, start + offset, bytes);

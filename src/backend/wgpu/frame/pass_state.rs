@@ -9,7 +9,7 @@ use parking_lot::RwLock;
 use super::bundle_cache::BundleCache;
 use super::pass_statistics::WgpuPassStatistics;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{CachedBindGroup, GrowingBuffer, UploadQueue};
+use crate::backend::wgpu::resources::{CachedBindGroup, CountedQueue, GrowingBuffer};
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
@@ -72,7 +72,8 @@ pub(crate) struct WgpuPassState {
     pub(crate) process_bind_group: Option<CachedBindGroup>,
     /// `@group(3)`: the columns and the engine's own resources that the process reads.
     pub(crate) engine_bind_group: Option<CachedBindGroup>,
-    /// The versions of the objects that the buffers hold: of those of pieces in the draw list, and of the others.
+    /// The versions of the objects that the buffers hold: of those of static groups in the draw list, and of the
+    /// others.
     pub(crate) uploaded_lists: RwLock<[Version; 2]>,
     pub(crate) strategy: PassStrategy,
     /// The strategy's index in the backend's set, and whether the frame only tries it.
@@ -193,7 +194,7 @@ impl WgpuPassState {
     pub(crate) fn upload_partial_indices(
         &self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         indices: &[u32],
     ) -> Result<(), BackendError> {
         let mut buffer = self.partial_indices.write();

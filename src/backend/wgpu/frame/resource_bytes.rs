@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{MirroredBuffer, UploadQueue, check_storage_binding_size};
+use crate::backend::wgpu::resources::{CountedQueue, MirroredBuffer, check_storage_binding_size};
 
 /// The buffers of [`ShaderResource::Bytes`](crate::process::ShaderResource::Bytes),
 /// [`ShaderResource::SharedBytes`](crate::process::ShaderResource::SharedBytes), and the values of material types,
@@ -26,7 +26,7 @@ impl ResourceBytes {
     pub(crate) fn update<'a, B: Iterator<Item = &'a [u8]>>(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         bytes_of_processes: impl Iterator<Item = B>,
     ) -> Result<(), BackendError> {
         self.bound.clear();
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn the_same_bytes_have_one_buffer_and_equal_bytes_have_two() {
         let (device, queue) = noop_device();
-        let uploads = UploadQueue::new(queue);
+        let uploads = CountedQueue::new(queue);
         let shared: Arc<[u8]> = vec![1; 64].into();
         let own = || ShaderResource::Bytes(vec![1; 64].into());
         let same = || ShaderResource::SharedBytes(Arc::clone(&shared));

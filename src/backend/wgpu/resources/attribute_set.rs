@@ -1,7 +1,7 @@
 //! Vertex attributes on the device: a buffer for each attribute that processes read.
 
 use super::buffers::{filled_buffer, new_buffer};
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
 use crate::process::DeclaredAttribute;
 use crate::scene::{AttributeFormat, AttributeLayout, Mesh};
@@ -66,7 +66,7 @@ impl AttributeSet {
     pub(crate) fn of_mesh(
         &self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         mesh: &Mesh,
     ) -> Result<AttributeBuffers, BackendError> {
         let upload = |attribute: &DeclaredAttribute| {

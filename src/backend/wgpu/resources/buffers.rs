@@ -1,6 +1,6 @@
 //! Buffers that are initialised when they are made.
 
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
 
 /// A zeroed buffer. It is mapped at creation, so that wgpu regards it as initialized: otherwise wgpu clears it again
@@ -31,7 +31,7 @@ pub(crate) fn new_buffer(
 /// If the device allows no buffer of that size.
 pub(crate) fn filled_buffer(
     device: &wgpu::Device,
-    uploads: &UploadQueue,
+    uploads: &CountedQueue,
     label: &'static str,
     bytes: &[u8],
     usage: wgpu::BufferUsages,

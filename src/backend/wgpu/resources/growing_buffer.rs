@@ -1,7 +1,7 @@
 //! Buffers that are reallocated when they are too small.
 
 use super::buffers::new_buffer;
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
 
 /// The alignment of offsets into uniform and storage buffers that every device supports.
@@ -44,7 +44,7 @@ impl GrowingBuffer {
         Ok(true)
     }
 
-    pub(crate) fn write(&self, uploads: &UploadQueue, offset: usize, bytes: &[u8]) {
+    pub(crate) fn write(&self, uploads: &CountedQueue, offset: usize, bytes: &[u8]) {
         if let Some(buffer) = self.buffer.as_ref().filter(|_| !bytes.is_empty()) {
             uploads.write_buffer(buffer, offset as u64, bytes);
         }

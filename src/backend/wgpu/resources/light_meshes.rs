@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::buffers::filled_buffer;
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
 use crate::process::LightVolume;
 use crate::scene::LightKind;
@@ -19,7 +19,7 @@ impl LightMeshes {
 
     /// # Errors
     /// If the device has no room.
-    pub(crate) fn new(device: &wgpu::Device, uploads: &UploadQueue) -> Result<Self, BackendError> {
+    pub(crate) fn new(device: &wgpu::Device, uploads: &CountedQueue) -> Result<Self, BackendError> {
         let mut vertices: Vec<[f32; 3]> = Vec::new();
         let ranges = Self::VOLUMES.map(|volume| {
             let first = vertices.len() as u32;

@@ -3,14 +3,14 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use super::counted_queue::CountedQueue;
 use super::gpu_material::GpuMaterial;
 use super::snapshot_lifetimes::SnapshotToken;
 use super::texture_arrays::{TextureArrays, TextureLocation};
-use super::upload_queue::UploadQueue;
 use crate::backend::mip_generation::reduced_textures;
 use crate::backend::{BackendError, SceneLimits};
 use crate::scene::{Assets, Material, MaterialLayout};
-use crate::view::{RejectionReason, Rejections};
+use crate::view::{IssueReason, SceneIssues};
 
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
 #[derive(Clone)]
@@ -45,9 +45,9 @@ pub(crate) struct MaterialCache {
     /// By material slot, whether its texture is not on the device.
     lacks_texture: Arc<[bool]>,
     current: Option<Current>,
-    /// Rejections that making the snapshot found. Every frame that uses the snapshot reports them.
-    rejected_textures: Vec<(RejectionReason, usize)>,
-    rejected_materials: Vec<(RejectionReason, usize)>,
+    /// Scene issues that making the snapshot found. Every frame that uses the snapshot reports them.
+    rejected_textures: Vec<(IssueReason, usize)>,
+    rejected_materials: Vec<(IssueReason, usize)>,
     /// The slots of the textures with more pixels than their arrays have.
     reduced_textures: Vec<usize>,
 }
@@ -70,13 +70,13 @@ impl MaterialCache {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         assets: &Assets,
         types: &[MaterialLayout],
-        (limits, rejections): (SceneLimits, &Rejections),
+        (limits, scene_issues): (SceneLimits, &SceneIssues),
     ) -> Result<MaterialSnapshot, BackendError> {
         let textures = (assets.textures.identity(), assets.textures.revision());
-        self.update_snapshot(device, assets, types, (limits, rejections), textures, |cache| {
+        self.update_snapshot(device, assets, types, (limits, scene_issues), textures, |cache| {
             cache.rejected_textures.clear();
             cache.textures.update(device, uploads, assets, &mut cache.rejected_textures)
         })
@@ -88,13 +88,13 @@ impl MaterialCache {
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
-        (limits, rejections): (SceneLimits, &Rejections),
+        (limits, scene_issues): (SceneLimits, &SceneIssues),
     ) -> (MaterialSnapshot, Arc<[bool]>) {
         // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on
         // the device.
         let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
         let Ok(snapshot) =
-            self.update_snapshot(device, assets, types, (limits, rejections), textures, |_| Ok::<_, Infallible>(()));
+            self.update_snapshot(device, assets, types, (limits, scene_issues), textures, |_| Ok::<_, Infallible>(()));
         (snapshot, Arc::clone(&self.lacks_texture))
     }
 
@@ -107,7 +107,7 @@ impl MaterialCache {
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
-        (limits, rejections): (SceneLimits, &Rejections),
+        (limits, scene_issues): (SceneLimits, &SceneIssues),
         textures: (u64, u64),
         update_textures: impl FnOnce(&mut Self) -> Result<(), E>,
     ) -> Result<MaterialSnapshot, E> {
@@ -135,9 +135,9 @@ impl MaterialCache {
         let moves = self.textures.moves();
         self.current = Some(Current { materials, textures, limits, moves, snapshot: snapshot.clone() });
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
-            rejections.count(reason, index);
+            scene_issues.count(reason, index);
         }
-        self.reduced_textures.iter().for_each(|slot| rejections.count(RejectionReason::ReducedTexture, *slot));
+        self.reduced_textures.iter().for_each(|slot| scene_issues.count(IssueReason::ReducedTexture, *slot));
         Ok(snapshot)
     }
 
@@ -170,7 +170,7 @@ impl MaterialCache {
         let texture = material.texture?;
         if assets.get(texture).is_err() {
             let is_pending = assets.is_pending(texture);
-            let reason = if is_pending { RejectionReason::TextureNotResident } else { RejectionReason::StaleTexture };
+            let reason = if is_pending { IssueReason::TextureNotResident } else { IssueReason::StaleTexture };
             self.rejected_materials.push((reason, slot as usize));
             return None;
         }

@@ -4,11 +4,11 @@ use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use super::attribute_set::AttributeBuffers;
+use super::counted_queue::CountedQueue;
 use super::imported_meshes::ImportedMeshes;
 use super::mesh_pages::{MeshBytes, MeshLocation, MeshPages, MeshTarget, PageSizes};
 use super::mesh_snapshot::{CoarserLevels, MeshPageIndices, MeshRange, MeshSnapshot};
 use super::snapshot_lifetimes::SnapshotLifetimes;
-use super::upload_queue::UploadQueue;
 use super::vertex_layout::with_vertex_bytes;
 use crate::backend::BackendError;
 use crate::handle::Handle;
@@ -94,7 +94,7 @@ impl MeshCache {
     pub(crate) fn attributes_of(
         &self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         mesh: &Mesh,
     ) -> Result<AttributeBuffers, BackendError> {
         self.pages.attributes.of_mesh(device, uploads, mesh)
@@ -108,7 +108,7 @@ impl MeshCache {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         assets: &Assets,
         used: &UsedMeshes,
         vertices: VertexFormat,
@@ -198,7 +198,7 @@ impl MeshCache {
     fn upload_missing(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         assets: &Assets,
         used: &UsedMeshes,
     ) -> Result<(), BackendError> {
@@ -226,7 +226,7 @@ impl MeshCache {
     pub(super) fn write(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
         target: &MeshTarget,
     ) -> Result<(), BackendError> {

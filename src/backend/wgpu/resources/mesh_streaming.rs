@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
 
+use super::counted_queue::CountedQueue;
 use super::mesh_cache::{MeshCache, MeshVersion};
 use super::mesh_pages::{MeshLocation, MeshTarget, PageSizes};
 use super::mesh_snapshot::MeshSnapshot;
 use super::snapshot_lifetimes::LastReader;
-use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::handle::Handle;
 use crate::quality::VertexFormat;
@@ -55,7 +55,7 @@ impl MeshCache {
     pub(crate) fn begin_streamed_frame(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         (assets, used): (&Assets, &UsedMeshes),
         vertices: VertexFormat,
         (budget, mut bytes_at_once): (u64, u64),
@@ -109,7 +109,7 @@ impl MeshCache {
     fn replace_at_once(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
         budget: u64,
     ) -> Result<bool, BackendError> {

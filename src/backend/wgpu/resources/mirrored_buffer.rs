@@ -1,7 +1,7 @@
 //! Buffers with a copy on the CPU.
 
+use super::counted_queue::CountedQueue;
 use super::growing_buffer::GrowingBuffer;
-use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 
 /// A buffer that is rewritten as a whole, and uploaded only if its bytes change.
@@ -30,7 +30,7 @@ impl MirroredBuffer {
     pub(crate) fn set(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         bytes: &[u8],
     ) -> Result<(), BackendError> {
         if self.on_device.reserve(device, bytes.len())? || bytes.len() != self.written.len() {
@@ -56,7 +56,7 @@ impl MirroredBuffer {
     ///
     /// # Errors
     /// If the device allows no buffer of that size.
-    pub(crate) fn upload(&mut self, device: &wgpu::Device, uploads: &UploadQueue) -> Result<bool, BackendError> {
+    pub(crate) fn upload(&mut self, device: &wgpu::Device, uploads: &CountedQueue) -> Result<bool, BackendError> {
         let reallocated = self.on_device.reserve(device, self.next.len())?;
         if reallocated || self.next != self.written {
             self.on_device.write(uploads, 0, &self.next);
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn only_blocks_that_changed_are_uploaded() {
         let (device, queue) = noop_device();
-        let uploads = UploadQueue::new(queue);
+        let uploads = CountedQueue::new(queue);
         let mut buffer = MirroredBuffer::new("", wgpu::BufferUsages::STORAGE);
         let mut bytes = vec![0; 5 * BLOCK + 8];
         let mut uploaded = |bytes: &[u8]| {

@@ -32,7 +32,7 @@ mod texture_arrays;
 mod texture_layers;
 mod texture_streaming;
 mod transient_targets;
-mod upload_queue;
+mod counted_queue;
 mod vertex_layout;
 mod view_array;
 
@@ -41,6 +41,7 @@ pub(crate) use bind_group_layouts::{
     BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
 };
 pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
+pub(crate) use counted_queue::CountedQueue;
 pub(crate) use growing_buffer::{ALIGNMENT, GrowingBuffer, check_storage_binding_size, size_with_headroom};
 pub(crate) use imported_meshes::{ImportedMeshes, VertexSlot, VertexStreamLayouts};
 pub(crate) use imported_target::ImportedTarget;
@@ -61,6 +62,5 @@ pub(crate) use target_texture::sample_count;
 pub(crate) use texture_arrays::{TextureArrays, TextureLocation};
 pub(crate) use texture_layers::{copy_rows, layer_bytes};
 pub(crate) use texture_streaming::ArrayBudget;
-pub(crate) use upload_queue::UploadQueue;
 pub(crate) use vertex_layout::{vertex_attributes, vertex_stride};
 pub(crate) use view_array::shape_dimension;

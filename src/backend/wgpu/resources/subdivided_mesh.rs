@@ -2,7 +2,7 @@
 
 use super::attribute_set::AttributeBuffers;
 use super::buffers::filled_buffer;
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use super::vertex_layout::with_vertex_bytes;
 use crate::backend::BackendError;
 use crate::quality::VertexFormat;
@@ -21,7 +21,7 @@ impl SubdividedMesh {
     /// If the device has no room.
     pub(crate) fn new(
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         mesh: &Mesh,
         format: VertexFormat,
         attributes: AttributeBuffers,

@@ -3,14 +3,14 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
+use super::counted_queue::CountedQueue;
 use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
 use super::texture_layers::{TextureLayers, copy_layer, layer_bytes, new_array};
-use super::upload_queue::UploadQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::handle::Handle;
 use crate::scene::{Assets, Texture};
-use crate::view::RejectionReason;
+use crate::view::IssueReason;
 
 /// The array and layer of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,9 +65,9 @@ impl TextureArrays {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         assets: &Assets,
-        rejected: &mut Vec<(RejectionReason, usize)>,
+        rejected: &mut Vec<(IssueReason, usize)>,
     ) -> Result<(), BackendError> {
         let current = |slot| assets.textures.get_with_revision(slot).map(|(revision, _)| revision);
         self.retire_changed(assets, |texture| current(texture.handle.index()) != Some(texture.revision));
@@ -95,7 +95,7 @@ impl TextureArrays {
                     let location = TextureLocation { array: index as u32, layer };
                     self.textures[slot] = Some(ResidentTexture { handle, revision, location });
                 }
-                _ => rejected.push((RejectionReason::TextureLimit, slot)),
+                _ => rejected.push((IssueReason::TextureLimit, slot)),
             }
         }
         uploads.add_commands([encoder.finish()]);
@@ -183,7 +183,7 @@ impl TextureArrays {
     }
 
     /// Makes room for `textures` further textures in an array, if the device allows that number of layers.
-    fn make_room(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, textures: usize) {
+    fn make_room(&mut self, device: &wgpu::Device, uploads: &CountedQueue, index: usize, textures: usize) {
         let array = &self.arrays[index];
         let max_layers = device.limits().max_texture_array_layers as usize;
         let has_retired = self.lifetimes.retired().any(|location| location.array == index as u32);
@@ -203,7 +203,7 @@ impl TextureArrays {
 
     /// Moves the textures of an array to the first layers of a new one, with this many layers, at least as many as
     /// textures.
-    pub(super) fn move_array(&mut self, device: &wgpu::Device, uploads: &UploadQueue, index: usize, layers: u32) {
+    pub(super) fn move_array(&mut self, device: &wgpu::Device, uploads: &CountedQueue, index: usize, layers: u32) {
         let live: Vec<_> = self.live_layers(index).collect();
         self.arrays[index].move_to(device, uploads, ARRAY_SIDES[index], layers, &live);
         let moved = self.textures.iter_mut().flatten().filter(|texture| texture.location.array == index as u32);

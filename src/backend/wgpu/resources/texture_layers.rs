@@ -1,6 +1,6 @@
 //! One texture array, and which of its layers are in use.
 
-use super::upload_queue::UploadQueue;
+use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::backend::wgpu::error_scope::{loss_or, refused};
@@ -55,7 +55,7 @@ impl TextureLayers {
     pub(super) fn move_to(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
+        uploads: &CountedQueue,
         side: u32,
         layers: u32,
         live: &[u32],

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use super::counted_queue::CountedQueue;
 use super::mesh_streaming::{EndOfUpload, Placed, Unplaced};
 use super::snapshot_lifetimes::LastReader;
 use super::texture_arrays::{ResidentTexture, TextureArrays, TextureLocation};
 use super::texture_layers::layer_bytes;
-use super::upload_queue::UploadQueue;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::handle::Handle;
 use crate::scene::{Assets, Texture};
@@ -15,7 +15,7 @@ use crate::scene::{Assets, Texture};
 #[derive(Clone, Copy)]
 pub(crate) struct ArrayBudget<'a> {
     device: &'a wgpu::Device,
-    uploads: &'a UploadQueue,
+    uploads: &'a CountedQueue,
     /// Of all arrays.
     bytes: u64,
     /// Of each array.
@@ -24,7 +24,7 @@ pub(crate) struct ArrayBudget<'a> {
 
 impl<'a> ArrayBudget<'a> {
     /// The bytes that it takes, and the limit of the device.
-    pub(crate) fn new(device: &'a wgpu::Device, uploads: &'a UploadQueue, bytes: u64) -> Self {
+    pub(crate) fn new(device: &'a wgpu::Device, uploads: &'a CountedQueue, bytes: u64) -> Self {
         Self { device, uploads, bytes, max_layers: u64::from(device.limits().max_texture_array_layers) }
     }
 }
@@ -328,7 +328,7 @@ mod tests {
         arrays: TextureArrays,
         assets: Assets,
         device: wgpu::Device,
-        uploads: UploadQueue,
+        uploads: CountedQueue,
         by_use: Vec<u32>,
     }
 
@@ -339,7 +339,7 @@ mod tests {
     impl Arrays {
         fn new() -> Self {
             let (device, queue) = noop_device();
-            let (arrays, uploads) = (TextureArrays::default(), UploadQueue::new(queue));
+            let (arrays, uploads) = (TextureArrays::default(), CountedQueue::new(queue));
             Self { arrays, assets: Assets::default(), device, uploads, by_use: Vec::new() }
         }
 

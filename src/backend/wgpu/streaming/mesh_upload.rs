@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::allowance::Allowance;
+use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{MeshTarget, UploadQueue};
+use crate::backend::wgpu::resources::{CountedQueue, MeshTarget};
 use crate::handle::Handle;
 use crate::quality::VertexFormat;
 use crate::scene::{Mesh, PackedVertex};
@@ -40,8 +40,8 @@ impl MeshUpload {
     pub(super) fn advance(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
-        allowance: &mut Allowance,
+        uploads: &CountedQueue,
+        upload_budget: &mut UploadBudget,
     ) -> Result<bool, BackendError> {
         self.target.create_buffers(device)?;
         let vertices: &[u8] = match self.target.format {
@@ -57,7 +57,7 @@ impl MeshUpload {
         self.target.for_each_write(&self.mesh, vertices, |buffer, offset, bytes| {
             let end = begin + bytes.len() as u64;
             while written < end {
-                let length = allowance.take(end - written, 4);
+                let length = upload_budget.take(end - written, 4);
                 if length == 0 {
                     break;
                 }

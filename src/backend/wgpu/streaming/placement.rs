@@ -3,15 +3,15 @@
 use std::cell::Cell;
 use std::iter;
 
+use super::backoff::{RefusedMeshes, RefusedTextures, Retries};
 use super::budget::StreamingBudget;
+use super::eviction_order::EvictionOrder;
 use super::mesh_upload::MeshUpload;
-use super::on_device::{HeldUpload, OnDevice};
-use super::refusals::{RefusedMeshes, RefusedTextures, Retries};
 use super::request::{Request, Requested};
+use super::residency::{HeldUpload, Residency};
 use super::texture_upload::TextureUpload;
 use super::upload_jobs::Upload;
-use super::uses::Uses;
-use super::victims::Victims;
+use super::usage::Usage;
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{ArrayBudget, MeshTarget, Placed, TextureLocation, Unplaced};
 use crate::handle::Handle;
@@ -19,13 +19,13 @@ use crate::scene::{Mesh, Texture};
 
 /// Gives room to the requests of a frame, the most important ones first.
 pub(super) struct Placement<'a, 'b> {
-    on_device: &'a mut OnDevice<'b>,
+    residency: &'a mut Residency<'b>,
     budget: &'a StreamingBudget,
-    uses: &'a Uses<'a>,
+    usage: &'a Usage<'a>,
     retries: &'a mut Retries,
     /// Made when something has to make room.
-    mesh_victims: Option<Victims>,
-    texture_victims: Option<Victims>,
+    mesh_evictions: Option<EvictionOrder>,
+    texture_evictions: Option<EvictionOrder>,
     refused_meshes: RefusedMeshes,
     refused_textures: RefusedTextures,
     /// The number of those that made room.
@@ -34,18 +34,18 @@ pub(super) struct Placement<'a, 'b> {
 
 impl<'a, 'b> Placement<'a, 'b> {
     pub(super) fn new(
-        on_device: &'a mut OnDevice<'b>,
+        residency: &'a mut Residency<'b>,
         budget: &'a StreamingBudget,
-        uses: &'a Uses<'a>,
+        usage: &'a Usage<'a>,
         retries: &'a mut Retries,
     ) -> Self {
         Self {
-            on_device,
+            residency,
             budget,
-            uses,
+            usage,
             retries,
-            mesh_victims: None,
-            texture_victims: None,
+            mesh_evictions: None,
+            texture_evictions: None,
             refused_meshes: RefusedMeshes::default(),
             refused_textures: RefusedTextures::default(),
             evictions: 0,
@@ -61,14 +61,14 @@ impl<'a, 'b> Placement<'a, 'b> {
         let placed = match request.requested {
             Requested::Mesh(handle, revision, mesh) => self.place_mesh(handle, mesh, importance)?.map(|placed| {
                 let Placed { target, last_reader } = placed;
-                let epoch = self.on_device.meshes.begin_upload(handle.index());
+                let epoch = self.residency.meshes.begin_upload(handle.index());
                 let upload = Upload::Mesh(MeshUpload::new(epoch, (handle, revision), mesh.clone(), target));
                 HeldUpload { upload, last_reader }
             }),
             Requested::Texture(handle, revision, texture) => {
                 self.place_texture(handle, texture, importance).map(|placed| {
                     let Placed { target: (location, array), last_reader } = placed;
-                    let epoch = self.on_device.materials.textures.begin_upload(handle, location);
+                    let epoch = self.residency.materials.textures.begin_upload(handle, location);
                     let upload = TextureUpload::new(epoch, (handle, revision), texture.clone(), array, location);
                     HeldUpload { upload: Upload::Texture(upload), last_reader }
                 })
@@ -83,14 +83,14 @@ impl<'a, 'b> Placement<'a, 'b> {
         mesh: &Mesh,
         importance: (bool, i32),
     ) -> Result<Result<Placed<MeshTarget>, Unplaced>, BackendError> {
-        let Self { on_device, uses, retries, refused_meshes, .. } = self;
-        let (device, budget, slot) = (on_device.device, self.budget.mesh_bytes, handle.index());
+        let Self { residency, usage, retries, refused_meshes, .. } = self;
+        let (device, budget, slot) = (residency.device, self.budget.mesh_bytes, handle.index());
         // A mesh that replaces one may take the place of that.
-        let replaces = on_device.meshes.is_resident(slot);
+        let replaces = residency.meshes.is_resident(slot);
         if refused_meshes.covers(mesh) && !replaces {
             return Ok(Err(Unplaced::Full));
         }
-        let beside = on_device.meshes.place(device, mesh, budget, iter::empty(), &mut 0)?;
+        let beside = residency.meshes.place(device, mesh, budget, iter::empty(), &mut 0)?;
         if !matches!(beside, Err(Unplaced::Full)) {
             return Ok(beside);
         }
@@ -98,10 +98,10 @@ impl<'a, 'b> Placement<'a, 'b> {
             refused_meshes.add(mesh, 0);
             return Ok(beside);
         }
-        let victims = self.mesh_victims.get_or_insert_with(|| uses.mesh_victims(on_device.meshes));
+        let eviction_order = self.mesh_evictions.get_or_insert_with(|| usage.mesh_evictions(residency.meshes));
         let tried = Cell::new(0);
-        let candidates = victims.candidates(importance, slot).inspect(|_| tried.set(tried.get() + 1));
-        let placed = on_device.meshes.place(device, mesh, budget, candidates, &mut self.evictions)?;
+        let candidates = eviction_order.candidates(importance, slot).inspect(|_| tried.set(tried.get() + 1));
+        let placed = residency.meshes.place(device, mesh, budget, candidates, &mut self.evictions)?;
         if placed.is_err() {
             refused_meshes.add(mesh, tried.get());
             retries.add(slot, tried.get());
@@ -115,20 +115,24 @@ impl<'a, 'b> Placement<'a, 'b> {
         texture: &Texture,
         importance: (bool, i32),
     ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
-        let Self { on_device, uses, refused_textures, .. } = self;
+        let Self { residency, usage, refused_textures, .. } = self;
         let (budget, slot) = (self.budget.texture_bytes, handle.index());
-        let replaces = on_device.materials.textures.is_resident(slot);
+        let replaces = residency.materials.textures.is_resident(slot);
         if let Some(refused) = refused_textures.of(texture).filter(|refused| !replaces || *refused == Unplaced::Awaited)
         {
             return Err(refused);
         }
-        let textures = &mut on_device.materials.textures;
-        let budget = ArrayBudget::new(on_device.device, on_device.uploads, budget);
+        let textures = &mut residency.materials.textures;
+        let budget = ArrayBudget::new(residency.device, residency.uploads, budget);
         let mut placed = textures.place_beside(texture, budget);
         if matches!(placed, Err(Unplaced::Full)) {
-            let victims = self.texture_victims.get_or_insert_with(|| uses.texture_victims(textures));
-            placed =
-                textures.place_instead(texture, budget, || victims.candidates(importance, slot), &mut self.evictions);
+            let eviction_order = self.texture_evictions.get_or_insert_with(|| usage.texture_evictions(textures));
+            placed = textures.place_instead(
+                texture,
+                budget,
+                || eviction_order.candidates(importance, slot),
+                &mut self.evictions,
+            );
         }
         if let Err(unplaced) = &placed {
             refused_textures.add(texture, *unplaced);

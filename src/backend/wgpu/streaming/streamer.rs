@@ -5,24 +5,24 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
+use super::backoff::{Retries, TooLarge};
 use super::budget::StreamingBudget;
 use super::frame_use::FrameUse;
 use super::mesh_upload::MeshUpload;
-use super::on_device::{Epochs, HeldUpload, OnDevice};
 use super::placement::Placement;
-use super::refusals::{Retries, TooLarge};
 use super::request::Requested;
+use super::residency::{Epochs, HeldUpload, Residency};
 use super::statistics::StreamingStatistics;
 use super::texture_upload::TextureUpload;
 use super::upload_jobs::{Upload, UploadJobs};
-use super::uses::{TextureUsers, Uses};
+use super::usage::{TextureUsers, Usage};
 use crate::backend::wgpu::resources::{
-    EndOfUpload, MaterialCache, MaterialSnapshot, MeshSnapshot, Unplaced, UploadQueue,
+    CountedQueue, EndOfUpload, MaterialCache, MaterialSnapshot, MeshSnapshot, Unplaced,
 };
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
 use crate::unwind::emit_unlocked;
-use crate::view::{RejectionReason, Rejections, UsedMeshes};
+use crate::view::{IssueReason, SceneIssues, UsedMeshes};
 
 /// Brings meshes and textures to the device by background jobs, within a budget.
 ///
@@ -73,7 +73,7 @@ impl Streamer {
     /// If the device had no room for what a job has uploaded, or has none now.
     pub(crate) fn begin_frame(
         &self,
-        mut on_device: OnDevice<'_>,
+        mut residency: Residency<'_>,
         request: &FrameRequest<'_>,
     ) -> Result<StreamedResources, BackendError> {
         let assets = request.scene.assets;
@@ -82,26 +82,26 @@ impl Streamer {
         latest.frame_use.frame += 1;
         latest.frame_use.meshes.reserve(assets.meshes.slot_count());
         latest.frame_use.materials.reserve(assets.materials.slot_count());
-        on_device.begin_frame(request, &self.budget)?;
-        if on_device.update_epochs(&mut latest.epochs) {
-            latest.held.retain(|held| on_device.is_current(&held.upload));
-            self.jobs.drop_stale(|upload| on_device.is_current(upload));
+        residency.begin_frame(request, &self.budget)?;
+        if residency.update_epochs(&mut latest.epochs) {
+            latest.held.retain(|held| residency.is_current(&held.upload));
+            self.jobs.drop_stale(|upload| residency.is_current(upload));
         }
-        self.take_over(&mut on_device, (assets, request.objects.used_meshes()), &latest.frame_use)?;
-        self.place(&mut on_device, (assets, request.rejections), latest)?;
+        self.take_over(&mut residency, (assets, request.objects.used_meshes()), &latest.frame_use)?;
+        self.place(&mut residency, (assets, request.scene_issues), latest)?;
         let Latest { frame_use, statistics, held, .. } = latest;
         latest.warning.update(statistics.over_budget);
-        let (materials, lacks_texture) = on_device.materials.update_streamed(
-            on_device.device,
+        let (materials, lacks_texture) = residency.materials.update_streamed(
+            residency.device,
             assets,
             request.plan.material_types(),
-            (request.limits, request.rejections),
+            (request.limits, request.scene_issues),
         );
         frame_use.lacks_texture = lacks_texture;
         // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in
         // flight.
-        self.begin_uploads(&on_device, held);
-        let OnDevice { meshes, materials: MaterialCache { textures, .. }, .. } = on_device;
+        self.begin_uploads(&residency, held);
+        let Residency { meshes, materials: MaterialCache { textures, .. }, .. } = residency;
         statistics.mesh_bytes = meshes.resident_bytes();
         statistics.texture_bytes = textures.resident_bytes();
         (statistics.meshes, statistics.textures) = (meshes.resident_count(), textures.resident_count());
@@ -115,7 +115,7 @@ impl Streamer {
     }
 
     /// Uploads what the budget allows between two frames.
-    pub(crate) fn work(&self, device: &wgpu::Device, uploads: &UploadQueue) {
+    pub(crate) fn work(&self, device: &wgpu::Device, uploads: &CountedQueue) {
         self.jobs.work(device, uploads, &self.budget);
     }
 
@@ -130,13 +130,13 @@ impl Streamer {
     /// Returns the first error of the device.
     fn take_over(
         &self,
-        on_device: &mut OnDevice<'_>,
+        residency: &mut Residency<'_>,
         (assets, used): (&Assets, &UsedMeshes),
         frame_use: &FrameUse,
     ) -> Result<(), BackendError> {
         let (finished, commands) = self.jobs.take_finished();
         if !commands.is_empty() {
-            on_device.uploads.add_commands(commands);
+            residency.uploads.add_commands(commands);
         }
         let mut outcome = Ok(());
         for (upload, result) in finished {
@@ -144,7 +144,7 @@ impl Streamer {
             let end = match upload {
                 Upload::Mesh(MeshUpload { epoch, handle, revision, mesh, target, .. }) => {
                     let arrived = (assets, used, is_complete);
-                    let end = on_device.meshes.end_upload(&epoch, (handle, revision, &mesh), &target, arrived);
+                    let end = residency.meshes.end_upload(&epoch, (handle, revision, &mesh), &target, arrived);
                     if end == EndOfUpload::Resident {
                         // As if it had been drawn, so that what was used before makes room first.
                         frame_use.mark_arrival(handle.index(), Self::FRAMES_IN_SIGHT);
@@ -152,7 +152,7 @@ impl Streamer {
                     end
                 }
                 Upload::Texture(TextureUpload { epoch, handle, revision, location, .. }) => {
-                    let textures = &mut on_device.materials.textures;
+                    let textures = &mut residency.materials.textures;
                     textures.end_upload(&epoch, (handle, revision), location, (assets, is_complete))
                 }
             };
@@ -169,23 +169,23 @@ impl Streamer {
     /// If a page is missing. This is a bug in Drawloom.
     fn place(
         &self,
-        on_device: &mut OnDevice<'_>,
-        (assets, rejections): (&Assets, &Rejections),
+        residency: &mut Residency<'_>,
+        (assets, scene_issues): (&Assets, &SceneIssues),
         latest: &mut Latest,
     ) -> Result<(), BackendError> {
         let Latest { frame_use, texture_users, statistics, held, retries, too_large, .. } = latest;
         texture_users.update(assets);
         retries.begin_frame(frame_use.frame);
         too_large.update(assets);
-        let uses = Uses::new(assets, (frame_use, texture_users), Self::FRAMES_IN_SIGHT);
-        let mut requests = uses.requests(on_device.meshes, &on_device.materials.textures);
+        let usage = Usage::new(assets, (frame_use, texture_users), Self::FRAMES_IN_SIGHT);
+        let mut requests = usage.requests(residency.meshes, &residency.materials.textures);
         statistics.requested = requests.len();
         statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
         statistics.over_budget = 0;
 
         let max_waiting = self.budget.upload_bytes_per_frame.saturating_mul(Self::MAX_WAITING_FRAMES);
         let mut waiting = self.jobs.waiting_bytes() + held.iter().map(|held| held.upload.bytes()).sum::<u64>();
-        let mut placement = Placement::new(on_device, &self.budget, &uses, retries);
+        let mut placement = Placement::new(residency, &self.budget, &usage, retries);
         while waiting < max_waiting
             && let Some(request) = requests.pop()
         {
@@ -205,7 +205,7 @@ impl Streamer {
                     if let Requested::Texture(handle, ..) = request.requested
                         && request.is_wanted
                     {
-                        rejections.count(RejectionReason::TextureLimit, handle.index() as usize);
+                        scene_issues.count(IssueReason::TextureLimit, handle.index() as usize);
                     }
                 }
                 Err(Unplaced::Awaited) => {}
@@ -217,8 +217,8 @@ impl Streamer {
     }
 
     /// Has jobs do the uploads whose memory no frame in flight reads any more.
-    fn begin_uploads(&self, on_device: &OnDevice<'_>, held: &mut Vec<HeldUpload>) {
-        self.jobs.add(held.extract_if(.., |held| on_device.may_begin(held)).map(|held| held.upload));
+    fn begin_uploads(&self, residency: &Residency<'_>, held: &mut Vec<HeldUpload>) {
+        self.jobs.add(held.extract_if(.., |held| residency.may_begin(held)).map(|held| held.upload));
     }
 }
 
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn an_error_of_an_upload_to_pages_that_are_gone_is_nobodys() {
         let (device, queue) = noop_device();
-        let (streamer, uploads) = (Streamer::new(StreamingBudget::default()), UploadQueue::new(queue));
+        let (streamer, uploads) = (Streamer::new(StreamingBudget::default()), CountedQueue::new(queue));
         let (mut assets, used) = (Assets::default(), UsedMeshes::default());
         let mesh = Mesh::new("leaf", Topology::TriangleList, vec![Vertex::default(); 3], vec![0, 1, 2]).unwrap();
         let handle = assets.add(mesh.clone()).unwrap();
@@ -275,8 +275,8 @@ mod tests {
                 meshes = MeshCache::default();
             }
             let (device, uploads) = (&device, &uploads);
-            let mut on_device = OnDevice { device, uploads, meshes: &mut meshes, materials: &mut materials };
-            let outcome = streamer.take_over(&mut on_device, (&assets, &used), &FrameUse::default());
+            let mut residency = Residency { device, uploads, meshes: &mut meshes, materials: &mut materials };
+            let outcome = streamer.take_over(&mut residency, (&assets, &used), &FrameUse::default());
             assert_eq!(outcome.is_ok(), was_cleared);
         }
     }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::allowance::Allowance;
+use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
-use crate::backend::wgpu::resources::{TextureLocation, UploadQueue, copy_rows, layer_bytes};
+use crate::backend::wgpu::resources::{CountedQueue, TextureLocation, copy_rows, layer_bytes};
 use crate::handle::Handle;
 use crate::scene::Texture;
 
@@ -48,8 +48,8 @@ impl TextureUpload {
     pub(super) fn advance(
         &mut self,
         device: &wgpu::Device,
-        uploads: &UploadQueue,
-        allowance: &mut Allowance,
+        uploads: &CountedQueue,
+        upload_budget: &mut UploadBudget,
     ) -> Result<(bool, wgpu::CommandBuffer), BackendError> {
         if self.levels.is_empty() {
             self.levels = mip_chain(&self.texture, self.array.width());
@@ -61,7 +61,7 @@ impl TextureUpload {
             let number = self.array.mip_level_count() - self.levels.len() as u32;
             let row_bytes = u64::from(self.array.width() >> number) * 4;
             let first = u64::from(self.rows) * row_bytes;
-            let length = allowance.take(level.len() as u64 - first, row_bytes);
+            let length = upload_budget.take(level.len() as u64 - first, row_bytes);
             if length == 0 {
                 break;
             }

@@ -5,13 +5,13 @@ use std::mem;
 
 use parking_lot::Mutex;
 
-use super::allowance::Allowance;
 use super::budget::StreamingBudget;
 use super::mesh_upload::MeshUpload;
 use super::texture_upload::TextureUpload;
+use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
-use crate::backend::wgpu::resources::UploadQueue;
+use crate::backend::wgpu::resources::CountedQueue;
 
 /// Something on its way to the device.
 pub(super) enum Upload {
@@ -84,24 +84,24 @@ impl UploadJobs {
     }
 
     /// Uploads what the budget allows between two frames.
-    pub(super) fn work(&self, device: &wgpu::Device, uploads: &UploadQueue, budget: &StreamingBudget) {
-        let mut allowance = Allowance::new(budget.upload_bytes_per_frame, budget.upload_time_per_frame);
+    pub(super) fn work(&self, device: &wgpu::Device, uploads: &CountedQueue, budget: &StreamingBudget) {
+        let mut upload_budget = UploadBudget::new(budget.upload_bytes_per_frame, budget.upload_time_per_frame);
         loop {
             // The lock is not held meanwhile, so that a frame can begin.
             let next = self.state.lock().waiting.pop_front();
             let Some(mut upload) = next else { break };
-            let before = allowance.bytes();
+            let before = upload_budget.bytes();
             let advance = || match &mut upload {
-                Upload::Mesh(mesh) => Ok((mesh.advance(device, uploads, &mut allowance)?, None)),
+                Upload::Mesh(mesh) => Ok((mesh.advance(device, uploads, &mut upload_budget)?, None)),
                 Upload::Texture(texture) => {
-                    let (is_complete, commands) = texture.advance(device, uploads, &mut allowance)?;
+                    let (is_complete, commands) = texture.advance(device, uploads, &mut upload_budget)?;
                     Ok((is_complete, Some(commands)))
                 }
             };
             let label = "a streamed mesh or texture";
             let advanced = with_error_scope(device, label, || catch_wgpu_panic(label, advance)).flatten().flatten();
             let mut state = self.state.lock();
-            state.uploaded_bytes += before - allowance.bytes();
+            state.uploaded_bytes += before - upload_budget.bytes();
             match advanced {
                 Ok((is_complete, commands)) => {
                     state.commands.extend(commands);
@@ -113,7 +113,9 @@ impl UploadJobs {
                 }
                 Err(error) => state.finished.push((upload, Err(error))),
             }
-            if allowance.is_over() || matches!(state.waiting.front(), Some(next) if !next.can_advance(&allowance)) {
+            if upload_budget.is_over()
+                || matches!(state.waiting.front(), Some(next) if !next.can_advance(&upload_budget))
+            {
                 break;
             }
         }
@@ -130,10 +132,10 @@ impl Upload {
     }
 
     /// Whether its next portion may fit into what is left.
-    fn can_advance(&self, allowance: &Allowance) -> bool {
+    fn can_advance(&self, upload_budget: &UploadBudget) -> bool {
         match self {
-            Self::Mesh(_) => allowance.bytes() >= 4,
-            Self::Texture(texture) => allowance.bytes() >= u64::from(texture.array.width()) * 4,
+            Self::Mesh(_) => upload_budget.bytes() >= 4,
+            Self::Texture(texture) => upload_budget.bytes() >= u64::from(texture.array.width()) * 4,
         }
     }
 }

@@ -115,8 +115,8 @@ impl DeviceClock {
     }
 
     /// Converts the times of frames' passes to the timeline's axis. Each frame comes with its number
-    /// ([`Recorded::frame_number`](crate::Recorded::frame_number)). Passes whose times cannot be converted are left
-    /// out. A warning reports their number, together with the [skipped](DevicePassTimes::skipped) ones.
+    /// ([`RecordedFrame::frame_number`](crate::RecordedFrame::frame_number)). Passes whose times cannot be converted
+    /// are left out. A warning reports their number, together with the [skipped](DevicePassTimes::skipped) ones.
     pub fn log(&self, frames: impl IntoIterator<Item = (u64, DevicePassTimes)>) -> DeviceLog {
         let (mut passes, mut skipped) = (Vec::new(), 0);
         for (frame, times) in frames {

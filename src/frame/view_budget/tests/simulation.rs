@@ -6,7 +6,7 @@ use fastrand::Rng;
 use glam::DVec3;
 
 use crate::frame::view_budget::ViewBudget;
-use crate::frame::{BudgetedView, FrameStatistics, Rung, StageTimes, ViewForm, ViewStatistics};
+use crate::frame::{BudgetedView, FrameStatistics, QualityLevel, StageTimes, ViewStatistics, ViewVariant};
 use crate::raster::CulledTriangles;
 use crate::scene::{Camera, Redraw, ViewKind};
 use crate::timeline::FrameTuning;
@@ -19,7 +19,7 @@ pub(super) struct Simulated {
     pub(super) view: BudgetedView,
     /// What drawing each of its cameras at its best takes, in milliseconds.
     pub(super) cost: f64,
-    /// What drawing a camera takes on a rung with a smaller picture, as a share of that.
+    /// What drawing a camera takes on a quality level with a smaller picture, as a share of that.
     pub(super) share_of_small: f64,
 }
 
@@ -33,28 +33,28 @@ pub(super) struct Simulation {
     pub(super) noise: f64,
     pub(super) random: Rng,
     pub(super) frame: u32,
-    /// How often the rung of a view changed.
+    /// How often the quality level of a view changed.
     pub(super) changes: usize,
     /// The cameras of the latest frame that are drawn when they change, with their size.
     pub(super) cached: Vec<(String, [u32; 2])>,
 }
 
-pub(super) fn every(interval: u32) -> Rung {
-    Rung::Drawn(ViewForm { interval, ..ViewForm::BEST })
+pub(super) fn every(interval: u32) -> QualityLevel {
+    QualityLevel::Drawn(ViewVariant { interval, ..ViewVariant::BEST })
 }
 
-pub(super) fn small() -> Rung {
-    Rung::Drawn(ViewForm { size: SMALL, ..ViewForm::BEST })
+pub(super) fn small() -> QualityLevel {
+    QualityLevel::Drawn(ViewVariant { size: SMALL, ..ViewVariant::BEST })
 }
 
-pub(super) fn view(name: &str, priority: i32, cost: f64, ladder: &[Rung]) -> Simulated {
-    with_cameras(name, priority, cost, 1, ladder)
+pub(super) fn view(name: &str, priority: i32, cost: f64, levels: &[QualityLevel]) -> Simulated {
+    with_cameras(name, priority, cost, 1, levels)
 }
 
-pub(super) fn with_cameras(name: &str, priority: i32, cost: f64, cameras: usize, ladder: &[Rung]) -> Simulated {
+pub(super) fn with_cameras(name: &str, priority: i32, cost: f64, cameras: usize, levels: &[QualityLevel]) -> Simulated {
     let camera = |index| Camera::looking_at(format!("{name} {index}"), DVec3::Z, DVec3::ZERO);
-    let (name, cameras, ladder) = (name.to_owned(), (0..cameras).map(camera).collect(), ladder.to_vec());
-    let view = BudgetedView { name, priority, cameras, ladder };
+    let (name, cameras, levels) = (name.to_owned(), (0..cameras).map(camera).collect(), levels.to_vec());
+    let view = BudgetedView { name, priority, cameras, levels };
     Simulated { view, cost, share_of_small: f64::from(SMALL * SMALL) }
 }
 
@@ -65,16 +65,16 @@ impl Simulation {
         Self { budget, views, rest, noise: 0.0, random, frame: 0, changes: 0, cached: Vec::new() }
     }
 
-    pub(super) fn rungs(&self) -> Vec<usize> {
-        self.views.iter().map(|simulated| self.budget.rung(&simulated.view.name).unwrap()).collect()
+    pub(super) fn levels(&self) -> Vec<usize> {
+        self.views.iter().map(|simulated| self.budget.level(&simulated.view.name).unwrap()).collect()
     }
 
     pub(super) fn is_at_best(&self) -> bool {
-        self.rungs().iter().all(|rung| *rung == 0)
+        self.levels().iter().all(|level| *level == 0)
     }
 
     pub(super) fn is_at_last(&self) -> bool {
-        self.rungs().iter().zip(&self.views).all(|(rung, simulated)| *rung == simulated.view.ladder.len())
+        self.levels().iter().zip(&self.views).all(|(level, simulated)| *level == simulated.view.levels.len())
     }
 
     pub(super) fn sample(&mut self, milliseconds: f64) -> Duration {
@@ -111,8 +111,8 @@ impl Simulation {
                 kind: ViewKind::Main,
                 age: u32::from(!is_drawn),
                 visible: 0,
-                pieces: 0,
-                objects_of_pieces: 0,
+                static_groups: 0,
+                objects_of_static_groups: 0,
                 occluded: 0,
                 lights: 0,
                 commands: 0,
@@ -130,26 +130,27 @@ impl Simulation {
     pub(super) fn run(&mut self, frames: usize) {
         for _ in 0..frames {
             let statistics = self.draw();
-            let before = self.rungs();
+            let before = self.levels();
             self.budget.update(&statistics);
-            self.changes += before.iter().zip(self.rungs()).filter(|(before, after)| **before != *after).count();
+            self.changes += before.iter().zip(self.levels()).filter(|(before, after)| **before != *after).count();
         }
     }
 
-    /// What a frame costs on average on the current rungs, in milliseconds: a sum over what each rung says.
+    /// What a frame costs on average on the current quality levels, in milliseconds: a sum over what each quality level
+    /// says.
     pub(super) fn true_cost(&self) -> f64 {
-        let cost = |(rung, simulated): (usize, &Simulated)| {
+        let cost = |(level, simulated): (usize, &Simulated)| {
             let count = simulated.view.cameras.len();
-            match rung.checked_sub(1).map(|index| simulated.view.ladder[index]) {
+            match level.checked_sub(1).map(|index| simulated.view.levels[index]) {
                 None => simulated.cost * count as f64,
-                Some(Rung::LeftOut) => 0.0,
-                Some(Rung::Drawn(form)) => {
+                Some(QualityLevel::LeftOut) => 0.0,
+                Some(QualityLevel::Drawn(form)) => {
                     let share = if form.size < 1.0 { simulated.share_of_small } else { 1.0 };
                     simulated.cost * count.min(form.max_cameras) as f64 * share / f64::from(form.interval)
                 }
             }
         };
-        self.rest + self.rungs().into_iter().zip(&self.views).map(cost).sum::<f64>()
+        self.rest + self.levels().into_iter().zip(&self.views).map(cost).sum::<f64>()
     }
 
     pub(super) fn scale_costs(&mut self, factor: f64) {

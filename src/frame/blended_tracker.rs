@@ -1,0 +1,164 @@
+//! Whether an object of the scene needs transparency, known by one object that does.
+
+use crate::handle::Handle;
+use crate::process::{Deferred, Requirements};
+use crate::scene::{Assets, Material, SceneRef};
+use crate::view::{IssueReason, ObjectTable, set_bits};
+
+/// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes
+/// no difference.
+///
+/// While the witness needs transparency, a frame looks at no other object; without a witness, at those that changed.
+/// All objects are searched when the witness stops needing it, and without a witness when a material starts to need it.
+///
+/// An object counts by its material alone, also if it is rejected for another reason or no camera sees it: what is
+/// visible changes with every step of a camera, and the processes of a frame should not. Objects beyond the device's
+/// room count too: the room depends on the processes, which depend on the witness.
+#[derive(Debug, Default)]
+pub(super) struct BlendedTracker {
+    materials: BlendedMaterials,
+    witness: Option<Witness>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Witness {
+    object: usize,
+    material: Handle<Material>,
+}
+
+impl BlendedTracker {
+    /// Whether an object of the scene needs transparency. The object table has begun the frame, so it knows which
+    /// objects changed: after a failed frame all of them, so nothing has to be invalidated here.
+    pub(super) fn update(&mut self, scene: &SceneRef<'_>, objects: &ObjectTable) -> bool {
+        let has_started = self.materials.update(scene.assets);
+        let materials = &self.materials;
+        let count = scene.object_count();
+        let witness_of = |object: usize| {
+            let material = scene.materials[object];
+            materials.contains(material).then_some(Witness { object, material })
+        };
+        // An object that is not reported is drawn as it was, so its material of that time counts. Those without room
+        // are not drawn.
+        let is_current = |object: usize| object >= objects.len() || objects.is_reported(object);
+        let remains = |witness: Witness| match is_current(witness.object) {
+            true => witness_of(witness.object),
+            false => materials.contains(witness.material).then_some(witness),
+        };
+        self.witness = match self.witness {
+            _ if materials.count == 0 => None,
+            Some(witness) => {
+                let next = witness.object.min(count);
+                let kept = Some(witness).filter(|witness| witness.object < count).and_then(remains);
+                // Objects often stop one after the other, so the search goes on where the last one ended.
+                kept.or_else(|| (next..count).chain(0..next).find_map(witness_of))
+            }
+            None if has_started => (0..count).find_map(witness_of),
+            None => {
+                let words = (0..objects.changed_word_count()).map(|index| objects.changed_word(index));
+                let changed = words.flat_map(|word| set_bits(word.mask).map(move |bit| word.word * 64 + bit));
+                changed.chain(objects.len()..count).find_map(witness_of)
+            }
+        };
+        self.witness.is_some()
+    }
+
+    /// Counts an object if the pipeline draws it in half floats because the backend cannot blend floats: the witness,
+    /// or another one if that has no room in the table.
+    pub(super) fn count_half_floats(&self, scene: &SceneRef<'_>, deferred: Option<&Deferred>, objects: &ObjectTable) {
+        let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
+        let drawn = witness.and_then(|Witness { object, .. }| match object < objects.len() {
+            true => Some(object),
+            false => (0..objects.len()).find(|object| self.materials.contains(scene.materials[*object])),
+        });
+        if let Some(object) = drawn {
+            objects.scene_issues().count(IssueReason::HalfFloatBlending, object);
+        }
+    }
+}
+
+/// The materials that need transparency.
+#[derive(Debug, Default)]
+struct BlendedMaterials {
+    /// The identity and revision of the materials; `None` before the first update.
+    version: Option<(u64, u64)>,
+    /// By slot: each material of the assets.
+    materials: Vec<Option<Handle<Material>>>,
+    /// By slot: whether there is a material that needs transparency. A search looks here for each object.
+    is_blended: Vec<bool>,
+    /// The number of those that need it.
+    count: usize,
+}
+
+impl BlendedMaterials {
+    /// Updates the materials. Returns whether one that was there before starts to need transparency: objects that have
+    /// it need not be reported. No object that is not reported can have one that is new.
+    fn update(&mut self, assets: &Assets) -> bool {
+        let version = Some((assets.materials.identity(), assets.materials.revision()));
+        if self.version == version {
+            return false;
+        }
+        let mut starts = false;
+        let mut materials = vec![None; assets.materials.slot_count()];
+        let mut is_blended = vec![false; assets.materials.slot_count()];
+        for (handle, material) in assets.iter::<Material>() {
+            let slot = handle.index() as usize;
+            materials[slot] = Some(handle);
+            is_blended[slot] = Requirements::needs_transparency(material);
+            let was_opaque = self.materials.get(slot) == Some(&Some(handle)) && !self.is_blended[slot];
+            starts |= was_opaque && is_blended[slot];
+        }
+        self.count = is_blended.iter().filter(|is_blended| **is_blended).count();
+        (self.version, self.materials, self.is_blended) = (version, materials, is_blended);
+        starts
+    }
+
+    fn contains(&self, material: Handle<Material>) -> bool {
+        let slot = material.index() as usize;
+        self.is_blended.get(slot) == Some(&true) && self.materials[slot] == Some(material)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Blend, Changes, RenderObject, Scene, Topology, Vertex};
+    use crate::view::TableLimits;
+
+    /// The device's room for objects changes after the frame's processes are decided on, in both directions.
+    #[test]
+    fn a_blended_object_that_gets_room_within_a_frame_is_known() {
+        let mut scene = Scene::new();
+        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+        let mesh = crate::scene::Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2]);
+        let mesh = scene.add(mesh.unwrap()).unwrap();
+        let opaque = scene.add(Material::default()).unwrap();
+        let blended = scene.add(Material { blend: Blend::Alpha, ..Material::default() }).unwrap();
+        for object in 0..200 {
+            let material = if object == 150 { blended } else { opaque };
+            scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        }
+        let unchanged = SceneRef { changes: Changes::Objects(&[]), ..scene.as_scene_ref() };
+        let can_draw = |_: &crate::scene::Mesh| true;
+        let within = |objects| TableLimits { objects, can_draw: &can_draw, ..TableLimits::NONE };
+        let (mut witness, mut table) = (BlendedTracker::default(), ObjectTable::default());
+        // Before and after the processes are known: how many objects have room.
+        for (before, after) in [(100, 200), (200, 200), (200, 100), (100, 100), (100, 200)] {
+            table.begin_frame_within(&unchanged, &within(before));
+            let found = witness.update(&unchanged, &table);
+            if after != before {
+                table.begin_frame_anew(&unchanged, &within(after));
+            }
+            table.describe(&unchanged, 0..table.changed_block_count());
+            table.finish();
+            table.end_frame();
+            assert_eq!(found, Requirements::any_needs_transparency(&unchanged), "{before} {after}");
+        }
+        let fewer = SceneRef { materials: &unchanged.materials[..0], ..unchanged };
+        let fewer = SceneRef { meshes: &[], orientations: &[], positions: &[], scales: &[], ..fewer };
+        table.begin_frame_within(&fewer, &within(200));
+        assert!(!witness.update(&fewer, &table), "the object is removed");
+    }
+}
