@@ -26,7 +26,10 @@ pub const CASES: &[Case] = &[
     ("a_mask_that_changes_looks_like_one_that_was_so_from_the_beginning", leaves::changing),
     ("the_order_of_faces_in_an_obj_file_does_not_decide_which_leaf_covers_which", leaves::leaves_of_a_file),
     ("what_is_behind_a_hole_is_drawn_with_occlusion_culling", behind_a_hole),
-    ("masks_look_the_same_culled_by_triangle_in_static_groups_and_deformed", leaves::culled_in_pieces_and_deformed),
+    (
+        "masks_look_the_same_culled_by_triangle_in_static_groups_and_deformed",
+        leaves::culled_in_static_groups_and_deformed,
+    ),
     ("a_process_of_the_engine_draws_masks_by_entry_points_of_their_own", leaves::own_pre_pass),
     ("coarse_levels_of_masks_have_holes", leaves::coarse_levels),
 ];

@@ -16,7 +16,7 @@ pub const NAMES: &[&str] = &[
     "a_frame_in_flight_keeps_its_vertices",
     "a_jitter_of_whole_pixels_moves_the_picture",
     "a_long_beam_casts_a_straight_shadow",
-    "a_mesh_and_a_texture_larger_than_a_frame_may_upload_arrive_in_pieces",
+    "a_mesh_and_a_texture_larger_than_a_frame_may_upload_arrive_in_parts",
     "a_mesh_in_the_engines_buffers_looks_like_one_in_the_pages",
     "a_mesh_is_drawn_in_the_first_frame_in_which_an_object_has_it",
     "a_mesh_that_is_replaced_while_the_budget_is_full_is_drawn_until_the_next_one_arrives",

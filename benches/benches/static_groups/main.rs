@@ -95,7 +95,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let titles = [
         "cameras",
         "objects",
-        "static_groups",
+        "static groups",
         "drawn",
         "draws",
         "static groups, µs",

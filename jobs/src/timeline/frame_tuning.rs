@@ -54,7 +54,7 @@ impl TuningSubject {
             Self::RunMode => "run mode",
             Self::OcclusionTest => "occlusion test",
             Self::Recording => "recording",
-            Self::QualityLevel => "level",
+            Self::QualityLevel => "quality level",
         }
     }
 

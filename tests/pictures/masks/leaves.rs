@@ -396,7 +396,7 @@ impl<R: Real> DeformationCpuShader<R> for Still {
     }
 }
 
-pub(super) fn culled_in_pieces_and_deformed() -> Result<(), Failed> {
+pub(super) fn culled_in_static_groups_and_deformed() -> Result<(), Failed> {
     let leaves = Leaf::crossing(30);
     let plain = leaf_objects(&leaves)?;
     let expected = Fixture::with(2, |builder| builder.deferred(colored()))?.draw(&plain)?;
