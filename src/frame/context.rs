@@ -4,16 +4,15 @@ use std::time::Duration;
 
 use super::borrowed_nodes::BorrowedNodes;
 use super::cost_model::CostModel;
-use super::culling::{OcclusionControls, allows_triangle_culling};
+use super::culling::OcclusionControls;
 use super::granularity::Granularity;
 use super::list_inputs::{ListInputs, OrderInputs};
 use super::pass_recording::PassRecording;
 use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
-use super::tables::{FrameTables, MAX_SEGMENTS};
+use super::tables::{FrameTables, MAX_SEGMENTS, PassTable};
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::{DrawList, Splitters};
-use crate::scene::Projection;
 use crate::view::{DrawFilter, ObjectLevels, VisibleRange};
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
@@ -62,25 +61,16 @@ impl<B: Backend> FrameContext<'_, B> {
         self.tables.levels.get(view).map(|view| &view.levels)
     }
 
-    /// Whether a pass orders its objects by bin, and not by depth.
-    pub(super) fn orders_by_bin(&self, pass: usize) -> bool {
-        self.tables.passes[pass].orders_by_bin
-    }
-
-    /// Whether the draw list of a pass has a place for static groups.
-    pub(super) fn has_static_groups(&self, pass: usize) -> bool {
-        !self.tables.static_groups.is_empty() && self.orders_by_bin(pass)
-    }
-
     /// What the draw list of a pass is made from, once its view's visible set is complete.
     pub(super) fn list_inputs(&self, pass: usize) -> ListInputs {
         let view_index = self.view_index_of(pass);
         let objects = &self.tables.objects;
-        let selection = self.tables.passes[pass].selection.unwrap_or_default();
+        let PassTable { mode, selection, .. } = &self.tables.passes[pass];
+        let selection = selection.unwrap_or_default();
         let filter = DrawFilter::new(objects, self.request.scene, selection);
         ListInputs {
             visible: self.tables.visibility[view_index].set.version(),
-            static_groups: self.has_static_groups(pass).then(|| {
+            static_groups: mode.lists_static_groups().then(|| {
                 [
                     self.tables.static_groups.version(selection),
                     self.tables.visibility[view_index].static_groups.version(),
@@ -91,7 +81,7 @@ impl<B: Backend> FrameContext<'_, B> {
             layers: (!filter.ignores_layers()).then(|| objects.epoch()),
             material_types: objects.material_types_revision(),
             instancing: self.instancing,
-            order: if self.orders_by_bin(pass) {
+            order: if mode.orders_by_bin {
                 OrderInputs::Bins { draws_changed_in: objects.draws_changed_in() }
             } else {
                 OrderInputs::of_depth(objects.epoch(), &self.request.views[view_index].camera)
@@ -99,16 +89,12 @@ impl<B: Backend> FrameContext<'_, B> {
         }
     }
 
-    /// Whether last frame's draw list of a pass can be reused.
+    /// Whether last frame's draw list of a pass can be reused: decided when it is first asked, which is once its view's
+    /// visible set is complete.
     pub(super) fn keeps_list(&self, pass: usize) -> bool {
-        self.can_keep_list(pass) && *self.tables.passes[pass].list_inputs.read() == Some(self.list_inputs(pass))
-    }
-
-    /// Whether later frames may keep the draw list of a pass. Those of paraboloids are made anew, because a frame
-    /// counts the objects whose edges are too coarse while it makes them; so are those whose triangles are culled.
-    pub(super) fn can_keep_list(&self, pass: usize) -> bool {
-        let view = &self.request.views[self.view_index_of(pass)];
-        view.camera.projection != Projection::Paraboloid && !self.pass_culls_triangles(pass)
+        let table = &self.tables.passes[pass];
+        let is_same = || *table.list_inputs.read() == Some(self.list_inputs(pass));
+        *table.keeps_list.get_or_init(|| table.can_keep_list && is_same())
     }
 
     /// The number of segments in which a pass orders its objects by bin. Passes run in parallel already, so they share
@@ -164,15 +150,10 @@ impl<B: Backend> FrameContext<'_, B> {
         self.backend.part_count(self.backend_frame, &self.pass_request(pass, &self.tables.passes[pass].list.read()))
     }
 
-    /// Whether a pass culls triangles of meshes with triangle culling.
-    pub(super) fn pass_culls_triangles(&self, pass: usize) -> bool {
-        self.culls_triangles && allows_triangle_culling(self.request, pass)
-    }
-
     /// Whether equal commands of the mesh in a slot become one draw. Objects whose triangles are culled are drawn one
     /// by one.
     pub(super) fn can_merge(&self, pass: usize, mesh: u32) -> bool {
-        self.instancing && !(self.pass_culls_triangles(pass) && self.tables.culling.is_cullable(mesh))
+        self.instancing && !(self.tables.passes[pass].culls_triangles && self.tables.culling.is_cullable(mesh))
     }
 
     /// The number of a node's `width` items that are worth a job.

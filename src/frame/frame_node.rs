@@ -13,7 +13,7 @@ use crate::scene::run_node_job;
 use crate::task::Worker;
 
 /// A node of the frame's stage graph.
-pub(super) enum FrameNode<B> {
+pub(super) enum FrameNode<B: Backend> {
     Stage(StageNode<B>),
     Cpu(CpuNodeIndex),
 }

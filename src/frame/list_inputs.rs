@@ -2,10 +2,8 @@
 
 use glam::{DVec3, Quat};
 
-use crate::command::{Blending, DrawOrder, Selection, Version};
-use crate::quality::DepthPrecision;
-use crate::scene::{Camera, Projection};
-use crate::view::RenderView;
+use crate::command::{Selection, Version};
+use crate::scene::Camera;
 
 /// What a draw list is made from: equal inputs make equal lists.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,12 +38,4 @@ impl OrderInputs {
         let &Camera { position, orientation, near, far, .. } = camera;
         Self::Depth { epoch, position, orientation, near, far }
     }
-}
-
-/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order,
-/// and the view is not a paraboloid, where the subdivision level gives an object another state.
-pub(super) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthPrecision) -> bool {
-    (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
-        && opaque_order.bits == 0
-        && view.camera.projection != Projection::Paraboloid
 }

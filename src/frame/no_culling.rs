@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::tables::FrameTables;
-use crate::backend::{FrameRequest, KeptView};
+use crate::backend::KeptView;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
@@ -28,15 +28,8 @@ impl CullingOptions {
     }
 }
 
-pub(super) fn allows_triangle_culling(_: &FrameRequest<'_>, _pass: usize) -> bool {
+pub(super) fn allows_triangle_culling(_: &FramePlan, _: &[Draws<'_>], _: &RenderView, _: &Pass) -> bool {
     false
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CullingNeeds;
-
-impl CullingNeeds {
-    pub(super) const NONE: Self = Self;
 }
 
 #[derive(Default)]
@@ -75,10 +68,6 @@ impl OcclusionControls {
 
     pub(super) fn is_possible(&self, _view: usize) -> bool {
         false
-    }
-
-    pub(super) fn needs(&self, _view: usize) -> CullingNeeds {
-        CullingNeeds
     }
 
     pub(super) fn inherit_measurements(&mut self, _: &Self, _: &[Option<KeptView>]) {}

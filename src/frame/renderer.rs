@@ -19,7 +19,7 @@ use super::scene_capacity::SceneCapacity;
 use super::scene_check::check_scene;
 use super::shadow_views::MapSettings;
 use super::stage_clock::{StageClock, StageGroup};
-use super::stage_graph::StageOptions;
+use super::stage_graph::FrameFeatures;
 use super::stage_graph_cache::StageGraphCache;
 use super::tables::FrameTables;
 use super::valid_lights::ValidLights;
@@ -312,15 +312,16 @@ impl<B: Backend> Renderer<B> {
         self.tables.culling.update(scene.assets, self.tables.objects.used_meshes());
         self.tables.mesh_levels.update(scene.assets, self.tables.objects.used_meshes());
         let culling = CullingOptions::new(&self.quality, &self.tables.culling);
-        let options = StageOptions {
+        let features = FrameFeatures {
             culling,
             chooses_levels: self.quality.level_of_detail > 0.0 && !self.tables.mesh_levels.is_empty(),
             opaque_order: self.quality.opaque_order,
             has_static_groups: !scene.static_groups.is_empty(),
         };
         let nodes = self.node_declarations.lend(nodes)?;
-        let graph = self.graphs.get(&plan, &draws, views, options, nodes)?;
-        graph.begin_frame(&mut self.tables, scene, views, &self.quality, self.scheduler.workers(), self.granularity)?;
+        let graph = self.graphs.get(&plan, &draws, views, features, nodes)?;
+        let workers = self.scheduler.workers();
+        graph.begin_frame(&mut self.tables, scene, (views, &draws), &self.quality, workers, self.granularity)?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);
@@ -363,8 +364,8 @@ impl<B: Backend> Renderer<B> {
             costs: &graph.tuning.costs,
             occlusion: &graph.tuning.occlusion,
             culls_triangles: culling.culls_triangles(),
-            workers: self.scheduler.workers(),
-            binning_passes: self.tables.passes.iter().filter(|table| table.orders_by_bin).count(),
+            workers,
+            binning_passes: self.tables.passes.iter().filter(|table| table.mode.orders_by_bin).count(),
             sorted_before: self.tables.sorted_before(),
         };
         graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);

@@ -5,13 +5,12 @@ use std::sync::Arc;
 
 use super::FrameError;
 use super::borrowed_nodes::{BorrowedNodes, NodeKeys};
-use super::culling::{CullingNeeds, CullingOptions, OcclusionControls};
+use super::culling::{CullingOptions, OcclusionControls, allows_triangle_culling};
 use super::frame_node::{CpuNodeIndex, FrameNode};
 use super::granularity::Granularity;
-use super::list_inputs::orders_by_bin;
-use super::stage::{Stage, StageNeeds, StageNode};
+use super::pass_mode::{PassMode, orders_by_bin};
+use super::stage::{Stage, StageNode, StageOwner};
 use super::stage_tuning::{StageTuning, TuningLabels};
-use super::stages::{stages_of_frame, stages_of_pass, stages_of_view};
 use super::static_groups::ListConditions;
 use super::table_keys::TableKeys;
 use super::tables::{FrameTables, PassTable};
@@ -31,6 +30,8 @@ pub(super) struct StageGraph<B: Backend> {
     pub(super) tuning: StageTuning,
     /// In submission order.
     pub(super) passes: Vec<Pass>,
+    /// One for each pass.
+    modes: Vec<PassMode>,
     pub(super) sampled_views: SampledViews,
     pub(super) plan: Arc<FramePlan>,
     table_keys: Arc<TableKeys>,
@@ -52,7 +53,7 @@ struct GraphKey {
     views: Vec<ViewKey>,
     /// Of each process.
     draws: Vec<DrawsKey>,
-    options: StageOptions,
+    features: FrameFeatures,
     nodes: NodeKeys,
 }
 
@@ -66,7 +67,7 @@ struct DrawsKey {
 
 /// The optional parts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct StageOptions {
+pub(super) struct FrameFeatures {
     pub(super) culling: CullingOptions,
     /// Whether views choose levels of detail.
     pub(super) chooses_levels: bool,
@@ -126,20 +127,26 @@ impl GraphKey {
     fn new(
         draws: &[Draws<'_>],
         views: &[RenderView],
-        options: StageOptions,
+        features: FrameFeatures,
         nodes: BorrowedNodes<'_>,
     ) -> Result<Self, FrameError> {
         Ok(Self {
             views: views.iter().map(ViewKey::new).collect(),
             draws: draws.iter().map(DrawsKey::new).collect(),
-            options,
+            features,
             nodes: nodes.keys()?,
         })
     }
 
     /// Whether the key matches the inputs of a frame. Allocates nothing.
-    fn fits(&self, draws: &[Draws<'_>], views: &[RenderView], options: StageOptions, nodes: BorrowedNodes<'_>) -> bool {
-        self.options == options
+    fn fits(
+        &self,
+        draws: &[Draws<'_>],
+        views: &[RenderView],
+        features: FrameFeatures,
+        nodes: BorrowedNodes<'_>,
+    ) -> bool {
+        self.features == features
             && self.nodes.fit(nodes)
             && self.views.len() == views.len()
             && self.views.iter().zip(views).all(|(key, view)| key.fits(view))
@@ -156,10 +163,10 @@ impl<B: Backend> StageGraph<B> {
         plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
         views: &[RenderView],
-        options: StageOptions,
+        features: FrameFeatures,
         nodes: BorrowedNodes<'_>,
     ) -> Result<Self, FrameError> {
-        Self::new(plan, draws, views, GraphKey::new(draws, views, options, nodes)?)
+        Self::new(plan, draws, views, GraphKey::new(draws, views, features, nodes)?)
     }
 
     /// Whether it is the graph of a frame. Allocates nothing.
@@ -168,10 +175,10 @@ impl<B: Backend> StageGraph<B> {
         plan: &FramePlan,
         draws: &[Draws<'_>],
         views: &[RenderView],
-        options: StageOptions,
+        features: FrameFeatures,
         nodes: BorrowedNodes<'_>,
     ) -> bool {
-        self.plan.identity() == plan.identity() && self.key.fits(draws, views, options, nodes)
+        self.plan.identity() == plan.identity() && self.key.fits(draws, views, features, nodes)
     }
 
     /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass
@@ -191,44 +198,40 @@ impl<B: Backend> StageGraph<B> {
                 return Err(FrameError::NoProcess { view: view.name().to_owned(), kind: view.kind() });
             }
         }
-        let occlusion = OcclusionControls::new(key.options.culling, plan, draws, &passes, views);
+        let occlusion = OcclusionControls::new(key.features.culling, plan, draws, &passes, views);
         let mut builder = GraphBuilder::default();
-        let every_frame = StageNeeds {
-            draws_commands: true,
-            orders_by_bin: false,
-            culling: CullingNeeds::NONE,
-            chooses_levels: false,
-            has_static_groups: key.options.has_static_groups,
-        };
-        let frame = builder.add(Scope::default(), stages_of_frame(), every_frame);
-        let mut view_scopes = vec![None; views.len()];
-        for (index, pass) in passes.iter().enumerate() {
-            let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].name.as_str());
+        let FrameFeatures { culling, chooses_levels, opaque_order, has_static_groups } = key.features;
+        let mode_of = |pass: &Pass| {
             let selection = draws[pass.process_index].selection();
-            let needs = StageNeeds {
-                draws_commands: selection.is_some(),
-                orders_by_bin: selection
-                    .is_some_and(|selection| orders_by_bin(selection, view, key.options.opaque_order)),
-                culling: occlusion.needs(pass.view_index),
-                chooses_levels: key.options.chooses_levels,
-                has_static_groups: key.options.has_static_groups,
-            };
+            let by_bin = |selection| orders_by_bin(selection, &views[pass.view_index], opaque_order);
+            PassMode {
+                draws_objects: selection.is_some(),
+                orders_by_bin: selection.is_some_and(by_bin),
+                has_static_groups,
+                chooses_levels,
+                tests_occlusion: occlusion.is_possible(pass.view_index),
+                has_cullable_meshes: culling.culls_triangles(),
+            }
+        };
+        let modes: Vec<_> = passes.iter().map(mode_of).collect();
+        let of_frame = PassMode { has_static_groups, ..PassMode::default() };
+        let frame = builder.add(NodeOwner::default(), (StageOwner::Frame, 0), of_frame);
+        let mut view_owners = vec![None; views.len()];
+        for (index, (pass, mode)) in passes.iter().zip(&modes).enumerate() {
+            let (view, process) = (&views[pass.view_index], plan.processes()[pass.process_index].name.as_str());
             // The stages of a view stand right before those of its first pass: a serial run has what they write in its
             // caches.
-            let pass_scope = if needs.draws_commands {
-                let view_scope = view_scopes[pass.view_index].get_or_insert_with(|| {
-                    builder.add(
-                        frame.of_view(pass.view_index, view, occlusion.is_possible(pass.view_index)),
-                        stages_of_view(pass.view_index),
-                        needs,
-                    )
+            let owner = if mode.draws_objects {
+                let owner = view_owners[pass.view_index].get_or_insert_with(|| {
+                    let owner = frame.of_view(pass.view_index, view, mode.tests_occlusion);
+                    builder.add(owner, (StageOwner::View, pass.view_index), *mode)
                 });
-                view_scope.of_process(pass.process_index, process)
+                owner.of_process(pass.process_index, process)
             } else {
                 // What such a pass costs has nothing to do with occlusion.
                 frame.of_view(pass.view_index, view, false).of_process(pass.process_index, process)
             };
-            builder.add(pass_scope, stages_of_pass(index), needs);
+            builder.add(owner, (StageOwner::Pass, index), *mode);
         }
         builder.add_cpu_nodes(&key.nodes)?;
         let GraphBuilder { graph, cost_kinds, kind_of_node, labels, .. } = builder;
@@ -236,10 +239,11 @@ impl<B: Backend> StageGraph<B> {
         Ok(Self {
             schedule: graph.compile().map_err(|error| key.nodes.error_of(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
-            view_draws_commands: view_scopes.iter().map(Option::is_some).collect(),
+            view_draws_commands: view_owners.iter().map(Option::is_some).collect(),
             table_keys: Arc::new(TableKeys::new(plan, &passes, views)),
             cost_kinds,
             passes,
+            modes,
             sampled_views,
             plan: Arc::clone(plan),
             key,
@@ -269,8 +273,8 @@ impl<B: Backend> StageGraph<B> {
     /// The name of a stage's node, of a pass in these views.
     pub(super) fn node_name(&self, stage: &str, pass: usize, views: &[RenderView]) -> String {
         let Pass { process_index: process, view_index: view } = self.passes[pass];
-        let scope = Scope::default().of_view(view, &views[view], false);
-        scope.of_process(process, &self.plan.processes()[process].name).name_of(stage)
+        let owner = NodeOwner::default().of_view(view, &views[view], false);
+        owner.of_process(process, &self.plan.processes()[process].name).name_of(stage)
     }
 
     /// Begins a frame of these views in the tables. The object table has begun it already.
@@ -281,22 +285,23 @@ impl<B: Backend> StageGraph<B> {
         &self,
         tables: &mut FrameTables,
         scene: &SceneRef<'_>,
-        views: &[RenderView],
+        (views, draws): (&[RenderView], &[Draws<'_>]),
         quality: &Quality,
         workers: usize,
         granularity: Granularity,
     ) -> Result<(), FrameError> {
-        let StageOptions { culling, chooses_levels, opaque_order, .. } = self.key.options;
+        let FrameFeatures { culling, chooses_levels, .. } = self.key.features;
         let culls_triangles = culling.culls_triangles();
         tables.set_keys(&self.table_keys, views);
         tables.begin_frame(views.len(), workers);
         tables.passes.resize_with(self.passes.len(), PassTable::default);
         let frame = tables.version(0).frame;
-        for (pass, table) in self.passes.iter().zip(&mut tables.passes) {
+        for ((pass, mode), table) in self.passes.iter().zip(&self.modes).zip(&mut tables.passes) {
             let view = &views[pass.view_index];
             let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
-            let orders_by_bin = selection.is_some_and(|selection| orders_by_bin(selection, view, opaque_order));
-            table.begin_frame(frame, selection, tables.objects.len(), culls_triangles, orders_by_bin, granularity);
+            let culls_triangles = culls_triangles && allows_triangle_culling(&self.plan, draws, view, pass);
+            let of_pass = (*mode, selection, culls_triangles);
+            table.begin_frame(frame, of_pass, view.camera.projection, tables.objects.len(), granularity);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_static_groups(scene, conditions, &self.passes)?;
@@ -344,32 +349,32 @@ struct GraphBuilder<B: Backend> {
     nodes_of_stages: HashMap<&'static str, Vec<NodeId>>,
 }
 
-/// What a node belongs to: the frame, a view or a pass. Not the job system's `Scope`.
+/// What a node belongs to: the frame, a view or a pass.
 #[derive(Clone, Debug, Default)]
-struct Scope {
+struct NodeOwner {
     /// The view's index, and its name in graphs.
     view: Option<(usize, Arc<str>)>,
     process: Option<usize>,
     labels: Labels,
     tuned_view: Option<usize>,
-    /// The stages of the scope and of those around it, by name: what later stages can wait for.
+    /// The stages of the owner and of those around it, by name: what later stages can wait for.
     stages: Vec<(&'static str, NodeId)>,
 }
 
-impl Scope {
+impl NodeOwner {
     fn of_view(&self, index: usize, view: &RenderView, tests_occlusion: bool) -> Self {
-        let mut scope = self.clone();
-        scope.view = Some((index, format!("view {index} {:?}", view.name()).into()));
-        scope.labels.view = Some(view.name().into());
-        scope.tuned_view = tests_occlusion.then_some(index);
-        scope
+        let mut owner = self.clone();
+        owner.view = Some((index, format!("view {index} {:?}", view.name()).into()));
+        owner.labels.view = Some(view.name().into());
+        owner.tuned_view = tests_occlusion.then_some(index);
+        owner
     }
 
     fn of_process(&self, index: usize, name: &str) -> Self {
-        let mut scope = self.clone();
-        scope.process = Some(index);
-        scope.labels.process = Some(name.into());
-        scope
+        let mut owner = self.clone();
+        owner.process = Some(index);
+        owner.labels.process = Some(name.into());
+        owner
     }
 
     /// The name of a stage's node.
@@ -396,37 +401,37 @@ impl<B: Backend> Default for GraphBuilder<B> {
 }
 
 impl<B: Backend> GraphBuilder<B> {
-    /// Adds the needed ones of some stages, each after the stage that it names, and returns the scope with them.
-    fn add(&mut self, mut scope: Scope, stages: Vec<Box<dyn Stage<B>>>, needs: StageNeeds) -> Scope {
-        for stage in stages {
+    /// Adds the stages of the frame, a view or a pass that this mode needs, each after the stage that it names, and
+    /// returns the owner with them.
+    fn add(&mut self, mut owner: NodeOwner, (kind, of): (StageOwner, usize), mode: PassMode) -> NodeOwner {
+        for stage in Stage::<B>::all_of(kind) {
             // Also of stages that this frame does without, so that no node has such a name.
-            self.nodes_of_stages.entry(stage.info().name).or_default();
-            if !stage.is_needed(&needs) {
+            self.nodes_of_stages.entry(stage.name).or_default();
+            if !(stage.is_needed)(mode) {
                 continue;
             }
-            let info = stage.info();
             let mut labels_of = |stage: &'static str| {
                 let name = self.stage_names.entry(stage).or_insert_with(|| stage.into());
-                Labels { stage: Some(Arc::clone(name)), ..scope.labels.clone() }
+                Labels { stage: Some(Arc::clone(name)), ..owner.labels.clone() }
             };
-            let labels = labels_of(info.name);
+            let labels = labels_of(stage.name);
             // The stage whose jobs a node sizes is the one that it shares its cost kind with.
-            let cost_labels = labels_of(info.cost_kind);
-            let node = self.add_to_costs(scope.process, cost_labels);
-            let tuned_view = scope.tuned_view.filter(|_| info.depends_on_occlusion);
-            let view = scope.view.as_ref().map(|(index, _)| *index);
-            let payload = FrameNode::Stage(StageNode { stage, node, view, tuned_view });
-            let id = self.graph.add(scope.name_of(info.name), payload);
-            self.nodes_of_stages.entry(info.name).or_default().push(id);
+            let cost_labels = labels_of(stage.cost_kind);
+            let node = self.add_to_costs(owner.process, cost_labels);
+            let tuned_view = owner.tuned_view.filter(|_| stage.depends_on_occlusion(mode));
+            let view = owner.view.as_ref().map(|(index, _)| *index);
+            let payload = FrameNode::Stage(StageNode { stage, of, node, view, tuned_view });
+            let id = self.graph.add(owner.name_of(stage.name), payload);
+            self.nodes_of_stages.entry(stage.name).or_default().push(id);
             self.graph.label(id, labels);
             self.graph.keep(id);
-            let find = |name: &&str| scope.stages.iter().rev().find(|(known, _)| known == name);
-            if let Some((_, before)) = info.after.iter().find_map(find) {
+            let find = |name: &&str| owner.stages.iter().rev().find(|(known, _)| known == name);
+            if let Some((_, before)) = stage.after.iter().find_map(find) {
                 self.graph.order(*before, id);
             }
-            scope.stages.push((info.name, id));
+            owner.stages.push((stage.name, id));
         }
-        scope
+        owner
     }
 
     /// Adds the engine's own nodes, after all stages.
@@ -454,24 +459,5 @@ impl<B: Backend> GraphBuilder<B> {
         self.kind_of_node.push(*self.cost_kinds.entry((name, process)).or_insert(next_kind));
         self.labels.push(Arc::new(labels));
         self.labels.len() - 1
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::stage::StageInfo;
-    use super::*;
-    use crate::backend::NullBackend;
-
-    #[test]
-    fn a_stage_waits_only_for_stages_that_stand_before_it() {
-        let mut known = Vec::new();
-        let stages = [stages_of_frame::<NullBackend>(), stages_of_view(0), stages_of_pass(0)];
-        for stage in stages.iter().flatten() {
-            let StageInfo { name, after, .. } = stage.info();
-            assert!(after.iter().all(|before| known.contains(before)), "{name} waits for {after:?}, after {known:?}");
-            assert!(!known.contains(name), "{name} is listed twice");
-            known.push(name);
-        }
     }
 }

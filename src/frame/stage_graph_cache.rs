@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::FrameError;
 use super::borrowed_nodes::BorrowedNodes;
-use super::stage_graph::{StageGraph, StageOptions};
+use super::stage_graph::{FrameFeatures, StageGraph};
 use crate::backend::Backend;
 use crate::process::{Draws, FramePlan};
 use crate::view::RenderView;
@@ -33,14 +33,14 @@ impl<B: Backend> StageGraphCache<B> {
         plan: &Arc<FramePlan>,
         draws: &[Draws<'_>],
         views: &[RenderView],
-        options: StageOptions,
+        features: FrameFeatures,
         nodes: BorrowedNodes<'_>,
     ) -> Result<&mut StageGraph<B>, FrameError> {
-        let found = self.latest_first.iter().position(|graph| graph.fits(plan, draws, views, options, nodes));
+        let found = self.latest_first.iter().position(|graph| graph.fits(plan, draws, views, features, nodes));
         let graph = match found {
             Some(index) => self.latest_first.remove(index),
             None => {
-                let mut graph = StageGraph::of_frame(plan, draws, views, options, nodes)?;
+                let mut graph = StageGraph::of_frame(plan, draws, views, features, nodes)?;
                 if let Some(before) = self.latest_first.first() {
                     graph.inherit_measurements(before, views);
                 }

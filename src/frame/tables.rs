@@ -1,6 +1,6 @@
 //! The tables that the stages of a frame fill for each other.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
@@ -9,6 +9,7 @@ use super::blended_tracker::BlendedTracker;
 use super::culling::{CullingTables, PassTriangles};
 use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
+use super::pass_mode::PassMode;
 use super::static_groups::{ListConditions, StaticGroupTable};
 use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::view_levels::ViewLevels;
@@ -21,7 +22,7 @@ use crate::command::{
 };
 use crate::leaked_guards::unlock;
 use crate::process::Pass;
-use crate::scene::{SceneError, SceneRef};
+use crate::scene::{Projection, SceneError, SceneRef};
 use crate::view::{IssueReason, LightTable, MeshLevels, ObjectTable, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
@@ -91,10 +92,12 @@ impl FrameTables {
     ) -> Result<(), SceneError> {
         self.visibility.iter_mut().for_each(|view| view.may_execute_static_groups = true);
         for (pass, table) in passes.iter().zip(&self.passes) {
-            let draws_in_order = |selection: Selection| !table.orders_by_bin && selection.blending != Blending::Blended;
+            let draws_in_order =
+                |selection: Selection| !table.mode.orders_by_bin && selection.blending != Blending::Blended;
             self.visibility[pass.view_index].may_execute_static_groups &= !table.selection.is_some_and(draws_in_order);
         }
-        let selections = self.passes.iter().filter(|table| table.orders_by_bin).filter_map(|table| table.selection);
+        let selections =
+            self.passes.iter().filter(|table| table.mode.orders_by_bin).filter_map(|table| table.selection);
         self.static_groups.begin_frame(scene, self.objects.len(), conditions, selections)?;
         self.static_groups.count_unknown_objects(scene.object_count(), self.objects.scene_issues());
         Ok(())
@@ -125,7 +128,7 @@ impl FrameTables {
 
     /// How many objects all passes that sort put into their lists in the frame before.
     pub(super) fn sorted_before(&self) -> usize {
-        self.passes.iter().filter(|table| !table.orders_by_bin).map(|table| table.listed_before).sum()
+        self.passes.iter().filter(|table| !table.mode.orders_by_bin).map(|table| table.listed_before).sum()
     }
 
     /// The version of what the frame makes for a view or pass, by index.
@@ -163,8 +166,13 @@ const LIGHT_ALIGNMENT: u64 = 256;
 pub(super) struct PassTable {
     /// The objects that it draws; `None` for a pass without commands.
     pub(super) selection: Option<Selection>,
-    /// Whether it orders them by bin, and not by depth.
-    pub(super) orders_by_bin: bool,
+    pub(super) mode: PassMode,
+    /// Whether triangles of meshes with triangle culling are culled.
+    pub(super) culls_triangles: bool,
+    /// Whether later frames may keep the draw list.
+    pub(super) can_keep_list: bool,
+    /// Whether this frame keeps the one of the frame before; empty until that is known.
+    pub(super) keeps_list: OnceLock<bool>,
     /// How many objects it put into the list in the frame before; 0 if that kept its list.
     pub(super) listed_before: usize,
     /// One command for each visible object, by rank.
@@ -183,14 +191,14 @@ pub(super) struct PassTable {
 }
 
 impl PassTable {
-    /// Begins the frame of this number, of `objects` objects. The list is kept as that of a frame with the same inputs.
+    /// Begins the frame of this number, of `objects` objects, in a view of this projection. The list is kept as that of
+    /// a frame with the same inputs.
     pub(super) fn begin_frame(
         &mut self,
         frame: u64,
-        selection: Option<Selection>,
+        (mode, selection, culls_triangles): (PassMode, Option<Selection>, bool),
+        projection: Projection,
         objects: usize,
-        culls_triangles: bool,
-        orders_by_bin: bool,
         granularity: Granularity,
     ) {
         let parts = granularity.draws_per_job().map_or(0, |draws| objects.div_ceil(draws));
@@ -199,13 +207,16 @@ impl PassTable {
         // A list that cannot be kept has no version.
         let was_made = list.version() == Version::default() || list.version().frame + 1 == frame;
         self.listed_before = if was_made { list.objects.len() } else { 0 };
-        self.selection = selection;
-        self.orders_by_bin = orders_by_bin;
+        (self.mode, self.selection, self.culls_triangles) = (mode, selection, culls_triangles);
+        // Those of paraboloids are made anew, because a frame counts the objects whose edges are too coarse while it
+        // makes them; so are those whose triangles are culled.
+        self.can_keep_list = projection != Projection::Paraboloid && !culls_triangles;
+        self.keeps_list.take();
         if selection.is_none() || culls_triangles {
             self.clear_list();
         }
         self.triangles.get_mut().begin_frame(culls_triangles);
-        if orders_by_bin {
+        if mode.orders_by_bin {
             self.segments.resize_with(parts.max(MAX_SEGMENTS), RwLock::default);
         } else if selection.is_some() {
             self.commands.grow(objects, RenderCommand::EMPTY);
@@ -233,7 +244,8 @@ mod tests {
     fn a_list_counts_in_the_frame_after_it_was_made_and_not_while_it_is_kept() {
         let mut table = PassTable::default();
         let begin = |table: &mut PassTable, frame| {
-            table.begin_frame(frame, Some(Selection::default()), 10, false, false, Granularity::Adaptive);
+            let draws = (PassMode::default(), Some(Selection::default()), false);
+            table.begin_frame(frame, draws, Projection::Paraboloid, 10, Granularity::Adaptive);
             table.listed_before
         };
         table.list.get_mut().objects.extend(0..10);

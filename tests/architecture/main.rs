@@ -4,6 +4,7 @@
 //! - `circles`: the files of one module do not import each other in circles.
 //! - `files`: files are short, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files and print lines through `drawloom-output`.
+//! - `pipeline`: `ARCHITECTURE.md` has the table of stages.
 //! - `subscribers`: the library calls subscribers of `tracing` where their panics are caught.
 //! - `atomics`: the file `ORDERINGS.md` of each crate lists every atomic of the crate.
 
@@ -13,6 +14,7 @@ mod files;
 mod layers;
 mod outputs;
 mod paths;
+mod pipeline;
 mod sources;
 mod subscribers;
 mod tokens;

@@ -1,9 +1,9 @@
 //! What decides which stages of culling a frame has.
 
 use super::culling_tables::CullingTables;
-use crate::backend::FrameRequest;
-use crate::process::AttachmentExtent;
+use crate::process::{AttachmentExtent, Draws, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
+use crate::view::RenderView;
 
 /// What culling a frame does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,19 +11,6 @@ pub(in crate::frame) struct CullingOptions {
     /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
     pub(super) occlusion_tile: Option<u32>,
     culls_triangles: bool,
-}
-
-/// Which stages of culling a pass has, or its view.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::frame) struct CullingNeeds {
-    /// Whether the view may test for occlusion.
-    pub(in crate::frame) tests_occlusion: bool,
-    /// Whether the scene has meshes whose triangles are culled.
-    pub(in crate::frame) culls_triangles: bool,
-}
-
-impl CullingNeeds {
-    pub(in crate::frame) const NONE: Self = Self { tests_occlusion: false, culls_triangles: false };
 }
 
 impl CullingOptions {
@@ -41,10 +28,14 @@ impl CullingOptions {
 }
 
 /// Whether the triangles of meshes with triangle culling may be culled in a pass.
-pub(in crate::frame) fn allows_triangle_culling(request: &FrameRequest<'_>, pass: usize) -> bool {
-    let pass = request.passes[pass];
+pub(in crate::frame) fn allows_triangle_culling(
+    plan: &FramePlan,
+    draws: &[Draws<'_>],
+    view: &RenderView,
+    pass: &Pass,
+) -> bool {
     // Triangle culling tests undeformed triangles against the centres of the picture's pixels.
-    request.draws[pass.process_index].allows_triangle_culling()
-        && request.plan.attachment_extent(pass.process_index) == AttachmentExtent::PICTURE
-        && request.views[pass.view_index].can_cull_triangles()
+    draws[pass.process_index].allows_triangle_culling()
+        && plan.attachment_extent(pass.process_index) == AttachmentExtent::PICTURE
+        && view.can_cull_triangles()
 }

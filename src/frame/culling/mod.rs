@@ -10,7 +10,7 @@ mod occlusion_controls;
 mod pass_triangles;
 mod view_occlusion;
 
-pub(super) use culling_options::{CullingNeeds, CullingOptions, allows_triangle_culling};
+pub(super) use culling_options::{CullingOptions, allows_triangle_culling};
 pub(super) use culling_tables::CullingTables;
 pub(super) use occlusion_controls::OcclusionControls;
 pub(super) use pass_triangles::PassTriangles;

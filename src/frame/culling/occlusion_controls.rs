@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::tables::FrameTables;
-use super::culling_options::{CullingNeeds, CullingOptions};
+use super::culling_options::CullingOptions;
 use super::occlusion_control::OcclusionControl;
 use crate::backend::KeptView;
 use crate::command::Selection;
@@ -39,11 +39,6 @@ impl OcclusionControls {
     /// Whether a view can test for occlusion.
     pub(in crate::frame) fn is_possible(&self, view: usize) -> bool {
         self.of_views[view].is_possible()
-    }
-
-    /// Which stages of culling a pass has in a view, and the view.
-    pub(in crate::frame) fn needs(&self, view: usize) -> CullingNeeds {
-        CullingNeeds { tests_occlusion: self.is_possible(view), culls_triangles: self.options.culls_triangles() }
     }
 
     /// The objects that may occlude others in a view.

@@ -9,95 +9,39 @@ use std::time::Duration;
 use super::super::context::FrameContext;
 use super::super::pass_recording::PassRecording;
 use super::super::pass_runs::{PassFailure, PassRuns};
-use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
-use super::super::stage_clock::StageGroup;
+use super::super::stage::StageJob;
 use crate::backend::{Backend, BackendError, PassRequest};
 use crate::command::DrawList;
 use crate::task::{JobPanic, Worker, catch};
 
 /// Uploads which objects the pass draws, and makes its pipelines.
-pub(super) struct Prepare {
-    pub(super) pass: usize,
+pub(super) fn prepare<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let table = &frame.tables.passes[job.of];
+    frame.recordings[job.of].reserve(frame.part_count(job.of));
+    let list = table.list.read();
+    frame.backend.prepare(job.worker, frame.backend_frame, &frame.pass_request(job.of, &list))
 }
 
-impl<B: Backend> Stage<B> for Prepare {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "prepare",
-            after: &["cull list", "join"],
-            group: StageGroup::Record,
-            chunking: Chunking::PerItem,
-            cost_kind: "prepare",
-            depends_on_occlusion: true,
-        }
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let table = &frame.tables.passes[self.pass];
-        frame.recordings[self.pass].reserve(frame.part_count(self.pass));
-        let list = table.list.read();
-        frame.backend.prepare(job.worker, frame.backend_frame, &frame.pass_request(self.pass, &list))
-    }
+/// The parts that the backend records the pass in.
+pub(super) fn parts<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
+    frame.part_count(pass)
 }
 
 /// Records the pass in parts, such as bundles. An item is a part.
-pub(super) struct Record {
-    pub(super) pass: usize,
-}
-
-impl<B: Backend> Stage<B> for Record {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "record",
-            after: &["prepare"],
-            group: StageGroup::Record,
-            chunking: Chunking::ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE },
-            cost_kind: "record",
-            depends_on_occlusion: true,
-        }
-    }
-
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.part_count(self.pass)
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let list = frame.tables.passes[self.pass].list.read();
-        let request = frame.pass_request(self.pass, &list);
-        let mut put_part = frame.recordings[self.pass].put_parts_from(job.items.start);
-        frame.backend.record(job.worker, frame.backend_frame, &request, job.items, &mut put_part)
-    }
+pub(super) fn record<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let list = frame.tables.passes[job.of].list.read();
+    let request = frame.pass_request(job.of, &list);
+    let mut put_part = frame.recordings[job.of].put_parts_from(job.items.start);
+    frame.backend.record(job.worker, frame.backend_frame, &request, job.items, &mut put_part)
 }
 
 /// Finishes the pass: its commands are ready to submit. Of passes that are finished together, the job of the one that
 /// becomes ready last finishes all.
-pub(super) struct Finish {
-    pub(super) pass: usize,
-}
-
-impl<B: Backend> Stage<B> for Finish {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "finish",
-            after: &["record"],
-            group: StageGroup::Record,
-            chunking: Chunking::PerItem,
-            cost_kind: "finish",
-            depends_on_occlusion: true,
-        }
-    }
-
-    /// Every pass is finished, with commands or without.
-    fn is_needed(&self, _: &StageNeeds) -> bool {
-        true
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        match frame.pass_runs.complete(self.pass) {
-            None => Ok(()),
-            Some(passes) if passes.len() == 1 => finish_pass(frame, job.worker, self.pass),
-            Some(passes) => finish_together(frame, job.worker, passes, self.pass),
-        }
+pub(super) fn finish<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    match frame.pass_runs.complete(job.of) {
+        None => Ok(()),
+        Some(passes) if passes.len() == 1 => finish_pass(frame, job.worker, job.of),
+        Some(passes) => finish_together(frame, job.worker, passes, job.of),
     }
 }
 

@@ -1,89 +1,47 @@
 //! The stages of static groups: recorded once, executed by passes.
 
 use super::super::context::FrameContext;
-use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
-use super::super::stage_clock::StageGroup;
+use super::super::stage::StageJob;
 use crate::backend::{Backend, BackendError};
 
-/// Records static groups, for all views: makes what each process draws of them. An item is a static group that has to
-/// be recorded.
-pub(super) struct RecordStaticGroups;
+/// The static groups that have to be recorded.
+pub(super) fn changed_groups<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
+    frame.tables.static_groups.recording_count()
+}
 
-impl<B: Backend> Stage<B> for RecordStaticGroups {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "record static groups",
-            after: &["bins"],
-            group: StageGroup::Sort,
-            chunking: Chunking::PerItem,
-            cost_kind: "record static groups",
-            depends_on_occlusion: false,
-        }
+/// Records static groups, for all views: makes what each process draws of them. An item is a static group.
+pub(super) fn record_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let tables = frame.tables;
+    let changes_by_view =
+        |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.culling.is_cullable(mesh);
+    let timeline = job.worker.timeline();
+    for index in job.items {
+        // A slice of its own, by name.
+        let name = || format!("record static group {:?}", tables.static_groups.recorded_name(index));
+        let _span = timeline.is_on().then(|| timeline.span(name()));
+        let is_recordable = |mesh| !changes_by_view(mesh);
+        tables.static_groups.record(index, frame.request.scene, &tables.objects, is_recordable, |_| frame.instancing);
     }
+    Ok(())
+}
 
-    fn is_needed(&self, needs: &StageNeeds) -> bool {
-        needs.has_static_groups
-    }
-
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.static_groups.recording_count()
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let tables = frame.tables;
-        let changes_by_view =
-            |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.culling.is_cullable(mesh);
-        let timeline = job.worker.timeline();
-        for index in job.items {
-            // A slice of its own, by name.
-            let name = || format!("record static group {:?}", tables.static_groups.recorded_name(index));
-            let _span = timeline.is_on().then(|| timeline.span(name()));
-            let is_recordable = |mesh| !changes_by_view(mesh);
-            tables
-                .static_groups
-                .record(index, frame.request.scene, &tables.objects, is_recordable, |_| frame.instancing);
-        }
-        Ok(())
-    }
+/// 1 if the view executes static groups: also if the draw list, which executes them as well, is kept, so that timelines
+/// have the stage in every frame that does.
+pub(super) fn one_if_executed<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
+    let executed = frame.tables.visibility[frame.view_index_of(pass)].static_groups.executed();
+    usize::from(!executed.is_empty() || !frame.keeps_list(pass))
 }
 
 /// Puts what a pass draws of the static groups that its view sees into the draw list.
-pub(super) struct ExecuteStaticGroups {
-    pub(super) pass: usize,
-}
-
-impl<B: Backend> Stage<B> for ExecuteStaticGroups {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "execute static groups",
-            after: &["bin"],
-            group: StageGroup::Instance,
-            chunking: Chunking::PerItem,
-            cost_kind: "execute static groups",
-            depends_on_occlusion: true,
-        }
+pub(super) fn execute_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    if frame.keeps_list(job.of) {
+        return Ok(());
     }
-
-    fn is_needed(&self, needs: &StageNeeds) -> bool {
-        needs.draws_commands && needs.orders_by_bin && needs.has_static_groups
+    let table = &frame.tables.passes[job.of];
+    let static_groups = &frame.tables.visibility[frame.view_index_of(job.of)].static_groups;
+    if let Some(selection) = table.selection {
+        let executed = (|static_group| static_groups.executes(static_group), static_groups.version());
+        frame.tables.static_groups.execute(selection, executed, |_| frame.instancing, &mut table.list.write());
     }
-
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        let executed = frame.tables.visibility[frame.view_index_of(self.pass)].static_groups.executed();
-        // A kept list executes them as well: the stage is there in every frame that does, for the timeline.
-        usize::from(frame.has_static_groups(self.pass) && (!executed.is_empty() || !frame.keeps_list(self.pass)))
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        if frame.keeps_list(self.pass) {
-            return Ok(());
-        }
-        let table = &frame.tables.passes[self.pass];
-        let static_groups = &frame.tables.visibility[frame.view_index_of(self.pass)].static_groups;
-        if let Some(selection) = table.selection {
-            let executed = (|static_group| static_groups.executes(static_group), static_groups.version());
-            frame.tables.static_groups.execute(selection, executed, |_| frame.instancing, &mut table.list.write());
-        }
-        Ok(())
-    }
+    Ok(())
 }

@@ -1,96 +1,41 @@
 //! The stages of a view: from all objects to the visible ones.
 
 use super::super::context::FrameContext;
-use super::super::stage::{Chunking, Stage, StageInfo, StageJob, StageNeeds};
-use super::super::stage_clock::StageGroup;
+use super::super::stage::StageJob;
 use crate::backend::{Backend, BackendError};
 
-/// Tests objects against the view's frustum: all of them, or those that changed. An item is a word of objects.
-pub(super) struct Visibility {
-    pub(super) view: usize,
+/// The words of objects that the view tests: all of them, or those with changed objects.
+pub(super) fn tested_words<B: Backend>(frame: &FrameContext<'_, B>, view: usize) -> usize {
+    frame.tables.visibility[view].word_count(&frame.tables.objects)
 }
 
-impl<B: Backend> Stage<B> for Visibility {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "visibility",
-            after: &["bins"],
-            group: StageGroup::Visibility,
-            chunking: Chunking::ByCost,
-            cost_kind: "visibility",
-            depends_on_occlusion: false,
-        }
-    }
+/// Tests objects against the view's frustum. An item is a word of objects.
+pub(super) fn test_frustum<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let (visibility, objects) = (&frame.tables.visibility[job.of], &frame.tables.objects);
+    let (frustum, volume) = (&frame.request.views[job.of].frustum, frame.request.quality.culling);
+    visibility.test_words(job.items, objects, frustum, volume);
+    Ok(())
+}
 
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        frame.tables.visibility[self.view].word_count(&frame.tables.objects)
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let (visibility, objects) = (&frame.tables.visibility[self.view], &frame.tables.objects);
-        let (frustum, volume) = (&frame.request.views[self.view].frustum, frame.request.quality.culling);
-        visibility.test_words(job.items, objects, frustum, volume);
-        Ok(())
-    }
+pub(super) fn level_words<B: Backend>(frame: &FrameContext<'_, B>, view: usize) -> usize {
+    let tables = frame.tables;
+    tables.levels[view].word_count(&tables.visibility[view], &tables.objects)
 }
 
 /// Chooses the levels of detail of the objects in the view's frustum. An item is a word of objects.
-pub(super) struct Levels {
-    pub(super) view: usize,
-}
-
-impl<B: Backend> Stage<B> for Levels {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "levels",
-            after: &["visibility"],
-            group: StageGroup::Visibility,
-            chunking: Chunking::ByCost,
-            cost_kind: "levels",
-            depends_on_occlusion: false,
-        }
-    }
-
-    fn is_needed(&self, needs: &StageNeeds) -> bool {
-        needs.draws_commands && needs.chooses_levels
-    }
-
-    fn width(&self, frame: &FrameContext<'_, B>) -> usize {
-        let tables = frame.tables;
-        tables.levels[self.view].word_count(&tables.visibility[self.view], &tables.objects)
-    }
-
-    fn run(&self, frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-        let tables = frame.tables;
-        let inputs = (frame.request.scene, &tables.objects, &tables.mesh_levels);
-        tables.levels[self.view].choose(job.items, inputs, &tables.visibility[self.view]);
-        Ok(())
-    }
+pub(super) fn choose_levels<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let tables = frame.tables;
+    let inputs = (frame.request.scene, &tables.objects, &tables.mesh_levels);
+    tables.levels[job.of].choose(job.items, inputs, &tables.visibility[job.of]);
+    Ok(())
 }
 
 /// Counts the visible objects, which gives each its rank.
-pub(super) struct Compact {
-    pub(super) view: usize,
-}
-
-impl<B: Backend> Stage<B> for Compact {
-    fn info(&self) -> &'static StageInfo {
-        &StageInfo {
-            name: "compact",
-            after: &["occlusion", "levels", "visibility"],
-            group: StageGroup::Visibility,
-            chunking: Chunking::PerItem,
-            cost_kind: "compact",
-            depends_on_occlusion: false,
-        }
+pub(super) fn rank_visible<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+    let version = frame.tables.version(job.of);
+    frame.tables.visibility[job.of].compact(version);
+    if let Some(levels) = frame.levels_of_detail(job.of) {
+        levels.complete(version);
     }
-
-    fn run(&self, frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
-        let version = frame.tables.version(self.view);
-        frame.tables.visibility[self.view].compact(version);
-        if let Some(levels) = frame.levels_of_detail(self.view) {
-            levels.complete(version);
-        }
-        Ok(())
-    }
+    Ok(())
 }
