@@ -10,9 +10,9 @@
 //!
 //! | code | called in | its panic |
 //! | --- | --- | --- |
-//! | `Backend` beside a frame's jobs: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs` | `FrameError::Panicked` with the call; of `read_back` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` `FrameError::DiscardPanicked` |
-//! | `Backend` in jobs: `upload_objects`, `prepare`, `record`, `finish` and others; `RenderProcess` and `RawPass` there | `frame/stages`, caught where a graph runs its nodes | `FrameError::Panicked` with process, view and stage |
-//! | `Backend::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
+//! | `Backend` and `BackendExtras`: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs` | `FrameError::Panicked` with the call; of `read_back` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` `FrameError::DiscardPanicked` |
+//! | `FrameRecorder` in jobs: `upload_objects`, `prepare`, `record`, `finish` and others; `RenderProcess` and `RawPass` there | `frame/stages`, caught where a graph runs its nodes | `FrameError::Panicked` with process, view and stage |
+//! | `BackendExtras::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
 //! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `ProcessError::Panicked`, or `PlanError::Panicked` |
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
 //! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |

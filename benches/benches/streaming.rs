@@ -299,7 +299,7 @@ impl World {
     }
 
     fn uploaded(&self) -> u64 {
-        self.renderer.backend().uploaded_bytes()
+        self.renderer.backend().extras().uploaded_bytes()
     }
 
     fn resident(&self) -> u64 {

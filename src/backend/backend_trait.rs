@@ -1,4 +1,4 @@
-//! The interface between frames and devices.
+//! The interface between frames and devices, in three traits: the device, what records its frames, and its extras.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,12 +14,11 @@ use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
-use crate::task::Worker;
 use crate::timeline::{Labels, TuningChoice};
 
-/// The interface between frames and a device. All methods but [`Backend::read_back`] and [`Backend::submit`] are called
-/// while a frame is recorded, most of them by several workers at once; [`Backend::prepare_pipelines`] at any time, also
-/// beside a frame. Those that record take the worker as proof that they run in a job (M 10.3 asserts it).
+/// A device that frames are recorded for. It needs all methods of this trait and of [`FrameRecorder`]; what only some
+/// devices can do is in [`BackendExtras`]. To change some calls of another backend, implement
+/// [`BackendLayer`](super::BackendLayer) instead.
 ///
 /// The order within a frame:
 ///
@@ -28,12 +27,12 @@ use crate::timeline::{Labels, TuningChoice};
 ///    current epoch, and the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of
 ///    every pass `finish`, or `finish_together`. If all objects changed, a block is uploaded as soon as it is
 ///    described, while other jobs describe other blocks.
-/// 3. `recording_choice` for every pass.
+/// 3. `recording_choice` for every pass, and `target_memory`.
 /// 4. `read_back`.
 /// 5. Later, on the device thread, `submit`.
 ///
-/// A panic of a method fails the frame with an error that names the method or the stage of the pass, and the next frame
-/// is not affected.
+/// `prepare_pipelines` is called at any time, also beside a frame. A panic of a method fails the frame with an error
+/// that names the method or the stage of the pass, and the next frame is not affected.
 ///
 /// What a backend must honour:
 ///
@@ -48,29 +47,25 @@ use crate::timeline::{Labels, TuningChoice};
 ///   [`CoarseEdges`](crate::view::IssueReason::CoarseEdges).
 /// - Partial batches draw only the triangles in [`DrawList::remaining`](crate::command::DrawList::remaining).
 /// - Batches are drawn in the order of their list, and passes in that of the queues.
-pub trait Backend: Send + Sync + 'static {
-    /// The state of a frame in flight, from `begin` to `submit`.
-    type Frame: Send + Sync;
-    /// A part of a pass that is recorded before the pass is finished, such as a bundle.
-    type Part: Send;
-    /// A finished pass, ready to be submitted.
-    type Commands: Send;
+pub trait Backend: FrameRecorder {
     /// A submitted frame.
     type Submission;
 
     /// The name of the device, for reports.
     fn adapter_name(&self) -> String;
 
-    /// The number of bytes uploaded to the device so far; 0 for a backend without uploads.
-    fn uploaded_bytes(&self) -> u64 {
-        0
-    }
+    /// What the backend can hold of a scene, asked before each frame: none is lost because of what is beyond.
+    /// [`SceneLimits::NONE`] if there is no limit.
+    fn limits(&self) -> SceneLimits;
 
-    /// Whether targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) can be drawn
-    /// into. Without them, some of [`RadianceSum`](crate::quality::RadianceSum) falls back to half floats.
-    fn can_blend_floats(&self) -> bool {
-        false
-    }
+    /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or
+    /// not, before the first frame with it, and again after another backend or format was set. Objects with a mesh that
+    /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::IssueReason::UndrawableMesh);
+    /// the error becomes a warning. `begin` never sees that mesh among the used ones.
+    ///
+    /// # Errors
+    /// If it cannot be drawn, as it exceeds a limit of the device, or is in buffers that the backend cannot read.
+    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError>;
 
     /// Compiles the shaders of a plan's processes, and makes the pipelines for objects of these states of each process,
     /// ahead of the first frame that needs them. A backend without pipelines does nothing.
@@ -83,44 +78,7 @@ pub trait Backend: Send + Sync + 'static {
         draws: &[Draws<'_>],
         states: &[Vec<DrawState>],
         quality: &Quality,
-    ) -> Result<(), BackendError> {
-        let _ = (plan, draws, states, quality);
-        Ok(())
-    }
-
-    /// Whether there is work that a background job does between two frames, such as uploads of what is streamed.
-    fn has_background_work(&self) -> bool {
-        false
-    }
-
-    /// Does as much of that work as should be done between two frames. The renderer has a [background
-    /// job](crate::task::Scheduler::background) call it after a frame was recorded, unless the last such job still
-    /// runs; a scheduler with a single worker has no time for such jobs, so there the calling thread does it when a
-    /// frame was recorded.
-    fn work_in_background(&self) {}
-
-    /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes
-    /// that it uploaded.
-    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
-        let _ = count;
-    }
-
-    /// What the backend can hold of a scene, asked before each frame: none is lost because of what is beyond.
-    fn limits(&self) -> SceneLimits {
-        SceneLimits::NONE
-    }
-
-    /// Whether frames can draw a mesh with vertices in this format. Asked once for each mesh of the assets, used or
-    /// not, before the first frame with it, and again after another backend or format was set. Objects with a mesh that
-    /// cannot be drawn are left out, and counted as [`UndrawableMesh`](crate::view::IssueReason::UndrawableMesh);
-    /// the error becomes a warning. `begin` never sees that mesh among the used ones.
-    ///
-    /// # Errors
-    /// If it cannot be drawn, as it exceeds a limit of the device, or is in buffers that the backend cannot read.
-    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
-        let _ = (mesh, vertices);
-        Ok(())
-    }
+    ) -> Result<(), BackendError>;
 
     /// Begins a frame: uploads changed meshes, materials and textures, and creates targets and pipelines. Of the
     /// meshes, the frame draws none but the [used ones](crate::view::ObjectTable::used_meshes).
@@ -129,126 +87,19 @@ pub trait Backend: Send + Sync + 'static {
     /// If the device lacks room for the frame's resources, or refuses them.
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError>;
 
-    /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame
-    /// alone.
-    fn discard_frame(&self) {}
+    /// The memory of the targets of a frame; all 0 for a backend that does not know.
+    fn target_memory(&self, frame: &Self::Frame) -> TargetMemory;
 
-    /// Makes the next frame's [histories](crate::process::Declare::samples_previous) empty.
-    fn forget_histories(&self) {}
-
-    /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. That view is
-    /// never cached.
-    fn imports_targets_of(&self, view: &str) -> bool {
-        let _ = view;
-        false
-    }
-
-    /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if
-    /// they hold none. If it is the current one, nothing is uploaded.
-    fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
-        let _ = frame;
-        0
-    }
-
-    /// The memory of the targets of a frame; all 0 for a backend that does not tell.
-    fn target_memory(&self, frame: &Self::Frame) -> TargetMemory {
-        let _ = frame;
-        TargetMemory::default()
-    }
-
-    /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the
-    /// [columns](crate::scene::ObjectColumn) of these objects that the plan reads: at least what changed since
-    /// [`Backend::objects_epoch`]. Other blocks may be described meanwhile.
-    ///
-    /// # Errors
-    /// If the device refuses.
-    fn upload_objects(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        request: &FrameRequest<'_>,
-        blocks: Range<usize>,
-    ) -> Result<(), BackendError>;
-
-    /// Prepares a pass of commands for recording: uploads the indices of its objects, and creates missing pipelines.
-    ///
-    /// # Errors
-    /// If the device refuses. Compile errors of the process's shader are reported here at the latest.
-    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
-
-    /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant
-    /// throughout a frame.
-    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize;
-
-    /// Records a range of a pass's parts, and calls `emit` with each of them, in order.
-    ///
-    /// # Errors
-    /// If the device refuses what was recorded.
-    fn record(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: Range<usize>,
-        emit: &mut dyn FnMut(Self::Part),
-    ) -> Result<(), BackendError>;
-
-    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty.
-    /// The backend may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
-    ///
-    /// # Errors
-    /// If the device refuses the pass.
-    fn finish(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<Self::Part>,
-    ) -> Result<Self::Commands, BackendError>;
-
-    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission
-    /// order. Constant throughout a frame; by default every pass is finished alone. At most 16 passes are finished
-    /// together.
-    fn continues_previous_pass(&self, frame: &Self::Frame, pass: usize) -> bool {
-        let _ = (frame, pass);
-        false
-    }
-
-    /// Finishes passes that follow each other in submission order, each as [`Backend::finish`] does, and calls `emit`
-    /// with the commands of each, in order. `parts` has those of each pass; the caller drops what the backend leaves.
-    ///
-    /// # Errors
-    /// If the device refuses one of the passes. The error names that one.
-    fn finish_together(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        passes: &[PassRequest<'_>],
-        parts: &mut [Vec<Self::Part>],
-        emit: &mut dyn FnMut(Self::Commands),
-    ) -> Result<(), BackendError> {
-        for (pass, parts) in passes.iter().zip(parts) {
-            emit(self.finish(worker, frame, pass, parts)?);
-        }
-        Ok(())
-    }
-
-    /// How a pass, by index, of a frame that has begun is recorded, and why; `None` if the backend had no choice, or
-    /// made none by measured cost. `labels` are those of the pass.
-    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
-        let _ = (frame, pass, labels);
-        None
-    }
+    /// How a pass, by index, of a recorded frame was recorded, and why; `None` if the backend had no choice, or made
+    /// none by measured cost. `labels` are those of the pass.
+    fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice>;
 
     /// Has a view's target read back as a recorded frame leaves it, when the frame is submitted. It does not wait.
     ///
     /// # Errors
-    /// If there is no such target, or the device refuses; [`BackendError::CannotReadBack`] from a backend that does not
-    /// implement it.
-    fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
-        let _ = (frame, view, target);
-        Err(BackendError::CannotReadBack)
-    }
+    /// If there is no such target, or the device refuses; [`BackendError::CannotReadBack`] from a backend that reads
+    /// nothing back.
+    fn read_back(&self, frame: &mut Self::Frame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError>;
 
     /// Submits a frame's queues one after the other. Called only on the device thread.
     ///
@@ -267,4 +118,160 @@ pub trait Backend: Send + Sync + 'static {
         queues: Vec<ViewQueue<Self::Commands>>,
         fences: Vec<FrameFence>,
     ) -> Result<Self::Submission, BackendError>;
+
+    /// What this backend can do that others cannot: `&NoExtras` if that is nothing.
+    fn extras(&self) -> &dyn BackendExtras;
+}
+
+/// What records the passes of a frame. Jobs of the frame call it, several at once (M 10.3), from `begin` until all
+/// passes are finished; [`FrameRecorder::continues_previous_pass`] is called before the first of these jobs.
+pub trait FrameRecorder: Send + Sync + 'static {
+    /// The state of a frame in flight, from `begin` to `submit`.
+    type Frame: Send + Sync;
+    /// A part of a pass that is recorded before the pass is finished, such as a bundle.
+    type Part: Send;
+    /// A finished pass, ready to be submitted.
+    type Commands: Send;
+
+    /// The [epoch](crate::view::ObjectTable::epoch) of the object table that the frame's buffers hold already; 0 if
+    /// they hold none. If it is the current one, nothing is uploaded.
+    fn objects_epoch(&self, frame: &Self::Frame) -> u64;
+
+    /// Uploads blocks of objects, as [`FrameRequest::objects`] describes them, and the
+    /// [columns](crate::scene::ObjectColumn) of these objects that the plan reads: at least what changed since
+    /// [`FrameRecorder::objects_epoch`]. Other blocks may be described meanwhile.
+    ///
+    /// # Errors
+    /// If the device refuses.
+    fn upload_objects(
+        &self,
+        frame: &Self::Frame,
+        request: &FrameRequest<'_>,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError>;
+
+    /// Prepares a pass of commands for recording: uploads the indices of its objects, and creates missing pipelines.
+    ///
+    /// # Errors
+    /// If the device refuses. Compile errors of the process's shader are reported here at the latest.
+    fn prepare(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError>;
+
+    /// The number of parts to record before the pass is finished; 0 if `finish` records the whole pass. Constant
+    /// throughout a frame.
+    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize;
+
+    /// Records a range of a pass's parts, and calls `emit` with each of them, in order.
+    ///
+    /// # Errors
+    /// If the device refuses what was recorded.
+    fn record(
+        &self,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        emit: &mut dyn FnMut(Self::Part),
+    ) -> Result<(), BackendError>;
+
+    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty.
+    /// The backend may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
+    ///
+    /// # Errors
+    /// If the device refuses the pass.
+    fn finish(
+        &self,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<Self::Part>,
+    ) -> Result<Self::Commands, BackendError>;
+
+    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission
+    /// order; always `false` if every pass is finished alone. Constant throughout a frame. At most 16 passes are
+    /// finished together.
+    fn continues_previous_pass(&self, frame: &Self::Frame, pass: usize) -> bool;
+
+    /// Finishes passes that follow each other in submission order, each as [`FrameRecorder::finish`] does, and calls
+    /// `emit` with the commands of each, in order. `parts` has those of each pass; the caller drops what the backend
+    /// leaves. A backend that finishes every pass alone, too, calls `finish` for each: a layer may join passes.
+    ///
+    /// # Errors
+    /// If the device refuses one of the passes. The error names that one.
+    fn finish_together(
+        &self,
+        frame: &Self::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<Self::Part>],
+        emit: &mut dyn FnMut(Self::Commands),
+    ) -> Result<(), BackendError>;
+}
+
+/// What only some backends can do. A method without an implementation asks the [inner](Self::inner_extras) backend, and
+/// if there is none says that the backend can do no such thing.
+pub trait BackendExtras {
+    /// The [extras](Backend::extras) of the backend that this one wraps; `None` if it wraps none.
+    fn inner_extras(&self) -> Option<&dyn BackendExtras>;
+
+    /// The number of bytes uploaded to the device so far.
+    fn uploaded_bytes(&self) -> u64 {
+        self.inner_extras().map_or(0, BackendExtras::uploaded_bytes)
+    }
+
+    /// Whether targets of [`Format::Rgba32FloatBlendable`](crate::process::Format::Rgba32FloatBlendable) can be drawn
+    /// into. Without them, some of [`RadianceSum`](crate::quality::RadianceSum) falls back to half floats.
+    fn can_blend_floats(&self) -> bool {
+        self.inner_extras().is_some_and(BackendExtras::can_blend_floats)
+    }
+
+    /// Whether there is work that a background job does between two frames, such as uploads of what is streamed.
+    fn has_background_work(&self) -> bool {
+        self.inner_extras().is_some_and(BackendExtras::has_background_work)
+    }
+
+    /// Does as much of that work as should be done between two frames. The renderer has a [background
+    /// job](crate::task::Scheduler::background) call it after a frame was recorded, unless the last such job still
+    /// runs; a scheduler with a single worker has no time for such jobs, so there the calling thread does it when a
+    /// frame was recorded.
+    fn work_in_background(&self) {
+        if let Some(inner) = self.inner_extras() {
+            inner.work_in_background();
+        }
+    }
+
+    /// Calls `count` with the name and value of each number that the timeline shows for every frame, beside the bytes
+    /// that it uploaded.
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        if let Some(inner) = self.inner_extras() {
+            inner.counters(count);
+        }
+    }
+
+    /// A frame failed while it was recorded, perhaps before `begin`: drops what the engine has set for this frame
+    /// alone.
+    fn discard_frame(&self) {
+        if let Some(inner) = self.inner_extras() {
+            inner.discard_frame();
+        }
+    }
+
+    /// Makes the next frame's [histories](crate::process::Declare::samples_previous) empty.
+    fn forget_histories(&self) {
+        if let Some(inner) = self.inner_extras() {
+            inner.forget_histories();
+        }
+    }
+
+    /// Whether the next frame draws a target of the view of this name into a texture of the engine's own. That view is
+    /// never cached.
+    fn imports_targets_of(&self, view: &str) -> bool {
+        self.inner_extras().is_some_and(|inner| inner.imports_targets_of(view))
+    }
+}
+
+/// The [extras](Backend::extras) of a backend that has none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoExtras;
+
+impl BackendExtras for NoExtras {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        None
+    }
 }

@@ -29,8 +29,9 @@ impl CallPanic {
 /// The backend of a renderer, for calls outside of the frame's jobs: there no run catches the panics of the engine's
 /// code. Outside of jobs the rest of the crate calls it in no other way.
 ///
-/// The methods are those of [`Backend`]. Those that can fail already return the panic as a [`BackendError`] where the
-/// caller cannot tell it from other errors, and as a [`CallPanic`] elsewhere.
+/// The methods are those of [`Backend`] and its extras, and one of
+/// [`FrameRecorder`](super::FrameRecorder). Those that can fail already return the panic as a [`BackendError`] where
+/// the caller cannot tell it from other errors, and as a [`CallPanic`] elsewhere.
 pub(crate) struct GuardedBackend<B> {
     // Whoever drops the last reference may be a thread of a frame loop.
     backend: Contained<Arc<B>>,
@@ -69,12 +70,12 @@ impl<B> GuardedBackend<B> {
 
 impl<B: Backend> GuardedBackend<B> {
     pub(crate) fn uploaded_bytes(&self) -> Result<u64, CallPanic> {
-        self.call("uploaded_bytes", B::uploaded_bytes)
+        self.call("uploaded_bytes", |backend| backend.extras().uploaded_bytes())
     }
 
     /// A backend that panics instead of an answer blends none: what is then summed in half floats is what it can draw.
     pub(crate) fn can_blend_floats(&self) -> bool {
-        self.call("can_blend_floats", B::can_blend_floats).unwrap_or(false)
+        self.call("can_blend_floats", |backend| backend.extras().can_blend_floats()).unwrap_or(false)
     }
 
     pub(crate) fn prepare_pipelines(
@@ -88,15 +89,15 @@ impl<B: Backend> GuardedBackend<B> {
     }
 
     pub(crate) fn has_background_work(&self) -> Result<bool, CallPanic> {
-        self.call("has_background_work", B::has_background_work)
+        self.call("has_background_work", |backend| backend.extras().has_background_work())
     }
 
     pub(crate) fn work_in_background(&self) -> Result<(), CallPanic> {
-        self.call("work_in_background", B::work_in_background)
+        self.call("work_in_background", |backend| backend.extras().work_in_background())
     }
 
     pub(crate) fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) -> Result<(), CallPanic> {
-        self.call("counters", |backend| backend.counters(count))
+        self.call("counters", |backend| backend.extras().counters(count))
     }
 
     pub(crate) fn limits(&self) -> Result<SceneLimits, CallPanic> {
@@ -119,15 +120,15 @@ impl<B: Backend> GuardedBackend<B> {
     }
 
     pub(crate) fn discard_frame(&self) -> Result<(), CallPanic> {
-        self.call("discard_frame", B::discard_frame)
+        self.call("discard_frame", |backend| backend.extras().discard_frame())
     }
 
     pub(crate) fn forget_histories(&self) -> Result<(), CallPanic> {
-        self.call("forget_histories", B::forget_histories)
+        self.call("forget_histories", |backend| backend.extras().forget_histories())
     }
 
     pub(crate) fn imports_targets_of(&self, view: &str) -> Result<bool, CallPanic> {
-        self.call("imports_targets_of", |backend| backend.imports_targets_of(view))
+        self.call("imports_targets_of", |backend| backend.extras().imports_targets_of(view))
     }
 
     pub(crate) fn target_memory(&self, frame: &B::Frame) -> Result<TargetMemory, CallPanic> {

@@ -1,5 +1,6 @@
 //! Backends: they turn batches into recorded passes, and submit them (M 10.3, "Submitting a RenderCommand to the API").
 
+mod backend_layer;
 mod backend_trait;
 mod error;
 mod frame_fence;
@@ -24,12 +25,15 @@ mod view_queue;
 mod wgpu;
 
 #[cfg(feature = "wgpu")]
+pub(crate) use self::wgpu::WgpuFrame;
+#[cfg(feature = "wgpu")]
 pub use self::wgpu::{
     DeviceClock, DevicePassTime, DevicePassTimes, EncodingStrategy, PipelineLibrary, RecordingStrategy,
     StreamingBudget, StreamingStatistics, SurfaceError, SurfaceFrame, WgpuBackend, WgpuPassStatistics, WgpuReadBack,
     WgpuResources, WgpuSubmission, WindowDevice, WindowSurface,
 };
-pub use backend_trait::Backend;
+pub use backend_layer::BackendLayer;
+pub use backend_trait::{Backend, BackendExtras, FrameRecorder, NoExtras};
 pub use error::BackendError;
 pub use frame_fence::FrameFence;
 pub(crate) use guarded_backend::{CallPanic, GuardedBackend};

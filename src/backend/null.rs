@@ -2,18 +2,23 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::backend_trait::Backend;
+use super::backend_trait::{Backend, BackendExtras, FrameRecorder};
 use super::error::BackendError;
 use super::frame_fence::FrameFence;
+use super::read_back::ReadBack;
 use super::requests::{FrameRequest, PassRequest};
+use super::scene_limits::SceneLimits;
+use super::target_memory::TargetMemory;
 use super::view_queue::ViewQueue;
-use crate::command::DrawList;
-use crate::process::{Draws, Pass};
-use crate::scene::Assets;
-use crate::task::Worker;
+use crate::command::{DrawList, DrawState};
+use crate::process::{Draws, FramePlan, Pass};
+use crate::quality::{Quality, VertexFormat};
+use crate::scene::{Assets, Mesh};
+use crate::timeline::{Labels, TuningChoice};
 
 /// Draws nothing. It returns an error if the frame breaks one of the rules between frame and backend:
 ///
@@ -80,17 +85,28 @@ pub struct NullBundle {
 }
 
 impl Backend for NullBackend {
-    type Frame = NullFrame;
-    type Part = NullBundle;
-    type Commands = NullPass;
     type Submission = NullSubmission;
 
     fn adapter_name(&self) -> String {
         String::from("none (null backend)")
     }
 
-    fn can_blend_floats(&self) -> bool {
-        true
+    fn limits(&self) -> SceneLimits {
+        SceneLimits::NONE
+    }
+
+    fn check_mesh(&self, _mesh: &Mesh, _vertices: VertexFormat) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn prepare_pipelines(
+        &self,
+        _plan: &FramePlan,
+        _draws: &[Draws<'_>],
+        _states: &[Vec<DrawState>],
+        _quality: &Quality,
+    ) -> Result<(), BackendError> {
+        Ok(())
     }
 
     fn begin(&self, request: &FrameRequest<'_>) -> Result<NullFrame, BackendError> {
@@ -105,9 +121,65 @@ impl Backend for NullBackend {
         })
     }
 
+    fn target_memory(&self, _frame: &NullFrame) -> TargetMemory {
+        TargetMemory::default()
+    }
+
+    fn recording_choice(&self, _frame: &NullFrame, _pass: usize, _labels: &Arc<Labels>) -> Option<TuningChoice> {
+        None
+    }
+
+    fn read_back(&self, _: &mut NullFrame, _view: usize, _target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        Err(BackendError::CannotReadBack)
+    }
+
+    fn submit(
+        &self,
+        frame: NullFrame,
+        queues: Vec<ViewQueue<NullPass>>,
+        mut fences: Vec<FrameFence>,
+    ) -> Result<NullSubmission, BackendError> {
+        let uploaded = frame.uploaded.lock().len();
+        ensure(uploaded == frame.object_count, || {
+            format!("all objects are uploaded, but {uploaded} of {} are", frame.object_count)
+        })?;
+        let passes = || queues.iter().flat_map(|queue| &queue.passes);
+        let in_order = passes().map(|(pass, _)| pass).eq(&frame.passes);
+        ensure(in_order, || "passes are submitted in the planned order".to_owned())?;
+        ensure(fences.is_sorted_by_key(|fence| fence.passes), || "fences are in the order of their places".to_owned())?;
+        let within = fences.iter().all(|fence| fence.passes <= frame.passes.len());
+        ensure(within, || "fences have their places within the frame".to_owned())?;
+        FrameFence::set_up_to(frame.passes.len(), &mut fences);
+        let passes = queues.into_iter().flat_map(|queue| queue.passes);
+        Ok(NullSubmission { passes: passes.map(|(_, pass)| pass).collect() })
+    }
+
+    fn extras(&self) -> &dyn BackendExtras {
+        self
+    }
+}
+
+impl BackendExtras for NullBackend {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        None
+    }
+
+    fn can_blend_floats(&self) -> bool {
+        true
+    }
+}
+
+impl FrameRecorder for NullBackend {
+    type Frame = NullFrame;
+    type Part = NullBundle;
+    type Commands = NullPass;
+
+    fn objects_epoch(&self, _frame: &NullFrame) -> u64 {
+        0
+    }
+
     fn upload_objects(
         &self,
-        _worker: &Worker,
         frame: &NullFrame,
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
@@ -129,7 +201,6 @@ impl Backend for NullBackend {
 
     fn prepare(
         &self,
-        _worker: &Worker,
         frame: &NullFrame,
         &PassRequest { pass, list, .. }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
@@ -151,7 +222,6 @@ impl Backend for NullBackend {
 
     fn record(
         &self,
-        _worker: &Worker,
         frame: &NullFrame,
         &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
         bundles: Range<usize>,
@@ -169,7 +239,6 @@ impl Backend for NullBackend {
 
     fn finish(
         &self,
-        _worker: &Worker,
         frame: &NullFrame,
         &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
         bundles: &mut Vec<NullBundle>,
@@ -202,25 +271,21 @@ impl Backend for NullBackend {
         })
     }
 
-    fn submit(
+    fn continues_previous_pass(&self, _frame: &NullFrame, _pass: usize) -> bool {
+        false
+    }
+
+    fn finish_together(
         &self,
-        frame: NullFrame,
-        queues: Vec<ViewQueue<NullPass>>,
-        mut fences: Vec<FrameFence>,
-    ) -> Result<NullSubmission, BackendError> {
-        let uploaded = frame.uploaded.lock().len();
-        ensure(uploaded == frame.object_count, || {
-            format!("all objects are uploaded, but {uploaded} of {} are", frame.object_count)
-        })?;
-        let passes = || queues.iter().flat_map(|queue| &queue.passes);
-        let in_order = passes().map(|(pass, _)| pass).eq(&frame.passes);
-        ensure(in_order, || "passes are submitted in the planned order".to_owned())?;
-        ensure(fences.is_sorted_by_key(|fence| fence.passes), || "fences are in the order of their places".to_owned())?;
-        let within = fences.iter().all(|fence| fence.passes <= frame.passes.len());
-        ensure(within, || "fences have their places within the frame".to_owned())?;
-        FrameFence::set_up_to(frame.passes.len(), &mut fences);
-        let passes = queues.into_iter().flat_map(|queue| queue.passes);
-        Ok(NullSubmission { passes: passes.map(|(_, pass)| pass).collect() })
+        frame: &NullFrame,
+        passes: &[PassRequest<'_>],
+        bundles: &mut [Vec<NullBundle>],
+        emit: &mut dyn FnMut(NullPass),
+    ) -> Result<(), BackendError> {
+        for (pass, bundles) in passes.iter().zip(bundles) {
+            emit(self.finish(frame, pass, bundles)?);
+        }
+        Ok(())
     }
 }
 

@@ -41,6 +41,8 @@ pub struct FrameRequest<'a> {
     /// Whether the backend records passes in bundles, even if another strategy is cheaper, unless the engine has fixed
     /// one. Set for [`PerDraw`](crate::Granularity::PerDraw) and [`Chunk`](crate::Granularity::Chunk).
     pub records_bundles: bool,
+    /// The number of workers that record the frame.
+    pub workers: usize,
     /// The frame's accuracy.
     pub quality: &'a Quality,
     /// The backend's [limits](super::Backend::limits). What is beyond them is not drawn: a backend that keeps arrays of

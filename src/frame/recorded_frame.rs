@@ -8,6 +8,8 @@ use super::view_cache::InFlight;
 use super::view_queues::ViewQueues;
 use super::views::FrameViews;
 use super::{FencePoint, FrameError, FrameStatistics, SubmitError};
+#[cfg(feature = "wgpu")]
+use crate::backend::WgpuFrame;
 use crate::backend::{Backend, BackendError, FrameFence, GuardedBackend, ReadBack, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
@@ -136,15 +138,16 @@ impl<B: Backend> RecordedFrame<B> {
 }
 
 #[cfg(feature = "wgpu")]
-impl RecordedFrame<crate::backend::WgpuBackend> {
+impl<B: Backend<Frame = WgpuFrame>> RecordedFrame<B> {
     /// Reads back a rectangle of a view's target as this frame leaves it, without waiting: ask the result when the
-    /// frame is submitted. `origin` is the rectangle's upper left pixel, `size` its width and height.
+    /// frame is submitted. `origin` is the rectangle's upper left pixel, `size` its width and height. For `WgpuBackend`
+    /// and [layers](crate::backend::BackendLayer) around it.
     ///
     /// To find the object under the cursor, draw the indices of objects into a target of [`Format::R32Uint`], and read
     /// one pixel:
     ///
     /// ```no_run
-    /// # use drawloom::{Recorded, Submitter, backend::{WgpuBackend, BackendError}};
+    /// # use drawloom::{RecordedFrame, Submitter, backend::WgpuBackend};
     /// # fn pick(mut recorded: RecordedFrame<WgpuBackend>, submitter: &Submitter<WgpuBackend>, cursor: [u32; 2])
     /// # -> Result<(), Box<dyn std::error::Error>> {
     /// let under_cursor = recorded.read_back(0, "object index", cursor, [1, 1])?;
@@ -168,7 +171,7 @@ impl RecordedFrame<crate::backend::WgpuBackend> {
         origin: [u32; 2],
         size: [u32; 2],
     ) -> Result<crate::backend::WgpuReadBack, BackendError> {
-        self.frame.read_back(self.backend.unguarded().device(), view, target, [origin, size])
+        self.frame.read_back(view, target, [origin, size])
     }
 }
 

@@ -339,6 +339,7 @@ impl<B: Backend> Renderer<B> {
             list_capacity: self.tables.objects.len() + self.tables.static_groups.listed_objects(),
             generated: &nodes.declarations.generated,
             records_bundles: self.granularity.draws_per_job().is_some(),
+            workers: self.scheduler.workers(),
             quality: &self.quality,
             limits,
             scene_issues: self.tables.objects.scene_issues(),

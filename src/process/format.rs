@@ -32,7 +32,7 @@ pub enum Format {
     Rgba32Float,
     /// Four floats that can be blended, for sums of many small numbers. Devices need the feature `FLOAT32_BLENDABLE`,
     /// which [`WgpuBackend::optional_features`](crate::backend::WgpuBackend::optional_features) has if the adapter has
-    /// it: [`Backend::can_blend_floats`](crate::backend::Backend::can_blend_floats) tells.
+    /// it: [`BackendExtras::can_blend_floats`](crate::backend::BackendExtras::can_blend_floats) tells.
     Rgba32FloatBlendable,
     /// A float.
     R32Float,

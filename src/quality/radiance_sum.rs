@@ -20,7 +20,7 @@ pub enum RadianceSum {
     /// `radiance` once.
     ///
     /// Cost: 16 bytes per pixel, read and written for every light that reaches it, and up to two targets of that size.
-    /// It needs a device that [blends floats](crate::backend::Backend::can_blend_floats). Without one, lights are
+    /// It needs a device that [blends floats](crate::backend::BackendExtras::can_blend_floats). Without one, lights are
     /// summed as by [`Self::Shader`], and blended objects as by [`Self::HalfFloat`], which frames count as
     /// [`HalfFloatBlending`](crate::view::IssueReason::HalfFloatBlending).
     Float,
@@ -61,7 +61,8 @@ impl RadianceSum {
 
     /// The maximum error of the radiance of a pixel that this number of blended objects covers: as a fraction of the
     /// radiance that it would have if they were opaque to nothing and all added, on a device that [blends
-    /// floats](crate::backend::Backend::can_blend_floats). On others every value has the error of [`Self::HalfFloat`].
+    /// floats](crate::backend::BackendExtras::can_blend_floats). On others every value has the error of
+    /// [`Self::HalfFloat`].
     ///
     /// No partial sum exceeds that radiance. A blend has two products, of colour and opacity and of transmittance and
     /// sum, an addition, and the conversion of its colour: 4h in half floats, 4u in floats, where the opacity that is

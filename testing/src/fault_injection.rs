@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
+use drawloom::backend::{
+    Backend, BackendError, BackendLayer, FrameFence, FrameRequest, PassRequest, Picture, ViewQueue,
+};
 use drawloom::command::DrawState;
-use drawloom::process::{Draws, FramePlan};
+use drawloom::process::{Draws, FramePlan, ShaderResource};
 use drawloom::quality::Quality;
-use drawloom::task::Worker;
-
-use crate::forwarded_calls::{forward_limits, forward_picture_uploads, forward_unchanged_calls};
+use drawloom_async_post::UploadPicture;
 
 /// Passes calls on to another backend, counts them, and fails one of them.
 ///
@@ -47,15 +47,15 @@ pub struct FaultyBackend<B> {
 pub enum CallKind {
     /// [`Backend::begin`].
     Begin,
-    /// [`Backend::upload_objects`].
+    /// [`FrameRecorder::upload_objects`](drawloom::backend::FrameRecorder::upload_objects).
     UploadObjects,
-    /// [`Backend::prepare`].
+    /// [`FrameRecorder::prepare`](drawloom::backend::FrameRecorder::prepare).
     Prepare,
-    /// [`Backend::record`].
+    /// [`FrameRecorder::record`](drawloom::backend::FrameRecorder::record).
     Record,
-    /// [`Backend::finish`].
+    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish).
     Finish,
-    /// [`Backend::finish_together`], which fails in the middle: the passes of the first half are finished.
+    /// [`FrameRecorder::finish_together`](drawloom::backend::FrameRecorder::finish_together), which fails in the middle: the passes of the first half are finished.
     FinishTogether,
     /// [`Backend::submit`].
     Submit,
@@ -125,11 +125,6 @@ impl<B> FaultyBackend<B> {
     /// Has passes finished together, as many as the trait allows, even if the other backend finishes each alone.
     pub fn joining_passes(self) -> Self {
         Self { joins_passes: true, ..self }
-    }
-
-    /// The backend that does the work.
-    pub fn inner(&self) -> &B {
-        &self.inner
     }
 
     /// Fails a call, once: of the calls of this kind from now on, that of this index. Counts begin anew.
@@ -202,18 +197,11 @@ impl Fault {
     }
 }
 
-impl<B: Backend> Backend for FaultyBackend<B> {
-    type Frame = B::Frame;
-    type Part = B::Part;
-    type Commands = B::Commands;
-    type Submission = B::Submission;
+impl<B: Backend> BackendLayer for FaultyBackend<B> {
+    type Inner = B;
 
-    forward_limits!();
-
-    forward_unchanged_calls!();
-
-    fn adapter_name(&self) -> String {
-        self.inner.adapter_name()
+    fn inner(&self) -> &B {
+        &self.inner
     }
 
     fn prepare_pipelines(
@@ -234,41 +222,38 @@ impl<B: Backend> Backend for FaultyBackend<B> {
 
     fn upload_objects(
         &self,
-        worker: &Worker,
         frame: &B::Frame,
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
         self.call(CallKind::UploadObjects, None)?;
-        self.inner.upload_objects(worker, frame, request, blocks)
+        self.inner.upload_objects(frame, request, blocks)
     }
 
-    fn prepare(&self, worker: &Worker, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+    fn prepare(&self, frame: &B::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         self.call(CallKind::Prepare, Some(pass))?;
-        self.inner.prepare(worker, frame, pass)
+        self.inner.prepare(frame, pass)
     }
 
     fn record(
         &self,
-        worker: &Worker,
         frame: &B::Frame,
         pass: &PassRequest<'_>,
         parts: Range<usize>,
         emit: &mut dyn FnMut(B::Part),
     ) -> Result<(), BackendError> {
         self.call(CallKind::Record, Some(pass))?;
-        self.inner.record(worker, frame, pass, parts, emit)
+        self.inner.record(frame, pass, parts, emit)
     }
 
     fn finish(
         &self,
-        worker: &Worker,
         frame: &B::Frame,
         pass: &PassRequest<'_>,
         parts: &mut Vec<B::Part>,
     ) -> Result<B::Commands, BackendError> {
         self.call(CallKind::Finish, Some(pass))?;
-        self.inner.finish(worker, frame, pass, parts)
+        self.inner.finish(frame, pass, parts)
     }
 
     fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> bool {
@@ -277,7 +262,6 @@ impl<B: Backend> Backend for FaultyBackend<B> {
 
     fn finish_together(
         &self,
-        worker: &Worker,
         frame: &B::Frame,
         passes: &[PassRequest<'_>],
         parts: &mut [Vec<B::Part>],
@@ -285,11 +269,11 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     ) -> Result<(), BackendError> {
         let half = passes.len() / 2;
         if let Some(fault) = self.fault_of(CallKind::FinishTogether, passes.get(half)) {
-            self.inner.finish_together(worker, frame, &passes[..half], &mut parts[..half], emit)?;
+            self.inner.finish_together(frame, &passes[..half], &mut parts[..half], emit)?;
             fault.happen()?;
-            return self.inner.finish_together(worker, frame, &passes[half..], &mut parts[half..], emit);
+            return self.inner.finish_together(frame, &passes[half..], &mut parts[half..], emit);
         }
-        self.inner.finish_together(worker, frame, passes, parts, emit)
+        self.inner.finish_together(frame, passes, parts, emit)
     }
 
     fn submit(
@@ -303,4 +287,8 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     }
 }
 
-forward_picture_uploads!(FaultyBackend);
+impl<B: UploadPicture> UploadPicture for FaultyBackend<B> {
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        self.inner.upload_picture(picture)
+    }
+}

@@ -9,7 +9,6 @@ pub mod demo;
 pub mod draw_lists;
 pub mod fault_injection;
 pub mod feedback;
-mod forwarded_calls;
 pub mod hills;
 pub mod light_sums;
 pub mod limited;

@@ -1,10 +1,8 @@
 //! A backend with lower limits than its device has.
 
-use drawloom::backend::{Backend, BackendError, FrameFence, SceneLimits, ViewQueue};
+use drawloom::backend::{Backend, BackendError, BackendExtras, BackendLayer, SceneLimits};
 use drawloom::quality::VertexFormat;
 use drawloom::scene::Mesh;
-
-use crate::forwarded_calls::{forward_recording_calls, forward_unchanged_calls};
 
 /// Passes calls on to another backend, as if that one had lower limits: what takes gigabytes on a device needs
 /// kilobytes here.
@@ -25,24 +23,13 @@ impl<B> LimitedBackend<B> {
     pub fn without_float_blending(self) -> Self {
         Self { lacks_float_blending: true, ..self }
     }
-
-    /// The backend that does the work.
-    pub fn inner(&self) -> &B {
-        &self.inner
-    }
 }
 
-impl<B: Backend> Backend for LimitedBackend<B> {
-    type Frame = B::Frame;
-    type Part = B::Part;
-    type Commands = B::Commands;
-    type Submission = B::Submission;
+impl<B: Backend> BackendLayer for LimitedBackend<B> {
+    type Inner = B;
 
-    forward_unchanged_calls!();
-    forward_recording_calls!();
-
-    fn can_blend_floats(&self) -> bool {
-        !self.lacks_float_blending && self.inner.can_blend_floats()
+    fn inner(&self) -> &B {
+        &self.inner
     }
 
     fn limits(&self) -> SceneLimits {
@@ -60,16 +47,17 @@ impl<B: Backend> Backend for LimitedBackend<B> {
         self.inner.check_mesh(mesh, vertices)
     }
 
-    fn adapter_name(&self) -> String {
-        self.inner.adapter_name()
+    fn extras(&self) -> &dyn BackendExtras {
+        self
+    }
+}
+
+impl<B: Backend> BackendExtras for LimitedBackend<B> {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        Some(self.inner.extras())
     }
 
-    fn submit(
-        &self,
-        frame: B::Frame,
-        queues: Vec<ViewQueue<B::Commands>>,
-        fences: Vec<FrameFence>,
-    ) -> Result<B::Submission, BackendError> {
-        self.inner.submit(frame, queues, fences)
+    fn can_blend_floats(&self) -> bool {
+        !self.lacks_float_blending && self.inner.extras().can_blend_floats()
     }
 }

@@ -6,11 +6,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use drawloom::backend::{Backend, BackendError, FrameFence, ViewQueue};
-
-use crate::forwarded_calls::{
-    forward_limits, forward_picture_uploads, forward_recording_calls, forward_unchanged_calls,
-};
+use drawloom::backend::{Backend, BackendError, BackendLayer, FrameFence, Picture, ViewQueue};
+use drawloom::process::ShaderResource;
+use drawloom_async_post::UploadPicture;
 
 /// Wraps a backend whose frames need no device time, and adds a device that draws one frame after the other and takes a
 /// given time for each. Its passes take equal shares of that time.
@@ -50,11 +48,6 @@ impl<B> SimulatedDevice<B> {
     /// order in which they are submitted.
     pub fn beside<C>(&self, inner: C, frame_time: Duration) -> SimulatedDevice<C> {
         SimulatedDevice { inner, next_times: Mutex::default(), frame_time, device: Arc::clone(&self.device) }
-    }
-
-    /// The backend that it wraps.
-    pub fn inner(&self) -> &B {
-        &self.inner
     }
 
     /// The times of the frames that are submitted next, in order. Those after them take the usual time.
@@ -98,16 +91,16 @@ fn sleep_until(time: Instant) {
     }
 }
 
-impl<B: Backend> Backend for SimulatedDevice<B> {
-    type Frame = B::Frame;
-    type Part = B::Part;
-    type Commands = B::Commands;
-    type Submission = B::Submission;
+impl<B: Backend> BackendLayer for SimulatedDevice<B> {
+    type Inner = B;
 
-    forward_limits!();
+    fn inner(&self) -> &B {
+        &self.inner
+    }
 
-    forward_unchanged_calls!();
-    forward_recording_calls!();
+    fn adapter_name(&self) -> String {
+        format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
+    }
 
     fn submit(
         &self,
@@ -127,10 +120,10 @@ impl<B: Backend> Backend for SimulatedDevice<B> {
             .expect("the device runs until then");
         Ok(submission)
     }
-
-    fn adapter_name(&self) -> String {
-        format!("{}, {:?} a frame", self.inner.adapter_name(), self.frame_time)
-    }
 }
 
-forward_picture_uploads!(SimulatedDevice);
+impl<B: UploadPicture> UploadPicture for SimulatedDevice<B> {
+    fn upload_picture(&self, picture: &Picture) -> Result<Option<ShaderResource<'static>>, BackendError> {
+        self.inner.upload_picture(picture)
+    }
+}

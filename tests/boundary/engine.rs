@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use drawloom::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, Picture, ReadBack, SceneLimits,
-    SoftwareBackend, TargetMemory, ViewQueue,
+    Backend, BackendError, BackendExtras, FrameFence, FrameRecorder, FrameRequest, NullBackend, PassRequest, Picture,
+    ReadBack, SceneLimits, SoftwareBackend, TargetMemory, ViewQueue,
 };
 use drawloom::command::DrawState;
 use drawloom::fence::DeviceProgress;
@@ -77,23 +77,10 @@ fn backend(name: &'static str) {
 }
 
 impl<B: Backend> Backend for OwnBackend<B> {
-    type Frame = Owned<B::Frame>;
-    type Part = Owned<B::Part>;
-    type Commands = Owned<B::Commands>;
     type Submission = Owned<B::Submission>;
 
     fn adapter_name(&self) -> String {
         self.inner.adapter_name()
-    }
-
-    fn can_blend_floats(&self) -> bool {
-        backend("can_blend_floats");
-        self.inner.can_blend_floats()
-    }
-
-    fn uploaded_bytes(&self) -> u64 {
-        backend("uploaded_bytes");
-        self.inner.uploaded_bytes()
     }
 
     fn limits(&self) -> SceneLimits {
@@ -117,114 +104,14 @@ impl<B: Backend> Backend for OwnBackend<B> {
         self.inner.prepare_pipelines(plan, draws, states, quality)
     }
 
-    fn has_background_work(&self) -> bool {
-        backend("has_background_work");
-        true
-    }
-
-    fn work_in_background(&self) {
-        backend("work_in_background");
-    }
-
-    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
-        backend("counters");
-        self.inner.counters(count);
-    }
-
     fn begin(&self, request: &FrameRequest<'_>) -> Result<Self::Frame, BackendError> {
         backend("begin");
         self.inner.begin(request).map(|frame| Owned::new("frame", frame))
     }
 
-    fn discard_frame(&self) {
-        backend("discard_frame");
-        self.inner.discard_frame();
-    }
-
-    fn forget_histories(&self) {
-        backend("forget_histories");
-        self.inner.forget_histories();
-    }
-
-    fn imports_targets_of(&self, view: &str) -> bool {
-        backend("imports_targets_of");
-        self.inner.imports_targets_of(view)
-    }
-
-    fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
-        backend("objects_epoch");
-        self.inner.objects_epoch(frame.get())
-    }
-
     fn target_memory(&self, frame: &Self::Frame) -> TargetMemory {
         backend("target_memory");
         self.inner.target_memory(frame.get())
-    }
-
-    fn upload_objects(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        request: &FrameRequest<'_>,
-        blocks: Range<usize>,
-    ) -> Result<(), BackendError> {
-        backend("upload_objects");
-        self.inner.upload_objects(worker, frame.get(), request, blocks)
-    }
-
-    fn prepare(&self, worker: &Worker, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
-        backend("prepare");
-        self.inner.prepare(worker, frame.get(), pass)
-    }
-
-    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize {
-        backend("part_count");
-        self.inner.part_count(frame.get(), pass)
-    }
-
-    fn record(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: Range<usize>,
-        emit: &mut dyn FnMut(Self::Part),
-    ) -> Result<(), BackendError> {
-        backend("record");
-        self.inner.record(worker, frame.get(), pass, parts, &mut |part| emit(Owned::new("part", part)))
-    }
-
-    fn finish(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<Self::Part>,
-    ) -> Result<Self::Commands, BackendError> {
-        backend("finish");
-        let mut parts = parts.iter_mut().filter_map(|part| part.value.take()).collect();
-        let commands = self.inner.finish(worker, frame.get(), pass, &mut parts)?;
-        Ok(Owned::new("commands", commands))
-    }
-
-    fn continues_previous_pass(&self, _: &Self::Frame, pass: usize) -> bool {
-        backend("continues_previous_pass");
-        self.joins_passes && pass > 0
-    }
-
-    fn finish_together(
-        &self,
-        worker: &Worker,
-        frame: &Self::Frame,
-        passes: &[PassRequest<'_>],
-        parts: &mut [Vec<Self::Part>],
-        emit: &mut dyn FnMut(Self::Commands),
-    ) -> Result<(), BackendError> {
-        backend("finish_together");
-        for (pass, parts) in passes.iter().zip(parts) {
-            emit(self.finish(worker, frame, pass, parts)?);
-        }
-        Ok(())
     }
 
     fn recording_choice(&self, frame: &Self::Frame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
@@ -252,6 +139,128 @@ impl<B: Backend> Backend for OwnBackend<B> {
         let queues = queues.into_iter().map(passes_of).collect();
         let submission = self.inner.submit(frame.take(), queues, fences)?;
         Ok(Owned::new("submission", submission))
+    }
+
+    fn extras(&self) -> &dyn BackendExtras {
+        self
+    }
+}
+
+impl<B: Backend> BackendExtras for OwnBackend<B> {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        Some(self.inner.extras())
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        backend("uploaded_bytes");
+        self.inner.extras().uploaded_bytes()
+    }
+
+    fn can_blend_floats(&self) -> bool {
+        backend("can_blend_floats");
+        self.inner.extras().can_blend_floats()
+    }
+
+    fn has_background_work(&self) -> bool {
+        backend("has_background_work");
+        true
+    }
+
+    fn work_in_background(&self) {
+        backend("work_in_background");
+    }
+
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        backend("counters");
+        self.inner.extras().counters(count);
+    }
+
+    fn discard_frame(&self) {
+        backend("discard_frame");
+        self.inner.extras().discard_frame();
+    }
+
+    fn forget_histories(&self) {
+        backend("forget_histories");
+        self.inner.extras().forget_histories();
+    }
+
+    fn imports_targets_of(&self, view: &str) -> bool {
+        backend("imports_targets_of");
+        self.inner.extras().imports_targets_of(view)
+    }
+}
+
+impl<B: Backend> FrameRecorder for OwnBackend<B> {
+    type Frame = Owned<B::Frame>;
+    type Part = Owned<B::Part>;
+    type Commands = Owned<B::Commands>;
+
+    fn objects_epoch(&self, frame: &Self::Frame) -> u64 {
+        backend("objects_epoch");
+        self.inner.objects_epoch(frame.get())
+    }
+
+    fn upload_objects(
+        &self,
+        frame: &Self::Frame,
+        request: &FrameRequest<'_>,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        backend("upload_objects");
+        self.inner.upload_objects(frame.get(), request, blocks)
+    }
+
+    fn prepare(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        backend("prepare");
+        self.inner.prepare(frame.get(), pass)
+    }
+
+    fn part_count(&self, frame: &Self::Frame, pass: &PassRequest<'_>) -> usize {
+        backend("part_count");
+        self.inner.part_count(frame.get(), pass)
+    }
+
+    fn record(
+        &self,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: Range<usize>,
+        emit: &mut dyn FnMut(Self::Part),
+    ) -> Result<(), BackendError> {
+        backend("record");
+        self.inner.record(frame.get(), pass, parts, &mut |part| emit(Owned::new("part", part)))
+    }
+
+    fn finish(
+        &self,
+        frame: &Self::Frame,
+        pass: &PassRequest<'_>,
+        parts: &mut Vec<Self::Part>,
+    ) -> Result<Self::Commands, BackendError> {
+        backend("finish");
+        let mut parts = parts.iter_mut().filter_map(|part| part.value.take()).collect();
+        let commands = self.inner.finish(frame.get(), pass, &mut parts)?;
+        Ok(Owned::new("commands", commands))
+    }
+
+    fn continues_previous_pass(&self, _: &Self::Frame, pass: usize) -> bool {
+        backend("continues_previous_pass");
+        self.joins_passes && pass > 0
+    }
+
+    fn finish_together(
+        &self,
+        frame: &Self::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<Self::Part>],
+        emit: &mut dyn FnMut(Self::Commands),
+    ) -> Result<(), BackendError> {
+        backend("finish_together");
+        for (pass, parts) in passes.iter().zip(parts) {
+            emit(self.finish(frame, pass, parts)?);
+        }
+        Ok(())
     }
 }
 

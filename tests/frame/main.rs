@@ -2,6 +2,8 @@
 
 #[cfg(feature = "wgpu")]
 mod absent_features;
+#[cfg(feature = "wgpu")]
+mod backend_layers;
 mod backward_reach;
 mod bad_input;
 mod changes;

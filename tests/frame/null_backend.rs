@@ -4,14 +4,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use drawloom::Granularity;
-use drawloom::backend::{Backend, BackendError, FrameRequest, NullBackend, PassRequest, SceneLimits};
+use drawloom::backend::{Backend, BackendError, FrameRecorder, FrameRequest, NullBackend, PassRequest, SceneLimits};
 use drawloom::command::DrawList;
 use drawloom::command::internal::Bucket;
 use drawloom::process::internal::SampledViews;
 use drawloom::process::{FramePlan, GeometryBuffer, GeometryFormats, Pass};
 use drawloom::quality::Quality;
 use drawloom::scene::Scene;
-use drawloom::task::{Scheduler, Worker};
 use drawloom::view::internal::{LightTable, ObjectTable};
 use drawloom::view::{RenderView, SceneIssues};
 use drawloom_testing::scenes::field;
@@ -20,11 +19,10 @@ use crate::renderer;
 
 const PASS: Pass = Pass { process_index: 0, view_index: 0 };
 
-/// Runs `calls` on a worker, with a frame of the field's first view, and returns the broken rule.
-fn broken_rule(
-    calls: impl Fn(&Worker, &<NullBackend as Backend>::Frame, &DrawList, &FrameRequest<'_>) -> Result<(), BackendError>
-    + Sync,
-) -> String {
+type NullFrame = <NullBackend as FrameRecorder>::Frame;
+
+/// Makes `calls` with a frame of the field's first view, and returns the broken rule.
+fn broken_rule(calls: impl FnOnce(&NullFrame, &DrawList, &FrameRequest<'_>) -> Result<(), BackendError>) -> String {
     let scene = one_view();
     let (mut renderer, _) = renderer(1, Granularity::default());
     // A list that is ordered by depth has commands.
@@ -50,20 +48,13 @@ fn broken_rule(
         list_capacity: objects.len(),
         generated: &[],
         records_bundles: false,
+        workers: 1,
         quality: &Quality::balanced(),
         limits: SceneLimits::NONE,
         scene_issues: &SceneIssues::default(),
     };
     let frame = NullBackend.begin(&request).unwrap();
-    let rule = std::sync::Mutex::new(String::new());
-    Scheduler::new(1)
-        .unwrap()
-        .parallel_for(1, 1, |_, worker| {
-            let Err(error) = calls(worker, &frame, &list, &request) else { return };
-            *rule.lock().unwrap() = error.to_string();
-        })
-        .unwrap();
-    rule.into_inner().unwrap()
+    calls(&frame, &list, &request).err().map_or_else(String::new, |error| error.to_string())
 }
 
 fn pass<'a>(frame: &'a FrameRequest<'a>, list: &'a DrawList) -> PassRequest<'a> {
@@ -71,13 +62,12 @@ fn pass<'a>(frame: &'a FrameRequest<'a>, list: &'a DrawList) -> PassRequest<'a> 
 }
 
 fn record(
-    worker: &Worker,
-    frame: &<NullBackend as Backend>::Frame,
+    frame: &NullFrame,
     pass: &PassRequest<'_>,
     bundles: Range<usize>,
-) -> Result<Vec<<NullBackend as Backend>::Part>, BackendError> {
+) -> Result<Vec<<NullBackend as FrameRecorder>::Part>, BackendError> {
     let mut recorded = Vec::new();
-    NullBackend.record(worker, frame, pass, bundles, &mut |bundle| recorded.push(bundle))?;
+    NullBackend.record(frame, pass, bundles, &mut |bundle| recorded.push(bundle))?;
     Ok(recorded)
 }
 
@@ -89,17 +79,17 @@ fn one_view() -> Scene {
 
 #[test]
 fn a_valid_frame_is_accepted() {
-    let rule = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, &pass(request, list))?;
-        let mut bundles = record(worker, frame, &pass(request, list), 0..list.bundle_count())?;
-        NullBackend.finish(worker, frame, &pass(request, list), &mut bundles).map(|_| ())
+    let rule = broken_rule(|frame, list, request| {
+        NullBackend.prepare(frame, &pass(request, list))?;
+        let mut bundles = record(frame, &pass(request, list), 0..list.bundle_count())?;
+        NullBackend.finish(frame, &pass(request, list), &mut bundles).map(|_| ())
     });
     assert_eq!(rule, "");
 }
 
 #[test]
 fn commands_out_of_order_are_refused() {
-    let rule = broken_rule(|worker, frame, list, request| {
+    let rule = broken_rule(|frame, list, request| {
         let mut part = Bucket {
             commands: list.commands().rev().copied().collect(),
             batches: list.batches.clone(),
@@ -107,53 +97,53 @@ fn commands_out_of_order_are_refused() {
         };
         let mut reversed = DrawList::default();
         reversed.append(&mut part, |_| true);
-        NullBackend.prepare(worker, frame, &pass(request, &reversed))
+        NullBackend.prepare(frame, &pass(request, &reversed))
     });
     assert!(rule.contains("commands are sorted"), "{rule}");
 }
 
 #[test]
 fn a_missing_bundle_or_one_recorded_twice_is_refused() {
-    let lost = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, &pass(request, list))?;
-        NullBackend.finish(worker, frame, &pass(request, list), &mut Vec::new()).map(|_| ())
+    let lost = broken_rule(|frame, list, request| {
+        NullBackend.prepare(frame, &pass(request, list))?;
+        NullBackend.finish(frame, &pass(request, list), &mut Vec::new()).map(|_| ())
     });
     assert!(lost.contains("objects are recorded"), "{lost}");
-    let twice = broken_rule(|worker, frame, list, request| {
-        record(worker, frame, &pass(request, list), 0..1)?;
-        record(worker, frame, &pass(request, list), 0..1).map(|_| ())
+    let twice = broken_rule(|frame, list, request| {
+        record(frame, &pass(request, list), 0..1)?;
+        record(frame, &pass(request, list), 0..1).map(|_| ())
     });
     assert!(twice.contains("recorded once"), "{twice}");
 }
 
 #[test]
 fn batches_that_overlap_or_draw_no_mesh_are_refused() {
-    let overlap = broken_rule(|worker, frame, list, request| {
+    let overlap = broken_rule(|frame, list, request| {
         let mut list = list.clone();
         list.batches[1].first -= 1;
-        record(worker, frame, &pass(request, &list), 0..1).map(|_| ())
+        record(frame, &pass(request, &list), 0..1).map(|_| ())
     });
     assert!(overlap.contains("overlap"), "{overlap}");
-    let no_mesh = broken_rule(|worker, frame, list, request| {
+    let no_mesh = broken_rule(|frame, list, request| {
         let mut list = list.clone();
         list.batches[0].mesh = 99;
-        record(worker, frame, &pass(request, &list), 0..1).map(|_| ())
+        record(frame, &pass(request, &list), 0..1).map(|_| ())
     });
     assert!(no_mesh.contains("slot 99"), "{no_mesh}");
 }
 
 #[test]
 fn a_pass_finished_twice_and_objects_uploaded_twice_are_refused() {
-    let twice = broken_rule(|worker, frame, list, request| {
-        NullBackend.prepare(worker, frame, &pass(request, list))?;
-        let mut bundles = record(worker, frame, &pass(request, list), 0..list.bundle_count())?;
-        NullBackend.finish(worker, frame, &pass(request, list), &mut bundles)?;
-        NullBackend.finish(worker, frame, &pass(request, list), &mut Vec::new()).map(|_| ())
+    let twice = broken_rule(|frame, list, request| {
+        NullBackend.prepare(frame, &pass(request, list))?;
+        let mut bundles = record(frame, &pass(request, list), 0..list.bundle_count())?;
+        NullBackend.finish(frame, &pass(request, list), &mut bundles)?;
+        NullBackend.finish(frame, &pass(request, list), &mut Vec::new()).map(|_| ())
     });
     assert!(twice.contains("finished once"), "{twice}");
-    let uploaded = broken_rule(|worker, frame, _, request| {
-        NullBackend.upload_objects(worker, frame, request, 0..request.objects.block_count())?;
-        NullBackend.upload_objects(worker, frame, request, 0..1)
+    let uploaded = broken_rule(|frame, _, request| {
+        NullBackend.upload_objects(frame, request, 0..request.objects.block_count())?;
+        NullBackend.upload_objects(frame, request, 0..1)
     });
     assert!(uploaded.contains("uploaded once"), "{uploaded}");
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, BackendError, FrameFence, FrameRequest, NullBackend, PassRequest, ViewQueue};
+use drawloom::backend::{Backend, BackendError, BackendLayer, FrameRecorder, FrameRequest, NullBackend, PassRequest};
 use drawloom::fence::Fence;
 use drawloom::glam::DVec3;
 use drawloom::graph::NodeError;
@@ -175,28 +175,22 @@ fn columns() -> Result<(), Failed> {
 /// A backend that leaks what it reads of the objects.
 struct Leaks;
 
-impl Backend for Leaks {
-    type Frame = ();
-    type Part = ();
-    type Commands = ();
-    type Submission = ();
+type NullFrame = <NullBackend as FrameRecorder>::Frame;
 
-    fn adapter_name(&self) -> String {
-        "leaks".to_owned()
-    }
+impl BackendLayer for Leaks {
+    type Inner = NullBackend;
 
-    fn begin(&self, request: &FrameRequest<'_>) -> Result<(), BackendError> {
-        let _ = request;
-        Ok(())
+    fn inner(&self) -> &NullBackend {
+        &NullBackend
     }
 
     fn upload_objects(
         &self,
-        _: &Worker,
-        (): &(),
+        frame: &NullFrame,
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
     ) -> Result<(), BackendError> {
+        self.inner().upload_objects(frame, request, blocks.clone())?;
         for block in blocks {
             mem::forget(request.objects.block(block));
             mem::forget(request.objects.gpu_objects(block));
@@ -204,32 +198,9 @@ impl Backend for Leaks {
         Ok(())
     }
 
-    fn prepare(&self, _: &Worker, (): &(), pass: &PassRequest<'_>) -> Result<(), BackendError> {
+    fn prepare(&self, frame: &NullFrame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
         mem::forget(pass.frame.objects.bins());
-        Ok(())
-    }
-
-    fn part_count(&self, (): &(), _: &PassRequest<'_>) -> usize {
-        0
-    }
-
-    fn record(
-        &self,
-        _: &Worker,
-        (): &(),
-        _: &PassRequest<'_>,
-        _: Range<usize>,
-        _: &mut dyn FnMut(()),
-    ) -> Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn finish(&self, _: &Worker, (): &(), _: &PassRequest<'_>, _: &mut Vec<()>) -> Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn submit(&self, (): (), _: Vec<ViewQueue<()>>, _: Vec<FrameFence>) -> Result<(), BackendError> {
-        Ok(())
+        self.inner().prepare(frame, pass)
     }
 }
 

@@ -51,11 +51,11 @@ fn changing() -> Result<(), Failed> {
     let texture = scene.add(Texture::new("red", 1, 1, vec![255, 0, 0, 255])?)?;
     let handles: Vec<_> = scene.assets().iter::<Material>().map(|(handle, _)| handle).collect();
     let mut uploaded = |scene: &Scene| -> Result<_, Failed> {
-        let before = fixture.renderer.backend().uploaded_bytes();
+        let before = fixture.renderer.backend().extras().uploaded_bytes();
         let recorded = fixture.record(scene)?;
         let drawn = pictures(&fixture, recorded, scene)?;
         let (recorded, _) = counts(&fixture, |_| true);
-        Ok((drawn, fixture.renderer.backend().uploaded_bytes() - before, recorded))
+        Ok((drawn, fixture.renderer.backend().extras().uploaded_bytes() - before, recorded))
     };
     uploaded(&scene)?;
     let (mut before, nothing, _) = uploaded(&scene)?;
@@ -395,10 +395,10 @@ fn changing_values() -> Result<(), Failed> {
     let flat_material =
         scene.assets().iter::<Material>().nth(1).map(|(handle, _)| handle).ok_or("there are materials")?;
     let mut uploaded = |scene: &Scene| -> Result<_, Failed> {
-        let before = fixture.renderer.backend().uploaded_bytes();
+        let before = fixture.renderer.backend().extras().uploaded_bytes();
         let picture = fixture.draw(scene)?;
         let (recorded, _) = counts(&fixture, |_| true);
-        Ok((picture, fixture.renderer.backend().uploaded_bytes() - before, recorded))
+        Ok((picture, fixture.renderer.backend().extras().uploaded_bytes() - before, recorded))
     };
     uploaded(&scene)?;
     let (mut before, nothing, _) = uploaded(&scene)?;

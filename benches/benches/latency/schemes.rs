@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom::backend::{Backend, WgpuBackend};
+use drawloom::backend::{Backend, BackendLayer, WgpuBackend};
 use drawloom::process::Deferred;
 use drawloom::task::Scheduler;
 use drawloom::{Buffering, FrameTimes, Renderer};

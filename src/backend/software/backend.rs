@@ -10,10 +10,16 @@ use super::executor::Executor;
 use super::frame_recording::{BeginFrame, FrameRecording};
 use super::rasterizer::{Rasterizer, cpu_shaders_of};
 use super::targets;
-use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, ViewQueue};
-use crate::quality::VertexFormat;
+use crate::backend::{
+    Backend, BackendError, BackendExtras, FrameFence, FrameRecorder, FrameRequest, PassRequest, ReadBack, SceneLimits,
+    TargetMemory, ViewQueue,
+};
+use crate::command::DrawState;
+use crate::process::{Draws, FramePlan};
+use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
-use crate::task::{Scheduler, Worker};
+use crate::task::Scheduler;
+use crate::timeline::{Labels, TuningChoice};
 
 /// Draws on the CPU.
 ///
@@ -77,21 +83,14 @@ impl SoftwareBackend {
 }
 
 impl Backend for SoftwareBackend {
-    type Frame = SoftwareFrame;
-    type Part = Infallible;
-    type Commands = SoftwareCommands;
     type Submission = SoftwareSubmission;
 
     fn adapter_name(&self) -> String {
         self.rasterizer.adapter_name()
     }
 
-    fn can_blend_floats(&self) -> bool {
-        true
-    }
-
-    fn forget_histories(&self) {
-        self.rasterizer.forget_histories();
+    fn limits(&self) -> SceneLimits {
+        SceneLimits::NONE
     }
 
     fn check_mesh(&self, mesh: &Mesh, _vertices: VertexFormat) -> Result<(), BackendError> {
@@ -99,49 +98,27 @@ impl Backend for SoftwareBackend {
         can_see.then_some(()).ok_or_else(|| BackendError::ImportedMesh { mesh: mesh.name().to_owned() })
     }
 
+    fn prepare_pipelines(
+        &self,
+        _plan: &FramePlan,
+        _draws: &[Draws<'_>],
+        _states: &[Vec<DrawState>],
+        _quality: &Quality,
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
     fn begin(&self, request: &FrameRequest<'_>) -> Result<SoftwareFrame, BackendError> {
         let shaders = cpu_shaders_of(request)?;
         Ok(SoftwareFrame { recording: self.rasterizer.begin(request, &shaders)? })
     }
 
-    fn upload_objects(
-        &self,
-        _worker: &Worker,
-        frame: &SoftwareFrame,
-        request: &FrameRequest<'_>,
-        blocks: Range<usize>,
-    ) -> Result<(), BackendError> {
-        frame.recording.upload(request, blocks);
-        Ok(())
+    fn target_memory(&self, _frame: &SoftwareFrame) -> TargetMemory {
+        TargetMemory::default()
     }
 
-    fn prepare(&self, _worker: &Worker, frame: &SoftwareFrame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
-        frame.recording.prepare(pass)
-    }
-
-    fn part_count(&self, _frame: &SoftwareFrame, _pass: &PassRequest<'_>) -> usize {
-        0
-    }
-
-    fn record(
-        &self,
-        _worker: &Worker,
-        _frame: &SoftwareFrame,
-        _pass: &PassRequest<'_>,
-        _parts: Range<usize>,
-        _put: &mut dyn FnMut(Infallible),
-    ) -> Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn finish(
-        &self,
-        _worker: &Worker,
-        _frame: &SoftwareFrame,
-        pass: &PassRequest<'_>,
-        _parts: &mut Vec<Infallible>,
-    ) -> Result<SoftwareCommands, BackendError> {
-        Ok(SoftwareCommands::new(pass.list))
+    fn recording_choice(&self, _: &SoftwareFrame, _pass: usize, _labels: &Arc<Labels>) -> Option<TuningChoice> {
+        None
     }
 
     fn read_back(
@@ -160,5 +137,87 @@ impl Backend for SoftwareBackend {
         fences: Vec<FrameFence>,
     ) -> Result<SoftwareSubmission, BackendError> {
         frame.recording.submit(queues, fences)
+    }
+
+    fn extras(&self) -> &dyn BackendExtras {
+        self
+    }
+}
+
+impl BackendExtras for SoftwareBackend {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        None
+    }
+
+    fn can_blend_floats(&self) -> bool {
+        true
+    }
+
+    fn forget_histories(&self) {
+        self.rasterizer.forget_histories();
+    }
+}
+
+impl FrameRecorder for SoftwareBackend {
+    type Frame = SoftwareFrame;
+    type Part = Infallible;
+    type Commands = SoftwareCommands;
+
+    fn objects_epoch(&self, _frame: &SoftwareFrame) -> u64 {
+        0
+    }
+
+    fn upload_objects(
+        &self,
+        frame: &SoftwareFrame,
+        request: &FrameRequest<'_>,
+        blocks: Range<usize>,
+    ) -> Result<(), BackendError> {
+        frame.recording.upload(request, blocks);
+        Ok(())
+    }
+
+    fn prepare(&self, frame: &SoftwareFrame, pass: &PassRequest<'_>) -> Result<(), BackendError> {
+        frame.recording.prepare(pass)
+    }
+
+    fn part_count(&self, _frame: &SoftwareFrame, _pass: &PassRequest<'_>) -> usize {
+        0
+    }
+
+    fn record(
+        &self,
+        _frame: &SoftwareFrame,
+        _pass: &PassRequest<'_>,
+        _parts: Range<usize>,
+        _put: &mut dyn FnMut(Infallible),
+    ) -> Result<(), BackendError> {
+        Ok(())
+    }
+
+    fn finish(
+        &self,
+        _frame: &SoftwareFrame,
+        pass: &PassRequest<'_>,
+        _parts: &mut Vec<Infallible>,
+    ) -> Result<SoftwareCommands, BackendError> {
+        Ok(SoftwareCommands::new(pass.list))
+    }
+
+    fn continues_previous_pass(&self, _frame: &SoftwareFrame, _pass: usize) -> bool {
+        false
+    }
+
+    fn finish_together(
+        &self,
+        frame: &SoftwareFrame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<Infallible>],
+        emit: &mut dyn FnMut(SoftwareCommands),
+    ) -> Result<(), BackendError> {
+        for (pass, parts) in passes.iter().zip(parts) {
+            emit(self.finish(frame, pass, parts)?);
+        }
+        Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The wgpu backend: its configuration, and the resources that it keeps from frame to frame.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize};
+use std::sync::atomic::AtomicU64;
 
 use parking_lot::Mutex;
 
@@ -54,8 +54,6 @@ pub struct WgpuBackend {
     pub(super) strategies: StrategySet,
     /// The number of frames begun.
     pub(super) frames: AtomicU64,
-    /// The highest index of a worker that has recorded so far, plus one.
-    pub(super) workers: AtomicUsize,
     /// How each pass with commands was recorded in the frame that was submitted last.
     pub(super) latest: Mutex<Vec<WgpuPassStatistics>>,
     /// Whether a frame has failed because a raw pass destroyed a texture or buffer that it was lent, so that those of
@@ -140,7 +138,6 @@ impl WgpuBackend {
             buffers: Arc::new(BufferPool::new(maps_memory)),
             strategies: StrategySet::new(),
             frames: AtomicU64::new(0),
-            workers: AtomicUsize::new(1),
             latest: Mutex::default(),
             has_destroyed: Mutex::default(),
             device_timing: None,

@@ -1,4 +1,4 @@
-//! The [`Backend`] implementation.
+//! The implementation of [`Backend`], its extras, and [`FrameRecorder`].
 
 use std::mem;
 use std::ops::Range;
@@ -18,20 +18,17 @@ use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::streaming::Streamer;
 use super::submission::WgpuSubmission;
 use crate::backend::{
-    Backend, BackendError, FrameFence, FrameRequest, PassRequest, ReadBack, SceneLimits, TargetMemory, ViewQueue,
+    Backend, BackendError, BackendExtras, FrameFence, FrameRecorder, FrameRequest, PassRequest, ReadBack, SceneLimits,
+    TargetMemory, ViewQueue,
 };
 use crate::command::{Batch, DrawList, DrawState};
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::Mesh;
-use crate::task::Worker;
 use crate::timeline::{Labels, TuningAlternative, TuningChoice, TuningSubject};
 use crate::view::IssueReason;
 
 impl Backend for WgpuBackend {
-    type Frame = WgpuFrame;
-    type Part = WgpuPart;
-    type Commands = WgpuCommands;
     type Submission = WgpuSubmission;
 
     fn adapter_name(&self) -> String {
@@ -39,12 +36,15 @@ impl Backend for WgpuBackend {
         format!("{} ({})", info.name, info.backend)
     }
 
-    fn can_blend_floats(&self) -> bool {
-        self.device.features().contains(Self::BLENDING_FEATURES)
+    fn limits(&self) -> SceneLimits {
+        let limits = self.device.limits();
+        let (buffer_bytes, binding_bytes) = (limits.max_buffer_size, limits.max_storage_buffer_binding_size);
+        let texture_layers = limits.max_texture_array_layers;
+        SceneLimits { buffer_bytes, binding_bytes: binding_bytes.min(buffer_bytes), texture_layers }
     }
 
-    fn uploaded_bytes(&self) -> u64 {
-        self.uploads.bytes()
+    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
+        check_mesh(&self.device, mesh, vertices)
     }
 
     fn prepare_pipelines(
@@ -82,17 +82,6 @@ impl Backend for WgpuBackend {
         Ok(())
     }
 
-    fn limits(&self) -> SceneLimits {
-        let limits = self.device.limits();
-        let (buffer_bytes, binding_bytes) = (limits.max_buffer_size, limits.max_storage_buffer_binding_size);
-        let texture_layers = limits.max_texture_array_layers;
-        SceneLimits { buffer_bytes, binding_bytes: binding_bytes.min(buffer_bytes), texture_layers }
-    }
-
-    fn check_mesh(&self, mesh: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
-        check_mesh(&self.device, mesh, vertices)
-    }
-
     fn begin(&self, request: &FrameRequest<'_>) -> Result<WgpuFrame, BackendError> {
         let imports = mem::take(&mut *self.imports.lock());
         // Nothing has changed yet, so a camera out of reach, a picture too large, too many layers, or a shader that
@@ -116,6 +105,89 @@ impl Backend for WgpuBackend {
         })
     }
 
+    fn target_memory(&self, frame: &WgpuFrame) -> TargetMemory {
+        frame.targets.memory()
+    }
+
+    fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
+        let strategies = self.strategies.strategies();
+        let state = frame.pass(pass);
+        if strategies.len() == 1 || !state.draws_commands {
+            return None;
+        }
+        let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
+        let named = |(strategy, nanoseconds): (&PassStrategy, _)| TuningAlternative {
+            name: strategy.name().into(),
+            nanoseconds,
+        };
+        let alternatives = pipelines
+            .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
+        Some(TuningChoice {
+            subject: TuningSubject::Recording,
+            labels: Arc::clone(labels),
+            alternatives,
+            chosen: state.strategy_index,
+            is_trial: state.is_trial,
+        })
+    }
+
+    fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
+        Ok(Box::new(frame.read_back_whole(view, target)?))
+    }
+
+    fn submit(
+        &self,
+        mut frame: WgpuFrame,
+        queues: Vec<ViewQueue<WgpuCommands>>,
+        fences: Vec<FrameFence>,
+    ) -> Result<WgpuSubmission, BackendError> {
+        let submission = catch_wgpu_panic("the frame", || self.submit_frame(&mut frame, queues, fences));
+        let submission = submission.flatten().inspect_err(|error| {
+            self.fail_frame(error);
+            if let Some(timing) = &self.device_timing {
+                timing.readback_pool.clear();
+            }
+        })?;
+        frame.buffers.keep_objects();
+        Ok(submission)
+    }
+
+    fn extras(&self) -> &dyn BackendExtras {
+        self
+    }
+}
+
+impl BackendExtras for WgpuBackend {
+    fn inner_extras(&self) -> Option<&dyn BackendExtras> {
+        None
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        self.uploads.bytes()
+    }
+
+    fn can_blend_floats(&self) -> bool {
+        self.device.features().contains(Self::BLENDING_FEATURES)
+    }
+
+    fn has_background_work(&self) -> bool {
+        self.streamer.as_ref().is_some_and(Streamer::has_work)
+    }
+
+    fn work_in_background(&self) {
+        if let Some(streamer) = &self.streamer {
+            streamer.work(&self.device, &self.uploads);
+        }
+    }
+
+    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
+        if let Some(statistics) = self.streaming_statistics() {
+            count("bytes resident", statistics.resident_bytes() as f64);
+            count("streaming requests", (statistics.requested + statistics.in_flight) as f64);
+            count("streaming evictions", statistics.evictions as f64);
+        }
+    }
+
     fn discard_frame(&self) {
         self.imports.lock().clear();
     }
@@ -127,18 +199,19 @@ impl Backend for WgpuBackend {
     fn imports_targets_of(&self, view: &str) -> bool {
         self.imports.lock().iter().any(|import| import.view == view)
     }
+}
+
+impl FrameRecorder for WgpuBackend {
+    type Frame = WgpuFrame;
+    type Part = WgpuPart;
+    type Commands = WgpuCommands;
 
     fn objects_epoch(&self, frame: &WgpuFrame) -> u64 {
         frame.buffers.held_epoch()
     }
 
-    fn target_memory(&self, frame: &WgpuFrame) -> TargetMemory {
-        frame.targets.memory()
-    }
-
     fn upload_objects(
         &self,
-        _worker: &Worker,
         frame: &WgpuFrame,
         request: &FrameRequest<'_>,
         blocks: Range<usize>,
@@ -151,7 +224,6 @@ impl Backend for WgpuBackend {
 
     fn prepare(
         &self,
-        _worker: &Worker,
         frame: &WgpuFrame,
         &PassRequest { frame: request, index, pass, list }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
@@ -193,13 +265,11 @@ impl Backend for WgpuBackend {
 
     fn record(
         &self,
-        worker: &Worker,
         frame: &WgpuFrame,
         &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
         mut parts: Range<usize>,
         emit: &mut dyn FnMut(WgpuPart),
     ) -> Result<(), BackendError> {
-        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         let pass = frame.pass(index);
         let encoders = pass.strategy.encoder_count(list.bundle_count());
         // Cached bundles need no error scope, which locks the device twice.
@@ -229,12 +299,10 @@ impl Backend for WgpuBackend {
 
     fn finish(
         &self,
-        worker: &Worker,
         frame: &WgpuFrame,
         request: &PassRequest<'_>,
         parts: &mut Vec<WgpuPart>,
     ) -> Result<WgpuCommands, BackendError> {
-        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         let index = request.index;
         let pass = frame.pass(index);
         if is_split(parts) {
@@ -256,37 +324,17 @@ impl Backend for WgpuBackend {
         commands.map(WgpuCommands).inspect_err(|error| self.fail_frame(error))
     }
 
-    fn counters(&self, count: &mut dyn FnMut(&'static str, f64)) {
-        if let Some(statistics) = self.streaming_statistics() {
-            count("bytes resident", statistics.resident_bytes() as f64);
-            count("streaming requests", (statistics.requested + statistics.in_flight) as f64);
-            count("streaming evictions", statistics.evictions as f64);
-        }
-    }
-
-    fn has_background_work(&self) -> bool {
-        self.streamer.as_ref().is_some_and(Streamer::has_work)
-    }
-
-    fn work_in_background(&self) {
-        if let Some(streamer) = &self.streamer {
-            streamer.work(&self.device, &self.uploads);
-        }
-    }
-
     fn continues_previous_pass(&self, frame: &WgpuFrame, pass: usize) -> bool {
         frame.pass(pass).continues_previous
     }
 
     fn finish_together(
         &self,
-        worker: &Worker,
         frame: &WgpuFrame,
         passes: &[PassRequest<'_>],
         parts: &mut [Vec<WgpuPart>],
         emit: &mut dyn FnMut(WgpuCommands),
     ) -> Result<(), BackendError> {
-        self.workers.fetch_max(worker.index() + 1, Ordering::Relaxed);
         // One of them may have grown since these buffers were used last.
         if !parts.iter().any(|parts| is_split(parts)) {
             let start = Instant::now();
@@ -307,53 +355,10 @@ impl Backend for WgpuBackend {
         // Alone, the pass that the device refuses is found. A panic of wgpu would name the pass of this job.
         for (pass, parts) in passes.iter().zip(parts) {
             let label = &frame.pass(pass.index).label;
-            let finished = catch_wgpu_panic(label, || self.finish(worker, frame, pass, parts)).flatten();
+            let finished = catch_wgpu_panic(label, || self.finish(frame, pass, parts)).flatten();
             emit(finished.inspect_err(|error| self.fail_frame(error))?);
         }
         Ok(())
-    }
-
-    fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
-        let strategies = self.strategies.strategies();
-        let state = frame.pass(pass);
-        if strategies.len() == 1 || !state.draws_commands {
-            return None;
-        }
-        let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
-        let named = |(strategy, nanoseconds): (&PassStrategy, _)| TuningAlternative {
-            name: strategy.name().into(),
-            nanoseconds,
-        };
-        let alternatives = pipelines
-            .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
-        Some(TuningChoice {
-            subject: TuningSubject::Recording,
-            labels: Arc::clone(labels),
-            alternatives,
-            chosen: state.strategy_index,
-            is_trial: state.is_trial,
-        })
-    }
-
-    fn read_back(&self, frame: &mut WgpuFrame, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
-        Ok(Box::new(frame.read_back_whole(&self.device, view, target)?))
-    }
-
-    fn submit(
-        &self,
-        mut frame: WgpuFrame,
-        queues: Vec<ViewQueue<WgpuCommands>>,
-        fences: Vec<FrameFence>,
-    ) -> Result<WgpuSubmission, BackendError> {
-        let submission = catch_wgpu_panic("the frame", || self.submit_frame(&mut frame, queues, fences));
-        let submission = submission.flatten().inspect_err(|error| {
-            self.fail_frame(error);
-            if let Some(timing) = &self.device_timing {
-                timing.readback_pool.clear();
-            }
-        })?;
-        frame.buffers.keep_objects();
-        Ok(submission)
     }
 }
 

@@ -29,7 +29,7 @@ impl WgpuBackend {
         pipelines: Arc<[Arc<ProcessPipelines>]>,
         targets: Arc<WgpuTargets>,
     ) -> Result<WgpuFrame, BackendError> {
-        let FrameRequest { plan, draws, scene, .. } = *request;
+        let FrameRequest { plan, draws, scene, workers, .. } = *request;
         // From here on, so that what a frame uploads that cannot begin is not kept either.
         let pending_uploads = PendingUploads::new(&self.device, self.queue());
         let light_meshes = self.light_meshes(draws)?;
@@ -53,6 +53,7 @@ impl WgpuBackend {
             let (layouts, read_backs) = (self.layouts.clone(), Vec::new());
             let mut frame = WgpuFrame {
                 number,
+                workers,
                 pipelines,
                 layouts,
                 meshes,

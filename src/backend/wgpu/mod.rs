@@ -40,6 +40,7 @@ mod uploaded_picture;
 mod window_surface;
 
 pub use backend::{WgpuBackend, WgpuResources};
+pub(crate) use frame::WgpuFrame;
 pub use frame::WgpuPassStatistics;
 pub use pipeline_library::PipelineLibrary;
 pub use read_back::WgpuReadBack;

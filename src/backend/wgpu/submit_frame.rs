@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use drawloom_jobs::internal::Tuner;
 
@@ -114,7 +113,6 @@ impl WgpuBackend {
 
     /// Reports the frame's measured costs to the tuners, and keeps the statistics of its passes.
     fn report_costs(&self, frame: &WgpuFrame) {
-        let workers = self.workers.load(Ordering::Relaxed);
         let passes = frame.buffers.passes().iter().filter(|pass| pass.draws_commands);
         let all = passes.clone().map(|pass| pass.timing.total()).sum();
         let mut latest = self.latest.lock();
@@ -122,7 +120,7 @@ impl WgpuBackend {
         for pass in passes {
             let pipelines = frame.pipelines(pass.pass);
             if self.strategies.strategies().len() > 1 {
-                let sample = pass.cost_sample(all, workers);
+                let sample = pass.cost_sample(all, frame.workers);
                 let report = |tuner: &mut Tuner| tuner.report(frame.number, pass.strategy_index, sample);
                 pipelines.with_tuner(pass.pass.view_index, &self.strategies, report);
             }

@@ -39,5 +39,5 @@ pub(super) fn outdated_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize)
 
 /// Uploads what changed of the object table since the backend's buffers were written. An item is a block of objects.
 pub(super) fn upload_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-    frame.backend.upload_objects(job.worker, frame.backend_frame, frame.request, job.items)
+    frame.backend.upload_objects(frame.backend_frame, frame.request, job.items)
 }

@@ -12,14 +12,14 @@ use super::super::pass_runs::{PassFailure, PassRuns};
 use super::super::stage::StageJob;
 use crate::backend::{Backend, BackendError, PassRequest};
 use crate::command::DrawList;
-use crate::task::{JobPanic, Worker, catch};
+use crate::task::{JobPanic, catch};
 
 /// Uploads which objects the pass draws, and makes its pipelines.
 pub(super) fn prepare<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
     let table = &frame.tables.passes[job.of];
     frame.recordings[job.of].reserve(frame.part_count(job.of));
     let list = table.list.read();
-    frame.backend.prepare(job.worker, frame.backend_frame, &frame.pass_request(job.of, &list))
+    frame.backend.prepare(frame.backend_frame, &frame.pass_request(job.of, &list))
 }
 
 /// The parts that the backend records the pass in.
@@ -32,7 +32,7 @@ pub(super) fn record<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>)
     let list = frame.tables.passes[job.of].list.read();
     let request = frame.pass_request(job.of, &list);
     let mut put_part = frame.recordings[job.of].put_parts_from(job.items.start);
-    frame.backend.record(job.worker, frame.backend_frame, &request, job.items, &mut put_part)
+    frame.backend.record(frame.backend_frame, &request, job.items, &mut put_part)
 }
 
 /// Finishes the pass: its commands are ready to submit. Of passes that are finished together, the job of the one that
@@ -40,23 +40,22 @@ pub(super) fn record<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>)
 pub(super) fn finish<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
     match frame.pass_runs.complete(job.of) {
         None => Ok(()),
-        Some(passes) if passes.len() == 1 => finish_pass(frame, job.worker, job.of),
-        Some(passes) => finish_together(frame, job.worker, passes, job.of),
+        Some(passes) if passes.len() == 1 => finish_pass(frame, job.of),
+        Some(passes) => finish_together(frame, passes, job.of),
     }
 }
 
-fn finish_pass<B: Backend>(frame: &FrameContext<'_, B>, worker: &Worker, pass: usize) -> Result<(), BackendError> {
+fn finish_pass<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> Result<(), BackendError> {
     let list = frame.tables.passes[pass].list.read();
     let mut parts = frame.recordings[pass].ordered_parts()?;
     let request = frame.pass_request(pass, &list);
-    let commands = frame.backend.finish(worker, frame.backend_frame, &request, &mut parts)?;
+    let commands = frame.backend.finish(frame.backend_frame, &request, &mut parts)?;
     frame.recordings[pass].put_finished(commands);
     Ok(())
 }
 
 fn finish_together<B: Backend>(
     frame: &FrameContext<'_, B>,
-    worker: &Worker,
     passes: Range<usize>,
     job_of: usize,
 ) -> Result<(), BackendError> {
@@ -84,7 +83,7 @@ fn finish_together<B: Backend>(
     };
     let (requests, parts) = (&requests[..count], &mut parts[..count]);
     let start = frame.clock.stopwatch();
-    let result = catch(|| frame.backend.finish_together(worker, frame.backend_frame, requests, parts, &mut emit));
+    let result = catch(|| frame.backend.finish_together(frame.backend_frame, requests, parts, &mut emit));
     let result = result.unwrap_or_else(|JobPanic { message, .. }| {
         fail(finished);
         // The run reports it.

@@ -182,7 +182,7 @@ impl Deferred {
         if self.steps().next().is_none() { RADIANCE } else { PICTURE }
     }
 
-    /// Sets whether the backend can [blend floats](crate::backend::Backend::can_blend_floats).
+    /// Sets whether the backend can [blend floats](crate::backend::BackendExtras::can_blend_floats).
     pub(crate) fn with_float_blending(self, blends_floats: bool) -> Self {
         Self { blends_floats, ..self }
     }

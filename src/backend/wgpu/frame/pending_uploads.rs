@@ -10,26 +10,34 @@ use crate::unwind::emit;
 /// What is uploaded early does no harm: buffers of the frame are used by nothing else, and what is shared with earlier
 /// frames that are not submitted yet would have been uploaded before them, too.
 pub(crate) struct PendingUploads {
-    /// `None` once they are submitted.
-    device: Option<(wgpu::Device, wgpu::Queue)>,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    are_submitted: bool,
 }
 
 impl PendingUploads {
     pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Self {
-        Self { device: Some((device.clone(), queue.clone())) }
+        Self { device: device.clone(), queue: queue.clone(), are_submitted: false }
+    }
+
+    /// The device of the frame.
+    pub(crate) fn device(&self) -> &wgpu::Device {
+        &self.device
     }
 
     /// The frame was submitted.
     pub(crate) fn submitted(&mut self) {
-        self.device = None;
+        self.are_submitted = true;
     }
 }
 
 impl Drop for PendingUploads {
     fn drop(&mut self) {
-        let Some((device, queue)) = self.device.take() else { return };
+        if self.are_submitted {
+            return;
+        }
         let label = "the uploads of a frame that was dropped";
-        let submit = || with_error_scope(&device, label, || queue.submit(None));
+        let submit = || with_error_scope(&self.device, label, || self.queue.submit(None));
         if let Err(error) = catch_wgpu_panic(label, submit).flatten() {
             // The next frame meets the same, and returns it.
             let message = "uploads of a frame that was dropped stay in memory";

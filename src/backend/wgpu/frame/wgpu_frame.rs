@@ -20,6 +20,8 @@ use crate::process::Pass;
 pub struct WgpuFrame {
     /// Counted from the backend's first frame.
     pub(crate) number: u64,
+    /// [`FrameRequest::workers`].
+    pub(crate) workers: usize,
     /// One for each render process.
     pub(crate) pipelines: Arc<[Arc<ProcessPipelines>]>,
     pub(crate) layouts: BindGroupLayouts,
@@ -50,11 +52,11 @@ impl WgpuFrame {
     /// See [`new_read_back`].
     pub(crate) fn read_back(
         &mut self,
-        device: &wgpu::Device,
         view: usize,
         target: &str,
         rectangle: [[u32; 2]; 2],
     ) -> Result<WgpuReadBack, BackendError> {
+        let device = self.pending_uploads.device();
         let (read_back, copy) = new_read_back(device, &self.targets, view, target, rectangle)?;
         self.read_backs.push(copy);
         Ok(read_back)
@@ -64,15 +66,10 @@ impl WgpuFrame {
     ///
     /// # Errors
     /// See [`new_read_back`].
-    pub(crate) fn read_back_whole(
-        &mut self,
-        device: &wgpu::Device,
-        view: usize,
-        target: &str,
-    ) -> Result<WgpuReadBack, BackendError> {
+    pub(crate) fn read_back_whole(&mut self, view: usize, target: &str) -> Result<WgpuReadBack, BackendError> {
         let whole =
             self.targets.find(view, target).map_or([0; 2], |found| [found.texture.width(), found.texture.height()]);
-        self.read_back(device, view, target, [[0, 0], whole])
+        self.read_back(view, target, [[0, 0], whole])
     }
 
     /// Whether mip levels are generated after a pass, by index in the frame.
