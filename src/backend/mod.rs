@@ -5,7 +5,6 @@ mod backend_trait;
 mod error;
 mod frame_fence;
 mod guarded_backend;
-mod kept_views;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
 #[cfg(any(feature = "wgpu", feature = "software"))]
@@ -37,7 +36,6 @@ pub use backend_trait::{Backend, BackendExtras, FrameRecorder, NoExtras};
 pub use error::BackendError;
 pub use frame_fence::FrameFence;
 pub(crate) use guarded_backend::{CallPanic, GuardedBackend};
-pub(crate) use kept_views::{KeptView, kept_views};
 pub use null::NullBackend;
 pub use picture::Picture;
 pub use read_back::ReadBack;

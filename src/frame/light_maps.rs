@@ -4,14 +4,14 @@ use std::mem::discriminant;
 
 use super::views::FrameViews;
 use crate::scene::{Light, Projection};
-use crate::view::RenderView;
+use crate::view::{RenderView, ViewId};
 
 /// Whether lights of the same kinds request maps in the same order, wherever the lights are.
 pub(super) fn have_same_maps(before: &FrameViews, requested: &FrameViews) -> bool {
-    fn maps(frame: &FrameViews) -> impl Iterator<Item = (&str, usize, Option<std::mem::Discriminant<Light>>)> {
+    fn maps(frame: &FrameViews) -> impl Iterator<Item = (ViewId, usize, Option<std::mem::Discriminant<Light>>)> {
         // Shadow cameras of the engine's own have no light.
         let with_light = frame.views.iter().filter_map(|view| Some((view, view.valid_light?)));
-        with_light.map(|(view, light)| (view.name(), light, frame.lights.get(light).map(discriminant)))
+        with_light.map(|(view, light)| (view.id, light, frame.lights.get(light).map(discriminant)))
     }
     maps(before).eq(maps(requested))
 }

@@ -48,7 +48,6 @@ mod stages;
 mod static_group_statistics;
 mod static_groups;
 mod statistics;
-mod table_keys;
 mod tables;
 mod valid_lights;
 mod view_budget;

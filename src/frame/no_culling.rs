@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::tables::FrameTables;
-use crate::backend::KeptView;
 use crate::command::DrawList;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::Quality;
@@ -42,9 +41,7 @@ impl CullingTables {
         0
     }
 
-    pub(super) fn rearrange(&mut self, _: &[Option<usize>]) {}
-
-    pub(super) fn begin_frame(&mut self, _views: usize) {}
+    pub(super) fn set_views(&mut self, _: &[RenderView]) {}
 
     pub(super) fn tests_occlusion(&self, _view: usize) -> bool {
         false
@@ -70,7 +67,7 @@ impl OcclusionControls {
         false
     }
 
-    pub(super) fn inherit_measurements(&mut self, _: &Self, _: &[Option<KeptView>]) {}
+    pub(super) fn inherit_measurements(&mut self, _: &Self, _: impl Iterator<Item = Option<usize>>) {}
 
     pub(super) fn begin_frame(&self, _: &mut FrameTables, _: &Assets, _: &[RenderView]) {}
 

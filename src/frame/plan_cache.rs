@@ -22,7 +22,7 @@ pub(super) struct PlanCache {
 }
 
 impl PlanCache {
-    /// A cache with the plan of an empty scene.
+    /// A cache with the plan of an empty scene. Its processes have the ids that they have in the plan `before`.
     ///
     /// # Errors
     /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend
@@ -32,6 +32,7 @@ impl PlanCache {
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: Vec<String>,
         shadow_maps: ShadowMaps,
+        before: Option<&FramePlan>,
     ) -> Result<Self, PlanError> {
         if let Some(problem) = shadow_maps.problem() {
             return Err(PlanError::ShadowMaps { problem });
@@ -45,7 +46,9 @@ impl PlanCache {
         }
         let kept = kept_requirements(deferred.as_ref())?;
         let nothing = Requirements::default().union(kept);
-        let current = Arc::new(compile(deferred.as_ref(), &processes, &outputs, &nothing)?);
+        let mut current = compile(deferred.as_ref(), &processes, &outputs, &nothing)?;
+        before.iter().for_each(|before| current.inherit_process_ids(before));
+        let current = Arc::new(current);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
         Ok(Self { deferred, kept: Some(kept), processes, outputs, shadow_maps, compiled, current })
     }
@@ -55,7 +58,8 @@ impl PlanCache {
     /// # Errors
     /// As [`PlanCache::new`].
     pub(super) fn with_deferred(&self, deferred: Deferred) -> Result<Self, PlanError> {
-        Self::new(Some(deferred), self.processes.clone(), self.outputs.clone(), self.shadow_maps)
+        let Self { processes, outputs, shadow_maps, current, .. } = self;
+        Self::new(Some(deferred), processes.clone(), outputs.clone(), *shadow_maps, Some(&**current))
     }
 
     /// The deferred pipeline, if there is one.
@@ -135,7 +139,10 @@ impl PlanCache {
         if let Some(plan) = self.compiled.get(&requirements) {
             return Ok(Arc::clone(plan));
         }
-        let plan = Arc::new(compile(Some(deferred), &self.processes, &self.outputs, &requirements)?);
+        let mut plan = compile(Some(deferred), &self.processes, &self.outputs, &requirements)?;
+        let known = self.compiled.values().chain([&self.current]);
+        known.for_each(|known| plan.inherit_process_ids(known));
+        let plan = Arc::new(plan);
         self.compiled.insert(requirements, Arc::clone(&plan));
         Ok(plan)
     }
@@ -192,4 +199,42 @@ pub(super) fn with_quality(deferred: Deferred, quality: &Quality) -> Result<Defe
 /// Calls code of processes and steps of the engine, and turns its panic into an error.
 fn catch_panics<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
     catch(call).unwrap_or_else(|JobPanic { message, .. }| Err(PlanError::Panicked { message }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::process::ProcessId;
+
+    /// The processes of a plan by name and kind of views, each with its id.
+    fn ids_of(plan: &FramePlan) -> HashMap<(String, ViewKind), ProcessId> {
+        let named = plan.processes().iter().map(|planned| (planned.name.clone(), planned.declaration.views));
+        named.zip(plan.processes().iter().map(|planned| planned.id)).collect()
+    }
+
+    #[test]
+    fn a_process_has_the_same_id_in_all_plans() {
+        let mut cache =
+            PlanCache::new(Some(Deferred::to_picture()), Vec::new(), Vec::new(), ShadowMaps::default(), None).unwrap();
+        let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
+        let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
+        let mirror = Camera { kind: ViewKind::Reflection, ..Camera::looking_at("mirror", DVec3::Z, DVec3::ZERO) };
+        let mut known = ids_of(cache.current());
+        let mut check = |plan: &FramePlan| {
+            for (process, id) in ids_of(plan) {
+                assert_eq!(*known.entry(process).or_insert(id), id);
+            }
+            assert_eq!(known.values().collect::<HashSet<_>>().len(), known.len(), "{known:?}");
+        };
+        check(&cache.select(&[lamp], false, &[]).unwrap());
+        check(&cache.select(&[lamp, sun], true, &[]).unwrap());
+        check(&cache.select(&[sun], true, &[mirror]).unwrap());
+        let mut replaced = cache.with_deferred(Deferred::to_picture()).unwrap();
+        check(replaced.current());
+        check(&replaced.select(&[], false, &[]).unwrap());
+    }
 }

@@ -36,7 +36,7 @@ use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
 use crate::unwind::CaughtSpan;
-use crate::view::{RenderView, possible_draw_states};
+use crate::view::{RenderView, ViewRegistry, possible_draw_states};
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
@@ -77,6 +77,7 @@ pub struct Renderer<B: Backend> {
     pipeline_has_quality: bool,
     scheduler: Arc<Scheduler>,
     graphs: StageGraphCache<B>,
+    view_registry: ViewRegistry,
     tables: FrameTables,
     capacity: SceneCapacity,
     view_cache: ViewCache,
@@ -111,6 +112,7 @@ impl<B: Backend> Renderer<B> {
             pipeline_has_quality: quality.is_some(),
             scheduler,
             graphs: StageGraphCache::default(),
+            view_registry: ViewRegistry::default(),
             tables: FrameTables::default(),
             capacity: SceneCapacity::default(),
             view_cache: ViewCache::default(),
@@ -166,6 +168,7 @@ impl<B: Backend> Renderer<B> {
         });
         match recorded {
             Ok(recorded) => {
+                self.view_registry.end_frame();
                 self.tables.end_frame();
                 Ok(recorded)
             }
@@ -301,7 +304,8 @@ impl<B: Backend> Renderer<B> {
         self.tables.blended_object.count_half_floats(scene, self.plans.deferred(), &self.tables.objects);
         let interval = self.quality.shadows.interval;
         let maps = self.plans.shadow_maps().map(|maps| MapSettings { maps, interval, limits });
-        let requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.scene_issues())?;
+        let mut requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.scene_issues())?;
+        self.view_registry.begin_frame(&mut requested.views);
         let is_imported = |view: &str| self.backend.imports_targets_of(view);
         let frame_views = Arc::new(self.view_cache.resolve(&plan, requested, is_imported)?);
         let FrameViews { views, lights, .. } = &*frame_views;

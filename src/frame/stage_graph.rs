@@ -12,17 +12,16 @@ use super::pass_mode::{PassMode, orders_by_bin};
 use super::stage::{Stage, StageNode, StageOwner};
 use super::stage_tuning::{StageTuning, TuningLabels};
 use super::static_groups::ListConditions;
-use super::table_keys::TableKeys;
-use super::tables::{FrameTables, PassTable};
+use super::tables::FrameTables;
 use super::view_levels::ViewLevels;
-use crate::backend::{Backend, kept_views};
+use crate::backend::Backend;
 use crate::command::Selection;
 use crate::graph::{FrameGraph, NodeId, Schedule};
 use crate::process::{Draws, FramePasses, FramePlan, Pass, SampledViews};
 use crate::quality::{DepthPrecision, Quality};
 use crate::scene::{LayerMask, Projection, SceneRef, ViewKind};
 use crate::timeline::Labels;
-use crate::view::{LevelSelector, RenderView};
+use crate::view::{LevelSelector, RenderView, ViewId};
 
 /// The stages of a frame for one plan and one list of views, compiled to a schedule, with what is measured about them.
 pub(super) struct StageGraph<B: Backend> {
@@ -34,7 +33,6 @@ pub(super) struct StageGraph<B: Backend> {
     modes: Vec<PassMode>,
     pub(super) sampled_views: SampledViews,
     pub(super) plan: Arc<FramePlan>,
-    table_keys: Arc<TableKeys>,
     /// For each view whether a pass of it draws commands.
     view_draws_commands: Vec<bool>,
     /// The cost kinds of the tuning, by stage and by the index of the process.
@@ -80,6 +78,8 @@ pub(super) struct FrameFeatures {
 /// What decides which stages a view has.
 #[derive(Debug)]
 struct ViewKey {
+    /// That of the latest view that the key fits.
+    id: ViewId,
     name: String,
     kind: ViewKind,
     /// Whether its picture is cached.
@@ -93,6 +93,7 @@ struct ViewKey {
 impl ViewKey {
     fn new(view: &RenderView) -> Self {
         Self {
+            id: view.id,
             name: view.name().to_owned(),
             kind: view.kind(),
             is_cached: view.is_cached(),
@@ -104,7 +105,8 @@ impl ViewKey {
     }
 
     fn fits(&self, view: &RenderView) -> bool {
-        (self.name.as_str(), self.kind, self.is_cached) == (view.name(), view.kind(), view.is_cached())
+        (self.id == view.id || (self.name.as_str(), self.kind) == (view.name(), view.kind()))
+            && self.is_cached == view.is_cached()
             && (self.is_paraboloid, self.has_oblique_near_plane) == (is_paraboloid(view), view.has_oblique_near_plane())
             && (self.layers, self.samples_views) == (view.camera.layers, view.camera.samples_views)
     }
@@ -181,6 +183,11 @@ impl<B: Backend> StageGraph<B> {
         self.plan.identity() == plan.identity() && self.key.fits(draws, views, features, nodes)
     }
 
+    /// Remembers the ids of the views of a frame that the graph fits.
+    pub(super) fn set_view_ids(&mut self, views: &[RenderView]) {
+        self.key.views.iter_mut().zip(views).for_each(|(key, view)| key.id = view.id);
+    }
+
     /// Builds the graph: each process has a pass in each view of its kind that is not cached, and the stages of a pass
     /// run one after the other. Nothing else waits: the order of passes binds submission, not recording.
     ///
@@ -240,7 +247,6 @@ impl<B: Backend> StageGraph<B> {
             schedule: graph.compile().map_err(|error| key.nodes.error_of(error.problem))?,
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
             view_draws_commands: view_owners.iter().map(Option::is_some).collect(),
-            table_keys: Arc::new(TableKeys::new(plan, &passes, views)),
             cost_kinds,
             passes,
             modes,
@@ -252,14 +258,15 @@ impl<B: Backend> StageGraph<B> {
 
     /// Takes over what was measured in the frames of another graph, where both have the same stages and views. So a
     /// frame that requires something else does not try out again what is known.
-    pub(super) fn inherit_measurements(&mut self, before: &Self, views: &[RenderView]) {
+    pub(super) fn inherit_measurements(&mut self, before: &Self) {
         self.schedule.inherit_measurements(&before.schedule);
         let kinds_before: HashMap<_, _> = before.cost_kind_names().collect();
         let pairs = self.cost_kind_names().filter_map(|(name, kind)| Some((kind, *kinds_before.get(&name)?)));
         let pairs: Vec<_> = pairs.collect();
         self.tuning.costs.inherit_estimates(&before.tuning.costs, pairs);
-        let views_before = before.key.views.iter().map(|view| (view.kind, view.name.as_str()));
-        self.tuning.occlusion.inherit_measurements(&before.tuning.occlusion, &kept_views(views_before, views));
+        let views_before: HashMap<_, _> = before.key.views.iter().map(|view| view.id).zip(0..).collect();
+        let kept = self.key.views.iter().map(|view| views_before.get(&view.id).copied());
+        self.tuning.occlusion.inherit_measurements(&before.tuning.occlusion, kept);
     }
 
     /// The cost kinds by their names.
@@ -292,9 +299,7 @@ impl<B: Backend> StageGraph<B> {
     ) -> Result<(), FrameError> {
         let FrameFeatures { culling, chooses_levels, .. } = self.key.features;
         let culls_triangles = culling.culls_triangles();
-        tables.set_keys(&self.table_keys, views);
-        tables.begin_frame(views.len(), workers);
-        tables.passes.resize_with(self.passes.len(), PassTable::default);
+        tables.begin_frame(&self.plan, views, &self.passes, workers);
         let frame = tables.version(0).frame;
         for ((pass, mode), table) in self.passes.iter().zip(&self.modes).zip(&mut tables.passes) {
             let view = &views[pass.view_index];
@@ -307,7 +312,7 @@ impl<B: Backend> StageGraph<B> {
         tables.begin_static_groups(scene, conditions, &self.passes)?;
         self.tuning.occlusion.begin_frame(tables, scene.assets, views);
         if chooses_levels {
-            ViewLevels::keep(&mut tables.levels, views);
+            tables.levels.set_views(views, |levels| *levels = ViewLevels::default());
         } else {
             tables.levels.clear();
         }
@@ -322,9 +327,9 @@ impl<B: Backend> StageGraph<B> {
                     view: view.name().to_owned(),
                     message: panic.message,
                 })?;
-                if let Some(levels) = tables.levels.get_mut(index) {
-                    let selector = LevelSelector::new(view, quality);
-                    levels.begin_frame(selector, &tables.visibility[index], tables.objects.len());
+                if chooses_levels {
+                    let (selector, objects) = (LevelSelector::new(view, quality), tables.objects.len());
+                    tables.levels[index].begin_frame(selector, &tables.visibility[index], objects);
                 }
             } else {
                 let version = tables.version(index);

@@ -38,11 +38,15 @@ impl<B: Backend> StageGraphCache<B> {
     ) -> Result<&mut StageGraph<B>, FrameError> {
         let found = self.latest_first.iter().position(|graph| graph.fits(plan, draws, views, features, nodes));
         let graph = match found {
-            Some(index) => self.latest_first.remove(index),
+            Some(index) => {
+                let mut graph = self.latest_first.remove(index);
+                graph.set_view_ids(views);
+                graph
+            }
             None => {
                 let mut graph = StageGraph::of_frame(plan, draws, views, features, nodes)?;
                 if let Some(before) = self.latest_first.first() {
-                    graph.inherit_measurements(before, views);
+                    graph.inherit_measurements(before);
                 }
                 graph
             }

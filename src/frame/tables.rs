@@ -1,6 +1,7 @@
 //! The tables that the stages of a frame fill for each other.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
@@ -11,7 +12,6 @@ use super::granularity::Granularity;
 use super::list_inputs::ListInputs;
 use super::pass_mode::PassMode;
 use super::static_groups::{ListConditions, StaticGroupTable};
-use super::table_keys::{TableKeys, TakenTables, rearrange};
 use super::view_levels::ViewLevels;
 use super::view_times::ViewTimes;
 use super::view_visibility::ViewVisibility;
@@ -21,9 +21,9 @@ use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, Partition, RenderCommand, Selection, SortScratch, Splitters, Version,
 };
 use crate::leaked_guards::unlock;
-use crate::process::Pass;
+use crate::process::{FramePlan, Pass, ProcessId};
 use crate::scene::{Projection, SceneError, SceneRef};
-use crate::view::{IssueReason, LightTable, MeshLevels, ObjectTable, RenderView};
+use crate::view::{IssueReason, LightTable, MeshLevels, ObjectTable, PerView, RenderView};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
@@ -34,50 +34,56 @@ pub(super) struct FrameTables {
     pub(super) blended_object: BlendedTracker,
     /// The thread time of each view.
     pub(super) view_times: ViewTimes,
-    /// One for each view.
-    pub(super) visibility: Vec<ViewVisibility>,
+    pub(super) visibility: PerView<ViewVisibility>,
     pub(super) culling: CullingTables,
     /// The meshes that have levels of detail.
     pub(super) mesh_levels: MeshLevels,
-    /// One for each view of a frame that chooses levels of detail.
-    pub(super) levels: Vec<ViewLevels>,
+    /// Those of a frame that chooses levels of detail; otherwise there are none.
+    pub(super) levels: PerView<ViewLevels>,
     /// The lights that reach each view.
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
     pub(super) passes: Vec<PassTable>,
+    /// What each of these belongs to.
+    pass_keys: Vec<PassKey>,
     /// One for each worker.
     pub(super) sort_scratch: Vec<Mutex<SortScratch>>,
-    /// What the tables of views and passes belong to; `None` before the first frame.
-    keys: Option<Arc<TableKeys>>,
     /// The number of frames that began.
     frames: u64,
     is_in_frame: bool,
 }
 
-impl FrameTables {
-    /// Gives the tables to the views and passes of a stage graph, so that what it shares with the graph before makes
-    /// nothing anew. Does nothing for the graph of the frame before.
-    pub(super) fn set_keys(&mut self, keys: &Arc<TableKeys>, views: &[RenderView]) {
-        let before = match self.keys.replace(Arc::clone(keys)) {
-            Some(before) if !Arc::ptr_eq(&before, keys) => before,
-            _ => return,
-        };
-        let TakenTables { of_views, of_passes } = keys.taken_from(&before, views);
-        rearrange(&mut self.visibility, &of_views);
-        self.culling.rearrange(&of_views);
-        rearrange(&mut self.lights, &of_views);
-        rearrange(&mut self.passes, &of_passes);
-    }
+/// What a pass's table is kept under.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct PassKey {
+    /// That of its view.
+    slot: u32,
+    process: ProcessId,
+}
 
-    /// Begins a frame of `views` views on `workers` workers. The object table has begun it already.
-    pub(super) fn begin_frame(&mut self, views: usize, workers: usize) {
+impl FrameTables {
+    /// Begins a frame of these views and passes on `workers` workers. The object table has begun it already.
+    ///
+    /// Views and passes that the frame before had too go on with their tables, and others take tables that are left.
+    /// That is safe, because a table records the inputs that it was made from.
+    pub(super) fn begin_frame(&mut self, plan: &FramePlan, views: &[RenderView], passes: &[Pass], workers: usize) {
         self.frames += 1;
         self.is_in_frame = true;
-        self.view_times.reset(views);
-        self.visibility.resize_with(views, ViewVisibility::default);
-        self.culling.begin_frame(views);
-        self.lights.resize_with(views, LightTable::default);
+        self.view_times.reset(views.len());
+        self.visibility.set_views(views, |_| {});
+        self.culling.set_views(views);
+        self.lights.resize_with(views.len(), LightTable::default);
         self.sort_scratch.resize_with(workers, Mutex::default);
+        let key = |pass: &Pass| PassKey {
+            slot: views[pass.view_index].id.slot,
+            process: plan.processes()[pass.process_index].id,
+        };
+        if !self.pass_keys.iter().copied().eq(passes.iter().map(key)) {
+            let before: HashMap<_, _> = self.pass_keys.drain(..).zip(0..).collect();
+            self.pass_keys.extend(passes.iter().map(key));
+            let taken: Vec<_> = self.pass_keys.iter().map(|key| before.get(key).copied()).collect();
+            rearrange(&mut self.passes, &taken);
+        }
     }
 
     /// Begins a frame of a scene's static groups. The tables of these passes have begun it already.
@@ -90,7 +96,7 @@ impl FrameTables {
         conditions: ListConditions,
         passes: &[Pass],
     ) -> Result<(), SceneError> {
-        self.visibility.iter_mut().for_each(|view| view.may_execute_static_groups = true);
+        self.visibility.slots_mut().iter_mut().for_each(|view| view.may_execute_static_groups = true);
         for (pass, table) in passes.iter().zip(&self.passes) {
             let draws_in_order =
                 |selection: Selection| !table.mode.orders_by_bin && selection.blending != Blending::Blended;
@@ -122,7 +128,7 @@ impl FrameTables {
     pub(super) fn invalidate(&mut self) {
         self.objects.invalidate();
         self.static_groups.invalidate();
-        self.visibility.iter_mut().for_each(ViewVisibility::invalidate);
+        self.visibility.slots_mut().iter_mut().for_each(ViewVisibility::invalidate);
         self.passes.iter_mut().for_each(PassTable::invalidate);
     }
 
@@ -153,6 +159,15 @@ impl FrameTables {
         let left_out = left_out.into_iter().map(|light| scene_indices[light]);
         self.objects.scene_issues().count_all_once(IssueReason::LightLimit, left_out);
     }
+}
+
+/// Makes `tables` those at the indices in `taken`, each at most once. Where there is none, one that is left, or a new
+/// one.
+fn rearrange<T: Default>(tables: &mut Vec<T>, taken: &[Option<usize>]) {
+    let mut before: Vec<_> = tables.drain(..).map(Some).collect();
+    let taken: Vec<_> = taken.iter().map(|index| before.get_mut((*index)?)?.take()).collect();
+    let mut left = before.into_iter().flatten();
+    tables.extend(taken.into_iter().map(|table| table.or_else(|| left.next()).unwrap_or_default()));
 }
 
 /// The most segments in which a pass orders its objects by bin with adaptive granularity: one job joins them.
@@ -239,6 +254,17 @@ impl PassTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tables_go_where_they_are_wanted_and_others_are_used_again() {
+        let mut tables = vec![10, 11, 12, 13];
+        rearrange(&mut tables, &[Some(2), None, Some(0), None]);
+        assert_eq!(tables, [12, 11, 10, 13]);
+        rearrange(&mut tables, &[None, Some(0), None, None, None]);
+        assert_eq!(tables, [11, 12, 10, 13, 0]);
+        rearrange(&mut tables, &[Some(9)]);
+        assert_eq!(tables, [11]);
+    }
 
     #[test]
     fn a_list_counts_in_the_frame_after_it_was_made_and_not_while_it_is_kept() {

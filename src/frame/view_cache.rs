@@ -7,16 +7,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::frame_outcome::FrameOutcome;
 use super::light_maps::{covers, have_same_maps, with_brightness_of};
 use super::views::FrameViews;
-use crate::backend::{KeptView, kept_views};
 use crate::process::{FramePlan, ViewArray};
 use crate::scene::{Camera, Redraw, ViewKind};
-use crate::view::RenderView;
+use crate::view::{PerView, RenderView};
 
 /// The views of the latest frame, for the next one to read: see [`Redraw`].
 #[derive(Default)]
 pub(super) struct ViewCache {
     /// `None` where the next frame must draw all of its views.
     latest: Option<DrawnViews>,
+    /// The indices of these views.
+    indices: PerView<usize>,
     /// Whether a recorded frame was dropped before it was submitted, so that its views were never drawn.
     lost: Arc<AtomicBool>,
     /// By view of the frame that is being recorded: the earlier frame that draws it, if it is cached.
@@ -75,14 +76,12 @@ impl ViewCache {
         let Some(DrawnViews { views: drawn, drawn_by, .. }) = latest else { return Ok(requested) };
         let keeps_layers = kinds_with_same_layers(plan, &drawn.views, &requested.views);
         let keeps_light_maps = have_same_maps(&drawn, &requested);
-        let names = drawn.views.iter().map(|view| (view.kind(), view.name()));
-        let kept = kept_views(names, &requested.views);
         let loses_layer = views_without_their_layers(&drawn, &requested);
         let FrameViews { views, lights, scene_indices, .. } = &mut requested;
         let mut cached: Vec<Option<usize>> = Vec::with_capacity(views.len());
-        for ((index, view), kept) in views.iter().enumerate().zip(kept) {
+        for (index, view) in views.iter().enumerate() {
             let is_turn = turns.take(view, view.valid_light.map(|light| MapSet::of(light, scene_indices)));
-            let Some(KeptView { index: kept, is_same: true }) = kept else {
+            let Some((&kept, true)) = self.indices.kept(view) else {
                 cached.push(None);
                 continue;
             };
@@ -129,6 +128,8 @@ impl ViewCache {
         let outcome = Arc::new(FrameOutcome::in_flight(self.kept_from.iter().flatten()));
         let drawn_by = |kept: &Option<Arc<FrameOutcome>>| kept.clone().unwrap_or_else(|| Arc::clone(&outcome));
         let drawn_by = self.kept_from.iter().map(drawn_by).collect();
+        self.indices.set_views(&views.views, |_| {});
+        (0..views.views.len()).for_each(|index| self.indices[index] = index);
         self.latest = Some(DrawnViews { plan: plan.identity(), views: Arc::clone(views), drawn_by });
         let kept = self.kept_from.drain(..).enumerate();
         let kept = kept.filter_map(|(view, frame)| Some((view, frame.filter(|frame| !frame.is_submitted())?)));
@@ -232,7 +233,7 @@ fn kinds_with_same_layers(plan: &FramePlan, before: &[RenderView], views: &[Rend
     let mut are_same = [true; ViewKind::COUNT];
     for kind in plan.targets().iter().filter(|target| target.layered).map(|target| target.views) {
         let [before, after] =
-            [before, views].map(|views| views.iter().filter(move |view| view.kind() == kind).map(RenderView::name));
+            [before, views].map(|views| views.iter().filter(move |view| view.kind() == kind).map(|view| view.id));
         are_same[kind as usize] = before.eq(after);
     }
     are_same

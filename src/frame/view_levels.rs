@@ -3,16 +3,12 @@
 use std::ops::Range;
 
 use super::view_visibility::{Retest, ViewVisibility};
-use crate::backend::kept_views;
-use crate::scene::{SceneRef, ViewKind};
-use crate::view::{LevelSelector, MeshLevels, ObjectLevels, ObjectTable, RenderView};
+use crate::scene::SceneRef;
+use crate::view::{LevelSelector, MeshLevels, ObjectLevels, ObjectTable};
 
 /// The levels of detail in a view, and what they were chosen with.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct ViewLevels {
-    /// The view that they are of.
-    kind: ViewKind,
-    name: String,
     pub(super) levels: ObjectLevels,
     /// `None` before the first frame.
     selector: Option<LevelSelector>,
@@ -20,33 +16,6 @@ pub(super) struct ViewLevels {
 }
 
 impl ViewLevels {
-    fn new(view: &RenderView) -> Self {
-        Self {
-            kind: view.kind(),
-            name: view.name().to_owned(),
-            levels: ObjectLevels::default(),
-            selector: None,
-            scope: Retest::None,
-        }
-    }
-
-    fn is_of(&self, view: &RenderView) -> bool {
-        (self.kind, self.name.as_str()) == (view.kind(), view.name())
-    }
-
-    /// Makes `levels` one for each view. A view of the same kind and name as one of the frame before keeps its levels.
-    pub(super) fn keep(levels: &mut Vec<Self>, views: &[RenderView]) {
-        if levels.len() == views.len() && levels.iter().zip(views).all(|(levels, view)| levels.is_of(view)) {
-            return;
-        }
-        let kept = kept_views(levels.iter().map(|levels| (levels.kind, levels.name.as_str())), views);
-        let mut before: Vec<_> = levels.drain(..).map(Some).collect();
-        levels.extend(kept.iter().zip(views).map(|(kept, view)| {
-            let same = kept.filter(|kept| kept.is_same).and_then(|kept| before[kept.index].take());
-            same.unwrap_or_else(|| Self::new(view))
-        }));
-    }
-
     /// Begins a frame in which the view's visible set is tested already: decides for which objects levels are chosen.
     pub(super) fn begin_frame(&mut self, selector: LevelSelector, visibility: &ViewVisibility, objects: usize) {
         self.levels.resize(objects);

@@ -57,7 +57,7 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
-pub(crate) use plan::{FramePasses, ViewArray};
+pub(crate) use plan::{FramePasses, ProcessId, ViewArray};
 pub use plan::{FramePlan, Pass};
 pub use plan::{PlanError, ProcessError};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};

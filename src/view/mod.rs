@@ -31,6 +31,7 @@ mod object_table;
 #[cfg(feature = "occlusion")]
 mod occlusion;
 mod packet_columns;
+mod per_view;
 mod static_group_objects;
 mod scene_issue;
 mod render_view;
@@ -41,6 +42,7 @@ mod table_limits;
 #[cfg(feature = "occlusion")]
 mod triangle_culling;
 mod used_meshes;
+mod view_registry;
 mod visible_set;
 
 pub(crate) use bin::{VisibleRange, bin_visible, can_scan_bin_order};
@@ -56,11 +58,14 @@ pub(crate) use level_errors::MeshLevels;
 pub(crate) use level_selector::LevelSelector;
 pub(crate) use map_owners::MapOwners;
 pub(crate) use object_levels::ObjectLevels;
+pub(crate) use per_view::PerView;
 pub use render_view::RenderView;
+pub(crate) use render_view::ViewId;
 pub use scene_issue::{IssueReason, SceneIssue, SceneIssues};
 pub use shadow_maps::ShadowMaps;
 pub(crate) use static_group_objects::{ObjectWord, bin_objects, recordable_objects};
 pub(crate) use table_limits::TableLimits;
+pub(crate) use view_registry::ViewRegistry;
 pub(crate) use visible_set::set_bits;
 
 /// Tables and culling of a frame: for the tests and benchmarks of this repository. No part of the interface.

@@ -24,6 +24,18 @@ pub struct RenderView {
     /// How many frames before this one the view was drawn: 0 if this frame draws it. Camera, frustum and light are
     /// those that it was drawn with.
     pub age: u32,
+    /// Which view it is from frame to frame.
+    pub(crate) id: ViewId,
+}
+
+/// What a view is known by from frame to frame, whatever its index: the
+/// [`ViewRegistry`](super::view_registry::ViewRegistry) gives it to each view of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct ViewId {
+    /// Where tables keep what belongs to the view. When the view is gone, another one has its slot, and so its memory.
+    pub(crate) slot: u32,
+    /// A number that no other view has had. What was kept for another identity is not this view's.
+    pub(crate) identity: u64,
 }
 
 impl RenderView {
@@ -36,6 +48,7 @@ impl RenderView {
             main_view: None,
             layer: 0,
             age: 0,
+            id: ViewId::default(),
         }
     }
 

@@ -8,6 +8,7 @@
 
 mod absent_features;
 mod static_groups;
+mod view_names;
 
 use std::alloc::System;
 use std::hint::black_box;
@@ -262,5 +263,6 @@ fn a_steady_frame_allocates_nothing() {
 fn frames_allocate_no_more_than_they_need() {
     absent_features::what_a_scene_does_not_use_allocates_nothing();
     static_groups::frames_that_execute_static_groups_allocate_nothing_more();
+    view_names::views_of_ever_new_names_leave_no_memory_behind();
     a_steady_frame_allocates_nothing();
 }

@@ -11,12 +11,12 @@ use super::precision::Precision;
 use super::submission::ReadTargets;
 use super::target_mip_levels::{MipLevel, generate};
 use super::tiles::{Tile, Tiling};
-use crate::backend::{BackendError, KeptView, Picture, kept_views};
+use crate::backend::{BackendError, Picture};
 use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
 use crate::scene::ViewKind;
 use crate::task::JobPanic;
-use crate::view::RenderView;
+use crate::view::{PerView, RenderView};
 
 /// The greatest width and height of a picture, in pixels.
 pub(super) const MAX_PICTURE_SIZE: u32 = 16_384;
@@ -47,7 +47,7 @@ impl<R> Clone for SoftwareTarget<R> {
 /// The targets of one frame.
 pub(super) struct SoftwareTargets<R> {
     /// Of each view its own targets, and its layers of shared ones.
-    views: Vec<Vec<SoftwareTarget<R>>>,
+    views: PerView<Vec<SoftwareTarget<R>>>,
     /// The targets that all views of a kind share.
     layered: Vec<Arc<TiledTexture<R>>>,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format.
@@ -56,14 +56,14 @@ pub(super) struct SoftwareTargets<R> {
 
 impl<R> Default for SoftwareTargets<R> {
     fn default() -> Self {
-        Self { views: Vec::new(), layered: Vec::new(), placeholder: Vec::new() }
+        Self { views: PerView::default(), layered: Vec::new(), placeholder: Vec::new() }
     }
 }
 
 impl<R> SoftwareTargets<R> {
     /// A view's target by its name.
     pub(super) fn find(&self, view: usize, name: &str) -> Option<&SoftwareTarget<R>> {
-        self.views.get(view)?.iter().find(|target| target.texture.planned.name == name)
+        find(self.views.get(view)?, name)
     }
 
     /// Copies what processes of later frames read of the views that this one draws.
@@ -102,15 +102,13 @@ impl<R> SoftwareTargets<R> {
 /// dropped.
 pub(super) struct TargetCache<R> {
     current: Arc<SoftwareTargets<R>>,
-    /// The kind and name of each of its views.
-    views: Vec<(ViewKind, String)>,
     /// Whether the histories of the next frame are empty.
     forgets_histories: bool,
 }
 
 impl<R> Default for TargetCache<R> {
     fn default() -> Self {
-        Self { current: Arc::default(), views: Vec::new(), forgets_histories: false }
+        Self { current: Arc::default(), forgets_histories: false }
     }
 }
 
@@ -143,8 +141,9 @@ impl<R: Precision> TargetCache<R> {
             };
             next.layered.push(texture);
         }
-        let kept_views = kept_views(self.views.iter().map(|(kind, name)| (*kind, name.as_str())), views);
-        for (view, kept_view) in views.iter().zip(kept_views) {
+        let mut of_views = Vec::with_capacity(views.len());
+        for view in views {
+            let kept_targets = self.current.views.kept(view);
             let mut targets = Vec::new();
             for planned in plan.targets().iter().filter(|planned| planned.views == view.kind()) {
                 if planned.layered {
@@ -157,17 +156,18 @@ impl<R: Precision> TargetCache<R> {
                 }
                 let size = planned.size.in_view(view.camera.size);
                 // Another view has no part in this one's history.
-                let keeps_history = |kept: &KeptView| kept.is_same && !self.forgets_histories;
-                let kept = kept_view.filter(|kept| planned.copy_of.is_none() || keeps_history(kept));
-                let kept = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
+                let keeps_history = |is_same: bool| is_same && !self.forgets_histories;
+                let kept = kept_targets.filter(|(_, is_same)| planned.copy_of.is_none() || keeps_history(*is_same));
+                let kept = kept.and_then(|(targets, _)| find(targets, &planned.name));
                 let texture = match kept.filter(|kept| kept.texture.is_for(planned, size)) {
                     Some(kept) => Arc::clone(&kept.texture),
                     None => Arc::new(TiledTexture::new(planned, size, 1)?),
                 };
                 targets.push(SoftwareTarget { texture, layer: 0 });
             }
-            next.views.push(targets);
+            of_views.push(targets);
         }
+        next.views = PerView::new(views, of_views);
         for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
             let (Access::SampleView(views, _) | Access::SampleViewPrevious(views, _)) = *access else { continue };
             if let Some(planned) = plan.sampled_target(views, target)
@@ -182,9 +182,13 @@ impl<R: Precision> TargetCache<R> {
         }
         self.forgets_histories = false;
         self.current = Arc::new(next);
-        self.views = views.iter().map(|view| (view.kind(), view.name().to_owned())).collect();
         Ok(Arc::clone(&self.current))
     }
+}
+
+/// The one of a view's targets that has this name.
+fn find<'a, R>(targets: &'a [SoftwareTarget<R>], name: &str) -> Option<&'a SoftwareTarget<R>> {
+    targets.iter().find(|target| target.texture.planned.name == name)
 }
 
 impl<R: Precision> TiledTexture<R> {

@@ -2,17 +2,15 @@
 
 use std::time::Duration;
 
-use super::super::table_keys::rearrange;
 use super::cullable_meshes::CullableMeshes;
 use super::view_occlusion::ViewOcclusion;
 use crate::scene::Assets;
-use crate::view::{OccluderMeshes, UsedMeshes};
+use crate::view::{OccluderMeshes, PerView, RenderView, UsedMeshes};
 
 /// What culling keeps from frame to frame.
 #[derive(Default)]
 pub(in crate::frame) struct CullingTables {
-    /// One for each view.
-    pub(in crate::frame) occlusion: Vec<ViewOcclusion>,
+    pub(in crate::frame) occlusion: PerView<ViewOcclusion>,
     /// The convex parts of meshes, for views that test for occlusion.
     pub(in crate::frame) occluder_meshes: OccluderMeshes,
     /// The meshes whose triangles are culled.
@@ -30,14 +28,9 @@ impl CullingTables {
         self.occlusion[view].hidden()
     }
 
-    /// Gives the tables of views to others: see [`rearrange`].
-    pub(in crate::frame) fn rearrange(&mut self, of_views: &[Option<usize>]) {
-        rearrange(&mut self.occlusion, of_views);
-    }
-
-    /// Begins a frame with this number of views.
-    pub(in crate::frame) fn begin_frame(&mut self, views: usize) {
-        self.occlusion.resize_with(views, ViewOcclusion::default);
+    /// Begins a frame of these views.
+    pub(in crate::frame) fn set_views(&mut self, views: &[RenderView]) {
+        self.occlusion.set_views(views, |_| {});
     }
 
     /// Whether a view tests for occlusion in this frame.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::super::tables::FrameTables;
 use super::culling_options::CullingOptions;
 use super::occlusion_control::OcclusionControl;
-use crate::backend::KeptView;
 use crate::command::Selection;
 use crate::process::{Draws, FramePlan, Pass};
 use crate::scene::Assets;
@@ -46,11 +45,12 @@ impl OcclusionControls {
         self.of_views[view].occluders.as_deref().unwrap_or_default()
     }
 
-    /// Takes over what was measured in the frames of another graph, of the views that it has too.
-    pub(in crate::frame) fn inherit_measurements(&mut self, before: &Self, kept: &[Option<KeptView>]) {
+    /// Takes over what was measured in the frames of another graph. `kept` has the index of each view there; `None` for
+    /// a view that it does not have.
+    pub(in crate::frame) fn inherit_measurements(&mut self, before: &Self, kept: impl Iterator<Item = Option<usize>>) {
         for (control, kept) in self.of_views.iter_mut().zip(kept) {
-            if let Some(kept) = kept.as_ref().filter(|kept| kept.is_same) {
-                control.inherit_measurements(&before.of_views[kept.index]);
+            if let Some(index) = kept {
+                control.inherit_measurements(&before.of_views[index]);
             }
         }
     }
@@ -61,8 +61,8 @@ impl OcclusionControls {
             tables.culling.occluder_meshes.sync(assets, tables.objects.used_meshes());
         }
         let tile = self.options.occlusion_tile;
-        for ((occlusion, control), view) in tables.culling.occlusion.iter_mut().zip(&self.of_views).zip(views) {
-            occlusion.reset(view, tile.filter(|_| control.is_on()));
+        for (index, (control, view)) in self.of_views.iter().zip(views).enumerate() {
+            tables.culling.occlusion[index].reset(view, tile.filter(|_| control.is_on()));
         }
     }
 
@@ -72,7 +72,7 @@ impl OcclusionControls {
         tables: &'a FrameTables,
         labels: &'a [Arc<Labels>],
     ) -> impl Iterator<Item = TuningChoice> + 'a {
-        let views = self.of_views.iter().zip(labels).zip(&tables.culling.occlusion);
+        let views = self.of_views.iter().zip(labels).zip(tables.culling.occlusion.iter());
         views.filter_map(|((control, labels), occlusion)| control.choice(occlusion.is_on(), labels))
     }
 

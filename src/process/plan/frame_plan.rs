@@ -9,6 +9,7 @@ use super::attributes::attributes_of;
 use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::material_types::{check_material_types, material_types_of};
+use super::planned_process::ProcessId;
 use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
 use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
@@ -100,7 +101,7 @@ impl FramePlan {
         }
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
-        let processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
+        let mut processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
         if processes.is_empty() {
             return Err(PlanError::Empty);
         }
@@ -113,6 +114,9 @@ impl FramePlan {
         let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
+        for (index, planned) in processes.iter_mut().enumerate() {
+            planned.id = ProcessId { plan: identity, index };
+        }
         Ok(Self {
             identity,
             alive: Arc::default(),
@@ -133,6 +137,18 @@ impl FramePlan {
     /// A number that no other plan of this program has.
     pub fn identity(&self) -> u64 {
         self.identity
+    }
+
+    /// Gives the processes the ids that those of the same name and kind of views have in another plan.
+    pub(crate) fn inherit_process_ids(&mut self, other: &Self) {
+        for planned in &mut self.processes {
+            let is_same = |known: &&PlannedProcess| {
+                known.name == planned.name && known.declaration.views == planned.declaration.views
+            };
+            if let Some(known) = other.processes.iter().find(is_same) {
+                planned.id = known.id;
+            }
+        }
     }
 
     /// A token that expires with the plan: a cache that holds it can drop what it made for the plan.

@@ -25,6 +25,7 @@ pub(crate) use frame_passes::FramePasses;
 pub use frame_plan::FramePlan;
 pub use pass::Pass;
 pub use planned_process::PlannedProcess;
+pub(crate) use planned_process::ProcessId;
 pub use planned_target::{AttachmentExtent, PlannedTarget};
 pub use sampled_views::SampledViews;
 pub(crate) use view_arrays::ViewArray;

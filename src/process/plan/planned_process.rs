@@ -19,11 +19,21 @@ pub struct PlannedProcess {
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,
+    /// What it is known by in all plans of a renderer.
+    pub(crate) id: ProcessId,
     /// Whether it draws in the kind of views that it declares, and not in a further one.
     pub(super) is_of_own_kind: bool,
     /// What its raw pass asks for.
     #[cfg(feature = "wgpu")]
     pub(crate) requests: Arc<RequestLog>,
+}
+
+/// What a process of a name, for one kind of view, is known by in all plans of a renderer: the first of these plans that
+/// has it, by its identity, and the index of the process there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct ProcessId {
+    pub(super) plan: u64,
+    pub(super) index: usize,
 }
 
 impl PlannedProcess {
@@ -61,6 +71,7 @@ impl PlannedProcess {
             Self {
                 process: Arc::clone(process),
                 name: name.clone(),
+                id: ProcessId::default(),
                 is_of_own_kind: views == own_kind,
                 #[cfg(feature = "wgpu")]
                 requests: Arc::new(RequestLog::new(&declaration)),

@@ -1,6 +1,6 @@
 //! The buffers of one frame in flight, pooled for later frames.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,9 +11,8 @@ use super::allotment::allot;
 use super::material_buffer::MaterialBuffer;
 use super::object_buffers::ObjectBuffers;
 use super::object_lists::ObjectLists;
-use super::pass_state::{FrameRanges, PassName, WgpuPassState};
+use super::pass_state::{FrameRanges, PassId, WgpuPassState};
 use super::resource_bytes::ResourceBytes;
-use super::view_ranges::ViewRanges;
 use crate::backend::subdivision_cache::SubdividedMeshes;
 use crate::backend::wgpu::error_scope::poll;
 use crate::backend::wgpu::resources::{
@@ -24,7 +23,7 @@ use crate::backend::wgpu::timing::Timestamps;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::{DrawList, Version};
 use crate::process::{Draws, Pass, PlannedProcess, ShaderResource};
-use crate::view::GpuView;
+use crate::view::{GpuView, PerView};
 
 /// A pool of frame buffers.
 ///
@@ -326,8 +325,7 @@ struct Buffers {
     /// What processes read of the engine's own.
     bytes: ResourceBytes,
     passes: Vec<WgpuPassState>,
-    /// By view index.
-    view_ranges: Vec<ViewRanges>,
+    view_ranges: PerView<ViewRanges>,
     subdivided: RwLock<SubdividedMeshes<SubdividedMesh>>,
     timestamps: Option<Timestamps>,
     /// For how many frames no frame has taken them.
@@ -348,7 +346,7 @@ impl Buffers {
             parameters: MirroredBuffer::new("parameters", BufferUsages::UNIFORM),
             bytes: ResourceBytes::default(),
             passes: Vec::new(),
-            view_ranges: Vec::new(),
+            view_ranges: PerView::default(),
             subdivided: RwLock::default(),
             timestamps: None,
             unused: 0,
@@ -366,19 +364,11 @@ impl Buffers {
     /// had keeps what it has cached, whatever its index.
     fn set_passes(&mut self, request: &FrameRequest<'_>) {
         let FrameRequest { plan, draws, views, passes, .. } = *request;
-        let are_same = self.passes.len() == passes.len()
-            && self.passes.iter().zip(passes).all(|(state, pass)| state.name().is_of(plan, views, *pass));
-        if !are_same {
-            let mut before: HashMap<_, VecDeque<_>> = HashMap::new();
-            for state in self.passes.drain(..) {
-                before.entry(state.name().clone()).or_default().push_back(state);
-            }
-            let state_of = |pass: &Pass| {
-                let name = PassName::new(plan, views, *pass);
-                let kept = before.get_mut(&name).and_then(VecDeque::pop_front);
-                kept.unwrap_or_else(|| WgpuPassState::new(name))
-            };
-            self.passes.extend(passes.iter().map(state_of));
+        let id = |pass: &Pass| PassId::new(plan, views, pass);
+        if !self.passes.iter().map(|state| state.id).eq(passes.iter().map(id)) {
+            let mut before: HashMap<_, _> = self.passes.drain(..).map(|state| (state.id, state)).collect();
+            let new = |pass: &Pass| WgpuPassState::new(plan, views, pass);
+            self.passes.extend(passes.iter().map(|pass| before.remove(&id(pass)).unwrap_or_else(|| new(pass))));
         }
         for (state, &pass) in self.passes.iter_mut().zip(passes) {
             state.begin_frame(pass, &draws[pass.process_index]);
@@ -395,35 +385,39 @@ impl Buffers {
     }
 
     /// Allots each view its ranges, and collects the views and their lights. A view that the latest frame with these
-    /// buffers had keeps its ranges, whatever its index; a new view takes those of one of its kind that is gone.
+    /// buffers had keeps its ranges, whatever its index; another one takes those that are left in its slot.
     ///
     /// # Errors
     /// If a camera is out of reach.
     fn set_views(&mut self, request: &FrameRequest<'_>) -> Result<(), BackendError> {
         let FrameRequest { views, light_tables, limits, .. } = *request;
-        let ranges = &mut self.view_ranges;
-        ViewRanges::keep(ranges, views);
-        for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
+        let all = &mut self.view_ranges;
+        all.set_views(views, |_| {});
+        for (view, lights) in light_tables.iter().enumerate() {
+            let ranges = &mut all[view];
             // The layout requires a binding even if no light reaches the view.
             let needed = size_of_val(lights.gpu_lights());
             ranges.lights_length = size_with_headroom(ranges.lights.len(), needed, limits.binding_bytes);
+            ranges.view_length = GPU_VIEW_BYTES;
         }
-        let end_of_views = allot(ranges, |ranges| &mut ranges.view, |_| GPU_VIEW_BYTES);
-        let allot_lights =
-            |ranges: &mut [ViewRanges]| allot(ranges, |ranges| &mut ranges.lights, |ranges| ranges.lights_length);
-        let mut end_of_lights = allot_lights(ranges);
+        let end_of_views = allot(all.slots_mut(), |ranges| &mut ranges.view, |ranges| ranges.view_length);
+        let allot_lights = |all: &mut PerView<ViewRanges>| {
+            allot(all.slots_mut(), |ranges| &mut ranges.lights, |ranges| ranges.lights_length)
+        };
+        let mut end_of_lights = allot_lights(all);
         if end_of_lights as u64 > limits.buffer_bytes {
             // Without headroom, and without what belongs to nobody.
-            for (ranges, lights) in ranges.iter_mut().zip(light_tables) {
+            for (view, lights) in light_tables.iter().enumerate() {
+                let ranges = &mut all[view];
                 ranges.lights = 0..0;
                 ranges.lights_length = size_of_val(lights.gpu_lights()).max(1).next_multiple_of(ALIGNMENT);
             }
-            end_of_lights = allot_lights(ranges);
+            end_of_lights = allot_lights(all);
         }
         let (view_bytes, light_bytes) = (self.views.rewrite(), self.lights.rewrite());
         view_bytes.resize(end_of_views, 0);
         light_bytes.resize(end_of_lights, 0);
-        for (index, (ranges, lights)) in ranges.iter().zip(light_tables).enumerate() {
+        for (index, (ranges, lights)) in all.iter().zip(light_tables).enumerate() {
             let gpu_view = request.view(index).gpu_view()?;
             view_bytes[ranges.view.start..][..size_of::<GpuView>()].copy_from_slice(bytemuck::bytes_of(&gpu_view));
             let lights: &[u8] = bytemuck::cast_slice(lights.gpu_lights());
@@ -477,6 +471,17 @@ impl Buffers {
             entries: &entries,
         })
     }
+}
+
+/// The bytes of a view in the frame's buffers.
+#[derive(Default)]
+struct ViewRanges {
+    /// Those of its [`GpuView`], and the length that these need: 0 where no view is.
+    view: Range<usize>,
+    view_length: usize,
+    /// Those of the lights that reach it.
+    lights: Range<usize>,
+    lights_length: usize,
 }
 
 /// The bytes that a process's shader reads: the values of materials, then resources.

@@ -12,7 +12,6 @@ mod pass_state;
 mod pass_statistics;
 mod pending_uploads;
 mod resource_bytes;
-mod view_ranges;
 mod wgpu_frame;
 
 pub(crate) use bundle_cache::BundleKey;

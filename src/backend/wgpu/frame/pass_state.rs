@@ -13,30 +13,19 @@ use crate::backend::wgpu::resources::{CachedBindGroup, CountedQueue, GrowingBuff
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use crate::backend::wgpu::timing::PassTiming;
 use crate::command::Version;
-use crate::process::{Draws, FramePlan, Pass};
-use crate::scene::ViewKind;
-use crate::view::RenderView;
+use crate::process::{Draws, FramePlan, Pass, ProcessId};
+use crate::view::{RenderView, ViewId};
 
 /// What a pass is known by from frame to frame, whatever its index.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub(super) struct PassName {
-    kind: ViewKind,
-    view: String,
-    process: String,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct PassId {
+    view: ViewId,
+    process: ProcessId,
 }
 
-impl PassName {
-    pub(super) fn new(plan: &FramePlan, views: &[RenderView], pass: Pass) -> Self {
-        let view = &views[pass.view_index];
-        let process = plan.processes()[pass.process_index].name.clone();
-        Self { kind: view.kind(), view: view.name().to_owned(), process }
-    }
-
-    /// Whether it is the name of a pass. Allocates nothing.
-    pub(super) fn is_of(&self, plan: &FramePlan, views: &[RenderView], pass: Pass) -> bool {
-        let view = &views[pass.view_index];
-        (self.kind, self.view.as_str()) == (view.kind(), view.name())
-            && self.process == plan.processes()[pass.process_index].name
+impl PassId {
+    pub(super) fn new(plan: &FramePlan, views: &[RenderView], pass: &Pass) -> Self {
+        Self { view: views[pass.view_index].id, process: plan.processes()[pass.process_index].id }
     }
 }
 
@@ -51,7 +40,7 @@ pub(super) struct FrameRanges {
 /// One pass of a frame, and what it caches for the next frame that uses the same buffers.
 pub(crate) struct WgpuPassState {
     pub(crate) pass: Pass,
-    name: PassName,
+    pub(super) id: PassId,
     /// Process and view, for error messages.
     pub(crate) label: String,
     /// Whether it draws commands.
@@ -99,7 +88,7 @@ impl Default for WgpuPassState {
     fn default() -> Self {
         Self {
             pass: Pass { process_index: 0, view_index: 0 },
-            name: PassName::default(),
+            id: PassId::default(),
             label: String::new(),
             draws_commands: false,
             clamps_depth: false,
@@ -132,13 +121,10 @@ impl WgpuPassState {
     const MAX_BATCHES_OF_SMALL_PASS: usize = 64;
 
     /// The state of a new pass.
-    pub(super) fn new(name: PassName) -> Self {
-        let label = format!("{:?} in view {:?}", name.process, name.view);
-        Self { name, label, ..Self::default() }
-    }
-
-    pub(super) fn name(&self) -> &PassName {
-        &self.name
+    pub(super) fn new(plan: &FramePlan, views: &[RenderView], pass: &Pass) -> Self {
+        let (process, view) = (&plan.processes()[pass.process_index].name, views[pass.view_index].name());
+        let label = format!("{process:?} in view {view:?}");
+        Self { id: PassId::new(plan, views, pass), label, ..Self::default() }
     }
 
     /// The bytes of its parameters in their buffer; `None` for a pass without.

@@ -10,16 +10,16 @@ use super::target_mip_levels::{MipGenerator, MipPipelines};
 use super::target_texture::{TextureKind, new_texture, new_views, texture_bytes};
 use super::transient_targets::{TransientTargets, uses_transient};
 use super::view_array::{ViewArrayTexture, layer_descriptor};
-use crate::backend::{BackendError, FrameRequest, KeptView, TargetMemory, kept_views};
+use crate::backend::{BackendError, FrameRequest, TargetMemory};
 use crate::process::{Format, Pass, PlannedTarget, SampledShape, SampledViews};
 use crate::scene::ViewKind;
-use crate::view::RenderView;
+use crate::view::{PerView, RenderView, ViewId};
 
 /// The targets of one frame.
 #[derive(Clone, Default)]
 pub(crate) struct WgpuTargets {
-    /// For each view its name, its own targets, and its layers of the shared ones.
-    views: Vec<(String, Vec<ViewTarget>)>,
+    /// For each view its own targets, and its layers of the shared ones.
+    views: PerView<Vec<ViewTarget>>,
     /// The targets that all views of a kind share.
     layered: Vec<LayeredTarget>,
     /// Those that transient targets share.
@@ -95,7 +95,7 @@ impl ViewTarget {
 impl WgpuTargets {
     /// The target of one view by its name.
     pub(crate) fn find(&self, view: usize, name: &str) -> Option<&ViewTarget> {
-        self.views.get(view)?.1.iter().find(|target| target.planned.name == name)
+        find(self.views.get(view)?, name)
     }
 
     /// The array that all views of a kind share.
@@ -121,7 +121,7 @@ impl WgpuTargets {
 
     /// Copies what processes of later frames read of the views that this one draws.
     pub(crate) fn copy_histories(&self, encoder: &mut wgpu::CommandEncoder, is_drawn: impl Fn(usize) -> bool) {
-        for (view, (_, targets)) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
+        for (view, targets) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
             for copy in targets {
                 let source = copy.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
                 let Some(source) = source else { continue };
@@ -138,7 +138,7 @@ impl WgpuTargets {
 
     /// Whether processes of later frames read something of this one.
     pub(crate) fn have_histories(&self) -> bool {
-        self.views.iter().any(|(_, targets)| targets.iter().any(|target| target.planned.copy_of.is_some()))
+        self.views.iter().flatten().any(|target| target.planned.copy_of.is_some())
     }
 
     /// The memory of those that are not imported.
@@ -149,8 +149,7 @@ impl WgpuTargets {
     /// Computes the memory of these targets, none of which is imported.
     fn computed_memory(&self) -> TargetMemory {
         let mut memory = TargetMemory::default();
-        let of_views = self.views.iter().flat_map(|(_, targets)| targets);
-        for target in of_views.filter(|target| target.storage != TargetStorage::Layer) {
+        for target in self.views.iter().flatten().filter(|target| target.storage != TargetStorage::Layer) {
             let bytes = texture_bytes(target.planned.format, &target.texture);
             memory.dedicated_bytes += bytes;
             if !target.is_transient() {
@@ -175,10 +174,10 @@ impl WgpuTargets {
 #[derive(Default)]
 pub(crate) struct TargetCache {
     current: Arc<WgpuTargets>,
-    /// The key of the current targets, beside the views' names: the plan's identity, and of each view its kind, its
-    /// size, its layer, and whether it may be cached.
+    /// The key of the current targets: the plan's identity, and of each view its id, its size, its layer, and whether
+    /// it may be cached.
     plan: Option<u64>,
-    views: Vec<(ViewKind, [u32; 2], u32, bool)>,
+    views: Vec<(ViewId, [u32; 2], u32, bool)>,
     /// The targets that are not among the current ones because they were imported: the view's index, and the name.
     imported: Vec<(usize, String)>,
     /// What decides which targets share textures, beside the above: see [`uses_transient`]. `None` if none may.
@@ -209,8 +208,7 @@ impl TargetCache {
             let ResolvedImport { view_index, planned, texture } = import;
             let (planned, texture) = (Arc::new(PlannedTarget::clone(planned)), texture.clone());
             let (view, sampled) = new_views(&texture, planned.format, &import.view_descriptor());
-            let (_, targets) = &mut with_imports.views[*view_index];
-            targets.push(ViewTarget {
+            with_imports.views[*view_index].push(ViewTarget {
                 planned,
                 texture,
                 view,
@@ -235,10 +233,9 @@ impl TargetCache {
         imports: &[ResolvedImport<'_>],
         transient: bool,
     ) -> Result<(), BackendError> {
-        let key = |view: &RenderView| (view.kind(), view.camera.size, view.layer, !view.camera.redraw.is_every_frame());
+        let key = |view: &RenderView| (view.id, view.camera.size, view.layer, !view.camera.redraw.is_every_frame());
         let requested = || views.iter().map(key);
-        let names = self.current.views.iter().map(|(name, _)| name.as_str());
-        let are_same_views = self.views.iter().copied().eq(requested()) && names.eq(views.iter().map(RenderView::name));
+        let are_same_views = self.views.iter().copied().eq(requested());
         let imported = || imports.iter().map(|import| (import.view_index, import.planned.name.as_str()));
         let known = self.imported.iter().map(|(view, target)| (*view, target.as_str()));
         let is_same_order = match &self.order {
@@ -284,9 +281,6 @@ impl TargetCache {
             slot.mip_levels =
                 Some(Arc::new(MipGenerator::new(device, pipelines, (&slot.texture, 0), slot.kind.format)));
         }
-        let kinds_and_names =
-            self.views.iter().zip(&self.current.views).map(|((kind, ..), (name, _))| (*kind, name.as_str()));
-        let kept = kept_views(kinds_and_names, views);
         if transient {
             let (mut wanted, mut positions) = (Vec::new(), Vec::new());
             for (index, view) in views.iter().enumerate() {
@@ -296,7 +290,7 @@ impl TargetCache {
                     let has_storage =
                         layers.contains_key(&position) || shared.texture_of(index, target_index).is_some();
                     if !has_storage && SmallTargets::accepts(plan, planned, kind) {
-                        let kept = kept[index].and_then(|kept| self.current.find(kept.index, &planned.name));
+                        let kept = self.kept_target(view, &planned.name).map(|(target, _)| target);
                         wanted.push(SmallTarget { kind, kept: kept.map(|kept| (kept.texture.clone(), kept.layer)) });
                         positions.push(position);
                     }
@@ -306,6 +300,7 @@ impl TargetCache {
             next.small = small;
             layers.extend(positions.into_iter().zip(assigned));
         }
+        let mut of_views = Vec::with_capacity(views.len());
         for (index, view) in views.iter().enumerate() {
             let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
             let own = of_kind.filter(|(_, planned)| !is_imported(index, &planned.name));
@@ -324,26 +319,26 @@ impl TargetCache {
                     });
                 }
                 if let Some((texture, layer)) = layers.get(&(index, target_index)) {
-                    return Ok(self.layer_target((planned, texture), kept[index], *layer));
+                    return Ok(self.layer_target((planned, texture), view, *layer));
                 }
                 if !planned.layered {
-                    return self.own_target(device, planned, kept[index], view);
+                    return self.own_target(device, planned, view);
                 }
                 let layered = next.layered.iter().find(|layered| *layered.planned == **planned);
                 let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
                 let layered = layered.ok_or_else(missing)?;
-                Ok(self.layer_target((&layered.planned, &layered.texture), kept[index], view.layer))
+                Ok(self.layer_target((&layered.planned, &layered.texture), view, view.layer))
             });
-            let targets = targets.collect::<Result<_, _>>()?;
-            next.views.push((view.name().to_owned(), targets));
+            of_views.push(targets.collect::<Result<Vec<_>, _>>()?);
         }
-        let written = next.views.iter_mut().flat_map(|(_, targets)| targets);
+        let written = of_views.iter_mut().flatten();
         let mipmapped = written.filter(|target| target.planned.mipmapped && target.planned.copy_of.is_none());
         for target in mipmapped.filter(|target| target.mip_levels.is_none()) {
             let pipelines = self.mip_pipelines.get_or_insert_with(|| MipPipelines::new(device));
             let texture = (&target.texture, target.layer);
             target.mip_levels = Some(Arc::new(MipGenerator::new(device, pipelines, texture, target.planned.format)));
         }
+        next.views = PerView::new(views, of_views);
         next.placeholders = self.current.placeholders.updated(device, plan)?;
         next.memory = next.computed_memory();
         self.current = Arc::new(next);
@@ -380,8 +375,8 @@ impl TargetCache {
     /// Makes the histories of the next frame empty.
     pub(crate) fn forget_histories(&mut self) {
         if self.current.have_histories() {
-            let targets = Arc::make_mut(&mut self.current).views.iter_mut().map(|(_, targets)| targets);
-            targets.for_each(|targets| targets.retain(|target| target.planned.copy_of.is_none()));
+            let all = Arc::make_mut(&mut self.current).views.slots_mut();
+            all.iter_mut().for_each(|targets| targets.retain(|target| target.planned.copy_of.is_none()));
             // The next frame has other targets than these.
             self.plan = None;
         }
@@ -392,21 +387,31 @@ impl TargetCache {
         &self.current
     }
 
+    /// The current target of this name in the slot of a view, and whether it is the same view's.
+    fn kept_target(&self, view: &RenderView, name: &str) -> Option<(&ViewTarget, bool)> {
+        let (targets, is_same) = self.current.views.kept(view)?;
+        Some((find(targets, name)?, is_same))
+    }
+
     fn own_target(
         &self,
         device: &wgpu::Device,
         planned: &Arc<PlannedTarget>,
-        kept: Option<KeptView>,
         view: &RenderView,
     ) -> Result<ViewTarget, BackendError> {
         let kind = TextureKind::of(planned, view.camera.size);
         let [width, height] = kind.size;
         let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         // Another view has no part in this one's history.
-        let kept = kept.filter(|kept| kept.is_same || planned.copy_of.is_none());
-        let cached = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
-        let mut cached = cached.filter(|cached| cached.planned == *planned && cached.texture.size() == extent);
-        if let Some(cached) = cached.take_if(|cached| cached.storage == TargetStorage::Own) {
+        let is_usable = |cached: &ViewTarget, is_same: bool| {
+            (is_same || planned.copy_of.is_none())
+                && cached.planned == *planned
+                && cached.texture.size() == extent
+                && cached.storage == TargetStorage::Own
+        };
+        if let Some((cached, is_same)) = self.kept_target(view, &planned.name)
+            && is_usable(cached, is_same)
+        {
             return Ok(cached.clone());
         }
         let texture = new_texture(device, &planned.name, kind, 1)?;
@@ -418,11 +423,12 @@ impl TargetCache {
     fn layer_target(
         &self,
         (planned, texture): (&Arc<PlannedTarget>, &wgpu::Texture),
-        kept: Option<KeptView>,
+        view: &RenderView,
         layer: u32,
     ) -> ViewTarget {
-        let cached = kept.and_then(|kept| self.current.find(kept.index, &planned.name));
-        if let Some(cached) = cached.filter(|cached| cached.texture == *texture && cached.layer == layer) {
+        if let Some((cached, _)) = self.kept_target(view, &planned.name)
+            && (&cached.texture, cached.layer) == (texture, layer)
+        {
             return cached.clone();
         }
         let (view, sampled) = new_views(texture, planned.format, &layer_descriptor(layer));
@@ -466,4 +472,9 @@ impl TargetCache {
         let (_, array) = new_views(&texture, planned.format, &descriptor);
         Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
     }
+}
+
+/// The one of a view's targets that has this name.
+fn find<'a>(targets: &'a [ViewTarget], name: &str) -> Option<&'a ViewTarget> {
+    targets.iter().find(|target| target.planned.name == name)
 }
