@@ -102,6 +102,7 @@
 // Each module uses only modules above it; `tests/architecture` fails otherwise.
 mod unwind;
 mod leaked_guards;
+mod bit_set;
 pub mod quality;
 pub mod handle;
 pub mod scene;

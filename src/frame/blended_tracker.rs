@@ -1,9 +1,10 @@
 //! Whether an object of the scene needs transparency, known by one object that does.
 
+use crate::bit_set::BitWord;
 use crate::handle::Handle;
 use crate::process::{Deferred, Requirements};
 use crate::scene::{Assets, Material, SceneRef};
-use crate::view::{IssueReason, ObjectTable, set_bits};
+use crate::view::{IssueReason, ObjectTable};
 
 /// One object whose material needs transparency: the witness that the scene has such objects. Which of them it is makes
 /// no difference.
@@ -55,8 +56,7 @@ impl BlendedTracker {
             None if has_started => (0..count).find_map(witness_of),
             None => {
                 let words = (0..objects.changed_word_count()).map(|index| objects.changed_word(index));
-                let changed = words.flat_map(|word| set_bits(word.mask).map(move |bit| word.word * 64 + bit));
-                changed.chain(objects.len()..count).find_map(witness_of)
+                words.flat_map(BitWord::indices).chain(objects.len()..count).find_map(witness_of)
             }
         };
         self.witness.is_some()

@@ -10,9 +10,10 @@ use super::node_accesses::NodeAccess;
 use super::tables::FrameTables;
 use super::{FrameData, NodeResource};
 use crate::backend::FrameRequest;
+use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::command::DrawList;
 use crate::scene::{ChunkError, GeneratedBuffer, GeneratedContents};
-use crate::view::{RenderView, VisibleSet, set_bits};
+use crate::view::RenderView;
 
 /// What a [`CpuNode`](super::CpuNode) sees of the frame while it runs: what it declares to read of it.
 #[derive(Clone, Copy)]
@@ -36,17 +37,18 @@ impl<'a> NodeContext<'a> {
     /// If the node does not declare that it reads [`FrameData::VisibleObjects`].
     pub fn visible_objects(&self, view: usize) -> Result<impl Iterator<Item = usize> + use<'a>, NodeAccessError> {
         self.check(FrameData::VisibleObjects)?;
-        const WORD: usize = VisibleSet::OBJECTS_PER_WORD;
         let static_groups = &self.tables.static_groups;
         let seen = self.tables.visibility.get(view).map(|visibility| {
             (0..visibility.set.word_count()).flat_map(move |word| {
-                let is_executed = |bit: &usize| {
-                    static_groups.owner(word * WORD + bit).is_some_and(|owner| visibility.static_groups.executes(owner))
+                let is_executed = |object: &usize| {
+                    static_groups.owner(*object).is_some_and(|owner| visibility.static_groups.executes(owner))
                 };
                 // What is excluded from the view's tests lies outside, or is executed.
-                let executed = set_bits(visibility.static_groups.excluded(word)).filter(is_executed);
-                let mask = executed.fold(visibility.set.word(word), |mask, bit| mask | 1 << bit);
-                set_bits(mask).map(move |bit| word * WORD + bit)
+                let excluded = BitWord::new(word, visibility.static_groups.excluded(word));
+                let executed = excluded.indices().filter(is_executed);
+                let mask =
+                    executed.fold(visibility.set.word(word), |mask, object| mask | 1 << (object % BITS_PER_WORD));
+                BitWord::new(word, mask).indices()
             })
         });
         Ok(seen.into_iter().flatten())

@@ -183,8 +183,8 @@ fn compile(
         let own = deferred.map(|deferred| deferred.output().to_owned());
         let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
         // Without a pipeline there is one plan for all scenes.
-        let is_present = |kind| kind != ViewKind::Reflection || deferred.is_none() || requirements.reflections();
-        FramePlan::for_views(chain, processes.to_vec(), &outputs, (&[ViewKind::Reflection], &is_present))
+        let is_present = |kind| deferred.is_none() || requirements.has_views(kind);
+        FramePlan::for_views(chain, processes.to_vec(), &outputs, is_present)
     })
 }
 

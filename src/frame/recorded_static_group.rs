@@ -1,14 +1,15 @@
 //! What is recorded of one static group.
 
+use crate::bit_set::{BitSet, BitWord};
 use crate::command::{BinnedSegment, DrawList, Selection};
 use crate::scene::{Assets, SceneRef, StaticGroup};
-use crate::view::{Bounds4, DrawFilter, ObjectTable, ObjectWord, bin_objects, recordable_objects, set_bits};
+use crate::view::{Bounds4, DrawFilter, ObjectTable, bin_objects, recordable_objects};
 
 /// What is recorded of a static group.
 #[derive(Debug, Default)]
 pub(super) struct RecordedStaticGroup {
     /// The objects that are recorded; others are drawn as if they were in no static group.
-    pub(super) words: Vec<ObjectWord>,
+    pub(super) words: Vec<BitWord>,
     /// Their number.
     pub(super) count: usize,
     pub(super) bounds: Bounds4,
@@ -36,7 +37,7 @@ impl RecordedStaticGroup {
     ) {
         let Self { words, count, bounds, lists, meshes, materials, scratch } = self;
         *bounds = recordable_objects(table, &static_group.objects, is_recordable, words);
-        *count = words.iter().map(|(_, mask)| mask.count_ones() as usize).sum();
+        *count = words.iter().map(|word| word.mask.count_ones() as usize).sum();
         lists.resize_with(selections.len(), DrawList::default);
         for (&selection, list) in selections.iter().zip(lists) {
             bin_objects(table, words, selection, DrawFilter::new(table, scene, selection), scratch);
@@ -69,17 +70,12 @@ fn collect_slots(
     revision_of: impl Fn(u32) -> Option<u64>,
 ) {
     slots.clear();
-    let mut seen: Vec<u64> = Vec::new();
+    let mut seen = BitSet::default();
     for slot in all {
-        let (word, bit) = (slot as usize / WORD, 1 << (slot as usize % WORD));
-        if word >= seen.len() {
-            seen.resize(word + 1, 0);
+        if slot as usize >= seen.room() {
+            seen.resize(slot as usize + 1);
         }
-        seen[word] |= bit;
+        seen.insert(slot as usize);
     }
-    for (word, &mask) in seen.iter().enumerate() {
-        slots.extend(set_bits(mask).map(|bit| (word * WORD + bit) as u32).map(|slot| (slot, revision_of(slot))));
-    }
+    slots.extend(seen.iter().map(|slot| (slot as u32, revision_of(slot as u32))));
 }
-
-const WORD: usize = u64::BITS as usize;

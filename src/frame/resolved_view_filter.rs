@@ -1,8 +1,9 @@
 //! The filter of a view within a frame.
 
+use crate::bit_set::{BITS_PER_WORD, BitSet, set_bits};
 use crate::scene::{Assets, FilteredObjects, Material, MaterialPredicate, SceneRef, ViewFilter};
 use crate::task::{JobPanic, catch};
-use crate::view::{Frustum, IssueReason, ObjectBlock, SceneIssues, set_bits};
+use crate::view::{IssueReason, ObjectBlock, SceneIssues};
 
 /// The filter of a view, with what its predicate said of the scene's materials.
 #[derive(Debug, Default)]
@@ -19,8 +20,8 @@ struct PassingMaterials {
     predicate: MaterialPredicate,
     /// The materials of which it was asked: the identity of their collection, and its revision.
     version: (u64, u64),
-    /// A bit for each slot.
-    slots: Vec<u64>,
+    /// Their slots.
+    slots: BitSet,
 }
 
 impl ResolvedViewFilter {
@@ -76,22 +77,18 @@ impl ResolvedViewFilter {
     /// Those that pass by their materials.
     fn pass_by_material(&self, objects: u64, word: usize, block: &ObjectBlock) -> u64 {
         let Some(PassingMaterials { slots, .. }) = &self.materials else { return objects };
-        let first = word * Frustum::WORD % ObjectBlock::SIZE;
-        let passes = |bit: &usize| {
-            let slot = block.draws[first + bit].material as usize;
-            slots[slot / SLOTS_PER_WORD] >> (slot % SLOTS_PER_WORD) & 1 == 1
-        };
+        let first = word * BITS_PER_WORD % ObjectBlock::SIZE;
+        let passes = |bit: &usize| slots.contains(block.draws[first + bit].material as usize);
         set_bits(objects).filter(passes).fold(0, |passing, bit| passing | 1 << bit)
     }
 }
 
-/// A bit for each slot whose material the predicate contains.
-fn passing_slots(predicate: &MaterialPredicate, assets: &Assets) -> Vec<u64> {
-    let mut slots = vec![0; assets.materials.slot_count().div_ceil(SLOTS_PER_WORD)];
-    for (handle, material) in assets.iter::<Material>() {
-        let slot = handle.index() as usize;
-        slots[slot / SLOTS_PER_WORD] |= u64::from(predicate.contains(material)) << (slot % SLOTS_PER_WORD);
-    }
+/// The slots whose material the predicate contains.
+fn passing_slots(predicate: &MaterialPredicate, assets: &Assets) -> BitSet {
+    let mut slots = BitSet::default();
+    slots.resize(assets.materials.slot_count());
+    let passing = assets.iter::<Material>().filter(|(_, material)| predicate.contains(material));
+    passing.for_each(|(handle, _)| slots.insert(handle.index() as usize));
     slots
 }
 
@@ -103,5 +100,3 @@ pub(super) fn count_unknown_objects(scene: &SceneRef<'_>, scene_issues: &SceneIs
         }
     }
 }
-
-const SLOTS_PER_WORD: usize = u64::BITS as usize;

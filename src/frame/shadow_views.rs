@@ -3,7 +3,7 @@
 use super::error::FrameError;
 use super::valid_lights::ValidLights;
 use crate::backend::SceneLimits;
-use crate::scene::{Camera, Light, Redraw, SceneRef, ViewKind};
+use crate::scene::{Camera, Light, Redraw, SceneRef};
 use crate::view::{IssueReason, MapOwners, RenderView, SceneIssues, ShadowMaps};
 
 /// The lights of a frame, and the views of their shadow maps.
@@ -55,7 +55,7 @@ impl ShadowViews {
         scene_issues: &SceneIssues,
     ) -> Self {
         let owners = settings.maps.map_owners(scene.cameras);
-        for (index, view) in views.iter_mut().enumerate().filter(|(_, view)| view.kind() != ViewKind::Shadow) {
+        for (index, view) in views.iter_mut().enumerate().filter(|(_, view)| view.kind().rules().is_lit) {
             view.main_view = owners.owner_of(index);
         }
         let maps = maps_that_fit(scene, &valid, views, &owners, settings, scene_issues);
@@ -138,7 +138,7 @@ fn maps_that_fit(
 /// How many maps there may be beside these views, the cameras of a scene, some of which may draw maps of the engine's
 /// own.
 fn room_for_maps(views: &[RenderView], limits: SceneLimits) -> usize {
-    let own = views.iter().filter(|view| view.kind() == ViewKind::Shadow).count();
+    let own = views.iter().filter(|view| view.kind().rules().is_shadow_map).count();
     let layers = (limits.texture_layers as usize).saturating_sub(own);
     layers.min(FrameError::MAX_VIEWS.saturating_sub(views.len()))
 }
@@ -148,7 +148,7 @@ fn room_for_maps(views: &[RenderView], limits: SceneLimits) -> usize {
 fn rank_of_first_reached(light: &Light, views: &[RenderView], owners: &MapOwners) -> Option<usize> {
     let (center, radius) = light.bounding_sphere()?;
     let mut first = None;
-    for view in views.iter().filter(|view| view.kind() != ViewKind::Shadow) {
+    for view in views.iter().filter(|view| view.kind().rules().is_lit) {
         // Without a main camera all views are equal.
         let rank =
             view.main_view.and_then(|owner| owners.owners().iter().position(|other| *other == owner)).unwrap_or(0);

@@ -19,9 +19,10 @@ use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::recorded_static_group::RecordedStaticGroup;
 use super::static_group_statistics::StaticGroupStatistics;
+use crate::bit_set::{BitSet, BitWord};
 use crate::command::{Batch, DrawList, Selection, Version};
 use crate::scene::{Changes, SceneError, SceneRef, StaticGroup};
-use crate::view::{Bounds4, IssueReason, ObjectTable, ObjectWord, SceneIssues};
+use crate::view::{Bounds4, IssueReason, ObjectTable, SceneIssues};
 
 /// The static groups of a scene.
 #[derive(Debug, Default)]
@@ -30,8 +31,8 @@ pub(super) struct StaticGroupTable {
     static_groups: Vec<KnownStaticGroup>,
     /// By object: the index of its static group, or [`NO_STATIC_GROUP`].
     owners: Vec<u32>,
-    /// The objects of recorded static groups that need no test: a mask for each word.
-    recorded_words: Vec<u64>,
+    /// The objects of recorded static groups that need no test.
+    recorded_objects: BitSet,
     /// The bounds of the static groups, in groups.
     bounds: Vec<Bounds4>,
     /// What the recorded lists are of: all selections that passes with bins have had.
@@ -93,15 +94,11 @@ impl KnownStaticGroup {
     }
 
     /// It is not recorded any more. Returns whether it was.
-    fn lose(&mut self, recorded_words: &mut [u64]) -> bool {
+    fn lose(&mut self, recorded_objects: &mut BitSet) -> bool {
         let was_recorded = std::mem::take(&mut self.is_recorded);
         if was_recorded {
-            for &(word, mask) in &self.recorded.get_mut().words {
-                // The scene may have fewer objects than before.
-                if let Some(recorded) = recorded_words.get_mut(word) {
-                    *recorded &= !mask;
-                }
-            }
+            // The scene may have fewer objects than before.
+            self.recorded.get_mut().words.iter().for_each(|word| recorded_objects.remove_word(*word));
         }
         was_recorded
     }
@@ -174,15 +171,13 @@ impl StaticGroupTable {
             let recorded = known.recorded.get_mut();
             let (group, place) = (index as usize / Bounds4::GROUPS, index as usize % Bounds4::GROUPS);
             self.bounds[group].set_union(place, &recorded.bounds);
-            for &(word, mask) in &recorded.words {
-                self.recorded_words[word] |= mask;
-            }
+            recorded.words.iter().for_each(|word| self.recorded_objects.insert_word(*word));
         }
     }
 
     /// A static group is not recorded any more.
     fn lose(&mut self, static_group: usize) {
-        if self.static_groups[static_group].lose(&mut self.recorded_words) {
+        if self.static_groups[static_group].lose(&mut self.recorded_objects) {
             self.revision += 1;
             self.recorded_count -= 1;
         }
@@ -206,7 +201,7 @@ impl StaticGroupTable {
             }
         }
         self.owners.resize(objects, NO_STATIC_GROUP);
-        self.recorded_words.resize(objects.div_ceil(WORD), 0);
+        self.recorded_objects.resize(objects);
         if self.static_groups.iter().map(|known| &known.static_group).eq(static_groups) {
             if before != objects {
                 (0..self.static_groups.len()).try_for_each(|static_group| self.claim(static_group, before..objects))?;
@@ -230,7 +225,7 @@ impl StaticGroupTable {
             self.claim(index, 0..objects)?;
         }
         for mut gone in known.into_values() {
-            gone.lose(&mut self.recorded_words);
+            gone.lose(&mut self.recorded_objects);
         }
         self.object_count = self.static_groups.iter().map(|known| known.static_group.objects.len()).sum();
         self.find_unknown_objects(objects);
@@ -370,13 +365,13 @@ impl StaticGroupTable {
         &self.bounds
     }
 
-    /// The objects that are executed if all recorded static groups are: a mask for each word.
-    pub(super) fn recorded_words(&self) -> &[u64] {
-        &self.recorded_words
+    /// The objects that are executed if all recorded static groups are.
+    pub(super) fn recorded_objects(&self) -> &BitSet {
+        &self.recorded_objects
     }
 
     /// Calls `visit` with the objects of a recorded static group that are executed.
-    pub(super) fn visit_words(&self, static_group: usize, visit: impl FnMut(&ObjectWord)) {
+    pub(super) fn visit_words(&self, static_group: usize, visit: impl FnMut(&BitWord)) {
         self.static_groups[static_group].recorded.read().words.iter().for_each(visit);
     }
 
@@ -479,5 +474,3 @@ impl StaticGroupTable {
         joined.version = version;
     }
 }
-
-const WORD: usize = u64::BITS as usize;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::view_visibility::{Retest, ViewVisibility};
+use crate::bit_set::BitWord;
 use crate::scene::SceneRef;
 use crate::view::{LevelSelector, MeshLevels, ObjectLevels, ObjectTable};
 
@@ -37,8 +38,9 @@ impl ViewLevels {
     ) {
         let Some(selector) = &self.selector else { return };
         for index in indices {
-            let (word, mask) = self.scope.word(index, table);
-            self.levels.choose(selector, (scene, table, meshes), word, visibility.set.word(word) & mask);
+            let word = self.scope.word(index, table);
+            let mask = visibility.set.word(word.index()) & word.mask;
+            self.levels.choose(selector, (scene, table, meshes), BitWord { mask, ..word });
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::resolved_view_filter::ResolvedViewFilter;
 use super::static_groups::StaticGroupTable;
+use crate::bit_set::BitSet;
 use crate::command::Version;
 use crate::quality::CullingVolume;
 use crate::scene::FilteredObjects;
@@ -14,8 +15,8 @@ pub(super) struct ViewStaticGroups {
     /// What it was found with; `None` if the view executes no static groups.
     found_with: Option<FoundWith>,
     executed: Vec<u32>,
-    /// The same as bits.
-    executed_words: Vec<u64>,
+    /// The same as a set.
+    executed_set: BitSet,
     /// The number of objects that are executed.
     object_count: usize,
     /// The version of the executed static groups.
@@ -25,8 +26,8 @@ pub(super) struct ViewStaticGroups {
     /// What the filter says of each static group, and the revisions of filter and static groups.
     by_filter: Vec<Passing>,
     filtered_with: Option<(u64, u64)>,
-    /// A mask for each word of objects; empty for no objects.
-    excluded: Vec<u64>,
+    /// Objects; without room for any if there are none.
+    excluded: BitSet,
     excluded_revision: u64,
     scratch: Vec<u32>,
 }
@@ -96,11 +97,9 @@ impl ViewStaticGroups {
         if is_other || self.executed != executed_before {
             self.version = version;
             self.object_count = self.executed.iter().map(|static_group| table.object_count(*static_group)).sum();
-            self.executed_words.clear();
-            self.executed_words.resize(table.len().div_ceil(WORD), 0);
-            self.executed.iter().for_each(|&static_group| {
-                self.executed_words[static_group as usize / WORD] |= 1 << (static_group as usize % WORD)
-            });
+            self.executed_set.clear();
+            self.executed_set.resize(table.len());
+            self.executed.iter().for_each(|static_group| self.executed_set.insert(*static_group as usize));
         }
         self.scratch = executed_before;
         let (before, now) = self.opened.split_at(opened_before);
@@ -115,7 +114,7 @@ impl ViewStaticGroups {
     pub(super) fn clear(&mut self, version: Version) {
         if self.found_with.take().is_some() {
             self.executed.clear();
-            self.executed_words.clear();
+            self.executed_set.clear();
             self.object_count = 0;
             self.opened.clear();
             self.excluded.clear();
@@ -137,10 +136,10 @@ impl ViewStaticGroups {
         for static_group in table.recorded() {
             self.by_filter.resize(static_group + 1, Passing::All);
             let (mut some, mut all) = (false, true);
-            table.visit_words(static_group, |&(word, mask)| {
-                let passing = filter.objects().mask(word) & mask;
+            table.visit_words(static_group, |word| {
+                let passing = filter.objects().mask(word.index()) & word.mask;
                 some |= passing != 0;
-                all &= passing == mask;
+                all &= passing == word.mask;
             });
             self.by_filter[static_group] = match (some, all && filter.passes_all_materials()) {
                 (false, _) => Passing::None,
@@ -152,10 +151,9 @@ impl ViewStaticGroups {
 
     fn exclude(&mut self, table: &StaticGroupTable) {
         self.excluded_revision += 1;
-        self.excluded.clear();
-        self.excluded.extend_from_slice(table.recorded_words());
+        self.excluded.copy_from(table.recorded_objects());
         for &static_group in &self.opened {
-            table.visit_words(static_group as usize, |&(word, mask)| self.excluded[word] &= !mask);
+            table.visit_words(static_group as usize, |word| self.excluded.remove_word(*word));
         }
     }
 
@@ -167,9 +165,7 @@ impl ViewStaticGroups {
     /// Whether it executes a static group, by index.
     #[inline]
     pub(super) fn executes(&self, static_group: u32) -> bool {
-        self.executed_words
-            .get(static_group as usize / WORD)
-            .is_some_and(|word| word >> (static_group as usize % WORD) & 1 == 1)
+        self.executed_set.contains(static_group as usize)
     }
 
     /// The number of objects that are executed.
@@ -185,7 +181,7 @@ impl ViewStaticGroups {
     /// The objects of a word that are not tested: a mask.
     #[inline]
     pub(super) fn excluded(&self, word: usize) -> u64 {
-        self.excluded.get(word).copied().unwrap_or(0)
+        self.excluded.mask(word)
     }
 
     /// Counts how often the objects that are not tested changed.
@@ -200,5 +196,3 @@ impl ResolvedViewFilter {
         *self.objects() == FilteredObjects::All && self.passes_all_materials()
     }
 }
-
-const WORD: usize = u64::BITS as usize;

@@ -6,11 +6,12 @@ use std::ops::Range;
 use super::resolved_view_filter::ResolvedViewFilter;
 use super::static_groups::StaticGroupTable;
 use super::view_static_groups::ViewStaticGroups;
+use crate::bit_set::BitWord;
 use crate::command::Version;
 use crate::quality::CullingVolume;
 use crate::scene::{Assets, FilteredObjects};
 use crate::task::JobPanic;
-use crate::view::{ChangedWord, Frustum, ObjectTable, Overlap, RenderView, VisibleSet};
+use crate::view::{Frustum, ObjectBlock, ObjectTable, Overlap, RenderView, VisibleSet};
 
 /// The visible set of a view, and what it was found with. While the view does not change, a frame tests the
 /// objects that changed.
@@ -62,18 +63,13 @@ impl Retest {
     }
 
     /// One of these words, by its index among them, and a mask of the objects to test.
-    pub(super) fn word(self, index: usize, table: &ObjectTable) -> (usize, u64) {
+    pub(super) fn word(self, index: usize, table: &ObjectTable) -> BitWord {
         match self {
-            Self::Changed => {
-                let ChangedWord { word, mask } = table.changed_word(index);
-                (word, mask)
-            }
-            Self::All | Self::None => (index, u64::MAX),
+            Self::Changed => table.changed_word(index),
+            Self::All | Self::None => BitWord::new(index, u64::MAX),
         }
     }
 }
-
-const WORDS_PER_BLOCK: usize = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
 
 impl ViewVisibility {
     /// Begins a frame of a view that draws commands: decides which static groups it executes, and which objects it
@@ -150,35 +146,33 @@ impl ViewVisibility {
         volume: CullingVolume,
     ) {
         if self.tests == Retest::Changed {
-            for (word, mask) in indices.map(|index| self.tests.word(index, table)) {
-                let tested = mask & !self.static_groups.excluded(word);
-                self.set.replace(word, mask, self.visible_among(word, tested, table, frustum, volume));
+            for word in indices.map(|index| self.tests.word(index, table)) {
+                self.set.replace(word.index(), word.mask, self.visible_among(word, table, frustum, volume));
             }
             return;
         }
         if let FilteredObjects::Only(set) = self.filter.objects() {
             // Words without listed objects stay empty, and need no work.
-            for (word, mask) in set.masks(indices) {
-                let tested = mask & !self.static_groups.excluded(word);
-                self.set.replace(word, u64::MAX, self.visible_among(word, tested, table, frustum, volume));
+            for word in set.words(indices) {
+                self.set.replace(word.index(), u64::MAX, self.visible_among(word, table, frustum, volume));
             }
             return;
         }
-        let blocks = indices.start / WORDS_PER_BLOCK..indices.end.div_ceil(WORDS_PER_BLOCK);
+        let blocks = indices.start / ObjectBlock::WORDS..indices.end.div_ceil(ObjectBlock::WORDS);
         let test_block = |index: usize, overlap: Overlap| {
-            let first = index * WORDS_PER_BLOCK;
-            let excluded: [_; WORDS_PER_BLOCK] = array::from_fn(|word| self.static_groups.excluded(first + word));
-            if excluded == [u64::MAX; WORDS_PER_BLOCK] {
+            let first = index * ObjectBlock::WORDS;
+            let excluded: [_; ObjectBlock::WORDS] = array::from_fn(|word| self.static_groups.excluded(first + word));
+            if excluded == [u64::MAX; ObjectBlock::WORDS] {
                 return;
             }
             let block = table.block(index);
-            let words = indices.start.max(first) - first..(indices.end - first).min(WORDS_PER_BLOCK);
+            let words = indices.start.max(first) - first..(indices.end - first).min(ObjectBlock::WORDS);
             let put = |word: usize, bits: u64| {
                 self.set.replace(first + word, u64::MAX, self.filter.pass(bits, first + word, &block));
             };
             if overlap == Overlap::Inside {
                 words.for_each(|word| put(word, block.drawable(word) & !excluded[word]));
-            } else if excluded == [0; WORDS_PER_BLOCK] {
+            } else if excluded == [0; ObjectBlock::WORDS] {
                 block.visible_words(frustum, volume, words, put);
             } else {
                 words.for_each(|word| put(word, block.visible_among(frustum, volume, word, !excluded[word])));
@@ -192,17 +186,12 @@ impl ViewVisibility {
         }
     }
 
-    /// The visible ones of a word's objects, of those in a mask.
-    fn visible_among(
-        &self,
-        word: usize,
-        mask: u64,
-        table: &ObjectTable,
-        frustum: &Frustum,
-        volume: CullingVolume,
-    ) -> u64 {
-        let block = table.block(word / WORDS_PER_BLOCK);
-        let visible = block.visible_among(frustum, volume, word % WORDS_PER_BLOCK, mask);
+    /// The visible ones of a word's objects that no executed static group has.
+    fn visible_among(&self, objects: BitWord, table: &ObjectTable, frustum: &Frustum, volume: CullingVolume) -> u64 {
+        let word = objects.index();
+        let block = table.block(word / ObjectBlock::WORDS);
+        let tested = objects.mask & !self.static_groups.excluded(word);
+        let visible = block.visible_among(frustum, volume, word % ObjectBlock::WORDS, tested);
         self.filter.pass(visible, word, &block)
     }
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{FrameError, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::process::Requirements;
-use crate::scene::{Camera, Changes, Light, SceneRef, ViewKind};
+use crate::scene::{Camera, Changes, Light, SceneRef};
 use crate::view::LightClass;
 
 /// Frames to draw while a world is loaded, whose pictures are not shown.
@@ -48,18 +48,19 @@ pub struct WarmUp<'a> {
 struct WarmUpFrame {
     lights: Vec<Light>,
     transparency: bool,
-    reflections: bool,
+    /// Whether it has the views that a scene may do without: reflections.
+    optional_views: bool,
 }
 
 impl<'a> WarmUp<'a> {
     /// The warm-up for a scene.
     pub fn new(scene: SceneRef<'a>) -> Self {
-        let frame = |lights, transparency, reflections| WarmUpFrame { lights, transparency, reflections };
+        let frame = |lights, transparency, optional_views| WarmUpFrame { lights, transparency, optional_views };
         let of_class = |class| {
             let mut lights = scene.lights.iter().filter(|light| LightClass::of(light, true) == class);
             lights.find(|light| light.check(0).is_ok())
         };
-        let main = scene.cameras.iter().find(|camera| camera.kind == ViewKind::Main).or(scene.cameras.first());
+        let main = scene.cameras.iter().find(|camera| camera.kind.rules().owns_shadow_maps).or(scene.cameras.first());
         let alone = |light: &Light| frame(vec![main.map_or(*light, |camera| shining_from(camera, *light))], true, true);
         let mut frames = vec![frame(scene.lights.to_vec(), true, true)];
         frames.extend(LightClass::all().filter_map(of_class).map(alone));
@@ -67,8 +68,8 @@ impl<'a> WarmUp<'a> {
         if Requirements::any_needs_transparency(&scene) {
             frames.push(frame(Vec::new(), false, true));
         }
-        let is_reflection = |camera: &Camera| camera.kind == ViewKind::Reflection;
-        if scene.cameras.iter().any(is_reflection) && !scene.cameras.iter().all(is_reflection) {
+        let is_optional = |camera: &Camera| camera.kind.rules().is_optional;
+        if scene.cameras.iter().any(is_optional) && !scene.cameras.iter().all(is_optional) {
             frames.push(frame(Vec::new(), true, false));
         }
         Self { scene, frames: frames.into_iter() }
@@ -88,8 +89,8 @@ impl<'a> WarmUp<'a> {
         &mut self,
         renderer: &mut Renderer<B>,
     ) -> Result<Option<RecordedFrame<B>>, FrameError> {
-        let Some(WarmUpFrame { lights, transparency, reflections }) = self.frames.next() else { return Ok(None) };
-        let is_drawn = |camera: &&Camera| reflections || camera.kind != ViewKind::Reflection;
+        let Some(WarmUpFrame { lights, transparency, optional_views }) = self.frames.next() else { return Ok(None) };
+        let is_drawn = |camera: &&Camera| optional_views || !camera.kind.rules().is_optional;
         let cameras: Vec<_> = self.scene.cameras.iter().filter(is_drawn).cloned().collect();
         let scene = SceneRef { lights: &lights, cameras: &cameras, changes: Changes::Unknown, ..self.scene };
         let recorded = renderer.record_part(&scene, &[], transparency);

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec2};
 
 use super::projection::MAX_SHIFT;
 use super::transform::is_unit;
-use super::{ClipPlane, LayerMask, Projection, Redraw, SceneError, ViewFilter, WholePicture};
+use super::{ClipPlane, LayerMask, Projection, Redraw, SceneError, ViewFilter, ViewKind, WholePicture};
 
 /// A camera. In camera space, −Z is forward, +Y is up and +X is to the right.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,39 +54,6 @@ pub struct Camera {
     pub redraw: Redraw,
 }
 
-/// The purpose of a view (M listing 10.4). If two views do not depend on each other, the earlier kind comes first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ViewKind {
-    /// The shadow map of a light.
-    Shadow,
-    /// The picture of a mirror, a portal or a screen in the scene. The [deferred pipeline](crate::process::Deferred)
-    /// draws in it what it draws in a main view, as far as others [sample](crate::process::Declare::samples_view) it.
-    /// Shadow maps of directional lights cover what a main view sees, so elsewhere nothing is in their shadow: the main
-    /// view that it is [named](Camera::child_name) after, as `main/mirror` is after `main`, or else the scene's first
-    /// one.
-    Reflection,
-    /// The picture on the screen.
-    #[default]
-    Main,
-    /// A picture composed of other pictures.
-    Post,
-}
-
-impl ViewKind {
-    /// How many kinds there are.
-    pub const COUNT: usize = 4;
-
-    /// The lower-case name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shadow => "shadow",
-            Self::Reflection => "reflection",
-            Self::Main => "main",
-            Self::Post => "post",
-        }
-    }
-}
-
 impl Camera {
     /// A camera at `position` that looks at `target`, upright (+Y), with a vertical field of view of 60°, a near plane
     /// at 5 cm and a picture of 960 × 540 pixels.
@@ -128,6 +95,11 @@ impl Camera {
     /// Width ÷ height of the picture.
     pub fn aspect(&self) -> f32 {
         self.size[0] as f32 / self.size[1] as f32
+    }
+
+    /// Whether what is in front of the near plane is drawn as if it were on it.
+    pub(crate) fn clamps_depth(&self) -> bool {
+        matches!(self.projection, Projection::Orthographic { .. }) && self.kind.rules().clamps_depth
     }
 
     /// The whole of this picture.
@@ -211,7 +183,7 @@ impl Camera {
                 (!is_in_range).then_some("its height is not a distance of 1e-6 m or more")
             }
             Projection::Paraboloid => {
-                (self.kind != ViewKind::Shadow).then_some("only a shadow view can use a paraboloid projection")
+                (!self.kind.rules().allows_paraboloid).then_some("only a shadow view can use a paraboloid projection")
             }
         }
     }

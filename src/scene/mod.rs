@@ -29,6 +29,7 @@ mod mesh_levels;
 mod node_column;
 mod object_column;
 mod view_filter;
+mod view_kind;
 mod object_set;
 mod owned_scene;
 mod packed_vertex;
@@ -46,8 +47,8 @@ mod whole_picture;
 
 pub use asset_loader::{Arrivals, AssetLoader, LoadError};
 pub use assets::{Asset, Assets};
+pub use camera::Camera;
 pub(crate) use camera::child_name;
-pub use camera::{Camera, ViewKind};
 pub use changes::Changes;
 pub(crate) use chunk_users::run_node_job;
 pub use clip_plane::ClipPlane;
@@ -82,6 +83,7 @@ pub use topology::Topology;
 pub(crate) use transform::is_unit;
 pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VERTEX_COLOR, VertexAttribute};
 pub use view_filter::{FilteredObjects, ViewFilter};
+pub use view_kind::ViewKind;
 pub use whole_picture::WholePicture;
 
 /// Layouts that backends read: for backends, and for the tests of this repository. No part of the interface.

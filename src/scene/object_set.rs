@@ -4,6 +4,8 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::bit_set::{BITS_PER_WORD, BitWord};
+
 /// A set of a scene's objects, by index: what an [`ViewFilter`](super::ViewFilter) lists. A clone shares its
 /// memory, which is 16 bytes for each 64 indices of the scene among which one is in the set.
 ///
@@ -22,14 +24,7 @@ use std::sync::Arc;
 #[derive(Clone, Default)]
 pub struct ObjectSet {
     /// Ascending by word; no mask is 0.
-    words: Arc<[SetWord]>,
-}
-
-/// Objects of a set among 64: bit `b` of the mask is object `word × 64 + b`.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct SetWord {
-    word: u32,
-    mask: u64,
+    words: Arc<[BitWord]>,
 }
 
 impl ObjectSet {
@@ -37,17 +32,17 @@ impl ObjectSet {
     pub fn new(indices: impl IntoIterator<Item = u32>) -> Self {
         let mut indices: Vec<_> = indices.into_iter().collect();
         indices.sort_unstable();
-        let in_same_word = |one: &u32, next: &u32| one / WORD == next / WORD;
-        let word = |indices: &[u32]| SetWord {
-            word: indices[0] / WORD,
-            mask: indices.iter().fold(0, |mask, index| mask | 1 << (index % WORD)),
+        let in_same_word = |one: &u32, next: &u32| one / u64::BITS == next / u64::BITS;
+        let word = |indices: &[u32]| BitWord {
+            word: indices[0] / u64::BITS,
+            mask: indices.iter().fold(0, |mask, index| mask | 1 << (index % u64::BITS)),
         };
         Self { words: indices.chunk_by(in_same_word).map(word).collect() }
     }
 
     /// Whether it contains the object at an index.
     pub fn contains(&self, object: usize) -> bool {
-        self.mask(object / WORD as usize) >> (object % WORD as usize) & 1 == 1
+        self.mask(object / BITS_PER_WORD) >> (object % BITS_PER_WORD) & 1 == 1
     }
 
     /// The number of objects.
@@ -67,28 +62,24 @@ impl ObjectSet {
 
     /// The indices from `first` on.
     pub(crate) fn iter_from(&self, first: usize) -> impl Iterator<Item = u32> {
-        let words = &self.words[self.position(first / WORD as usize)..];
-        let indices = words.iter().flat_map(|&SetWord { word, mask }| {
-            (0..WORD).filter(move |bit| mask >> bit & 1 == 1).map(move |bit| word * WORD + bit)
-        });
-        indices.filter(move |index| *index as usize >= first)
+        let words = &self.words[self.position(first / BITS_PER_WORD)..];
+        words.iter().flat_map(|word| word.indices()).filter(move |index| *index >= first).map(|index| index as u32)
     }
 
     /// A mask of its objects among the 64 from `word` × 64 on.
     pub(crate) fn mask(&self, word: usize) -> u64 {
         let found = self.words.get(self.position(word));
-        found.filter(|found| found.word as usize == word).map_or(0, |found| found.mask)
+        found.filter(|found| found.index() == word).map_or(0, |found| found.mask)
     }
 
-    /// The words of a range that have objects, in order, each with its mask.
-    pub(crate) fn masks(&self, words: Range<usize>) -> impl Iterator<Item = (usize, u64)> {
-        let found = &self.words[self.position(words.start)..];
-        found.iter().map(|found| (found.word as usize, found.mask)).take_while(move |(word, _)| *word < words.end)
+    /// The words of a range that have objects, in order.
+    pub(crate) fn words(&self, range: Range<usize>) -> impl Iterator<Item = BitWord> {
+        self.words[self.position(range.start)..].iter().copied().take_while(move |word| word.index() < range.end)
     }
 
     /// The number of words below one.
     fn position(&self, word: usize) -> usize {
-        self.words.partition_point(|known| (known.word as usize) < word)
+        self.words.partition_point(|known| known.index() < word)
     }
 }
 
@@ -112,9 +103,6 @@ impl fmt::Debug for ObjectSet {
         formatter.debug_set().entries(self.iter()).finish()
     }
 }
-
-/// The number of objects in a word.
-const WORD: u32 = u64::BITS;
 
 #[cfg(test)]
 mod tests {
@@ -141,9 +129,9 @@ mod tests {
                 let bits = expected.range(word * 64..(word + 1) * 64).fold(0, |mask, index| mask | 1 << (index % 64));
                 prop_assert_eq!(set.mask(word as usize), bits);
             }
-            let masks: Vec<_> = set.masks(words.0..words.1).collect();
-            let filled = (words.0..words.1).filter(|word| set.mask(*word) != 0).map(|word| (word, set.mask(word)));
-            prop_assert_eq!(masks, filled.collect::<Vec<_>>());
+            let found: Vec<_> = set.words(words.0..words.1).collect();
+            let expected = (words.0..words.1).map(|word| BitWord::new(word, set.mask(word)));
+            prop_assert_eq!(found, expected.filter(|word| word.mask != 0).collect::<Vec<_>>());
         }
     }
 

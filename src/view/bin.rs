@@ -1,9 +1,10 @@
-//! Bin: the visible objects of a pass, ordered by bin.
+//! Bin: objects of a pass, ordered by bin.
 
 use std::ops::Range;
 
 use super::block_reader::BlockReader;
-use super::{DrawFilter, ObjectTable, VisibleSet, set_bits};
+use super::{DrawFilter, ObjectBlock, ObjectTable, VisibleSet};
+use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::command::{BinnedSegment, MaterialShare, Selection};
 use crate::scene::Blend;
 
@@ -60,32 +61,47 @@ pub(crate) fn bin_visible(
             });
         }
     } else {
+        let mut reader = BlockReader::new(table);
         segment.clear();
-        collect(table, visible, selection, filter, range.among(visible.count()), segment);
+        visible.visit(range.among(visible.count()), |_, word, bits| {
+            push_word(BitWord::new(word, bits), reader.block_of_word(word), selection, filter, segment);
+        });
         segment.order(&bins);
     }
 }
 
-/// Appends the objects of some ranks of the visible set to a segment.
-fn collect(
+/// Makes a segment the opaque ones of some drawable objects that a process draws, ordered by bin.
+pub(crate) fn bin_objects(
     table: &ObjectTable,
-    visible: &VisibleSet,
+    words: &[BitWord],
     selection: Selection,
     filter: DrawFilter<'_>,
-    ranks: Range<usize>,
     segment: &mut BinnedSegment,
 ) {
-    let in_block = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
     let mut reader = BlockReader::new(table);
-    visible.visit(ranks, |_, word, bits| {
-        let block = reader.block(word / in_block);
-        let first = word * VisibleSet::OBJECTS_PER_WORD;
-        for object in set_bits(filter.pass(first, bits & block.opaque[word % in_block])).map(|bit| first + bit) {
-            let entry = object % ObjectTable::BLOCK_SIZE;
-            let draw = &block.draws[entry];
-            if selection.materials == MaterialShare::ALL || selection.contains(draw.state.blend(), draw.material) {
-                segment.push(object as u32, block.bins[entry]);
-            }
+    segment.clear();
+    for &word in words {
+        push_word(word, reader.block_of_word(word.index()), selection, filter, segment);
+    }
+    segment.order(&table.bins());
+}
+
+/// Appends the opaque objects of a word, which is in a block, that a process draws to a segment.
+#[inline]
+fn push_word(
+    objects: BitWord,
+    block: &ObjectBlock,
+    selection: Selection,
+    filter: DrawFilter<'_>,
+    segment: &mut BinnedSegment,
+) {
+    let mask = objects.mask & block.opaque[objects.index() % ObjectBlock::WORDS];
+    let drawn = filter.pass(objects.index() * BITS_PER_WORD, mask);
+    for object in BitWord::new(objects.index(), drawn).indices() {
+        let entry = object % ObjectBlock::SIZE;
+        let draw = &block.draws[entry];
+        if selection.materials == MaterialShare::ALL || selection.contains(draw.state.blend(), draw.material) {
+            segment.push(object as u32, block.bins[entry]);
         }
-    });
+    }
 }

@@ -17,6 +17,15 @@ impl<'a> BlockReader<'a> {
         Self { table, open: None }
     }
 
+    /// The block that has a word of objects.
+    ///
+    /// # Panics
+    /// As [`BlockReader::block`].
+    #[inline]
+    pub(super) fn block_of_word(&mut self, word: usize) -> &ObjectBlock {
+        self.block(word / ObjectBlock::WORDS)
+    }
+
     /// A block, by index.
     ///
     /// # Panics

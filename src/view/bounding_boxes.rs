@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::frustum::{LANES, ROUNDING_TOLERANCE, lane_mask, min};
 use super::{BoundingSpheres, Frustum};
+use crate::bit_set::BITS_PER_WORD;
 use crate::quality::CullingVolume;
 
 /// An oriented bounding box. Its centre is that of the object's bounding sphere.
@@ -89,7 +90,7 @@ fn store<const N: usize, const M: usize>(groups: &mut LaneGroups<N>, entry: usiz
 }
 
 impl Frustum {
-    /// Tests the boxes of the `candidates` among the [`Frustum::WORD`] objects from `first` on; bit 0 of either mask is
+    /// Tests the boxes of the `candidates` among the 64 objects from `first` on; bit 0 of either mask is
     /// `first`. Returns a mask of the boxes that intersect the frustum. The test is conservative: a box that intersects
     /// the frustum is never missing, a box just outside may be included.
     ///
@@ -102,7 +103,7 @@ impl Frustum {
     /// NaN counts as intersecting: the caller has already rejected objects with invalid transforms.
     ///
     /// # Panics
-    /// If `first` is not a multiple of 8, or fewer than [`Frustum::WORD`] objects follow it.
+    /// If `first` is not a multiple of 8, or fewer than 64 objects follow it.
     pub fn intersects_boxes(
         &self,
         spheres: &BoundingSpheres,
@@ -139,8 +140,8 @@ impl Frustum {
         candidates: u64,
         extent: impl Fn(&[[f32; LANES]; N], Vec3, usize) -> f32 + Copy,
     ) -> u64 {
-        let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[first..first + Self::WORD].as_chunks().0);
-        let groups = &groups[first / LANES..][..Self::WORD / LANES];
+        let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[first..first + BITS_PER_WORD].as_chunks().0);
+        let groups = &groups[first / LANES..][..BITS_PER_WORD / LANES];
         let mut intersecting = 0;
         for (index, (((x, y), z), group)) in x.iter().zip(y).zip(z).zip(groups).enumerate() {
             let in_group = candidates >> (index * LANES) & ((1 << LANES) - 1);

@@ -7,6 +7,7 @@ use multiversion::multiversion;
 
 use super::frustum::ROUNDING_TOLERANCE;
 use super::{BoundingSphere, BoundingSpheres, Frustum};
+use crate::bit_set::BITS_PER_WORD;
 
 /// The bounds of [`Bounds4::GROUPS`] groups of spheres: for each an axis-aligned box around the centres, and the
 /// largest radius. A group is a word of spheres, a block, or a group of blocks.
@@ -26,7 +27,7 @@ pub(crate) struct Bounds4 {
 type PerGroup = [f64; Bounds4::GROUPS];
 
 /// One number of each sphere of a word.
-type Word<T> = [T; Frustum::WORD];
+type Word<T> = [T; BITS_PER_WORD];
 
 /// How the spheres of a group lie relative to a frustum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +42,7 @@ pub(crate) enum Overlap {
 }
 
 impl Bounds4 {
-    pub(crate) const GROUPS: usize = BoundingSpheres::COUNT / Frustum::WORD;
+    pub(crate) const GROUPS: usize = BoundingSpheres::COUNT / BITS_PER_WORD;
 
     /// Computes the bounds of a word of spheres. Empty spheres make no difference.
     #[inline(always)]
@@ -81,7 +82,7 @@ impl Bounds4 {
 /// The entries of a word.
 #[inline(always)]
 fn word_of<T>(column: &[T; BoundingSpheres::COUNT], word: usize) -> &Word<T> {
-    column[word * Frustum::WORD..].first_chunk().expect("a column is of whole words")
+    column[word * BITS_PER_WORD..].first_chunk().expect("a column is of whole words")
 }
 
 /// The least and the greatest of some coordinates.
@@ -105,7 +106,7 @@ fn filled_extent(coordinates: &Word<f64>, radii: &Word<f32>) -> [f64; 2] {
 /// compile to a few vector instructions. `choose` must not depend on the order.
 #[inline(always)]
 fn reduce<T: Copy + Default>(numbers: &Word<T>, choose: impl Fn(T, T) -> T) -> T {
-    const HALF: usize = Frustum::WORD / 2;
+    const HALF: usize = BITS_PER_WORD / 2;
     let mut chosen = [T::default(); HALF];
     for index in 0..HALF {
         chosen[index] = choose(numbers[index], numbers[index + HALF]);
@@ -290,18 +291,18 @@ mod tests {
         for (entry, &(offset, share, kind)) in spheres.iter().enumerate() {
             let center = middle + DVec3::from(offset) * 10_f64.powf(extent);
             let sphere = BoundingSphere { center, radius: share * 10_f32.powf(radius) };
-            table.set(Frustum::WORD + entry, if kind == 0 { BoundingSphere::EMPTY } else { sphere });
+            table.set(BITS_PER_WORD + entry, if kind == 0 { BoundingSphere::EMPTY } else { sphere });
         }
         let mut bounds = Bounds4::default();
         bounds.set_word(1, &table);
         let mut extended = Bounds4::default();
-        (0..Frustum::WORD).for_each(|entry| extended.extend_word(1, table.get(Frustum::WORD + entry)));
+        (0..BITS_PER_WORD).for_each(|entry| extended.extend_word(1, table.get(BITS_PER_WORD + entry)));
         let mut union = Bounds4::default();
         union.set_union(2, &bounds);
         let frustum = Frustum::new(camera);
-        let found = frustum.classify_spheres(&table, Frustum::WORD);
-        let valid = (0..Frustum::WORD)
-            .fold(0, |mask, entry| mask | u64::from(table.get(Frustum::WORD + entry).radius >= 0.0) << entry);
+        let found = frustum.classify_spheres(&table, BITS_PER_WORD);
+        let valid = (0..BITS_PER_WORD)
+            .fold(0, |mask, entry| mask | u64::from(table.get(BITS_PER_WORD + entry).radius >= 0.0) << entry);
         let overlap = frustum.overlaps(&bounds)[1];
         prop_assert_eq!([frustum.overlaps(&extended)[1], frustum.overlaps(&union)[2]], [overlap; 2]);
         match overlap {
@@ -310,8 +311,8 @@ mod tests {
             Overlap::Partial => {}
         }
         // More than twice the margin outside or inside, the box around the centres suffices.
-        let filled: Vec<_> = (0..Frustum::WORD)
-            .map(|entry| table.get(Frustum::WORD + entry))
+        let filled: Vec<_> = (0..BITS_PER_WORD)
+            .map(|entry| table.get(BITS_PER_WORD + entry))
             .filter(|sphere| sphere.radius >= 0.0)
             .collect();
         let relative_box = relative_box(filled.iter().map(|sphere| sphere.center), camera);
@@ -338,7 +339,7 @@ mod tests {
         let frustum = Frustum::new(&camera);
         let verdict = |center: DVec3| {
             let mut table = BoundingSpheres::default();
-            for entry in 0..Frustum::WORD {
+            for entry in 0..BITS_PER_WORD {
                 let offset = DVec3::new(entry as f64 % 8.0, entry as f64 / 8.0, 0.0) * 0.1;
                 table.set(entry, BoundingSphere { center: center + offset, radius: 0.1 });
             }

@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use crate::scene::{Camera, Projection, ViewKind};
+use crate::scene::{Camera, Projection};
 
 /// The planes of a camera's frustum, without tolerance, in metres.
 pub(super) struct CameraPlanes {
@@ -58,7 +58,7 @@ impl CameraPlanes {
         };
         let near = match camera.projection {
             // Objects in front of the near plane of a shadow map cast shadows too.
-            Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => f32::INFINITY,
+            _ if camera.clamps_depth() => f32::INFINITY,
             // Filtering at the disc's rim reads a few texels beyond it.
             Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,
             // Its near plane is the clip plane, which may be nearer.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::object_block::ObjectBlock;
-use super::set_bits;
+use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::scene::Changes;
 
 /// The objects that a frame describes anew: all of them, or those that changed.
@@ -12,18 +12,11 @@ pub(super) struct ChangedObjects {
     /// The number of objects if all of them are described.
     all: Option<usize>,
     /// Otherwise each word with changed objects, ascending.
-    words: Vec<ChangedWord>,
+    words: Vec<BitWord>,
     /// For each block with changed objects, ascending, where its words are in `words`.
     blocks: Vec<Range<usize>>,
     /// While changes are collected, a mask for each word; zeros otherwise.
     masks: Vec<u64>,
-}
-
-/// Changed objects among 64: bit `b` of the mask is object `word × 64 + b`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct ChangedWord {
-    pub(crate) word: usize,
-    pub(crate) mask: u64,
 }
 
 /// Changed objects of a block.
@@ -38,14 +31,13 @@ pub(super) struct ChangedBlock {
 impl ChangedBlock {
     /// The first object of one of the block's words.
     pub(super) fn first_object(&self, word: usize) -> usize {
-        self.block * ObjectBlock::SIZE + word * WORD
+        self.block * ObjectBlock::SIZE + word * BITS_PER_WORD
     }
 }
 
-impl ChangedWord {
-    fn block(self) -> usize {
-        self.word / ObjectBlock::WORDS
-    }
+/// The index of the block that has a word.
+fn block_of(word: &BitWord) -> usize {
+    word.index() / ObjectBlock::WORDS
 }
 
 impl ChangedObjects {
@@ -62,12 +54,12 @@ impl ChangedObjects {
         self.all = None;
         self.words.clear();
         self.blocks.clear();
-        self.masks.resize(objects.div_ceil(WORD), 0);
+        self.masks.resize(objects.div_ceil(BITS_PER_WORD), 0);
         match changes {
             Changes::Unknown => return self.set_all(objects),
             Changes::Objects(indices) => {
                 indices.iter().map(|&index| index as usize).filter(|&index| index < objects).for_each(|index| {
-                    self.mark(index / WORD, 1 << (index % WORD));
+                    self.mark(index / BITS_PER_WORD, 1 << (index % BITS_PER_WORD));
                 });
             }
             Changes::Ranges(ranges) => {
@@ -77,10 +69,10 @@ impl ChangedObjects {
         self.mark_range(objects_before, objects);
         self.words.sort_unstable_by_key(|changed| changed.word);
         for changed in &mut self.words {
-            changed.mask = std::mem::take(&mut self.masks[changed.word]);
+            changed.mask = std::mem::take(&mut self.masks[changed.index()]);
         }
         let mut end = 0;
-        for words in self.words.chunk_by(|one, next| one.block() == next.block()) {
+        for words in self.words.chunk_by(|one, next| block_of(one) == block_of(next)) {
             self.blocks.push(end..end + words.len());
             end += words.len();
         }
@@ -88,9 +80,9 @@ impl ChangedObjects {
 
     fn mark_range(&mut self, start: usize, end: usize) {
         if start < end {
-            for word in start / WORD..end.div_ceil(WORD) {
-                let first = start.saturating_sub(word * WORD);
-                let excess = ((word + 1) * WORD).saturating_sub(end);
+            for word in start / BITS_PER_WORD..end.div_ceil(BITS_PER_WORD) {
+                let first = start.saturating_sub(word * BITS_PER_WORD);
+                let excess = ((word + 1) * BITS_PER_WORD).saturating_sub(end);
                 self.mark(word, (u64::MAX << first) & (u64::MAX >> excess));
             }
         }
@@ -99,14 +91,14 @@ impl ChangedObjects {
     fn mark(&mut self, word: usize, mask: u64) {
         if self.masks[word] == 0 {
             // The mask follows when all are marked.
-            self.words.push(ChangedWord { word, mask: 0 });
+            self.words.push(BitWord::new(word, 0));
         }
         self.masks[word] |= mask;
     }
 
     /// The number of words with changed objects.
     pub(super) fn word_count(&self) -> usize {
-        self.all.map_or(self.words.len(), |objects| objects.div_ceil(WORD))
+        self.all.map_or(self.words.len(), |objects| objects.div_ceil(BITS_PER_WORD))
     }
 
     /// The number of blocks with changed objects.
@@ -125,9 +117,9 @@ impl ChangedObjects {
         } else {
             self.blocks[index].clone()
         };
-        let mut changed = ChangedBlock { block: self.word(words.start).block(), masks: [0; ObjectBlock::WORDS] };
-        for ChangedWord { word, mask } in words.map(|index| self.word(index)) {
-            changed.masks[word % ObjectBlock::WORDS] = mask;
+        let mut changed = ChangedBlock { block: block_of(&self.word(words.start)), masks: [0; ObjectBlock::WORDS] };
+        for word in words.map(|index| self.word(index)) {
+            changed.masks[word.index() % ObjectBlock::WORDS] = word.mask;
         }
         changed
     }
@@ -135,9 +127,9 @@ impl ChangedObjects {
     /// The changed objects of a range of blocks, where not all objects changed. They ascend.
     pub(super) fn objects_of_blocks(&self, blocks: Range<usize>) -> impl Iterator<Item = usize> {
         debug_assert!(!self.are_all());
-        let index_of = |block: usize| self.words.partition_point(|changed| changed.block() < block);
+        let index_of = |block: usize| self.words.partition_point(|word| block_of(word) < block);
         let words = &self.words[index_of(blocks.start)..index_of(blocks.end)];
-        words.iter().flat_map(|changed| set_bits(changed.mask).map(|bit| changed.word * WORD + bit))
+        words.iter().flat_map(|word| word.indices())
     }
 
     /// Whether all objects are described, reported or not.
@@ -149,11 +141,11 @@ impl ChangedObjects {
     ///
     /// # Panics
     /// If `index` is not below [`ChangedObjects::word_count`].
-    pub(super) fn word(&self, index: usize) -> ChangedWord {
+    pub(super) fn word(&self, index: usize) -> BitWord {
         match self.all {
             Some(objects) => {
-                let excess = ((index + 1) * WORD).saturating_sub(objects);
-                ChangedWord { word: index, mask: u64::MAX >> excess }
+                let excess = ((index + 1) * BITS_PER_WORD).saturating_sub(objects);
+                BitWord::new(index, u64::MAX >> excess)
             }
             None => self.words[index],
         }
@@ -161,12 +153,11 @@ impl ChangedObjects {
 
     /// Whether an object is described.
     pub(super) fn contains(&self, object: usize) -> bool {
-        let is_marked = |index: usize| self.words[index].mask >> (object % WORD) & 1 == 1;
-        self.are_all() || self.words.binary_search_by_key(&(object / WORD), |changed| changed.word).is_ok_and(is_marked)
+        let is_marked = |index: usize| self.words[index].contains(object);
+        let word = object / BITS_PER_WORD;
+        self.are_all() || self.words.binary_search_by_key(&word, |changed| changed.index()).is_ok_and(is_marked)
     }
 }
-
-const WORD: usize = u64::BITS as usize;
 
 #[cfg(test)]
 mod tests {
@@ -179,8 +170,8 @@ mod tests {
     fn objects_of(changed: &ChangedObjects) -> Vec<usize> {
         let words = (0..changed.word_count()).map(|index| changed.word(index));
         words
-            .flat_map(|ChangedWord { word, mask }| {
-                (0..64).filter(move |bit| mask >> bit & 1 == 1).map(move |bit| word * 64 + bit)
+            .flat_map(|BitWord { word, mask }| {
+                (0..64).filter(move |bit| mask >> bit & 1 == 1).map(move |bit| word as usize * 64 + bit)
             })
             .collect()
     }

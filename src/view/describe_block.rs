@@ -10,7 +10,7 @@ use super::draw_states::DrawStates;
 use super::object_block::ObjectBlock;
 use super::object_description::{ObjectDraw, PacketDescription, bounding_box, rejection_reason};
 use super::packet_columns::{GatheredColumns, LANES, Lanes, PacketColumns};
-use super::{Frustum, set_bits};
+use crate::bit_set::{BITS_PER_WORD, set_bits};
 use crate::command::{Bin, Bins};
 use crate::scene::SceneRef;
 
@@ -56,10 +56,10 @@ pub(super) fn describe_block(inputs: &DescriptionInputs, block: &mut ObjectBlock
     for (word, &mask) in changed.masks.iter().enumerate().filter(|(_, mask)| **mask != 0) {
         let first = changed.first_object(word);
         let mut whole = 0_u64;
-        for packet in (0..Frustum::WORD).step_by(LANES) {
+        for packet in (0..BITS_PER_WORD).step_by(LANES) {
             let changed_in_packet = (mask >> packet) as u8;
             if changed_in_packet != 0 {
-                block.changed_in[(word * Frustum::WORD + packet) / LANES] = inputs.epoch;
+                block.changed_in[(word * BITS_PER_WORD + packet) / LANES] = inputs.epoch;
             }
             if changed_in_packet == u8::MAX {
                 whole |= u64::from(u8::MAX) << packet;
@@ -84,7 +84,7 @@ pub(super) fn describe_block(inputs: &DescriptionInputs, block: &mut ObjectBlock
 #[multiversion(targets("x86_64+avx2"))]
 fn describe_packets(inputs: &DescriptionInputs, block: &mut ObjectBlock, first: usize, mask: u64) -> Findings {
     let mut findings = Findings::default();
-    for packet in (0..Frustum::WORD).step_by(LANES) {
+    for packet in (0..BITS_PER_WORD).step_by(LANES) {
         if mask >> packet & 1 == 0 {
             continue;
         }
@@ -209,12 +209,12 @@ fn bin_of(bins: &RwLock<Bins>, draw: ObjectDraw) -> u32 {
 /// Makes the bounds of a word, whose first object is `first`, contain its changed objects, which are in the mask.
 #[multiversion(targets("x86_64+avx2"))]
 fn update_word_bounds(epoch: u64, block: &mut ObjectBlock, first: usize, changed: u64) {
-    let word = first / Frustum::WORD % ObjectBlock::WORDS;
+    let word = first / BITS_PER_WORD % ObjectBlock::WORDS;
     let ObjectBlock { spheres, word_bounds, .. } = block;
     // Words take turns.
-    let is_due = (epoch + (first / Frustum::WORD) as u64).is_multiple_of(EXTENDED_FRAMES);
+    let is_due = (epoch + (first / BITS_PER_WORD) as u64).is_multiple_of(EXTENDED_FRAMES);
     if changed.count_ones() < EXTENSION_LIMIT && !is_due {
-        let entries = set_bits(changed).map(|bit| word * Frustum::WORD + bit);
+        let entries = set_bits(changed).map(|bit| word * BITS_PER_WORD + bit);
         entries.for_each(|entry| word_bounds.extend_word(word, spheres.get(entry)));
     } else {
         word_bounds.set_word(word, spheres);

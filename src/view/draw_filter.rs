@@ -1,6 +1,7 @@
 //! Which objects a process draws by their layers and material types.
 
-use super::{ObjectTable, set_bits};
+use super::ObjectTable;
+use crate::bit_set::set_bits;
 use crate::command::{MaterialTypes, Selection};
 use crate::handle::Handle;
 use crate::scene::{LayerMask, Material, MaterialLayout, SceneRef};

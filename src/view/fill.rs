@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::block_reader::BlockReader;
 use super::subdivision_level::subdivision_level;
-use super::{DrawFilter, IssueReason, ObjectBlock, ObjectLevels, ObjectTable, RenderView, VisibleSet, set_bits};
+use super::{DrawFilter, IssueReason, ObjectBlock, ObjectLevels, ObjectTable, RenderView, VisibleSet};
+use crate::bit_set::{BITS_PER_WORD, set_bits};
 use crate::command::{DrawOrder, DrawState, RenderCommand, Selection, SortKey};
 use crate::quality::{DepthQuantizer, Quality};
 use crate::scene::{Blend, ColumnValues, Projection, SceneRef};
@@ -72,8 +73,7 @@ impl Fill<'_> {
             let mut slots = commands.write(block);
             let mut reader = BlockReader::new(self.table);
             self.visible.visit(part, |rank, word, bits| {
-                let first = word * VisibleSet::OBJECTS_PER_WORD;
-                let objects = reader.block(first / ObjectTable::BLOCK_SIZE);
+                let (first, objects) = (word * BITS_PER_WORD, reader.block_of_word(word));
                 let start = rank % ChunkedArray::<RenderCommand>::BLOCK_SIZE;
                 for (slot, bit) in slots[start..].iter_mut().zip(set_bits(bits)) {
                     *slot = self.command(first + bit, objects, &order);

@@ -7,6 +7,7 @@ use multiversion::multiversion;
 
 use super::BoundingSpheres;
 use super::camera_planes::{CameraPlanes, PairSlopes};
+use crate::bit_set::BITS_PER_WORD;
 use crate::scene::Camera;
 
 /// The volume that a camera sees, within six planes: a pyramid, a box or a hemisphere.
@@ -108,22 +109,19 @@ impl Frustum {
         self.signed_distance(point) >= -tolerant_radius(radius, point)
     }
 
-    /// Tests the [`Frustum::WORD`] spheres from `first` on. Bit 0 of the mask is `first`.
+    /// Tests the 64 spheres from `first` on. Bit 0 of the mask is `first`.
     ///
     /// # Panics
-    /// If there are fewer than [`Frustum::WORD`] spheres from `first` on.
+    /// If there are fewer than 64 spheres from `first` on.
     pub fn intersects_spheres(&self, spheres: &BoundingSpheres, first: usize) -> u64 {
         intersecting_spheres(self, spheres, first)
     }
-
-    /// The number of spheres that [`Frustum::intersects_spheres`] tests: one for each bit of its mask.
-    pub const WORD: usize = 64;
 
     /// Like [`Frustum::intersects_spheres`], and also finds the spheres that are entirely inside. That costs a third
     /// more; where the caller ignores it, inlining removes it.
     #[inline(always)]
     pub(super) fn classify_spheres(&self, spheres: &BoundingSpheres, first: usize) -> Classified {
-        let entries = first..first + Self::WORD;
+        let entries = first..first + BITS_PER_WORD;
         let [x, y, z] = spheres.coordinates().each_ref().map(|axis| axis[entries.clone()].as_chunks().0);
         let radii = spheres.radii()[entries].as_chunks::<LANES>().0;
         let mut classified = Classified { intersecting: 0, inside: 0 };
@@ -401,7 +399,7 @@ pub(super) mod tests {
             }
             for first in [0, 64, 100, 192] {
                 let together = frustum.intersects_spheres(&spheres, first);
-                for entry in 0..Frustum::WORD {
+                for entry in 0..BITS_PER_WORD {
                     let BoundingSphere { center, radius } = spheres.get(first + entry);
                     prop_assert_eq!(together >> entry & 1 == 1, frustum.intersects_sphere(center, radius), "{} {}", center, radius);
                 }

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::{FixedPosition, LightClass, RenderView};
-use crate::scene::{Projection, ViewKind};
+use crate::scene::Projection;
 
 /// The GPU layout of a view: `View` in `drawloom.wgsl`.
 ///
@@ -85,7 +85,7 @@ impl GpuView {
             forward,
             projection: match view.camera.projection {
                 Projection::Perspective { .. } => 0,
-                Projection::Orthographic { .. } => 1 + u32::from(view.kind() == ViewKind::Shadow),
+                Projection::Orthographic { .. } => 1 + u32::from(view.clamps_depth()),
                 Projection::Paraboloid => 3,
             },
             ambient,
@@ -111,14 +111,12 @@ fn origin_and_matrix(view: &RenderView) -> (DVec3, Mat4) {
 /// halves the distances, and the matrix includes the translation to it.
 fn origin(view: &RenderView) -> DVec3 {
     let camera = &view.camera;
-    match camera.projection {
-        Projection::Orthographic { .. } if camera.kind == ViewKind::Shadow => {
-            let along = (f64::from(camera.near) + f64::from(camera.far)) * 0.5;
-            let origin = camera.position + camera.orientation.as_dquat().normalize() * DVec3::NEG_Z * along;
-            if FixedPosition::new(origin).is_some() { origin } else { camera.position }
-        }
-        _ => camera.position,
+    if !camera.clamps_depth() {
+        return camera.position;
     }
+    let along = (f64::from(camera.near) + f64::from(camera.far)) * 0.5;
+    let origin = camera.position + camera.orientation.as_dquat().normalize() * DVec3::NEG_Z * along;
+    if FixedPosition::new(origin).is_some() { origin } else { camera.position }
 }
 
 #[cfg(test)]
@@ -126,7 +124,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::Camera;
+    use crate::scene::{Camera, ViewKind};
 
     /// The clip-space position of a point in the world.
     fn clip(gpu_view: &GpuView, point: DVec3) -> Vec3 {

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::level_errors::LevelErrors;
 use super::{BoundingSphere, RenderView};
 use crate::quality::Quality;
-use crate::scene::{Projection, ViewKind};
+use crate::scene::Projection;
 
 /// Chooses levels of detail in a view by their errors in its picture: see [`Quality::level_of_detail`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,9 +34,6 @@ enum Magnification {
 /// A level becomes coarser only where this share of the error that is allowed is enough.
 const COARSENING_SHARE: f64 = 0.75;
 
-/// How many times as large the error may be in shadow maps.
-const SHADOW_SCALE: f64 = 2.0;
-
 impl LevelSelector {
     pub(crate) fn new(view: &RenderView, quality: &Quality) -> Self {
         let camera = &view.camera;
@@ -50,7 +47,7 @@ impl LevelSelector {
             Projection::Orthographic { .. } => Magnification::Orthographic(focal),
             Projection::Paraboloid => Magnification::Paraboloid(width * 0.5),
         };
-        let of_kind = if view.kind() == ViewKind::Shadow { SHADOW_SCALE } else { 1.0 };
+        let of_kind = view.kind().rules().level_error_scale;
         Self {
             eye: camera.position,
             forward: camera.orientation.as_dquat().normalize() * DVec3::NEG_Z,
@@ -96,7 +93,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::scene::{Camera, ClipPlane, LevelOfDetail};
+    use crate::scene::{Camera, ClipPlane, LevelOfDetail, ViewKind};
 
     prop_compose! {
         fn any_camera()(

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{GpuLight, RenderView};
-use crate::scene::{Light, LightKind, ViewKind};
+use crate::scene::{Light, LightKind};
 
 /// The lights that reach one view, grouped by class: each class is one instanced draw.
 ///
@@ -79,7 +79,7 @@ impl LightTable {
         self.layers.clear();
         self.reaching.clear();
         self.ranges = Default::default();
-        if view.kind() == ViewKind::Shadow {
+        if !view.kind().rules().is_lit {
             return;
         }
         self.shadow_views.clear();
@@ -93,7 +93,7 @@ impl LightTable {
             }
         }
         if has_several {
-            let maps = views.iter().enumerate().filter(|(_, map)| map.kind() == ViewKind::Shadow);
+            let maps = views.iter().enumerate().filter(|(_, map)| map.kind().rules().is_shadow_map);
             self.layers.extend(maps.map(|(index, map)| map.valid_light.map(|light| (light, index))));
         }
         let capacity = capacity.saturating_sub(self.layers.len());
@@ -187,7 +187,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::Camera;
+    use crate::scene::{Camera, ViewKind};
 
     fn point(z: f64) -> Light {
         Light::Point { position: DVec3::Z * z, intensity: Vec3::splat(z.abs() as f32), range: 2.0, casts_shadow: false }

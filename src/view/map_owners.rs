@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::scene::{Camera, ViewKind};
+use crate::scene::Camera;
 
 /// Whose maps of directional lights light what each camera sees. An owner is a main camera, the first one that needs
 /// the same maps.
@@ -20,9 +20,9 @@ impl MapOwners {
     /// `covered` are the spheres that the maps of a main camera cover, `None` if it has no maps: main cameras with the
     /// same spheres share maps.
     pub(super) fn new(cameras: &[Camera], covered: impl Fn(&Camera) -> Option<Vec<(DVec3, f64)>>) -> Self {
-        let mut main_cameras =
-            (0..).zip(cameras).filter(|(_, camera)| camera.kind == ViewKind::Main).map(|(index, _)| index);
-        let (first, second) = (main_cameras.next(), main_cameras.next());
+        let main_cameras = || (0..).zip(cameras).filter(|(_, camera)| camera.kind.rules().owns_shadow_maps);
+        let mut indices = main_cameras().map(|(index, _)| index);
+        let (first, second) = (indices.next(), indices.next());
         if second.is_none() {
             // There is nobody else to share maps with.
             return Self { owners: first.into_iter().collect(), owner_of: vec![first; cameras.len()] };
@@ -31,7 +31,7 @@ impl MapOwners {
         let mut owner_of = vec![None; cameras.len()];
         let mut by_spheres: HashMap<Option<Vec<[u64; 4]>>, usize> = HashMap::new();
         let mut by_name: HashMap<&str, usize> = HashMap::new();
-        for (index, camera) in cameras.iter().enumerate().filter(|(_, camera)| camera.kind == ViewKind::Main) {
+        for (index, camera) in main_cameras() {
             let bits = |(center, radius): (DVec3, f64)| [center.x, center.y, center.z, radius].map(f64::to_bits);
             let spheres = covered(camera).map(|spheres| spheres.into_iter().map(bits).collect());
             let owner = *by_spheres.entry(spheres).or_insert(index);
@@ -72,6 +72,7 @@ impl MapOwners {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ViewKind;
 
     fn camera(name: &str, kind: ViewKind, x: f64) -> Camera {
         Camera { kind, ..Camera::looking_at(name, DVec3::X * x, DVec3::Z) }

@@ -45,10 +45,9 @@ mod used_meshes;
 mod view_registry;
 mod visible_set;
 
-pub(crate) use bin::{VisibleRange, bin_visible, can_scan_bin_order};
+pub(crate) use bin::{VisibleRange, bin_objects, bin_visible, can_scan_bin_order};
 pub(crate) use bounding_boxes::OrientedBox;
 pub(crate) use bounds4::{Bounds4, Overlap};
-pub(crate) use changed_objects::ChangedWord;
 pub(crate) use draw_filter::DrawFilter;
 pub(crate) use draw_states::possible_draw_states;
 pub(crate) use fill::Fill;
@@ -63,10 +62,9 @@ pub use render_view::RenderView;
 pub(crate) use render_view::ViewId;
 pub use scene_issue::{IssueReason, SceneIssue, SceneIssues};
 pub use shadow_maps::ShadowMaps;
-pub(crate) use static_group_objects::{ObjectWord, bin_objects, recordable_objects};
+pub(crate) use static_group_objects::recordable_objects;
 pub(crate) use table_limits::TableLimits;
 pub(crate) use view_registry::ViewRegistry;
-pub(crate) use visible_set::set_bits;
 
 /// Tables and culling of a frame: for the tests and benchmarks of this repository. No part of the interface.
 #[doc(hidden)]

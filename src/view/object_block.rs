@@ -7,7 +7,8 @@ use super::bounds4::{Bounds4, Overlap};
 use super::frustum::Classified;
 use super::object_description::{ObjectDescription, ObjectDraw, PacketDescription};
 use super::packet_columns::{LANES, PacketColumns};
-use super::{BoundingBoxes, Frustum, GpuObject, IssueReason, OrientedBox, set_bits};
+use super::{BoundingBoxes, Frustum, GpuObject, IssueReason, OrientedBox};
+use crate::bit_set::{BITS_PER_WORD, set_bits};
 use crate::quality::CullingVolume;
 use crate::scene::Blend;
 
@@ -45,7 +46,7 @@ impl ObjectBlock {
     pub(super) const PACKET: usize = LANES;
 
     /// The number of words in a block.
-    pub(super) const WORDS: usize = Self::SIZE / Frustum::WORD;
+    pub(crate) const WORDS: usize = Self::SIZE / BITS_PER_WORD;
 
     /// Replaces eight objects, from `object` of the scene on, by their descriptions. Returns a mask of those whose
     /// mesh, material or state changed, and with them perhaps their bin.
@@ -66,7 +67,7 @@ impl ObjectBlock {
             gpu_objects[lane] = packet.gpu_object(columns, lane, object + lane);
             draws_changed |= u8::from(draws[lane] != packet.draws[lane]) << lane;
         }
-        let (word, shift) = (entry / Frustum::WORD, entry % Frustum::WORD);
+        let (word, shift) = (entry / BITS_PER_WORD, entry % BITS_PER_WORD);
         self.drawable[word] |= u64::from(u8::MAX) << shift;
         if self.rejected_count > 0 {
             (0..LANES).for_each(|lane| self.set_rejected(entry + lane, None));
@@ -94,7 +95,7 @@ impl ObjectBlock {
         lane: usize,
     ) -> bool {
         let entry = object % Self::SIZE;
-        let (word, bit) = (entry / Frustum::WORD, 1 << (entry % Frustum::WORD));
+        let (word, bit) = (entry / BITS_PER_WORD, 1 << (entry % BITS_PER_WORD));
         let Some(ObjectDescription { gpu_object, bounds, draw }) = packet.object(columns, lane, object) else {
             self.spheres.set(entry, BoundingSphere::EMPTY);
             self.drawable[word] &= !bit;
@@ -115,7 +116,7 @@ impl ObjectBlock {
 
     fn set_draw(&mut self, entry: usize, draw: ObjectDraw) {
         self.draws[entry] = draw;
-        let (word, bit) = (entry / Frustum::WORD, entry % Frustum::WORD);
+        let (word, bit) = (entry / BITS_PER_WORD, entry % BITS_PER_WORD);
         self.opaque[word] = self.opaque[word] & !(1 << bit) | u64::from(draw.state.blend() == Blend::None) << bit;
     }
 
@@ -141,7 +142,7 @@ impl ObjectBlock {
     /// Removes an object: no view sees it.
     pub(super) fn remove(&mut self, entry: usize) {
         self.spheres.set(entry, BoundingSphere::EMPTY);
-        self.drawable[entry / Frustum::WORD] &= !(1 << (entry % Frustum::WORD));
+        self.drawable[entry / BITS_PER_WORD] &= !(1 << (entry % BITS_PER_WORD));
         self.set_rejected(entry, None);
     }
 
@@ -164,7 +165,7 @@ impl ObjectBlock {
         self.bins = [0; Self::SIZE];
     }
 
-    /// Tests the words from `words.start` on, each of [`Frustum::WORD`] objects, against a frustum: see
+    /// Tests the words from `words.start` on, each of 64 objects, against a frustum: see
     /// [`ObjectBlock::visible`]. Calls `put` with each and a mask of the objects that a view may see. Words that lie
     /// outside or inside as a whole have the same masks as if their objects were tested.
     ///
@@ -185,7 +186,7 @@ impl ObjectBlock {
             let mask = match overlaps[word] {
                 Overlap::Outside => 0,
                 Overlap::Inside => self.drawable[word],
-                Overlap::Partial => self.visible(frustum, volume, word * Frustum::WORD..(word + 1) * Frustum::WORD),
+                Overlap::Partial => self.visible(frustum, volume, word * BITS_PER_WORD..(word + 1) * BITS_PER_WORD),
             };
             put(word, mask);
         }
@@ -199,14 +200,14 @@ impl ObjectBlock {
     /// Tests objects of a word against a frustum: see [`ObjectBlock::visible`]. The mask that it returns is among
     /// `tested`; bit 0 of both is the word's first object.
     pub(crate) fn visible_among(&self, frustum: &Frustum, volume: CullingVolume, word: usize, tested: u64) -> u64 {
-        let first = word * Frustum::WORD;
+        let first = word * BITS_PER_WORD;
         if tested.count_ones() as usize >= WORD_TEST_THRESHOLD {
-            return self.visible(frustum, volume, first..first + Frustum::WORD) & tested;
+            return self.visible(frustum, volume, first..first + BITS_PER_WORD) & tested;
         }
         set_bits(tested).fold(0, |mask, bit| mask | self.visible(frustum, volume, first + bit..first + bit + 1) << bit)
     }
 
-    /// Tests the objects `entries`, all in one word of [`Frustum::WORD`] objects, against a frustum. Returns a mask of
+    /// Tests the objects `entries`, all in one word of 64 objects, against a frustum. Returns a mask of
     /// the objects that a view may see; bit 0 is `entries.start`. The mask contains every visible object and no
     /// rejected one; it may contain a few invisible ones.
     ///
@@ -216,11 +217,11 @@ impl ObjectBlock {
     /// # Panics
     /// If `entries` is empty or not within the block.
     pub fn visible(&self, frustum: &Frustum, volume: CullingVolume, entries: Range<usize>) -> u64 {
-        let offset = entries.start % Frustum::WORD;
+        let offset = entries.start % BITS_PER_WORD;
         let first = entries.start - offset;
-        let tested = (u64::MAX >> (Frustum::WORD - entries.len())) << offset;
+        let tested = (u64::MAX >> (BITS_PER_WORD - entries.len())) << offset;
         if volume == CullingVolume::None {
-            return (self.drawable[first / Frustum::WORD] & tested) >> offset;
+            return (self.drawable[first / BITS_PER_WORD] & tested) >> offset;
         }
         if entries.len() < WORD_TEST_THRESHOLD {
             let intersects = |entry: usize| {

@@ -6,7 +6,8 @@ use parking_lot::RwLock;
 
 use super::level_errors::MeshLevels;
 use super::level_selector::LevelSelector;
-use super::{ObjectTable, VisibleSet, set_bits};
+use super::{ObjectBlock, ObjectTable};
+use crate::bit_set::BitWord;
 use crate::command::Version;
 use crate::scene::SceneRef;
 
@@ -37,16 +38,14 @@ impl ObjectLevels {
         &self,
         selector: &LevelSelector,
         (scene, table, meshes): (&SceneRef<'_>, &ObjectTable, &MeshLevels),
-        word: usize,
-        visible: u64,
+        visible: BitWord,
     ) {
-        if visible == 0 {
+        if visible.mask == 0 {
             return;
         }
-        let first = word * VisibleSet::OBJECTS_PER_WORD;
-        let block = table.block(first / ObjectTable::BLOCK_SIZE);
-        for object in set_bits(visible).map(|bit| first + bit) {
-            let entry = object % ObjectTable::BLOCK_SIZE;
+        let block = table.block(visible.index() / ObjectBlock::WORDS);
+        for object in visible.indices() {
+            let entry = object % ObjectBlock::SIZE;
             // Relaxed, here and below: jobs that read the levels depend on this job.
             let before = self.levels[object].load(Ordering::Relaxed);
             let level = meshes.get(block.draws[entry].mesh).map_or(0, |errors| {

@@ -6,7 +6,7 @@ use drawloom_jobs::internal::{ChunkedArray, block_ranges};
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
 use super::block_bounds::BlockBounds;
-use super::changed_objects::{ChangedObjects, ChangedWord};
+use super::changed_objects::ChangedObjects;
 use super::describe_block::{DescriptionInputs, Findings, describe_block};
 use super::draw_states::DrawStates;
 use super::object_block::ObjectBlock;
@@ -14,6 +14,7 @@ use super::object_description::{PacketDescription, rejection_reason};
 use super::packet_columns::GatheredColumns;
 use super::used_meshes::UsedMeshes;
 use super::{BoundingBoxes, GpuObject, IssueReason, SceneIssues, TableLimits};
+use crate::bit_set::BitWord;
 use crate::command::{BinnedSegment, Bins};
 use crate::leaked_guards::unlock;
 use crate::quality::CullingVolume;
@@ -184,7 +185,7 @@ impl ObjectTable {
         self.changed.block_count()
     }
 
-    /// The number of words of [`Frustum::WORD`](super::Frustum::WORD) objects in which an object has to be described.
+    /// The number of words in which an object has to be described.
     pub(crate) fn changed_word_count(&self) -> usize {
         self.changed.word_count()
     }
@@ -193,7 +194,7 @@ impl ObjectTable {
     ///
     /// # Panics
     /// If `index` is not below [`ObjectTable::changed_word_count`].
-    pub(crate) fn changed_word(&self, index: usize) -> ChangedWord {
+    pub(crate) fn changed_word(&self, index: usize) -> BitWord {
         self.changed.word(index)
     }
 

@@ -71,7 +71,7 @@ impl RenderView {
     /// Whether what is in front of the near plane is drawn as if it were on it: in the map of a directional light,
     /// where it casts a shadow.
     pub fn clamps_depth(&self) -> bool {
-        matches!(self.camera.projection, Projection::Orthographic { .. }) && self.kind() == ViewKind::Shadow
+        self.camera.clamps_depth()
     }
 
     /// Which of the objects that a process draws it draws in this view.

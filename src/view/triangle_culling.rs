@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3, DVec4, Vec3};
 
 use super::RenderView;
 use crate::raster::{CullVertex, CulledTriangles, Vector, Winding, cull_triangles};
-use crate::scene::{Projection, SceneRef, Vertex, ViewKind};
+use crate::scene::{Projection, SceneRef, Vertex};
 
 impl RenderView {
     /// Culls the triangles of an object, and appends the indices of those that may cover a pixel to `remaining`. Frames
@@ -38,7 +38,7 @@ impl RenderView {
     pub fn can_cull_triangles(&self) -> bool {
         match self.camera.projection {
             Projection::Perspective { .. } => true,
-            Projection::Orthographic { .. } => self.kind() != ViewKind::Shadow,
+            Projection::Orthographic { .. } => !self.clamps_depth(),
             Projection::Paraboloid => false,
         }
     }

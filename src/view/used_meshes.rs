@@ -1,8 +1,8 @@
 //! The meshes that objects have, among those of the assets.
 
-use super::changed_objects::{ChangedObjects, ChangedWord};
+use super::changed_objects::ChangedObjects;
 use super::draw_states::DrawStates;
-use super::set_bits;
+use crate::bit_set::BITS_PER_WORD;
 use crate::handle::Handle;
 use crate::scene::{Assets, Mesh, SceneRef};
 
@@ -55,15 +55,15 @@ impl UsedMeshes {
     pub(super) fn update(&mut self, scene: &SceneRef<'_>, changed: &ChangedObjects, draw_states: &DrawStates) {
         self.update_assets(scene.assets, draw_states);
         let unused_before = self.unused;
-        for ChangedWord { word, mask } in (0..changed.word_count()).map(|index| changed.word(index)) {
+        for word in (0..changed.word_count()).map(|index| changed.word(index)) {
             if self.unused == 0 {
                 break;
             }
-            let first = word * u64::BITS as usize;
-            if mask == u64::MAX {
-                scene.meshes[first..][..u64::BITS as usize].iter().for_each(|mesh| self.add(*mesh));
+            if word.mask == u64::MAX {
+                let meshes = &scene.meshes[word.index() * BITS_PER_WORD..][..BITS_PER_WORD];
+                meshes.iter().for_each(|mesh| self.add(*mesh));
             } else {
-                set_bits(mask).for_each(|bit| self.add(scene.meshes[first + bit]));
+                word.indices().for_each(|object| self.add(scene.meshes[object]));
             }
         }
         self.revision += u64::from(self.unused < unused_before);

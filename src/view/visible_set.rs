@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use drawloom_jobs::internal::block_ranges;
 use parking_lot::RwLock;
 
+use crate::bit_set::{BITS_PER_WORD, set_bits};
 use crate::command::Version;
 
 /// The objects that a view sees: a bit for each object, in words of 64, and a prefix sum over the words that are not
@@ -34,7 +35,7 @@ struct Compacted {
     version: Version,
 }
 
-/// Visible objects among 64: bit `b` is object `word × 64 + b`.
+/// Visible objects among 64, as a [`BitWord`](crate::bit_set::BitWord), which with a rank beside it would be larger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct VisibleWord {
     word: u32,
@@ -52,7 +53,7 @@ impl Compacted {
 
 impl VisibleSet {
     /// The number of objects in a word.
-    pub const OBJECTS_PER_WORD: usize = u64::BITS as usize;
+    pub const OBJECTS_PER_WORD: usize = BITS_PER_WORD;
 
     /// Empties the set, and resizes it for `objects` objects.
     pub fn reset(&mut self, objects: usize) {
@@ -208,15 +209,6 @@ impl VisibleSet {
             }
         }
     }
-}
-
-/// The indices of the set bits, from the lowest.
-pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let index = (bits != 0).then(|| bits.trailing_zeros() as usize);
-        bits &= bits.wrapping_sub(1);
-        index
-    })
 }
 
 #[cfg(test)]

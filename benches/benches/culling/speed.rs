@@ -7,7 +7,7 @@ use std::time::Instant;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::quality::CullingVolume;
 use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, SceneError};
-use drawloom::view::internal::{BoundingSphere, Frustum, ObjectTable};
+use drawloom::view::internal::{BoundingSphere, Frustum, ObjectTable, VisibleSet};
 use drawloom_benches::harness::{Harness, Rounds};
 use drawloom_benches::statistics::median;
 use drawloom_testing::culling::lanes::SphereArrays;
@@ -45,7 +45,7 @@ impl Speed {
     }
 }
 
-/// Writes a mask of the visible objects for each word of [`Frustum::WORD`].
+/// Writes a mask of the visible objects for each word of [`VisibleSet::OBJECTS_PER_WORD`].
 type Test<'a> = Box<dyn Fn(&mut [u64]) + 'a>;
 
 /// Runs all tests on all objects of two scenes, interleaved.
@@ -54,7 +54,7 @@ type Test<'a> = Box<dyn Fn(&mut [u64]) + 'a>;
 /// Returns an error if a scene rejects a mesh, a material or an object.
 pub fn measure(objects: usize, rounds: usize, progress: &ProgressBar) -> Result<Vec<Speed>, SceneError> {
     let mut speeds = Vec::new();
-    let mut words = vec![0; objects.div_ceil(Frustum::WORD)];
+    let mut words = vec![0; objects.div_ceil(VisibleSet::OBJECTS_PER_WORD)];
     // In a cloud of 2 km few objects of some metres intersect a plane, and most of the large ones do.
     for (name, size) in [("small objects", 3.0), ("large objects", 400.0)] {
         let scene = cloud(objects, size)?;
@@ -116,7 +116,7 @@ fn tests<'a>(tables: &'a [ObjectTable; 3], camera: &Camera) -> Vec<(&'static str
 
 /// Culls like a frame: one block of objects at a time, with one lock.
 fn by_blocks(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume, words: &mut [u64]) {
-    let in_block = ObjectTable::BLOCK_SIZE / Frustum::WORD;
+    let in_block = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
     for (index, words) in words.chunks_mut(in_block).enumerate() {
         table.block(index).visible_words(frustum, volume, 0..words.len(), |word, bits| words[word] = bits);
     }
@@ -124,12 +124,12 @@ fn by_blocks(table: &ObjectTable, frustum: &Frustum, volume: CullingVolume, word
 
 /// One call of the crate's test for each sphere.
 fn one_by_one(table: &ObjectTable, frustum: &Frustum, words: &mut [u64]) {
-    let in_block = ObjectTable::BLOCK_SIZE / Frustum::WORD;
+    let in_block = ObjectTable::BLOCK_SIZE / VisibleSet::OBJECTS_PER_WORD;
     for (index, words) in words.chunks_mut(in_block).enumerate() {
         let block = table.block(index);
         for (word, bits) in words.iter_mut().enumerate() {
-            *bits = mask(Frustum::WORD, |bit| {
-                let BoundingSphere { center, radius } = block.spheres.get(word * Frustum::WORD + bit);
+            *bits = mask(VisibleSet::OBJECTS_PER_WORD, |bit| {
+                let BoundingSphere { center, radius } = block.spheres.get(word * VisibleSet::OBJECTS_PER_WORD + bit);
                 frustum.intersects_sphere(center, radius)
             });
         }
@@ -138,7 +138,7 @@ fn one_by_one(table: &ObjectTable, frustum: &Frustum, words: &mut [u64]) {
 
 /// The usual loop.
 fn naive_one_by_one(spheres: &[(Vec3, f32)], naive: &Naive, words: &mut [u64]) {
-    for (bits, spheres) in words.iter_mut().zip(spheres.chunks(Frustum::WORD)) {
+    for (bits, spheres) in words.iter_mut().zip(spheres.chunks(VisibleSet::OBJECTS_PER_WORD)) {
         *bits = mask(spheres.len(), |bit| naive.sees(spheres[bit].0, spheres[bit].1));
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::command::{Blending, Selection};
 use crate::process::{Access, Draws, FramePlan, Pass};
-use crate::scene::ViewKind;
 use crate::view::RenderView;
 
 /// The objects that may occlude others in a view, as the selections of the passes that draw them. Those of them with a
@@ -20,7 +19,7 @@ pub(super) fn occluders(
     passes: &[Pass],
     (index, view): (usize, &RenderView),
 ) -> Option<Vec<Selection>> {
-    if view.kind() == ViewKind::Shadow {
+    if !view.kind().rules().culls_hidden {
         return None;
     }
     // Passes are in draw order.

@@ -12,14 +12,21 @@ pub struct Requirements {
     lights: u8,
     /// Whether an object needs transparency.
     transparency: bool,
-    /// Whether a camera draws a reflection.
-    reflections: bool,
+    /// A bit for each kind of view that the scene has and might do without.
+    optional_views: u8,
     /// Whether shadow maps are drawn even if no light casts shadows.
     shadow_maps: bool,
 }
 
 const _: () = assert!(LightClass::COUNT <= 8);
 const _: () = assert!(LightClass::COUNT == 8, "light_ends in drawloom.wgsl and light_sum.wgsl have two vectors");
+
+const _: () = assert!(ViewKind::COUNT <= 8);
+
+/// The bit of a kind of view that a scene may do without; 0 for other kinds.
+fn optional_bit(kind: ViewKind) -> u8 {
+    u8::from(kind.rules().is_optional) << kind as u8
+}
 
 impl Requirements {
     /// What a scene with these valid lights requires, some of whose objects [need
@@ -48,7 +55,8 @@ impl Requirements {
 
     /// All that a scene can require.
     pub fn all() -> Self {
-        let mut requirements = Self { lights: 0, transparency: true, reflections: true, shadow_maps: true };
+        let optional_views = ViewKind::ALL.into_iter().fold(0, |bits, kind| bits | optional_bit(kind));
+        let mut requirements = Self { lights: 0, transparency: true, optional_views, shadow_maps: true };
         LightClass::all().for_each(|class| requirements.lights |= 1 << class.index());
         requirements
     }
@@ -68,7 +76,7 @@ impl Requirements {
 
     /// The same for a scene with these cameras.
     pub fn with_cameras(self, cameras: &[Camera]) -> Self {
-        Self { reflections: cameras.iter().any(|camera| camera.kind == ViewKind::Reflection), ..self }
+        Self { optional_views: cameras.iter().fold(0, |bits, camera| bits | optional_bit(camera.kind)), ..self }
     }
 
     /// The requirements of a scene that needs exactly those optional processes whose names satisfy `is_kept`.
@@ -88,14 +96,19 @@ impl Requirements {
         Self {
             lights,
             transparency: self.transparency || other.transparency,
-            reflections: self.reflections || other.reflections,
+            optional_views: self.optional_views | other.optional_views,
             shadow_maps,
         }
     }
 
     /// Whether the scene has views of kind [`ViewKind::Reflection`].
     pub fn reflections(&self) -> bool {
-        self.reflections
+        self.has_views(ViewKind::Reflection)
+    }
+
+    /// Whether a frame has processes for views of this kind: kinds that are not optional have them in each frame.
+    pub(crate) fn has_views(&self, kind: ViewKind) -> bool {
+        self.optional_views & optional_bit(kind) == optional_bit(kind)
     }
 
     /// Whether the scene has lights of this class.

@@ -54,7 +54,8 @@ impl FramePlan {
     ///
     /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot
     /// may be empty because the frame needs no such process; other processes may still be ordered before or after it.
-    /// The chain does not order its processes against writers of the same target that are outside of it.
+    /// The chain does not order its processes against writers of the same target that are outside of it. They draw in
+    /// reflections what they draw in main views.
     ///
     /// # Errors
     /// See [`PlanError`].
@@ -63,11 +64,10 @@ impl FramePlan {
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: &[String],
     ) -> Result<Self, PlanError> {
-        Self::for_views(chain, processes, outputs, (&[], &|_| true))
+        Self::for_views(chain, processes, outputs, |_| true)
     }
 
-    /// The plan of frames that have the kinds of views that `is_present` tells. The processes of the chain that draw in
-    /// main views draw in those of `with_main` too.
+    /// The plan of frames that have the kinds of views that `is_present` tells.
     ///
     /// # Errors
     /// See [`PlanError`].
@@ -75,19 +75,19 @@ impl FramePlan {
         chain: Vec<ChainSlot>,
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: &[String],
-        (with_main, is_present): (&[ViewKind], &dyn Fn(ViewKind) -> bool),
+        is_present: impl Fn(ViewKind) -> bool,
     ) -> Result<Self, PlanError> {
         let slot_names: Vec<_> = chain.iter().map(|slot| slot.name.clone()).collect();
         let mut added: Vec<(Option<usize>, PlannedProcess)> = Vec::new();
         for (index, slot) in chain.into_iter().enumerate() {
             let Some(process) = slot.process else { continue };
-            let mut of_kinds = PlannedProcess::of_each_kind(&process, with_main, is_present)?;
+            let mut of_kinds = PlannedProcess::of_each_kind(&process, true, &is_present)?;
             let own = of_kinds.iter_mut().filter(|planned| planned.is_of_own_kind);
             own.for_each(|planned| planned.declaration.keep |= slot.keep);
             added.extend(of_kinds.into_iter().map(|planned| (Some(index), planned)));
         }
         for process in &processes {
-            let of_kinds = PlannedProcess::of_each_kind(process, &[], is_present)?;
+            let of_kinds = PlannedProcess::of_each_kind(process, false, &is_present)?;
             added.extend(of_kinds.into_iter().map(|planned| (None, planned)));
         }
         added.sort_by_key(|(_, planned)| planned.declaration.views);
@@ -276,7 +276,7 @@ static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
 fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, PlannedProcess)]) -> Option<PlannedTarget> {
     let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
     let is_drawn = added.iter().any(|(_, other)| {
-        other.declaration.views == ViewKind::Shadow
+        other.declaration.views.rules().is_shadow_map
             && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
     });
     let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
@@ -296,8 +296,8 @@ fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, Planne
 
 fn reads_shadow_map(planned: &PlannedProcess) -> bool {
     planned.declaration.accesses.iter().any(|(target, access)| {
-        target == ShadowCasters::TARGET
-            && matches!(access, Access::SampleLayers(ViewKind::Shadow) | Access::SampleView(ViewKind::Shadow, _))
+        let (Access::SampleLayers(views) | Access::SampleView(views, _)) = access else { return false };
+        target == ShadowCasters::TARGET && views.rules().is_shadow_map
     })
 }
 

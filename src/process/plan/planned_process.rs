@@ -38,14 +38,14 @@ pub(crate) struct ProcessId {
 
 impl PlannedProcess {
     /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if
-    /// `is_present` says that frames have such views; if it draws in main views, for those of `with_main` too. What
-    /// draws once a frame does so in the kind that it declares.
+    /// `is_present` says that frames have such views; if it `is_chained`, also for the kinds that share the chain of the
+    /// kind that it declares. What draws once a frame does so in the kind that it declares.
     ///
     /// # Errors
     /// If one of them panics, or `declare` declares more than one depth target.
     pub(super) fn of_each_kind(
         process: &Arc<dyn RenderProcess>,
-        with_main: &[ViewKind],
+        is_chained: bool,
         is_present: impl Fn(ViewKind) -> bool,
     ) -> Result<Vec<Self>, PlanError> {
         let name =
@@ -58,14 +58,15 @@ impl PlannedProcess {
             return Err(PlanError::MultipleDepthTargets { process: name });
         }
         let Declaration { views, also_views, .. } = &declaration;
-        let with_main = if *views == ViewKind::Main { with_main } else { &[] };
-        let further = also_views.iter().chain(with_main).copied().filter(|_| !declaration.once_a_frame);
+        let shares_chain = |kind: &ViewKind| is_chained && kind.rules().shares_chain_of == Some(*views);
+        let further = also_views.iter().copied().chain(ViewKind::ALL.into_iter().filter(shares_chain));
+        let further = further.filter(|_| !declaration.once_a_frame);
         let mut kinds: Vec<_> = iter::once(*views).chain(further).filter(|kind| is_present(*kind)).collect();
         kinds.sort_unstable();
         kinds.dedup();
         let own_kind = *views;
         let of_kind = |views| {
-            // The engine has not said that the process has side effects in the views of `with_main`.
+            // The engine has not said that the process has side effects in the kinds that share the chain.
             let keep = declaration.keep && (views == own_kind || also_views.contains(&views));
             let declaration = Declaration { views, keep, ..declaration.clone() };
             Self {

@@ -108,10 +108,10 @@ fn process_graph(
 /// keep it, so that the graph reports it.
 pub(super) fn node_name(added: &[(Option<usize>, PlannedProcess)], planned: &PlannedProcess) -> String {
     let views = planned.declaration.views;
-    let count = |kind: ViewKind| {
-        added.iter().filter(|(_, other)| other.name == planned.name && other.declaration.views == kind).count()
-    };
-    if views == ViewKind::Main || count(views) > 1 || count(ViewKind::Main) == 0 {
+    let named =
+        || added.iter().filter(|(_, other)| other.name == planned.name).map(|(_, other)| other.declaration.views);
+    let has_plain_names = |kind: ViewKind| kind.rules().has_plain_names;
+    if has_plain_names(views) || named().filter(|kind| *kind == views).count() > 1 || !named().any(has_plain_names) {
         return planned.name.clone();
     }
     format!("{} in {} views", planned.name, views.name())

@@ -41,8 +41,6 @@ pub(super) fn views_of_output<'a>(processes: impl Iterator<Item = &'a PlannedPro
 
 /// A target's name in the graph. Views of different kinds have different targets, even if their names are the same.
 pub(super) fn resource_name(kind: ViewKind, target: &str) -> String {
-    match kind {
-        ViewKind::Main => target.to_owned(),
-        other => format!("{}: {target}", other.name()),
-    }
+    let rules = kind.rules();
+    if rules.has_plain_names { target.to_owned() } else { format!("{}: {target}", rules.name) }
 }

@@ -5,10 +5,11 @@ use parking_lot::RwLock;
 
 use super::OccluderMeshes;
 use super::occlusion_camera::{CameraFromObject, OcclusionCamera};
+use crate::bit_set::set_bits;
 use crate::command::Cull;
 use crate::raster::{CoarseDepth, ConvexPart, Plane, Silhouettes};
 use crate::scene::SceneRef;
-use crate::view::{ObjectBlock, ObjectDraw, ObjectTable, RenderView, VisibleSet, set_bits};
+use crate::view::{ObjectBlock, ObjectDraw, ObjectTable, RenderView, VisibleSet};
 
 /// Finds the objects that a view's larger objects hide, in three steps: [`OcclusionCuller::select_occluders`] selects
 /// those with the largest projections and projects their convex parts, [`OcclusionCuller::draw_occluders`] draws them

@@ -8,7 +8,7 @@ use drawloom::glam::{DMat3, DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::quality::CullingVolume;
 use drawloom::scene::{Bounds, Material, Mesh, Scene, SceneError, SceneRef, Topology, Vertex};
-use drawloom::view::internal::{FixedPosition, Frustum, ObjectTable};
+use drawloom::view::internal::{FixedPosition, Frustum, ObjectTable, VisibleSet};
 
 use super::cameras::{any_camera, magnitude};
 use super::oracle::{Classification, Oracle};
@@ -131,9 +131,9 @@ pub fn try_batches(shapes: &Shapes, batches: Range<usize>) -> BoxTallies {
             table.update(&objects.as_scene_ref(shapes));
             tallies.rejected += table.scene_issues().list().iter().map(|issue| issue.count as u64).sum::<u64>();
             let block = table.block(0);
-            for first in (0..ObjectTable::BLOCK_SIZE).step_by(Frustum::WORD) {
-                let visible = block.visible(&frustum, VOLUMES[volume], first..first + Frustum::WORD);
-                for (bit, case) in cases[first..][..Frustum::WORD].iter().enumerate() {
+            for first in (0..ObjectTable::BLOCK_SIZE).step_by(VisibleSet::OBJECTS_PER_WORD) {
+                let visible = block.visible(&frustum, VOLUMES[volume], first..first + VisibleSet::OBJECTS_PER_WORD);
+                for (bit, case) in cases[first..][..VisibleSet::OBJECTS_PER_WORD].iter().enumerate() {
                     // It must be visible if the object is inside, and may be culled if its volume is outside.
                     let classification = match (case.object, case.volumes[volume]) {
                         (Classification::Inside, _) => Classification::Inside,

@@ -3,7 +3,7 @@
 use std::array;
 use std::ops::Range;
 
-use drawloom::view::internal::{BoundingSphere, BoundingSpheres, Frustum};
+use drawloom::view::internal::{BoundingSphere, BoundingSpheres, Frustum, VisibleSet};
 
 use super::cameras::{any_camera, magnitude};
 use super::lanes::SphereArrays;
@@ -44,9 +44,11 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
             *case = (is_tangent, oracle.classify(oracle.relative(bounds.center), [radius; 6], radius));
             spheres.set(entry, bounds);
         }
-        for first in (0..BoundingSpheres::COUNT).step_by(Frustum::WORD) {
+        for first in (0..BoundingSpheres::COUNT).step_by(VisibleSet::OBJECTS_PER_WORD) {
             let visible = frustum.intersects_spheres(&spheres, first);
-            for (bit, &(is_tangent, classification)) in cases[first..][..Frustum::WORD].iter().enumerate() {
+            for (bit, &(is_tangent, classification)) in
+                cases[first..][..VisibleSet::OBJECTS_PER_WORD].iter().enumerate()
+            {
                 tallies.drawloom.of(is_tangent).count(classification, visible >> bit & 1 == 1);
             }
         }
@@ -55,11 +57,12 @@ pub fn try_batches(batches: Range<usize>) -> SphereTallies {
                 let BoundingSphere { center, radius } = spheres.get(entry);
                 (center.as_vec3(), radius)
             });
-            let mut words = [0; BoundingSpheres::COUNT / Frustum::WORD];
+            let mut words = [0; BoundingSpheres::COUNT / VisibleSet::OBJECTS_PER_WORD];
             SphereArrays::new(&in_world).visible(&naive, &mut words, f32::mul_add);
             for (entry, (&(is_tangent, classification), (center, radius))) in cases.iter().zip(in_world).enumerate() {
                 tallies.naive.of(is_tangent).count(classification, naive.sees(center, radius));
-                let is_visible = words[entry / Frustum::WORD] >> (entry % Frustum::WORD) & 1 == 1;
+                let is_visible =
+                    words[entry / VisibleSet::OBJECTS_PER_WORD] >> (entry % VisibleSet::OBJECTS_PER_WORD) & 1 == 1;
                 tallies.lanes.of(is_tangent).count(classification, is_visible);
             }
         }

@@ -5,7 +5,6 @@ use super::pipeline_key::{PipelineKey, VertexSource};
 use crate::backend::wgpu::resources::binding_type;
 use crate::process::{Access, Declaration, DeclaredAttribute, Draws, FramePlan, PlannedProcess};
 use crate::quality::Quality;
-use crate::scene::ViewKind;
 
 /// What all pipelines of a process are made from: what it declares, and what it draws in frames of one quality.
 /// Pipelines of equal inputs are equal on one device.
@@ -20,8 +19,8 @@ pub(super) struct PipelineInputs {
     pub(super) array_count: usize,
     /// What it says about its resources.
     pub(super) resources: Vec<wgpu::BindingType>,
-    /// Whether it draws in shadow maps.
-    draws_maps: bool,
+    /// Whether it draws in views of a kind that may clamp depth.
+    may_clamp: bool,
     features: wgpu::Features,
 }
 
@@ -40,7 +39,7 @@ impl PipelineInputs {
             attributes: planned.declaration.attributes.clone(),
             array_count: array_count(&planned.declaration),
             resources: draws.resources().iter().map(|resource| binding_type(features, resource)).collect(),
-            draws_maps: draws_maps(&planned.declaration),
+            may_clamp: may_clamp(&planned.declaration),
             features,
         }
     }
@@ -53,7 +52,7 @@ impl PipelineInputs {
         // clamps, so they clamp as well, and their declarations say what passes beyond the far plane.
         let tests_depth =
             self.attachments.depth.is_some_and(|depth| depth.format.has_depth() && depth.access != Access::TestStencil);
-        let can_clamp = has_geometry && self.draws_maps && tests_depth;
+        let can_clamp = has_geometry && self.may_clamp && tests_depth;
         can_clamp && (self.clamps_pixels() || self.key.clamped_fragments[0].is_some())
     }
 
@@ -70,7 +69,7 @@ impl PipelineInputs {
     /// Whether they still fit what a process of this plan declares.
     pub(super) fn fit_declaration(&self, plan: &FramePlan, planned: &PlannedProcess) -> bool {
         self.name == planned.name.as_str()
-            && self.draws_maps == draws_maps(&planned.declaration)
+            && self.may_clamp == may_clamp(&planned.declaration)
             && self.array_count == array_count(&planned.declaration)
             && self.attributes == planned.declaration.attributes
             && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
@@ -101,8 +100,8 @@ impl PipelineInputs {
     }
 }
 
-fn draws_maps(declaration: &Declaration) -> bool {
-    declaration.views == ViewKind::Shadow
+fn may_clamp(declaration: &Declaration) -> bool {
+    declaration.views.rules().clamps_depth
 }
 
 fn array_count(declaration: &Declaration) -> usize {
