@@ -1,5 +1,6 @@
 //! What frames request of a backend.
 
+use std::array;
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -99,8 +100,10 @@ impl ViewRequest<'_> {
     /// If the camera is out of reach.
     pub fn gpu_view(&self) -> Result<GpuView, BackendError> {
         let gpu_view = GpuView::new(self.view, self.ambient, self.light_table.light_count());
+        let ends = self.light_table.class_ends();
+        let light_ends = array::from_fn(|class| ends.get(class).copied().unwrap_or(u32::MAX));
         gpu_view
-            .map(|gpu_view| GpuView { light_ends: self.light_table.class_ends(), ..gpu_view })
+            .map(|gpu_view| GpuView { light_ends, ..gpu_view })
             .ok_or_else(|| BackendError::ViewOutOfReach { view: self.view.name().to_owned() })
     }
 }

@@ -39,14 +39,7 @@ const MAX_RANGE_GROWTH: f32 = 1.125;
 
 /// A cached light with its current brightness.
 pub(super) fn with_brightness_of(mut cached: Light, light: &Light) -> Light {
-    let (Light::Directional { illuminance: before, .. }
-    | Light::Point { intensity: before, .. }
-    | Light::Spot { intensity: before, .. }
-    | Light::Hemispherical { intensity: before, .. }) = &mut cached;
-    let (Light::Directional { illuminance: now, .. }
-    | Light::Point { intensity: now, .. }
-    | Light::Spot { intensity: now, .. }
-    | Light::Hemispherical { intensity: now, .. }) = light;
-    *before = *now;
+    let mut light = *light;
+    *cached.fields().color = *light.fields().color;
     cached
 }

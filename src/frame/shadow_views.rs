@@ -94,7 +94,7 @@ fn maps_that_fit(
     settings: MapSettings<'_>,
     scene_issues: &SceneIssues,
 ) -> Vec<LightMaps> {
-    let is_directional = |light: &Light| matches!(light, Light::Directional { .. });
+    let is_bounded = |light: &Light| light.kind().rules().is_bounded();
     let lights = valid.lights.iter().zip(&valid.scene_indices).enumerate();
     let casting: Vec<_> = lights.filter(|(_, (light, _))| light.casts_shadow()).collect();
     let ranks: Vec<_> = casting.iter().map(|(_, (light, _))| rank_of_first_reached(light, views, owners)).collect();
@@ -104,7 +104,7 @@ fn maps_that_fit(
     for rank in 0..owners.owners().len().max(1) {
         let owner = owners.owners().get(rank).copied();
         for (&(index, (light, &scene_index)), light_rank) in casting.iter().zip(&ranks) {
-            let needs_maps = if is_directional(light) { owner.is_some() } else { *light_rank == Some(rank) };
+            let needs_maps = if is_bounded(light) { *light_rank == Some(rank) } else { owner.is_some() };
             if !needs_maps {
                 continue;
             }
@@ -113,7 +113,7 @@ fn maps_that_fit(
                 continue;
             }
             let name = format!("shadow of light {scene_index}");
-            let (main_view, cameras) = match owner.filter(|_| is_directional(light)) {
+            let (main_view, cameras) = match owner.filter(|_| !is_bounded(light)) {
                 Some(owner) => {
                     let name = owners.map_name(&name, owner, scene.cameras);
                     let main_camera = std::slice::from_ref(&scene.cameras[owner]);

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{FrameError, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::process::Requirements;
-use crate::scene::{Camera, Changes, Light, SceneRef};
+use crate::scene::{Camera, Changes, Light, LightFields, SceneRef};
 use crate::view::LightClass;
 
 /// Frames to draw while a world is loaded, whose pictures are not shown.
@@ -104,13 +104,11 @@ fn shining_from(camera: &Camera, mut light: Light) -> Light {
     let along = (camera.orientation * Vec3::NEG_Z).normalize();
     // Behind the near plane the volume of a light with a short range would not be seen.
     let at = camera.position + along.as_dvec3() * f64::from(camera.near);
-    match &mut light {
-        Light::Directional { illuminance, .. } => *illuminance = illuminance.max(Vec3::ONE),
-        Light::Point { position, intensity, .. } => (*position, *intensity) = (at, intensity.max(Vec3::ONE)),
-        Light::Spot { position, direction, intensity, .. }
-        | Light::Hemispherical { position, direction, intensity, .. } => {
-            (*position, *direction, *intensity) = (at, along, intensity.max(Vec3::ONE));
-        }
+    let LightFields { position, direction, color, .. } = light.fields();
+    *color = color.max(Vec3::ONE);
+    if let Some(position) = position {
+        *position = at;
+        direction.into_iter().for_each(|direction| *direction = along);
     }
     light
 }

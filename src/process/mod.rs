@@ -75,7 +75,7 @@ pub use target_size::TargetSize;
 pub(crate) use cpu_shader::TypedCpuShader;
 pub(crate) use internal::*;
 #[cfg(feature = "wgpu")]
-pub(crate) use prelude::{FIRST_OWN_LOCATION, LightVolume, prelude_with};
+pub(crate) use prelude::{FIRST_OWN_LOCATION, prelude_with};
 #[cfg(feature = "wgpu")]
 pub(crate) use raw_access::{RawAccess, RequestLog};
 

@@ -88,22 +88,56 @@ impl Light {
 
     /// Whether objects cast shadows in this light.
     pub fn casts_shadow(&self) -> bool {
-        match *self {
-            Self::Directional { casts_shadow, .. }
-            | Self::Point { casts_shadow, .. }
-            | Self::Spot { casts_shadow, .. }
-            | Self::Hemispherical { casts_shadow, .. } => casts_shadow,
-        }
+        let mut light = *self;
+        light.fields().casts_shadow
     }
 
     /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional
     /// light, which reaches everything.
     pub fn bounding_sphere(&self) -> Option<(DVec3, f32)> {
-        match *self {
-            Self::Directional { .. } => None,
-            Self::Point { position, range, .. }
-            | Self::Spot { position, range, .. }
-            | Self::Hemispherical { position, range, .. } => Some((position, range)),
+        let mut light = *self;
+        let LightFields { position, range, .. } = light.fields();
+        Some((*position?, *range?))
+    }
+
+    /// The light's fields, whatever its kind.
+    #[inline]
+    pub(crate) fn fields(&mut self) -> LightFields<'_> {
+        match self {
+            Self::Directional { direction, illuminance, casts_shadow } => LightFields {
+                position: None,
+                direction: Some(direction),
+                color: illuminance,
+                range: None,
+                cone: None,
+                casts_shadow: *casts_shadow,
+            },
+            Self::Point { position, intensity, range, casts_shadow } => LightFields {
+                position: Some(position),
+                direction: None,
+                color: intensity,
+                range: Some(range),
+                cone: None,
+                casts_shadow: *casts_shadow,
+            },
+            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow } => {
+                LightFields {
+                    position: Some(position),
+                    direction: Some(direction),
+                    color: intensity,
+                    range: Some(range),
+                    cone: Some([*inner_angle, *outer_angle]),
+                    casts_shadow: *casts_shadow,
+                }
+            }
+            Self::Hemispherical { position, direction, intensity, range, casts_shadow } => LightFields {
+                position: Some(position),
+                direction: Some(direction),
+                color: intensity,
+                range: Some(range),
+                cone: None,
+                casts_shadow: *casts_shadow,
+            },
         }
     }
 
@@ -111,13 +145,11 @@ impl Light {
     /// nearer than its range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0
     /// changes nothing, and none changes a directional light, which does not fall off.
     pub(crate) fn cut_off_at(mut self, cut_off: f32) -> Self {
-        if let Self::Point { intensity, range, .. }
-        | Self::Spot { intensity, range, .. }
-        | Self::Hemispherical { intensity, range, .. } = &mut self
+        if let LightFields { range: Some(range), color, .. } = self.fields()
             && cut_off > 0.0
         {
             // No quotient of two f32 leaves the range of f64. The range of a light must not be 0.
-            let end = (f64::from(intensity.max_element()) / f64::from(cut_off)).sqrt() as f32;
+            let end = (f64::from(color.max_element()) / f64::from(cut_off)).sqrt() as f32;
             *range = range.min(end.max(f32::MIN_POSITIVE));
         }
         self
@@ -125,35 +157,35 @@ impl Light {
 
     /// Whether the light is black.
     pub(crate) fn is_dark(&self) -> bool {
-        let (Self::Directional { illuminance: color, .. }
-        | Self::Point { intensity: color, .. }
-        | Self::Spot { intensity: color, .. }
-        | Self::Hemispherical { intensity: color, .. }) = *self;
-        color == Vec3::ZERO
+        let mut light = *self;
+        *light.fields().color == Vec3::ZERO
     }
 
     /// # Errors
     /// If a number is not finite or out of its range. `index` is the light's index in the scene, for the message.
     pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
-        let problem = match *self {
-            Self::Directional { direction, illuminance, .. } => {
-                direction_problem(direction).or_else(|| color_problem(illuminance))
-            }
-            Self::Point { position, intensity, range, .. } => {
-                position_problem(position, range).or_else(|| color_problem(intensity))
-            }
-            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
-                position_problem(position, range)
-                    .or_else(|| color_problem(intensity))
-                    .or_else(|| direction_problem(direction))
-                    .or_else(|| cone_problem(inner_angle, outer_angle))
-            }
-            Self::Hemispherical { position, direction, intensity, range, .. } => position_problem(position, range)
-                .or_else(|| color_problem(intensity))
-                .or_else(|| direction_problem(direction)),
-        };
+        let mut light = *self;
+        let LightFields { position, direction, color, range, cone, .. } = light.fields();
+        let problem = position
+            .zip(range)
+            .and_then(|(position, range)| position_problem(*position, *range))
+            .or_else(|| color_problem(*color))
+            .or_else(|| direction_problem(*direction?))
+            .or_else(|| cone_problem(cone?));
         problem.map_or(Ok(()), |reason| Err(SceneError::InvalidLight { light: index, reason }))
     }
+}
+
+/// The fields of a light of any kind; `None` where its kind has none.
+pub(crate) struct LightFields<'a> {
+    pub(crate) position: Option<&'a mut DVec3>,
+    pub(crate) direction: Option<&'a mut Vec3>,
+    /// The intensity, or the illuminance.
+    pub(crate) color: &'a mut Vec3,
+    pub(crate) range: Option<&'a mut f32>,
+    /// The angles from the axis at which it begins to fade and at which it ends.
+    pub(crate) cone: Option<[f32; 2]>,
+    pub(crate) casts_shadow: bool,
 }
 
 /// The kind of a [`Light`].
@@ -174,15 +206,69 @@ impl LightKind {
     /// All kinds.
     pub const ALL: [Self; 4] = [Self::Directional, Self::Point, Self::Spot, Self::Hemispherical];
 
-    /// The lower-case name in reports.
-    pub fn name(self) -> &'static str {
+    /// The properties of the kind.
+    pub(crate) const fn rules(self) -> &'static LightRules {
         match self {
-            Self::Directional => "directional",
-            Self::Point => "point",
-            Self::Spot => "spot",
-            Self::Hemispherical => "hemispherical",
+            Self::Directional => {
+                &LightRules { name: "directional", volume: LightVolume::Screen, maps: ShadowProjection::Cascades }
+            }
+            Self::Point => &LightRules { name: "point", volume: LightVolume::Sphere, maps: ShadowProjection::Cube },
+            Self::Spot => &LightRules { name: "spot", volume: LightVolume::Cone, maps: ShadowProjection::Perspective },
+            Self::Hemispherical => {
+                &LightRules { name: "hemispherical", volume: LightVolume::Cone, maps: ShadowProjection::Paraboloid }
+            }
         }
     }
+
+    /// The lower-case name in reports.
+    pub fn name(self) -> &'static str {
+        self.rules().name
+    }
+}
+
+/// The properties of a kind of light.
+#[derive(Debug)]
+pub(crate) struct LightRules {
+    /// The lower-case name in reports.
+    pub(crate) name: &'static str,
+    /// What is drawn to light the pixels that it reaches.
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code))]
+    pub(crate) volume: LightVolume,
+    /// What shadow maps it has.
+    pub(crate) maps: ShadowProjection,
+}
+
+impl LightRules {
+    /// Whether it has a range. Otherwise it reaches everything, and each main camera has shadow maps of it.
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.maps != ShadowProjection::Cascades
+    }
+}
+
+/// The shadow maps that a light has: how many, and how they project.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ShadowProjection {
+    /// Orthographic ones around what a main camera sees, one behind the other.
+    Cascades,
+    /// The six faces of a cube, in perspective.
+    Cube,
+    /// One in perspective, around the axis.
+    Perspective,
+    /// One paraboloid, around the axis.
+    Paraboloid,
+}
+
+/// Geometry that contains all that a light can reach, so that only those pixels are lit: a sphere for a point light, a
+/// cone for a spot light, and the screen for a light that reaches everywhere (L 4.2.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum LightVolume {
+    /// A polyhedron that contains the unit sphere, to be scaled by the light's range.
+    Sphere,
+    /// A cone of sixteen sides with a cylinder at its wide end, whose corners `cone_corner` positions. At 90° it is a
+    /// cylinder with the range as its radius and height, which contains what a hemispherical light reaches too.
+    Cone,
+    /// One triangle that covers clip space.
+    Screen,
 }
 
 fn direction_problem(direction: Vec3) -> Option<&'static str> {
@@ -204,7 +290,7 @@ fn position_problem(position: DVec3, range: f32) -> Option<&'static str> {
     }
 }
 
-fn cone_problem(inner: f32, outer: f32) -> Option<&'static str> {
+fn cone_problem([inner, outer]: [f32; 2]) -> Option<&'static str> {
     let ordered = inner >= 0.0 && inner < outer && outer <= FRAC_PI_2;
     // Shaders fade between the cosines, so these must differ.
     let distinct = inner.cos() > outer.cos();

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::RenderView;
-use crate::scene::{Light, Projection};
+use crate::scene::{Light, LightFields, Projection};
 
 /// The GPU layout of a light, relative to one view's camera: `Light` in `drawloom.wgsl`.
 #[repr(C)]
@@ -42,29 +42,22 @@ impl GpuLight {
     /// The layout of `light` for a camera at `origin`. `shadow_map` is the view that draws its shadow map, if any.
     pub fn new(light: &Light, origin: DVec3, shadow_map: Option<&RenderView>) -> Self {
         let relative = |position: DVec3| (position - origin).as_vec3();
+        let mut fields = *light;
+        let LightFields { position, direction, color, range, cone, .. } = fields.fields();
+        let [cone_begin, cone_end] = cone.map_or([0.0; 2], |angles| angles.map(f32::cos));
         let mut gpu_light = Self {
+            position: position.map_or(Vec3::ZERO, |position| relative(*position)),
             kind: light.kind() as u32,
+            direction: direction.map_or(Vec3::ZERO, |direction| direction.normalize()),
+            range: range.copied().unwrap_or(0.0),
+            intensity: *color,
+            cone_begin,
+            cone_end,
             shadow_layer: Self::NO_SHADOW_MAP,
+            shadow_half: 0.0,
+            shadow_near: 0.0,
             shadow_orientation: Quat::IDENTITY,
-            ..bytemuck::Zeroable::zeroed()
         };
-        match *light {
-            Light::Directional { direction, illuminance, .. } => {
-                (gpu_light.direction, gpu_light.intensity) = (direction.normalize(), illuminance);
-            }
-            Light::Point { position, intensity, range, .. } => {
-                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
-            }
-            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
-                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
-                gpu_light.direction = direction.normalize();
-                (gpu_light.cone_begin, gpu_light.cone_end) = (inner_angle.cos(), outer_angle.cos());
-            }
-            Light::Hemispherical { position, direction, intensity, range, .. } => {
-                (gpu_light.position, gpu_light.intensity, gpu_light.range) = (relative(position), intensity, range);
-                gpu_light.direction = direction.normalize();
-            }
-        }
         if let Some(map) = shadow_map {
             gpu_light.shadow_layer = map.layer;
             gpu_light.shadow_near = map.camera.near;

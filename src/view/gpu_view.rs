@@ -54,8 +54,8 @@ pub struct GpuView {
     /// The far plane's distance in metres; infinite for most cameras.
     pub far: f32,
     /// For each class of lights, by [`LightClass::index`]: where they end among the view's lights. They begin where
-    /// those of the class before end.
-    pub light_ends: [u32; LightClass::COUNT],
+    /// those of the class before end. Shaders read vectors of four.
+    pub light_ends: [u32; LightClass::COUNT.next_multiple_of(4)],
 }
 
 impl GpuView {
@@ -90,7 +90,7 @@ impl GpuView {
             },
             ambient,
             far: view.camera.far,
-            light_ends: [0; LightClass::COUNT],
+            light_ends: bytemuck::Zeroable::zeroed(),
         })
     }
 }

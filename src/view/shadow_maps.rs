@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 use super::FixedPosition;
 use super::cascades::{cascade_slice, visible_sphere};
 use super::map_owners::MapOwners;
-use crate::scene::{Camera, LayerMask, Light, Projection, Redraw, ViewFilter, ViewKind};
+use crate::scene::{Camera, LayerMask, Light, LightFields, Projection, Redraw, ShadowProjection, ViewFilter, ViewKind};
 
 /// How shadow maps are drawn and read. The maps of all lights have the same size, and are the layers of one texture.
 ///
@@ -104,25 +104,29 @@ impl ShadowMaps {
         if !light.casts_shadow() || self.problem().is_some() {
             return Vec::new();
         }
-        match *light {
-            Light::Point { position, range, .. } => {
+        let mut fields = *light;
+        let LightFields { position, direction, range, cone, .. } = fields.fields();
+        let position = position.copied().unwrap_or_default();
+        let direction = direction.copied().unwrap_or(Vec3::NEG_Z);
+        let range = range.copied().unwrap_or_default();
+        let camera = |name: String, direction, projection| Camera {
+            projection,
+            ..self.camera(name, position, direction, range)
+        };
+        match light.kind().rules().maps {
+            ShadowProjection::Cube => {
                 let field_of_view = 2.0 * self.cube_face_extent().atan() as f32;
-                let face = |(axis, axis_name): &(Vec3, &str)| Camera {
-                    projection: Projection::Perspective { field_of_view },
-                    ..self.camera(format!("{name}, {axis_name}"), position, *axis, range)
+                let face = |(axis, axis_name): &(Vec3, &str)| {
+                    camera(format!("{name}, {axis_name}"), *axis, Projection::Perspective { field_of_view })
                 };
                 CUBE_FACES.iter().map(face).collect()
             }
-            Light::Spot { position, direction, range, outer_angle, .. } => {
-                let field_of_view = (2.0 * outer_angle).min(MAX_SPOT_FIELD_OF_VIEW);
-                let projection = Projection::Perspective { field_of_view };
-                vec![Camera { projection, ..self.camera(name.to_owned(), position, direction, range) }]
+            ShadowProjection::Perspective => {
+                let field_of_view = cone.map_or(f32::INFINITY, |[_, outer]| 2.0 * outer).min(MAX_SPOT_FIELD_OF_VIEW);
+                vec![camera(name.to_owned(), direction, Projection::Perspective { field_of_view })]
             }
-            Light::Hemispherical { position, direction, range, .. } => {
-                let projection = Projection::Paraboloid;
-                vec![Camera { projection, ..self.camera(name.to_owned(), position, direction, range) }]
-            }
-            Light::Directional { direction, .. } => {
+            ShadowProjection::Paraboloid => vec![camera(name.to_owned(), direction, Projection::Paraboloid)],
+            ShadowProjection::Cascades => {
                 let owners = self.map_owners(cameras);
                 let maps_of = |owner: usize| {
                     let (name, owner) = (owners.map_name(name, owner, cameras), &cameras[owner]);
@@ -140,10 +144,10 @@ impl ShadowMaps {
 
     /// How many maps a light has; a directional one for a main camera.
     pub(crate) fn map_count(&self, light: &Light) -> usize {
-        match light {
-            Light::Directional { .. } => self.cascades as usize,
-            Light::Point { .. } => CUBE_FACES.len(),
-            Light::Spot { .. } | Light::Hemispherical { .. } => 1,
+        match light.kind().rules().maps {
+            ShadowProjection::Cascades => self.cascades as usize,
+            ShadowProjection::Cube => CUBE_FACES.len(),
+            ShadowProjection::Perspective | ShadowProjection::Paraboloid => 1,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::process::{ShaderLight, ShaderView};
 use crate::raster::{PixelBounds, Real, Vector3};
-use crate::scene::{LightKind, Projection};
+use crate::scene::Projection;
 
 /// Conservative bounds of what a light reaches in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +22,7 @@ impl LightBounds {
     /// camera is inside of the sphere or beside it, the outline is the whole picture.
     pub(super) fn new<R: Real>(view: &ShaderView<R>, light: &ShaderLight<R>) -> Self {
         let whole = Self { pixels: PixelBounds::of_picture(view.size), depths: [0.0, f64::INFINITY] };
-        if light.kind == LightKind::Directional {
+        if !light.kind.rules().is_bounded() {
             return whole;
         }
         let double = |vector: Vector3<R>| vector.0.map(Real::as_f64);

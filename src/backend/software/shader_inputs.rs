@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::process::{ShaderLight, ShaderObject, ShaderView};
 use crate::quality::TransformPrecision;
 use crate::raster::{Quaternion, Real, Vector, Vector3};
-use crate::scene::{Light, LightKind, Projection, SceneRef};
+use crate::scene::{Light, LightFields, LightKind, Projection, SceneRef};
 use crate::view::{FixedPosition, GpuLight, GpuObject, GpuView, ObjectTable, RenderView};
 
 /// A camera's position in the world.
@@ -194,18 +194,13 @@ pub(super) fn exact_light(
 ) -> ShaderLight<f64> {
     let relative = |position: DVec3| Vector3::of(position - camera.exact);
     let mut values = light_as_uploaded(gpu_light);
-    let (position, direction) = match *light {
-        Light::Directional { direction, .. } => (None, Some(direction)),
-        Light::Point { position, .. } => (Some(position), None),
-        Light::Spot { position, direction, inner_angle, outer_angle, .. } => {
-            values.cone_begin = f64::from(inner_angle).cos();
-            values.cone_end = f64::from(outer_angle).cos();
-            (Some(position), Some(direction))
-        }
-        Light::Hemispherical { position, direction, .. } => (Some(position), Some(direction)),
-    };
+    let mut light = *light;
+    let LightFields { position, direction, cone, .. } = light.fields();
+    if let Some(cone) = cone {
+        [values.cone_begin, values.cone_end] = cone.map(|angle| f64::from(angle).cos());
+    }
     if let Some(position) = position {
-        values.position = relative(position);
+        values.position = relative(*position);
     }
     if let Some(direction) = direction {
         values.direction = Vector3::of(direction.as_dvec3().normalize());

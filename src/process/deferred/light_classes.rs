@@ -3,7 +3,7 @@
 use crate::view::LightClass;
 
 /// A bit for each class of lights, by [`LightClass::index`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct LightClasses(u32);
 
 impl LightClasses {
@@ -13,6 +13,10 @@ impl LightClasses {
 
     pub(super) fn bits(self) -> u32 {
         self.0
+    }
+
+    pub(super) fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 
     pub(super) fn contains(self, class: LightClass) -> bool {

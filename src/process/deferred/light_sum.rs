@@ -8,7 +8,7 @@ use super::shading::{ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, shadow_shader};
 use super::{GeometryFormats, LightClasses, LightTiles, ShadowCasters};
 use crate::process::{Declare, Draws, FullScreen, RenderProcess};
 use crate::scene::{Blend, ViewKind};
-use crate::view::ShadowMaps;
+use crate::view::{LightClass, ShadowMaps};
 
 /// Lights the geometry buffer with the lights of several classes, and adds the sum of the reflected light to the target
 /// `radiance` once: see [`RadianceSum::Shader`](crate::quality::RadianceSum::Shader). Of each pixel it tests the lights
@@ -35,10 +35,17 @@ impl LightSum {
             &format!("const CLASSES: u32 = {:#x}u;\n", classes.bits()),
             LIGHT_TILES_SHADER,
             LIGHT_BATCHES_SHADER,
-            include_str!("light_sum/light_sum.wgsl"),
+            &include_str!("light_sum/light_sum.wgsl").replace("ENDED_CLASSES", &ended_classes()),
         ];
         Self { shader: shader.concat(), classes, formats, maps: maps.copied() }
     }
+}
+
+/// Counts the classes of lights that end before an index, in the four parts of a vector.
+fn ended_classes() -> String {
+    let vectors = 0..LightClass::COUNT.div_ceil(4);
+    let ended = vectors.map(|vector| format!("vec4<u32>(vec4<u32>(index) >= view.light_ends[{vector}])"));
+    ended.collect::<Vec<_>>().join(" + ")
 }
 
 /// After depth, normal, diffuse and tiles.
@@ -68,5 +75,19 @@ impl RenderProcess for LightSum {
     fn cpu_shader(&self) -> Option<crate::process::CpuShader> {
         let shader = cpu_shader::LightSumCpuShader::new(self.classes, self.formats, self.maps.as_ref());
         Some(crate::process::CpuShader::full_screen(shader))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::SHADER_PRELUDE;
+
+    #[test]
+    fn shaders_know_where_each_class_of_lights_ends() {
+        let vectors = LightClass::COUNT.div_ceil(4);
+        assert!(SHADER_PRELUDE.contains(&format!("light_ends: array<vec4<u32>, {vectors}>")));
+        let shader = LightSum::new(LightClasses::default(), GeometryFormats::default(), None).shader;
+        assert_eq!(shader.matches("view.light_ends[").count(), vectors);
     }
 }

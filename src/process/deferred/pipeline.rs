@@ -10,7 +10,6 @@ use super::{
 use crate::command::MaterialShare;
 use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
 use crate::quality::{Quality, RadianceSum};
-use crate::scene::LightKind;
 use crate::unwind::Contained;
 use crate::view::{LightClass, ShadowMaps};
 
@@ -310,7 +309,7 @@ impl Deferred {
     }
 
     fn shadows(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
-        let hemispheres = requirements.lights(LightClass { kind: LightKind::Hemispherical, shadowed: true });
+        let hemispheres = requirements.paraboloid_maps();
         let casters = || Arc::new(ShadowCasters { hemispheres }) as Arc<dyn RenderProcess>;
         self.with_deformed(self.required_maps(requirements).map(|_| casters()).into_iter().collect())
     }

@@ -1,15 +1,15 @@
 //! Which processes a scene requires.
 
-use super::{LightVolumes, ShadowCasters, Transparency};
-use crate::scene::{Blend, Camera, Light, LightKind, Material, SceneRef, ViewKind};
+use super::{LightClasses, LightVolumes, ShadowCasters, Transparency};
+use crate::scene::{Blend, Camera, Light, Material, SceneRef, ShadowProjection, ViewKind};
 use crate::view::LightClass;
 
 /// What a scene requires of a frame. A frame has the processes that this requires, and no others. It follows from what
 /// the scene draws: materials of the assets that no object has require nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Requirements {
-    /// A bit for each class of lights in the scene, by [`LightClass::index`].
-    lights: u8,
+    /// The classes of lights in the scene.
+    lights: LightClasses,
     /// Whether an object needs transparency.
     transparency: bool,
     /// A bit for each kind of view that the scene has and might do without.
@@ -18,10 +18,12 @@ pub struct Requirements {
     shadow_maps: bool,
 }
 
-const _: () = assert!(LightClass::COUNT <= 8);
-const _: () = assert!(LightClass::COUNT == 8, "light_ends in drawloom.wgsl and light_sum.wgsl have two vectors");
-
 const _: () = assert!(ViewKind::COUNT <= 8);
+
+/// Whether the lights of a class have paraboloid maps.
+fn has_paraboloid_map(class: LightClass) -> bool {
+    class.shadowed && class.kind.rules().maps == ShadowProjection::Paraboloid
+}
 
 /// The bit of a kind of view that a scene may do without; 0 for other kinds.
 fn optional_bit(kind: ViewKind) -> u8 {
@@ -33,10 +35,8 @@ impl Requirements {
     /// transparency](Self::needs_transparency) if `transparency` is true. If `shadows` is false, lights count as
     /// casting none.
     pub fn of(lights: &[Light], transparency: bool, shadows: bool) -> Self {
-        let mut requirements = Self { transparency, ..Self::default() };
-        for light in lights {
-            requirements.lights |= 1 << LightClass::of(light, shadows).index();
-        }
+        let lights = lights.iter().map(|light| LightClass::of(light, shadows)).collect();
+        let requirements = Self { lights, transparency, ..Self::default() };
         // A light that casts shadows requires the maps, so that equal plans have equal requirements.
         Self { shadow_maps: requirements.shadows(), ..requirements }
     }
@@ -56,22 +56,18 @@ impl Requirements {
     /// All that a scene can require.
     pub fn all() -> Self {
         let optional_views = ViewKind::ALL.into_iter().fold(0, |bits, kind| bits | optional_bit(kind));
-        let mut requirements = Self { lights: 0, transparency: true, optional_views, shadow_maps: true };
-        LightClass::all().for_each(|class| requirements.lights |= 1 << class.index());
-        requirements
+        Self { lights: LightClass::all().collect(), transparency: true, optional_views, shadow_maps: true }
     }
 
     /// Requirements whose plans have every shader that a plan may have: transparency reads shadow maps or does not, and
-    /// shadow casters are drawn for hemispherical lights too or are not.
+    /// shadow casters are drawn in paraboloid maps too or are not.
     pub(crate) fn with_every_shader() -> [Self; 3] {
         let without = |is_absent: fn(LightClass) -> bool| {
-            let mut requirements = Self::all();
-            let absent = LightClass::all().filter(|class| is_absent(*class));
-            absent.for_each(|class| requirements.lights &= !(1 << class.index()));
+            let lights = LightClass::all().filter(|class| !is_absent(*class)).collect();
+            let requirements = Self { lights, ..Self::all() };
             Self { shadow_maps: requirements.shadows(), ..requirements }
         };
-        let hemispherical = without(|class| class.shadowed && class.kind == LightKind::Hemispherical);
-        [Self::all(), hemispherical, without(|class| class.shadowed)]
+        [Self::all(), without(has_paraboloid_map), without(|class| class.shadowed)]
     }
 
     /// The same for a scene with these cameras.
@@ -82,19 +78,15 @@ impl Requirements {
     /// The requirements of a scene that needs exactly those optional processes whose names satisfy `is_kept`.
     pub(super) fn of_processes(is_kept: impl Fn(&str) -> bool) -> Self {
         let (transparency, shadow_maps) = (is_kept(Transparency::NAME), is_kept(ShadowCasters::NAME));
-        let mut requirements = Self { transparency, shadow_maps, ..Self::default() };
-        for class in LightClass::all().filter(|class| is_kept(&LightVolumes::name_of(*class))) {
-            requirements.lights |= 1 << class.index();
-        }
-        requirements
+        let lights = LightClass::all().filter(|class| is_kept(&LightVolumes::name_of(*class))).collect();
+        Self { lights, transparency, shadow_maps, ..Self::default() }
     }
 
     /// What either of two scenes requires. Each set of requirements is one value, so that it has one plan.
     pub(crate) fn union(self, other: Self) -> Self {
-        let lights = self.lights | other.lights;
         let shadow_maps = self.shadow_maps() || other.shadow_maps();
         Self {
-            lights,
+            lights: self.lights.union(other.lights),
             transparency: self.transparency || other.transparency,
             optional_views: self.optional_views | other.optional_views,
             shadow_maps,
@@ -113,12 +105,17 @@ impl Requirements {
 
     /// Whether the scene has lights of this class.
     pub fn lights(&self, class: LightClass) -> bool {
-        self.lights & 1 << class.index() != 0
+        self.lights.contains(class)
     }
 
     /// Whether a light of the scene casts shadows.
     pub fn shadows(&self) -> bool {
         LightClass::all().any(|class| class.shadowed && self.lights(class))
+    }
+
+    /// Whether a light of the scene casts shadows by a paraboloid map.
+    pub(crate) fn paraboloid_maps(&self) -> bool {
+        LightClass::all().any(|class| has_paraboloid_map(class) && self.lights(class))
     }
 
     /// Whether shadow maps are drawn: a light of the scene casts shadows, or the pipeline

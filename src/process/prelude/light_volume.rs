@@ -4,31 +4,9 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use crate::scene::LightKind;
-
-/// Geometry that contains all that a light can reach, so that only those pixels are lit: a sphere for a point light, a
-/// cone for a spot light, and the screen for a light that reaches everywhere (L 4.2.1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum LightVolume {
-    /// A polyhedron that contains the unit sphere, to be scaled by the light's range.
-    Sphere,
-    /// A cone of sixteen sides with a cylinder at its wide end, whose corners `cone_corner` positions. At 90° it is a
-    /// cylinder with the range as its radius and height, which contains what a hemispherical light reaches too.
-    Cone,
-    /// One triangle that covers clip space.
-    Screen,
-}
+use crate::scene::LightVolume;
 
 impl LightVolume {
-    /// The light volume of a kind of light.
-    pub(crate) fn of(kind: LightKind) -> Self {
-        match kind {
-            LightKind::Point => Self::Sphere,
-            LightKind::Spot | LightKind::Hemispherical => Self::Cone,
-            LightKind::Directional => Self::Screen,
-        }
-    }
-
     /// Three corners for each triangle, counter-clockwise seen from outside. The volumes are closed.
     ///
     /// A sphere's corners are positions; a cone's are (x, y, tier), as `cone_corner` takes them; the screen's are (x,

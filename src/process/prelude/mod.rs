@@ -4,8 +4,6 @@
 mod light_volume;
 mod shader_prelude;
 
-#[cfg(feature = "wgpu")]
-pub(crate) use light_volume::LightVolume;
 pub use shader_prelude::SHADER_PRELUDE;
 #[cfg(feature = "wgpu")]
 pub(crate) use shader_prelude::{FIRST_OWN_LOCATION, prelude_with};

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::command::{Cull, DrawState};
 use crate::process::{BlendEquation, Draws, FaceCulling, Primitive, Stencil, prelude_with};
 use crate::quality::{Quality, TransformPrecision, VertexFormat};
-use crate::scene::{AttributeLayout, Blend, LightKind, Topology};
+use crate::scene::{AttributeLayout, Blend, LightVolume, Topology};
 
 /// The inputs of pipelines that a process, or the quality, may change from frame to frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,7 +131,10 @@ pub(crate) fn fixed_state(draws: &Draws<'_>) -> Option<DrawState> {
         }
         Draws::Lights(lights) => {
             // Only far sides, which the camera also sees from inside a volume.
-            let cull = if lights.class.kind == LightKind::Directional { Cull::Nothing } else { Cull::Front };
+            let cull = match lights.class.kind.rules().volume {
+                LightVolume::Screen => Cull::Nothing,
+                LightVolume::Sphere | LightVolume::Cone => Cull::Front,
+            };
             Some(DrawState::new(Topology::TriangleList, cull, Blend::Additive))
         }
         _ => None,

@@ -5,8 +5,7 @@ use std::ops::Range;
 use super::buffers::filled_buffer;
 use super::counted_queue::CountedQueue;
 use crate::backend::BackendError;
-use crate::process::LightVolume;
-use crate::scene::LightKind;
+use crate::scene::{LightKind, LightVolume};
 
 /// The vertices of all light volumes, in one vertex buffer.
 pub(crate) struct LightMeshes {
@@ -33,8 +32,7 @@ impl LightMeshes {
 
     /// The vertices of the volume of a light of this kind.
     pub(crate) fn range(&self, kind: LightKind) -> Range<u32> {
-        let volume = LightVolume::of(kind);
-        let index = Self::VOLUMES.iter().position(|other| *other == volume);
+        let index = Self::VOLUMES.iter().position(|volume| *volume == kind.rules().volume);
         index.map_or(0..0, |index| self.ranges[index].clone())
     }
 }

@@ -42,7 +42,7 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
 // Whether a light is of a class that is summed. Without a loop: llvmpipe ends all loops of a pixel after 65,535
 // iterations in total.
 fn is_summed(index: u32) -> bool {
-    let ended = vec4<u32>(vec4<u32>(index) >= view.light_ends[0]) + vec4<u32>(vec4<u32>(index) >= view.light_ends[1]);
+    let ended = ENDED_CLASSES;
     let class_index = ended.x + ended.y + ended.z + ended.w;
     return ((CLASSES >> class_index) & 1u) != 0u;
 }

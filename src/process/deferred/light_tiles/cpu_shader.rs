@@ -3,7 +3,7 @@
 use crate::process::cpu_shader::built_in::normalize;
 use crate::process::{FullScreenCpuShader, FullScreenPixel, PassInputs, ShaderLight, ShaderView};
 use crate::raster::{Real, Vector3, Vector4};
-use crate::scene::{LightKind, Projection};
+use crate::scene::Projection;
 
 /// The width and height of a tile in pixels of the target that holds its marks, which is half as wide and high as the
 /// picture.
@@ -60,7 +60,7 @@ impl<R: Real> FullScreenCpuShader<R> for LightTilesCpuShader {
 /// Whether a light may reach what is seen between clip coordinates: whether its sphere is not wholly beyond one of four
 /// planes. The margin is a hundred times what rounding makes.
 fn may_reach<R: Real>(view: &ShaderView<R>, light: &ShaderLight<R>, horizontal: [R; 2], vertical: [R; 2]) -> bool {
-    if light.kind == LightKind::Directional {
+    if !light.kind.rules().is_bounded() {
         return true;
     }
     let position = light.position;

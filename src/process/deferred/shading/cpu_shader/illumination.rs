@@ -29,7 +29,7 @@ pub(in crate::process::deferred) fn illuminance_from<R: Real>(
     let shape = match light.kind {
         LightKind::Spot => smoothstep(light.cone_end, light.cone_begin, along_axis),
         LightKind::Hemispherical => along_axis.max(R::zero()),
-        _ => R::one(),
+        LightKind::Directional | LightKind::Point => R::one(),
     };
     let fraction = distance_squared / (light.range * light.range);
     let window = R::one() - fraction * fraction;

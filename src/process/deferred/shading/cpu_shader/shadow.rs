@@ -3,7 +3,7 @@
 use crate::process::cpu_shader::built_in::{clamp, fract, normalize};
 use crate::process::{SampledTexture, ShaderLight, ShaderView};
 use crate::raster::{Real, Vector, Vector2, Vector3};
-use crate::scene::LightKind;
+use crate::scene::ShadowProjection;
 use crate::view::ShadowMaps;
 
 /// Reads shadow maps in CPU shaders: `shadow.wgsl`.
@@ -35,23 +35,26 @@ impl ShadowFilter {
         let off_surface = distance_off_surface(view, position);
         let biased_point = |map| self.biased_point(side, map, position, normal, off_surface);
         let (mut map, mut map_layer) = (light, layer);
-        if light.kind == LightKind::Point {
-            map_layer = layer + cube_face(position - light.position);
-            map = &by_layer[map_layer];
-            return self.filtered_visibility(maps, map_layer, &biased_point(map));
-        }
-        if light.kind == LightKind::Directional {
-            // The finest cascade in which the filter reads no pixel outside of the map.
-            let extent = R::one() - R::of(f64::from(2 * self.filter + 1)) / R::of(side as f64);
-            for cascade in 1..self.cascades as usize {
-                let found = biased_point(map);
-                let is_inside = found.clip.0.iter().all(|value| value.abs() < extent);
-                if is_inside && found.depth > R::zero() && found.depth < R::one() {
-                    return self.filtered_visibility(maps, map_layer, &found);
-                }
-                map_layer = layer + cascade;
+        match light.kind.rules().maps {
+            ShadowProjection::Cube => {
+                map_layer = layer + cube_face(position - light.position);
                 map = &by_layer[map_layer];
+                return self.filtered_visibility(maps, map_layer, &biased_point(map));
             }
+            ShadowProjection::Cascades => {
+                // The finest cascade in which the filter reads no pixel outside of the map.
+                let extent = R::one() - R::of(f64::from(2 * self.filter + 1)) / R::of(side as f64);
+                for cascade in 1..self.cascades as usize {
+                    let found = biased_point(map);
+                    let is_inside = found.clip.0.iter().all(|value| value.abs() < extent);
+                    if is_inside && found.depth > R::zero() && found.depth < R::one() {
+                        return self.filtered_visibility(maps, map_layer, &found);
+                    }
+                    map_layer = layer + cascade;
+                    map = &by_layer[map_layer];
+                }
+            }
+            ShadowProjection::Perspective | ShadowProjection::Paraboloid => {}
         }
         let found = biased_point(map);
         if found.clip.0.iter().any(|value| value.abs() >= R::one()) || found.depth <= R::zero() {
@@ -70,9 +73,11 @@ impl ShadowFilter {
         normal: Vector3<R>,
         off_surface: R,
     ) -> ShadowMapPoint<R> {
-        let towards = match light.kind {
-            LightKind::Directional => -light.direction,
-            _ => normalize(light.position - position),
+        let towards = match light.kind.rules().maps {
+            ShadowProjection::Cascades => -light.direction,
+            ShadowProjection::Cube | ShadowProjection::Perspective | ShadowProjection::Paraboloid => {
+                normalize(light.position - position)
+            }
         };
         // Slope times this, in pixels' widths, is an upper bound of the depth change within the filter.
         let reach = R::of(f64::from(self.filter + 1));
@@ -166,8 +171,8 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
     let two = R::of(2.0);
     let Vector([x, y, z]) = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
-    match light.kind {
-        LightKind::Spot | LightKind::Point => {
+    match light.kind.rules().maps {
+        ShadowProjection::Perspective | ShadowProjection::Cube => {
             let distance = (-z).max(light.shadow_near);
             let half = light.shadow_half * distance;
             ShadowMapPoint {
@@ -176,7 +181,7 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
                 pixel: two * half / side,
             }
         }
-        LightKind::Hemispherical => {
+        ShadowProjection::Paraboloid => {
             let distance = Vector([x, y, z]).length().max(R::of(1e-30));
             let widened = distance * (R::one() - z / distance).max(R::of(1e-3));
             let clip = Vector([x / widened, y / widened]);
@@ -184,7 +189,7 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
             let pixel = R::of(4.0) * distance / (side * (R::one() + clip.dot(clip)));
             ShadowMapPoint { clip, depth: (light.range - distance) / reach, pixel }
         }
-        _ => {
+        ShadowProjection::Cascades => {
             let half = light.shadow_half;
             ShadowMapPoint {
                 clip: Vector([x / half, y / half]),
@@ -199,13 +204,15 @@ fn shadow_map_point<R: Real>(side: usize, light: &ShaderLight<R>, position: Vect
 /// pixel widths.
 fn shadow_slope<R: Real>(light: &ShaderLight<R>, normal: Vector3<R>, towards: Vector3<R>) -> R {
     let cosine = clamp(normal.dot(towards), R::of(1e-3), R::one());
-    if light.kind == LightKind::Hemispherical {
+    match light.kind.rules().maps {
         // A pixel's diagonal, and a little more because pixels differ in size.
-        return R::of(1.5) * (R::one() - cosine * cosine).sqrt() / cosine;
+        ShadowProjection::Paraboloid => R::of(1.5) * (R::one() - cosine * cosine).sqrt() / cosine,
+        // The map is flat, so a surface that faces the light off the map's axis has a slope too.
+        ShadowProjection::Cascades | ShadowProjection::Cube | ShadowProjection::Perspective => {
+            let local = along_map_axes(light, normal);
+            (local[0].abs() + local[1].abs()) / cosine
+        }
     }
-    // The map is flat, so a surface that faces the light off the map's axis has a slope too.
-    let local = along_map_axes(light, normal);
-    (local[0].abs() + local[1].abs()) / cosine
 }
 
 /// From the world's axes to those of the light's shadow map.

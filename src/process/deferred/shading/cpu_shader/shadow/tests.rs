@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::process::cpu_shader::test_inputs::{FunctionTexture, UNIT, direction, light_values, plain, view_values};
-use crate::scene::{Camera, ClipPlane, Light, Projection};
+use crate::scene::{Camera, ClipPlane, Light, LightKind, Projection};
 use crate::view::RenderView;
 
 const SIDE: usize = 64;
