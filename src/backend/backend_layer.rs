@@ -121,14 +121,8 @@ backend_layer! {
             parts: Range<usize>,
             emit: &mut dyn FnMut(PartOf<Self>)
         ) -> Result<(), BackendError>;
+        fn shares_encoder(&self, frame: &FrameOf<Self>, pass: usize) -> bool;
         fn finish(
-            &self,
-            frame: &FrameOf<Self>,
-            pass: &PassRequest<'_>,
-            parts: &mut Vec<PartOf<Self>>
-        ) -> Result<CommandsOf<Self>, BackendError>;
-        fn continues_previous_pass(&self, frame: &FrameOf<Self>, pass: usize) -> bool;
-        fn finish_together(
             &self,
             frame: &FrameOf<Self>,
             passes: &[PassRequest<'_>],

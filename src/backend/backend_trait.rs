@@ -24,8 +24,8 @@ use crate::timeline::{Labels, TuningChoice};
 ///
 /// 1. `limits`, `check_mesh` for each mesh that is new, and `begin`.
 /// 2. In any order and at the same time: `upload_objects` for every block of objects, unless `objects_epoch` is the
-///    current epoch, and the passes. Of each pass of commands `prepare`, then `record` for each range of its parts; of
-///    every pass `finish`, or `finish_together`. If all objects changed, a block is uploaded as soon as it is
+///    current epoch, and the passes. Of each pass of commands `prepare`, then `record` for each range of its parts;
+///    then `finish` of each encoder, most often one pass. If all objects changed, a block is uploaded as soon as it is
 ///    described, while other jobs describe other blocks.
 /// 3. `recording_choice` for every pass, and `target_memory`.
 /// 4. `read_back`.
@@ -124,7 +124,7 @@ pub trait Backend: FrameRecorder {
 }
 
 /// What records the passes of a frame. Jobs of the frame call it, several at once (M 10.3), from `begin` until all
-/// passes are finished; [`FrameRecorder::continues_previous_pass`] is called before the first of these jobs.
+/// passes are finished; [`FrameRecorder::shares_encoder`] is called before the first of these jobs.
 pub trait FrameRecorder: Send + Sync + 'static {
     /// The state of a frame in flight, from `begin` to `submit`.
     type Frame: Send + Sync;
@@ -172,30 +172,21 @@ pub trait FrameRecorder: Send + Sync + 'static {
         emit: &mut dyn FnMut(Self::Part),
     ) -> Result<(), BackendError>;
 
-    /// Finishes a pass from its parts, or records it if it has none. The draw list of a pass without commands is empty.
-    /// The backend may take parts out of `parts`; the caller drops those it leaves, and reuses the vector's memory.
+    /// Whether a pass, by index, of a frame that has begun is encoded in the encoder of the pass before it in
+    /// submission order; always `false` if every pass has an encoder of its own. Constant throughout a frame. At most
+    /// 16 passes share an encoder.
+    fn shares_encoder(&self, frame: &Self::Frame, pass: usize) -> bool;
+
+    /// Finishes an encoder: passes that follow each other in submission order, most often one. A layer may have them
+    /// share an encoder even if the backend does not. Each pass is finished from its parts, or recorded if it has none;
+    /// the draw list of a pass without commands is empty. Calls `emit` with the commands of each pass, in order.
+    ///
+    /// `parts` has those of each pass. The backend may take parts out; the caller drops those it leaves, and reuses the
+    /// memory of the vectors.
     ///
     /// # Errors
-    /// If the device refuses the pass.
+    /// If the device refuses a pass: the one after those whose commands were emitted.
     fn finish(
-        &self,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<Self::Part>,
-    ) -> Result<Self::Commands, BackendError>;
-
-    /// Whether a pass, by index, of a frame that has begun is finished together with the one before it in submission
-    /// order; always `false` if every pass is finished alone. Constant throughout a frame. At most 16 passes are
-    /// finished together.
-    fn continues_previous_pass(&self, frame: &Self::Frame, pass: usize) -> bool;
-
-    /// Finishes passes that follow each other in submission order, each as [`FrameRecorder::finish`] does, and calls
-    /// `emit` with the commands of each, in order. `parts` has those of each pass; the caller drops what the backend
-    /// leaves. A backend that finishes every pass alone, too, calls `finish` for each: a layer may join passes.
-    ///
-    /// # Errors
-    /// If the device refuses one of the passes. The error names that one.
-    fn finish_together(
         &self,
         frame: &Self::Frame,
         passes: &[PassRequest<'_>],

@@ -135,8 +135,8 @@ impl<B: Backend> GuardedBackend<B> {
         self.call("target_memory", |backend| backend.target_memory(frame))
     }
 
-    pub(crate) fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> Result<bool, CallPanic> {
-        self.call("continues_previous_pass", |backend| backend.continues_previous_pass(frame, pass))
+    pub(crate) fn shares_encoder(&self, frame: &B::Frame, pass: usize) -> Result<bool, CallPanic> {
+        self.call("shares_encoder", |backend| backend.shares_encoder(frame, pass))
     }
 
     pub(crate) fn recording_choice(

@@ -237,56 +237,52 @@ impl FrameRecorder for NullBackend {
         Ok(())
     }
 
-    fn finish(
-        &self,
-        frame: &NullFrame,
-        &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
-        bundles: &mut Vec<NullBundle>,
-    ) -> Result<NullPass, BackendError> {
-        ensure(frame.finished.lock().insert(pass), || {
-            format!("each pass is finished once, but {pass:?} is finished again")
-        })?;
-        let process = &request.plan.processes()[pass.process_index].name;
-        if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
-            let has_none = bundles.is_empty() && list.batches.is_empty();
-            ensure(has_none, || format!("a pass without commands has no bundles, but one of {process:?} has"))?;
-        }
-        let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
-        let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.first_object == first);
-        ensure(in_order, || "bundles are finished in order".to_owned())?;
-        let objects = bundles.iter().map(|bundle| bundle.objects).sum();
-        let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
-        ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
-        Ok(NullPass {
-            process: process.clone(),
-            view: pass.view_index,
-            bundles: bundles.len(),
-            batches: bundles.iter().map(|bundle| bundle.batches).sum(),
-            objects,
-            triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
-            lights: match &request.draws[pass.process_index] {
-                Draws::Lights(lights) => request.light_tables[pass.view_index].range(lights.class).len(),
-                _ => 0,
-            },
-        })
-    }
-
-    fn continues_previous_pass(&self, _frame: &NullFrame, _pass: usize) -> bool {
+    fn shares_encoder(&self, _frame: &NullFrame, _pass: usize) -> bool {
         false
     }
 
-    fn finish_together(
+    fn finish(
         &self,
         frame: &NullFrame,
         passes: &[PassRequest<'_>],
         bundles: &mut [Vec<NullBundle>],
         emit: &mut dyn FnMut(NullPass),
     ) -> Result<(), BackendError> {
-        for (pass, bundles) in passes.iter().zip(bundles) {
-            emit(self.finish(frame, pass, bundles)?);
-        }
-        Ok(())
+        passes.iter().zip(bundles).try_for_each(|(pass, bundles)| finish_pass(frame, pass, bundles).map(&mut *emit))
     }
+}
+
+fn finish_pass(
+    frame: &NullFrame,
+    &PassRequest { frame: request, pass, list, .. }: &PassRequest<'_>,
+    bundles: &[NullBundle],
+) -> Result<NullPass, BackendError> {
+    ensure(frame.finished.lock().insert(pass), || {
+        format!("each pass is finished once, but {pass:?} is finished again")
+    })?;
+    let process = &request.plan.processes()[pass.process_index].name;
+    if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
+        let has_none = bundles.is_empty() && list.batches.is_empty();
+        ensure(has_none, || format!("a pass without commands has no bundles, but one of {process:?} has"))?;
+    }
+    let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
+    let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.first_object == first);
+    ensure(in_order, || "bundles are finished in order".to_owned())?;
+    let objects = bundles.iter().map(|bundle| bundle.objects).sum();
+    let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
+    ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
+    Ok(NullPass {
+        process: process.clone(),
+        view: pass.view_index,
+        bundles: bundles.len(),
+        batches: bundles.iter().map(|bundle| bundle.batches).sum(),
+        objects,
+        triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
+        lights: match &request.draws[pass.process_index] {
+            Draws::Lights(lights) => request.light_tables[pass.view_index].range(lights.class).len(),
+            _ => 0,
+        },
+    })
 }
 
 fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {

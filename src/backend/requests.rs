@@ -2,6 +2,7 @@
 
 use std::array;
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::Vec3;
 
@@ -122,9 +123,29 @@ pub struct PassRequest<'a> {
 }
 
 impl PassRequest<'_> {
-    /// What finishing the pass costs, relative to other passes that are finished together with it.
-    pub(crate) fn relative_cost(&self) -> u64 {
+    /// Divides a time that was spent on passes together among them, by what each costs relative to the others: a share
+    /// for each, in order.
+    pub(crate) fn divide_time<'a>(
+        passes: &'a [PassRequest<'_>],
+        time: Duration,
+    ) -> impl Iterator<Item = Duration> + 'a {
         // A pass costs something without batches too.
-        1 + self.list.batches.len() as u64
+        divide_by_costs(time, passes.iter().map(|pass| 1 + pass.list.batches.len() as u64))
+    }
+}
+
+fn divide_by_costs(time: Duration, costs: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item = Duration> {
+    let (time, all) = (time.as_nanos() as u64, costs.clone().sum::<u64>());
+    costs.map(move |cost| Duration::from_nanos(time * cost / all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_proportional_to_the_cost() {
+        let shares = divide_by_costs(Duration::from_micros(30), [1, 3, 2].into_iter());
+        assert_eq!(shares.collect::<Vec<_>>(), [5, 15, 10].map(Duration::from_micros));
     }
 }

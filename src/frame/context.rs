@@ -5,10 +5,10 @@ use std::time::Duration;
 use super::borrowed_nodes::BorrowedNodes;
 use super::cost_model::CostModel;
 use super::culling::OcclusionControls;
+use super::encoders::FrameEncoders;
 use super::granularity::Granularity;
 use super::list_inputs::{ListInputs, OrderInputs};
 use super::pass_recording::PassRecording;
-use super::pass_runs::PassRuns;
 use super::stage_clock::StageClock;
 use super::tables::{FrameTables, MAX_SEGMENTS, PassTable};
 use crate::backend::{Backend, FrameRequest, PassRequest};
@@ -29,7 +29,7 @@ pub(super) struct FrameContext<'a, B: Backend> {
     pub(super) backend_frame: &'a B::Frame,
     /// One for each pass.
     pub(super) recordings: &'a [PassRecording<B>],
-    pub(super) pass_runs: &'a PassRuns,
+    pub(super) encoders: &'a FrameEncoders,
     /// The engine's own nodes.
     pub(super) nodes: BorrowedNodes<'a>,
     pub(super) clock: &'a StageClock<'a>,

@@ -1,5 +1,6 @@
 //! Errors of building a renderer, recording a frame and submitting it.
 
+use super::encoders::{FailedPass, PassFailure};
 use crate::backend::{BackendError, CallPanic};
 use crate::fence::FenceError;
 use crate::graph::{GraphProblem, NodeError, RunError};
@@ -182,22 +183,28 @@ impl FrameError {
             _ => None,
         }
     }
+    /// The error of a frame's run. If a pass was not finished, the error has the name that `finish_of` gives that pass,
+    /// by index: the job of another pass of its encoder may have met it.
+    pub(super) fn of_run(error: RunError, finish_of: impl FnOnce(usize) -> String) -> Self {
+        let (stage, source) = match error {
+            RunError::Failed { node, source } => (node, source),
+            RunError::Panicked { node, message } => return Self::Panicked { stage: node, message },
+            RunError::Scheduler(panic) => return Self::Scheduler(panic),
+            other => ("the run of the graph".to_owned(), other.into()),
+        };
+        match source.downcast::<FailedPass>() {
+            Err(source) => Self::Failed { stage, source },
+            Ok(failed) => match failed.failure {
+                PassFailure::Error(error) => Self::Failed { stage: finish_of(failed.pass), source: error.into() },
+                PassFailure::Panic(panic) => Self::Panicked { stage: finish_of(failed.pass), message: panic.message },
+            },
+        }
+    }
 }
 
 impl From<CallPanic> for FrameError {
     fn from(CallPanic { call, message }: CallPanic) -> Self {
         Self::Panicked { stage: format!("the backend's {call}"), message }
-    }
-}
-
-impl From<RunError> for FrameError {
-    fn from(error: RunError) -> Self {
-        match error {
-            RunError::Failed { node, source } => Self::Failed { stage: node, source },
-            RunError::Panicked { node, message } => Self::Panicked { stage: node, message },
-            RunError::Scheduler(panic) => Self::Scheduler(panic),
-            other => Self::Failed { stage: "the run of the graph".to_owned(), source: other.into() },
-        }
     }
 }
 

@@ -9,12 +9,11 @@ use super::borrowed_nodes::NodeDeclarations;
 use super::change_check::ChangeCheck;
 use super::context::FrameContext;
 use super::culling::CullingOptions;
+use super::encoders::FrameEncoders;
 use super::pass_recording::{PassRecording, reset_recordings};
-use super::pass_runs::PassRuns;
 use super::plan_cache::{PlanCache, with_quality};
 use super::recorded_frame::{FrameFences, RecordedFrame};
 use super::resolved_view_filter::count_unknown_objects;
-use super::run_error::error_of_pass;
 use super::scene_capacity::SceneCapacity;
 use super::scene_check::check_scene;
 use super::shadow_views::MapSettings;
@@ -83,7 +82,7 @@ pub struct Renderer<B: Backend> {
     view_cache: ViewCache,
     /// One for each pass of the latest frame.
     recordings: Vec<PassRecording<B>>,
-    pass_runs: PassRuns,
+    encoders: FrameEncoders,
     /// What the engine chose for the next frame.
     choices: Vec<TuningChoice>,
     node_declarations: NodeDeclarations,
@@ -117,7 +116,7 @@ impl<B: Backend> Renderer<B> {
             capacity: SceneCapacity::default(),
             view_cache: ViewCache::default(),
             recordings: Vec::new(),
-            pass_runs: PassRuns::default(),
+            encoders: FrameEncoders::default(),
             choices: Vec::new(),
             node_declarations: NodeDeclarations::default(),
             warnings: Warnings::default(),
@@ -351,8 +350,8 @@ impl<B: Backend> Renderer<B> {
         let uploaded_before = self.backend.uploaded_bytes()?;
         let frame = clock.measure(StageGroup::Record, || self.backend.begin(&request)).0??;
         reset_recordings(&mut self.recordings, request.passes.len());
-        let continues = |pass| self.backend.continues_previous_pass(&frame, pass);
-        self.pass_runs.begin_frame(request.passes.len(), continues)?;
+        let shares_encoder = |pass| self.backend.shares_encoder(&frame, pass);
+        self.encoders.begin_frame(request.passes.len(), shares_encoder)?;
 
         // Objects → visibility → fill → sort → instance → record, on all workers: `stages.rs` lists the stages.
         let context = FrameContext {
@@ -363,7 +362,7 @@ impl<B: Backend> Renderer<B> {
             backend: &**self.backend.unguarded(),
             backend_frame: &frame,
             recordings: &self.recordings,
-            pass_runs: &self.pass_runs,
+            encoders: &self.encoders,
             nodes,
             clock: &clock,
             costs: &graph.tuning.costs,
@@ -374,9 +373,10 @@ impl<B: Backend> Renderer<B> {
             sorted_before: self.tables.sorted_before(),
         };
         graph.schedule.always_parallel(self.granularity != Granularity::Adaptive);
-        if let Err(error) = graph.schedule.run(&self.scheduler, &context) {
-            return Err(error_of_pass(error, graph, self.pass_runs.failures(), views).into());
-        }
+        graph
+            .schedule
+            .run(&self.scheduler, &context)
+            .map_err(|error| FrameError::of_run(error, |pass| graph.node_name("finish", pass, views)))?;
         if cfg!(debug_assertions) {
             self.change_check.check(&request)?;
         }

@@ -6,7 +6,7 @@ use super::context::FrameContext;
 use super::granularity::Granularity;
 use super::pass_mode::PassMode;
 use super::stage_clock::StageGroup;
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
 use crate::graph::{Node, NodeError};
 use crate::task::Worker;
 
@@ -29,7 +29,7 @@ pub(super) struct Stage<B: Backend> {
     /// Stages of one process with equal cost kinds share an estimate of what an item costs.
     pub(super) cost_kind: &'static str,
     /// Does the work of one job.
-    pub(super) run: fn(&FrameContext<'_, B>, StageJob<'_>) -> Result<(), BackendError>,
+    pub(super) run: fn(&FrameContext<'_, B>, StageJob<'_>) -> Result<(), NodeError>,
 }
 
 /// What has a node of its own for a stage.
@@ -136,6 +136,6 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         {
             frame.costs.add_sample(self.node, measured, took);
         }
-        Ok(result?)
+        result
     }
 }

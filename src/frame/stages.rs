@@ -22,8 +22,9 @@ use super::stage::Chunking::{ByCost, ByDraws, PerBucket, PerItem};
 use super::stage::StageOwner::{Frame, Pass, View};
 use super::stage::{Chunking, Stage, StageJob, StageOwner};
 use super::stage_clock::StageGroup::{self, Fill, Instance, Record, Sort, Visibility};
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
 use crate::command::DrawList;
+use crate::graph::NodeError;
 
 impl<B: Backend> Stage<B> {
     /// All stages. To add one, add a row, and a function that does the work of a job.
@@ -92,7 +93,7 @@ const fn stage<B: Backend>(
     width: fn(&FrameContext<'_, B>, usize) -> usize,
     chunking: Chunking,
     group: StageGroup,
-    run: fn(&FrameContext<'_, B>, StageJob<'_>) -> Result<(), BackendError>,
+    run: fn(&FrameContext<'_, B>, StageJob<'_>) -> Result<(), NodeError>,
 ) -> Stage<B> {
     Stage { name, of, after, is_needed, width, chunking, group, cost_kind: name, run }
 }

@@ -53,9 +53,10 @@ pub enum CallKind {
     Prepare,
     /// [`FrameRecorder::record`](drawloom::backend::FrameRecorder::record).
     Record,
-    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish).
+    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish) of one pass.
     Finish,
-    /// [`FrameRecorder::finish_together`](drawloom::backend::FrameRecorder::finish_together), which fails in the middle: the passes of the first half are finished.
+    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish) of several passes, which fails in the middle:
+    /// the passes of the first half are finished.
     FinishTogether,
     /// [`Backend::submit`].
     Submit,
@@ -122,7 +123,7 @@ impl<B> FaultyBackend<B> {
         Self { inner, joins_passes: false, state: Mutex::default() }
     }
 
-    /// Has passes finished together, as many as the trait allows, even if the other backend finishes each alone.
+    /// Has passes share encoders, as many as the trait allows, even if the other backend finishes each alone.
     pub fn joining_passes(self) -> Self {
         Self { joins_passes: true, ..self }
     }
@@ -246,34 +247,28 @@ impl<B: Backend> BackendLayer for FaultyBackend<B> {
         self.inner.record(frame, pass, parts, emit)
     }
 
+    fn shares_encoder(&self, frame: &B::Frame, pass: usize) -> bool {
+        self.joins_passes && pass > 0 || self.inner.shares_encoder(frame, pass)
+    }
+
     fn finish(
-        &self,
-        frame: &B::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<B::Part>,
-    ) -> Result<B::Commands, BackendError> {
-        self.call(CallKind::Finish, Some(pass))?;
-        self.inner.finish(frame, pass, parts)
-    }
-
-    fn continues_previous_pass(&self, frame: &B::Frame, pass: usize) -> bool {
-        self.joins_passes && pass > 0 || self.inner.continues_previous_pass(frame, pass)
-    }
-
-    fn finish_together(
         &self,
         frame: &B::Frame,
         passes: &[PassRequest<'_>],
         parts: &mut [Vec<B::Part>],
         emit: &mut dyn FnMut(B::Commands),
     ) -> Result<(), BackendError> {
-        let half = passes.len() / 2;
-        if let Some(fault) = self.fault_of(CallKind::FinishTogether, passes.get(half)) {
-            self.inner.finish_together(frame, &passes[..half], &mut parts[..half], emit)?;
-            fault.happen()?;
-            return self.inner.finish_together(frame, &passes[half..], &mut parts[half..], emit);
+        if let [pass] = passes {
+            self.call(CallKind::Finish, Some(pass))?;
+        } else {
+            let half = passes.len() / 2;
+            if let Some(fault) = self.fault_of(CallKind::FinishTogether, passes.get(half)) {
+                self.inner.finish(frame, &passes[..half], &mut parts[..half], emit)?;
+                fault.happen()?;
+                return self.inner.finish(frame, &passes[half..], &mut parts[half..], emit);
+            }
         }
-        self.inner.finish_together(frame, passes, parts, emit)
+        self.inner.finish(frame, passes, parts, emit)
     }
 
     fn submit(

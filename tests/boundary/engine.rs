@@ -1,6 +1,7 @@
 //! An engine whose code panics on request: its backend, process, node, device and subscriber.
 
 use std::ops::Range;
+use std::slice;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -232,33 +233,23 @@ impl<B: Backend> FrameRecorder for OwnBackend<B> {
         self.inner.record(frame.get(), pass, parts, &mut |part| emit(Owned::new("part", part)))
     }
 
-    fn finish(
-        &self,
-        frame: &Self::Frame,
-        pass: &PassRequest<'_>,
-        parts: &mut Vec<Self::Part>,
-    ) -> Result<Self::Commands, BackendError> {
-        backend("finish");
-        let mut parts = parts.iter_mut().filter_map(|part| part.value.take()).collect();
-        let commands = self.inner.finish(frame.get(), pass, &mut parts)?;
-        Ok(Owned::new("commands", commands))
-    }
-
-    fn continues_previous_pass(&self, _: &Self::Frame, pass: usize) -> bool {
-        backend("continues_previous_pass");
+    fn shares_encoder(&self, _: &Self::Frame, pass: usize) -> bool {
+        backend("shares_encoder");
         self.joins_passes && pass > 0
     }
 
-    fn finish_together(
+    fn finish(
         &self,
         frame: &Self::Frame,
         passes: &[PassRequest<'_>],
         parts: &mut [Vec<Self::Part>],
         emit: &mut dyn FnMut(Self::Commands),
     ) -> Result<(), BackendError> {
-        backend("finish_together");
         for (pass, parts) in passes.iter().zip(parts) {
-            emit(self.finish(frame, pass, parts)?);
+            backend("finish");
+            let mut parts = [parts.iter_mut().filter_map(|part| part.value.take()).collect()];
+            let mut emit = |commands| emit(Owned::new("commands", commands));
+            self.inner.finish(frame.get(), slice::from_ref(pass), &mut parts, &mut emit)?;
         }
         Ok(())
     }

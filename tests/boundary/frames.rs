@@ -95,7 +95,7 @@ fn names(error: &str, call: &str) -> bool {
         "prepare" => &[", prepare panicked"],
         "part_count" => &[", prepare panicked", ", record panicked"],
         "record" => &[", record panicked"],
-        "finish" | "finish_together" => &[", finish panicked"],
+        "finish" => &[", finish panicked"],
         "submit" => &["the submission of the frame panicked"],
         "name" => &["the name of node 0 panicked", "the engine's node panicked"],
         "declare" | "width" | "items_per_job" | "run" => &["the engine's node panicked"],

@@ -92,15 +92,11 @@ impl FrameRecorder for NoopBackend {
         Ok(())
     }
 
-    fn finish(&self, (): &(), _: &PassRequest<'_>, _: &mut Vec<()>) -> Result<(), BackendError> {
-        Ok(())
-    }
-
-    fn continues_previous_pass(&self, (): &(), _: usize) -> bool {
+    fn shares_encoder(&self, (): &(), _: usize) -> bool {
         false
     }
 
-    fn finish_together(
+    fn finish(
         &self,
         (): &(),
         passes: &[PassRequest<'_>],

@@ -195,29 +195,18 @@ impl FrameRecorder for SoftwareBackend {
         Ok(())
     }
 
-    fn finish(
-        &self,
-        _frame: &SoftwareFrame,
-        pass: &PassRequest<'_>,
-        _parts: &mut Vec<Infallible>,
-    ) -> Result<SoftwareCommands, BackendError> {
-        Ok(SoftwareCommands::new(pass.list))
-    }
-
-    fn continues_previous_pass(&self, _frame: &SoftwareFrame, _pass: usize) -> bool {
+    fn shares_encoder(&self, _frame: &SoftwareFrame, _pass: usize) -> bool {
         false
     }
 
-    fn finish_together(
+    fn finish(
         &self,
-        frame: &SoftwareFrame,
+        _frame: &SoftwareFrame,
         passes: &[PassRequest<'_>],
-        parts: &mut [Vec<Infallible>],
+        _parts: &mut [Vec<Infallible>],
         emit: &mut dyn FnMut(SoftwareCommands),
     ) -> Result<(), BackendError> {
-        for (pass, parts) in passes.iter().zip(parts) {
-            emit(self.finish(frame, pass, parts)?);
-        }
+        passes.iter().map(|pass| SoftwareCommands::new(pass.list)).for_each(emit);
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, check_device, loss_or, with_error_scope};
@@ -297,7 +297,59 @@ impl FrameRecorder for WgpuBackend {
             .inspect_err(|error| self.fail_frame(error))
     }
 
+    fn shares_encoder(&self, frame: &WgpuFrame, pass: usize) -> bool {
+        frame.pass(pass).shares_encoder
+    }
+
     fn finish(
+        &self,
+        frame: &WgpuFrame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<WgpuPart>],
+        emit: &mut dyn FnMut(WgpuCommands),
+    ) -> Result<(), BackendError> {
+        if let ([pass], [parts]) = (passes, &mut *parts) {
+            emit(self.finish_pass(frame, pass, parts)?);
+            return Ok(());
+        }
+        // One of them may have grown since these buffers were used last.
+        if !parts.iter().any(|parts| is_split(parts)) {
+            let start = Instant::now();
+            let label = &frame.pass(passes[0].index).label;
+            let encode = || Ok(encode_passes(&self.device, frame, passes, parts)?.finish());
+            let encoded = with_error_scope(&self.device, label, || catch_wgpu_panic(label, encode));
+            if let Ok(commands) = encoded.flatten().flatten() {
+                // wgpu encodes all of them when the encoder is finished, so none can be timed alone. A trial of a
+                // recording strategy is measured with its neighbours, which blurs it; a small pass has few batches, so
+                // there is little to choose.
+                for (pass, share) in passes.iter().zip(PassRequest::divide_time(passes, start.elapsed())) {
+                    frame.pass(pass.index).timing.add_serial(share.as_nanos() as u64);
+                }
+                emit(WgpuCommands(PassCommands::Finished(commands)));
+                for pass in &passes[1..] {
+                    frame.pass(pass.index).is_in_previous_encoder.store(true, Ordering::Relaxed);
+                    emit(WgpuCommands(PassCommands::InEarlierPass));
+                }
+                return Ok(());
+            }
+            self.buffers.clear();
+        }
+        // Alone, the pass that the device refuses is found.
+        for (pass, parts) in passes.iter().zip(parts) {
+            let label = &frame.pass(pass.index).label;
+            let finished = catch_wgpu_panic(label, || self.finish_pass(frame, pass, parts)).flatten();
+            emit(finished.inspect_err(|error| self.fail_frame(error))?);
+        }
+        Ok(())
+    }
+}
+
+impl WgpuBackend {
+    /// Finishes a pass in an encoder of its own, or in several.
+    ///
+    /// # Errors
+    /// If the device refuses it.
+    fn finish_pass(
         &self,
         frame: &WgpuFrame,
         request: &PassRequest<'_>,
@@ -322,43 +374,6 @@ impl FrameRecorder for WgpuBackend {
         };
         let commands = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, finish)).flatten();
         commands.map(WgpuCommands).inspect_err(|error| self.fail_frame(error))
-    }
-
-    fn continues_previous_pass(&self, frame: &WgpuFrame, pass: usize) -> bool {
-        frame.pass(pass).continues_previous
-    }
-
-    fn finish_together(
-        &self,
-        frame: &WgpuFrame,
-        passes: &[PassRequest<'_>],
-        parts: &mut [Vec<WgpuPart>],
-        emit: &mut dyn FnMut(WgpuCommands),
-    ) -> Result<(), BackendError> {
-        // One of them may have grown since these buffers were used last.
-        if !parts.iter().any(|parts| is_split(parts)) {
-            let start = Instant::now();
-            let label = &frame.pass(passes[0].index).label;
-            let encode = || Ok(encode_passes(&self.device, frame, passes, parts)?.finish());
-            let encoded = with_error_scope(&self.device, label, || catch_wgpu_panic(label, encode));
-            if let Ok(commands) = encoded.flatten().flatten() {
-                divide_time(frame, passes, start.elapsed());
-                emit(WgpuCommands(PassCommands::Finished(commands)));
-                for pass in &passes[1..] {
-                    frame.pass(pass.index).is_in_previous_encoder.store(true, Ordering::Relaxed);
-                    emit(WgpuCommands(PassCommands::InEarlierPass));
-                }
-                return Ok(());
-            }
-            self.buffers.clear();
-        }
-        // Alone, the pass that the device refuses is found. A panic of wgpu would name the pass of this job.
-        for (pass, parts) in passes.iter().zip(parts) {
-            let label = &frame.pass(pass.index).label;
-            let finished = catch_wgpu_panic(label, || self.finish(frame, pass, parts)).flatten();
-            emit(finished.inspect_err(|error| self.fail_frame(error))?);
-        }
-        Ok(())
     }
 }
 
@@ -399,14 +414,4 @@ fn count_unreadable(
 /// Whether the parts of a pass are its encoders.
 fn is_split(parts: &[WgpuPart]) -> bool {
     matches!(parts.first(), Some(WgpuPart(RecordedPart::Encoder(_))))
-}
-
-/// Divides the time that one encoder of several passes took among them, by their batches: wgpu encodes all of them when
-/// the encoder is finished, so none can be timed alone. A trial of a recording strategy is measured with its
-/// neighbours, which blurs it; a small pass has few batches, so there is little to choose.
-fn divide_time(frame: &WgpuFrame, passes: &[PassRequest<'_>], time: Duration) {
-    let all: u64 = passes.iter().map(PassRequest::relative_cost).sum();
-    for pass in passes {
-        frame.pass(pass.index).timing.add_serial(time.as_nanos() as u64 * pass.relative_cost() / all);
-    }
 }

@@ -223,27 +223,27 @@ impl WgpuBackend {
     }
 }
 
-/// Decides which passes continue the encoder of the pass before: those of one view that can share one, and in frames of
-/// many small views those of several.
+/// Decides which passes share the encoder of the pass before: those of one view that can, and in frames of many small
+/// views those of several.
 fn share_encoders(passes: &mut [WgpuPassState]) {
     /// The fewest encoders of a frame of many small views, for workers to share.
     const MIN_ENCODERS: usize = 16;
     let max_across_views = passes.iter().filter(|pass| pass.can_share_encoder).count() / MIN_ENCODERS;
-    // The passes in the run so far; 0 if the next pass cannot continue it.
-    let mut run = 0;
+    // The passes in the encoder so far; 0 if the next pass cannot share it.
+    let mut in_encoder = 0;
     let are_together = |one: &WgpuPassState, next: &WgpuPassState| {
         one.can_share_encoder && next.can_share_encoder && one.pass.view_index == next.pass.view_index
     };
     for passes in passes.chunk_by_mut(are_together) {
         let (count, can_share) = (passes.len(), passes[0].can_share_encoder);
-        let continues = can_share && run > 0 && run + count <= max_across_views;
+        let continues = can_share && in_encoder > 0 && in_encoder + count <= max_across_views;
         for (index, pass) in passes.iter_mut().enumerate() {
-            pass.continues_previous = index > 0 || continues;
+            pass.shares_encoder = index > 0 || continues;
         }
-        run = match (can_share, continues) {
+        in_encoder = match (can_share, continues) {
             (false, _) => 0,
             (true, false) => count,
-            (true, true) => run + count,
+            (true, true) => in_encoder + count,
         };
     }
 }

@@ -2,8 +2,9 @@
 
 use super::super::context::FrameContext;
 use super::super::stage::StageJob;
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
 use crate::command::Selection;
+use crate::graph::NodeError;
 use crate::scene::Blend;
 use crate::view::DrawFilter;
 
@@ -12,7 +13,7 @@ pub(super) fn one_if_testing<B: Backend>(frame: &FrameContext<'_, B>, view: usiz
 }
 
 /// Chooses the visible objects that may occlude others.
-pub(super) fn choose_occluders<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn choose_occluders<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let (tables, scene) = (frame.tables, frame.request.scene);
     let selections = frame.occlusion.occluders(job.of);
     let occlusion = &tables.culling.occlusion[job.of].occlusion;
@@ -43,7 +44,7 @@ pub(super) fn depth_strips<B: Backend>(frame: &FrameContext<'_, B>, view: usize)
 }
 
 /// Draws the occluders into the view's coarse depth buffer. An item is a strip.
-pub(super) fn draw_occluders<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn draw_occluders<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     job.items.for_each(|strip| frame.tables.culling.occlusion[job.of].occlusion.draw_occluders(strip));
     Ok(())
 }
@@ -53,7 +54,7 @@ pub(super) fn objects_if_testing<B: Backend>(frame: &FrameContext<'_, B>, view: 
 }
 
 /// Tests the visible objects against the coarse depth buffer, and removes the hidden ones.
-pub(super) fn test_occlusion<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn test_occlusion<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let occlusion = &frame.tables.culling.occlusion[job.of];
     let hidden_of =
         |first, visible| occlusion.occlusion.hidden(frame.request.scene, &frame.tables.objects, first, visible);
@@ -67,7 +68,7 @@ pub(super) fn cullable_draws<B: Backend>(frame: &FrameContext<'_, B>, pass: usiz
 }
 
 /// Culls the triangles of meshes with triangle culling (S 9.6).
-pub(super) fn cull_triangles<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn cull_triangles<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let table = &frame.tables.passes[job.of];
     let view = &frame.request.views[frame.view_index_of(job.of)];
     table.triangles.read().cull(job.items, view, frame.request.scene, &table.list.read());
@@ -75,7 +76,7 @@ pub(super) fn cull_triangles<B: Backend>(frame: &FrameContext<'_, B>, job: Stage
 }
 
 /// Leaves culled triangles out of the draw list.
-pub(super) fn remove_culled<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn remove_culled<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let table = &frame.tables.passes[job.of];
     table.triangles.read().apply(&mut table.list.write());
     Ok(())

@@ -8,8 +8,9 @@ use super::super::context::FrameContext;
 use super::super::granularity::Granularity;
 use super::super::stage::StageJob;
 use super::super::tables::MAX_SEGMENTS;
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
 use crate::command::{instance, sort};
+use crate::graph::NodeError;
 use crate::view::{self, DrawFilter};
 
 pub(super) fn one_unless_kept<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
@@ -22,7 +23,7 @@ pub(super) fn visible_objects<B: Backend>(frame: &FrameContext<'_, B>, pass: usi
 }
 
 /// Makes a command for each visible object (M 10.3).
-pub(super) fn make_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn make_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let (table, view_index) = (&frame.tables.passes[job.of], frame.view_index_of(job.of));
     let selection = table.selection.unwrap_or_default();
     let fill = view::Fill {
@@ -40,7 +41,7 @@ pub(super) fn make_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJ
 }
 
 /// Divides the pass's commands into buckets.
-pub(super) fn divide_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn divide_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let table = &frame.tables.passes[job.of];
     let count = frame.visible_count(job.of);
     if let Some(draws) = frame.granularity.draws_per_job() {
@@ -64,7 +65,7 @@ pub(super) fn buckets<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> u
 }
 
 /// Sorts the commands of each bucket (M 10.5). An item is a bucket.
-pub(super) fn sort_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn sort_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let table = &frame.tables.passes[job.of];
     if frame.granularity.draws_per_job().is_some() {
         let partition = table.partition.read();
@@ -83,7 +84,7 @@ pub(super) fn sort_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJ
 }
 
 /// Merges equal commands of each bucket into instanced draws (M 10.5). An item is a bucket.
-pub(super) fn merge_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn merge_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     for bucket in job.items {
         let mut bucket = frame.tables.passes[job.of].buckets[bucket].write();
         instance(&mut bucket, |mesh| frame.can_merge(job.of, mesh));
@@ -97,7 +98,7 @@ pub(super) fn segments<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> 
 }
 
 /// Orders the pass's objects by bin, where their depth does not matter. An item is a segment.
-pub(super) fn bin_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn bin_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let (table, objects) = (&frame.tables.passes[job.of], &frame.tables.objects);
     let view_index = frame.view_index_of(job.of);
     let (visible, levels) = (&frame.tables.visibility[view_index].set, frame.levels_of_detail(view_index));
@@ -117,7 +118,7 @@ pub(super) fn bin_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob
 }
 
 /// Joins the buckets, or segments, to the pass's draw list.
-pub(super) fn join<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn join<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let table = &frame.tables.passes[job.of];
     let can_merge = |mesh| frame.can_merge(job.of, mesh);
     let mut list = table.list.write();

@@ -3,7 +3,8 @@
 use super::super::context::FrameContext;
 use super::super::stage::StageJob;
 use super::super::tables::PassTable;
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
+use crate::graph::NodeError;
 use crate::view;
 
 pub(super) fn changed_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
@@ -12,14 +13,14 @@ pub(super) fn changed_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) 
 
 /// Checks the objects that changed, and computes what all views need to know about them. If these are all objects, it
 /// also uploads them, while they are in the worker's caches. An item is a block with changed objects.
-pub(super) fn update_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn update_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let objects = &frame.tables.objects;
     objects.describe(frame.request.scene, job.items.clone());
     if objects.all_changed() { upload_objects(frame, job) } else { Ok(()) }
 }
 
 /// Completes the object table, and orders its objects by bin if a pass may use that.
-pub(super) fn complete_objects<B: Backend>(frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn complete_objects<B: Backend>(frame: &FrameContext<'_, B>, _: StageJob<'_>) -> Result<(), NodeError> {
     let objects = &frame.tables.objects;
     objects.finish();
     let can_scan_bin_order =
@@ -38,6 +39,6 @@ pub(super) fn outdated_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize)
 }
 
 /// Uploads what changed of the object table since the backend's buffers were written. An item is a block of objects.
-pub(super) fn upload_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
-    frame.backend.upload_objects(frame.backend_frame, frame.request, job.items)
+pub(super) fn upload_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
+    Ok(frame.backend.upload_objects(frame.backend_frame, frame.request, job.items)?)
 }

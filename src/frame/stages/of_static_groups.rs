@@ -2,7 +2,8 @@
 
 use super::super::context::FrameContext;
 use super::super::stage::StageJob;
-use crate::backend::{Backend, BackendError};
+use crate::backend::Backend;
+use crate::graph::NodeError;
 
 /// The static groups that have to be recorded.
 pub(super) fn changed_groups<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
@@ -10,7 +11,7 @@ pub(super) fn changed_groups<B: Backend>(frame: &FrameContext<'_, B>, _: usize) 
 }
 
 /// Records static groups, for all views: makes what each process draws of them. An item is a static group.
-pub(super) fn record_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn record_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let tables = frame.tables;
     let changes_by_view =
         |mesh| tables.mesh_levels.contains(mesh) || frame.culls_triangles && tables.culling.is_cullable(mesh);
@@ -33,7 +34,7 @@ pub(super) fn one_if_executed<B: Backend>(frame: &FrameContext<'_, B>, pass: usi
 }
 
 /// Puts what a pass draws of the static groups that its view sees into the draw list.
-pub(super) fn execute_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), BackendError> {
+pub(super) fn execute_groups<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     if frame.keeps_list(job.of) {
         return Ok(());
     }

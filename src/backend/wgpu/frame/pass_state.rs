@@ -74,8 +74,8 @@ pub(crate) struct WgpuPassState {
     latest_batches: Option<usize>,
     /// Whether it may be encoded together with its neighbours.
     pub(crate) can_share_encoder: bool,
-    /// Whether it is finished together with the pass before it.
-    pub(crate) continues_previous: bool,
+    /// Whether it is to be encoded in the encoder of the pass before it.
+    pub(crate) shares_encoder: bool,
     /// Whether it is in the encoder of the pass before it.
     pub(crate) is_in_previous_encoder: AtomicBool,
     pub(crate) bundle_cache: BundleCache,
@@ -107,7 +107,7 @@ impl Default for WgpuPassState {
             is_warm: false,
             latest_batches: None,
             can_share_encoder: false,
-            continues_previous: false,
+            shares_encoder: false,
             is_in_previous_encoder: AtomicBool::new(false),
             bundle_cache: BundleCache::default(),
             partial_indices: RwLock::new(new_index_buffer()),
