@@ -64,7 +64,7 @@ pub(crate) fn bin_visible(
         let mut reader = BlockReader::new(table);
         segment.clear();
         visible.visit(range.among(visible.count()), |_, word, bits| {
-            push_word(BitWord::new(word, bits), reader.block_of_word(word), selection, filter, segment);
+            push_word(BitWord::new(word, bits), reader.block_of_word(word), selection, &filter, segment);
         });
         segment.order(&bins);
     }
@@ -81,7 +81,7 @@ pub(crate) fn bin_objects(
     let mut reader = BlockReader::new(table);
     segment.clear();
     for &word in words {
-        push_word(word, reader.block_of_word(word.index()), selection, filter, segment);
+        push_word(word, reader.block_of_word(word.index()), selection, &filter, segment);
     }
     segment.order(&table.bins());
 }
@@ -92,7 +92,7 @@ fn push_word(
     objects: BitWord,
     block: &ObjectBlock,
     selection: Selection,
-    filter: DrawFilter<'_>,
+    filter: &DrawFilter<'_>,
     segment: &mut BinnedSegment,
 ) {
     let mask = objects.mask & block.opaque[objects.index() % ObjectBlock::WORDS];
