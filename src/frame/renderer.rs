@@ -401,7 +401,7 @@ impl<B: Backend> Renderer<B> {
         let in_flight = self.view_cache.store(&plan, &frame_views);
         Ok(RecordedFrame {
             queues,
-            submission_order: graph.passes.clone(),
+            submission_order: graph.passes.to_vec(),
             plan,
             frame,
             statistics,

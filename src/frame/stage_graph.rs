@@ -28,7 +28,7 @@ pub(super) struct StageGraph<B: Backend> {
     pub(super) schedule: Schedule<FrameNode<B>>,
     pub(super) tuning: StageTuning,
     /// In submission order.
-    pub(super) passes: Vec<Pass>,
+    pub(super) passes: Arc<[Pass]>,
     /// One for each pass.
     modes: Vec<PassMode>,
     pub(super) sampled_views: SampledViews,
@@ -248,7 +248,7 @@ impl<B: Backend> StageGraph<B> {
             tuning: StageTuning::new(kind_of_node, occlusion, labels),
             view_draws_commands: view_owners.iter().map(Option::is_some).collect(),
             cost_kinds,
-            passes,
+            passes: passes.into(),
             modes,
             sampled_views,
             plan: Arc::clone(plan),

@@ -37,23 +37,20 @@ impl<B: Backend> StageGraphCache<B> {
         nodes: BorrowedNodes<'_>,
     ) -> Result<&mut StageGraph<B>, FrameError> {
         let found = self.latest_first.iter().position(|graph| graph.fits(plan, draws, views, features, nodes));
-        let graph = match found {
-            Some(index) => {
-                let mut graph = self.latest_first.remove(index);
-                graph.set_view_ids(views);
-                graph
-            }
+        match found {
+            Some(index) => self.latest_first[..=index].rotate_right(1),
             None => {
                 let mut graph = StageGraph::of_frame(plan, draws, views, features, nodes)?;
                 if let Some(before) = self.latest_first.first() {
                     graph.inherit_measurements(before);
                 }
-                graph
+                self.latest_first.truncate(Self::CAPACITY - 1);
+                self.latest_first.insert(0, graph);
             }
-        };
-        self.latest_first.truncate(Self::CAPACITY - 1);
-        self.latest_first.insert(0, graph);
-        Ok(&mut self.latest_first[0])
+        }
+        let graph = &mut self.latest_first[0];
+        graph.set_view_ids(views);
+        Ok(graph)
     }
 
     /// Discards what was measured in a frame that failed.

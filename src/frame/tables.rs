@@ -1,7 +1,7 @@
 //! The tables that the stages of a frame fill for each other.
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::{Mutex, RwLock};
@@ -44,8 +44,9 @@ pub(super) struct FrameTables {
     pub(super) lights: Vec<LightTable>,
     /// One for each pass.
     pub(super) passes: Vec<PassTable>,
-    /// What each of these belongs to.
+    /// What each of these belongs to, and the passes that these keys were made of: those of a stage graph.
     pass_keys: Vec<PassKey>,
+    keyed_passes: Option<Arc<[Pass]>>,
     /// One for each worker.
     pub(super) sort_scratch: Vec<Mutex<SortScratch>>,
     /// The number of frames that began.
@@ -66,24 +67,26 @@ impl FrameTables {
     ///
     /// Views and passes that the frame before had too go on with their tables, and others take tables that are left.
     /// That is safe, because a table records the inputs that it was made from.
-    pub(super) fn begin_frame(&mut self, plan: &FramePlan, views: &[RenderView], passes: &[Pass], workers: usize) {
+    pub(super) fn begin_frame(&mut self, plan: &FramePlan, views: &[RenderView], passes: &Arc<[Pass]>, workers: usize) {
         self.frames += 1;
         self.is_in_frame = true;
         self.view_times.reset(views.len());
-        self.visibility.set_views(views, |_| {});
+        let are_same_views = self.visibility.set_views(views, |_| {});
         self.culling.set_views(views);
         self.lights.resize_with(views.len(), LightTable::default);
         self.sort_scratch.resize_with(workers, Mutex::default);
+        if are_same_views && self.keyed_passes.as_ref().is_some_and(|keyed| Arc::ptr_eq(keyed, passes)) {
+            return;
+        }
+        self.keyed_passes = Some(Arc::clone(passes));
         let key = |pass: &Pass| PassKey {
             slot: views[pass.view_index].id.slot,
             process: plan.processes()[pass.process_index].id,
         };
-        if !self.pass_keys.iter().copied().eq(passes.iter().map(key)) {
-            let before: HashMap<_, _> = self.pass_keys.drain(..).zip(0..).collect();
-            self.pass_keys.extend(passes.iter().map(key));
-            let taken: Vec<_> = self.pass_keys.iter().map(|key| before.get(key).copied()).collect();
-            rearrange(&mut self.passes, &taken);
-        }
+        let before: HashMap<_, _> = self.pass_keys.drain(..).zip(0..).collect();
+        self.pass_keys.extend(passes.iter().map(key));
+        let taken: Vec<_> = self.pass_keys.iter().map(|key| before.get(key).copied()).collect();
+        rearrange(&mut self.passes, &taken);
     }
 
     /// Begins a frame of a scene's static groups. The tables of these passes have begun it already.

@@ -35,11 +35,12 @@ impl<T: Default> PerView<T> {
     }
 
     /// Makes the values those of these views. Calls `replace` with each value that another view had, or none. Drops the
-    /// values of views that are gone and whose slots no other view has. Allocates nothing if the views are the same.
-    pub(crate) fn set_views(&mut self, views: &[RenderView], mut replace: impl FnMut(&mut T)) {
+    /// values of views that are gone and whose slots no other view has. Returns whether the views are those that it had;
+    /// then it allocates nothing.
+    pub(crate) fn set_views(&mut self, views: &[RenderView], mut replace: impl FnMut(&mut T)) -> bool {
         let ids = || views.iter().map(|view| view.id);
         if self.ids.len() == views.len() && self.ids.iter().copied().eq(ids()) {
-            return;
+            return true;
         }
         self.ids.clear();
         self.ids.extend(ids());
@@ -57,6 +58,7 @@ impl<T: Default> PerView<T> {
         let slots = self.values.iter_mut().zip(&self.identities).zip(before);
         let left = slots.filter(|((_, now), before)| now.is_none() && before.is_some());
         left.for_each(|((value, _), _)| *value = T::default());
+        false
     }
 
     /// Drops all values.
@@ -119,6 +121,7 @@ mod tests {
     /// Sets views that write a cross where they replace a value.
     fn set(values: &mut PerView<String>, ids: &[(u32, u64)]) -> Vec<String> {
         values.set_views(&views(ids), |value| value.push('x'));
+        assert!(values.set_views(&views(ids), |_| panic!("nothing has changed")));
         assert_eq!(values.get(ids.len()), None);
         values.iter().cloned().collect()
     }
