@@ -250,7 +250,7 @@ pub enum BackendError {
 }
 
 /// The error for a broken rule between frame and backend. `rule` states what must hold.
-#[cfg(feature = "wgpu")]
+#[cfg(any(feature = "wgpu", feature = "software"))]
 pub(crate) fn broken_rule(rule: &str) -> BackendError {
     BackendError::BrokenRule { rule: rule.to_owned() }
 }

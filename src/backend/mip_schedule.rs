@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::process::{Access, FramePlan, Pass, PlannedTarget, SampledViews};
+use crate::process::{Access, FramePlan, Pass, SampledViews};
 use crate::view::RenderView;
 
 /// After which passes of a frame the mip levels of which targets are generated.
@@ -30,27 +30,25 @@ impl MipSchedule {
         // The targets whose levels are out of date, each with the last pass that wrote it.
         let mut outdated: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for (index, pass) in passes.iter().enumerate() {
-            let accesses = &plan.processes()[pass.process_index].declaration.accesses;
-            let target_of = |view: usize, name: &str| {
-                let is_found = |planned: &PlannedTarget| {
-                    planned.mipmapped && planned.views == views[view].kind() && planned.name == name
-                };
-                plan.targets().iter().position(is_found).map(|target| (view, target))
+            let accesses = &plan.processes()[pass.process_index].targets.accesses;
+            let mipmapped = |view: usize, target: usize| {
+                let planned = &plan.targets()[target];
+                (planned.mipmapped && planned.views == views[view].kind()).then_some((view, target))
             };
-            for (name, access) in accesses {
-                let sampled = match *access {
+            for &(target, access) in accesses {
+                let sampled = match access {
                     Access::Sample | Access::Read | Access::Change => &[Some(pass.view_index)],
                     Access::SampleView(_, sampled) => sampled_views.find(*pass, sampled),
                     _ => &[],
                 };
-                for target in sampled.iter().flatten().filter_map(|view| target_of(*view, name)) {
+                for target in sampled.iter().flatten().filter_map(|view| mipmapped(*view, target)) {
                     if let Some(writer) = outdated.remove(&target) {
                         schedule.after.entry(writer).or_default().push(target);
                     }
                 }
             }
             let written = accesses.iter().filter(|(_, access)| access.writes());
-            let written = written.filter_map(|(name, _)| target_of(pass.view_index, name));
+            let written = written.filter_map(|(target, _)| mipmapped(pass.view_index, *target));
             outdated.extend(written.map(|target| (target, index)));
         }
         for (target, writer) in outdated {
@@ -75,7 +73,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
+    use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, PlannedTarget, RenderProcess};
     use crate::scene::{Camera, ViewKind};
 
     /// A process that creates a target with mip levels, and draws over and samples others at random.

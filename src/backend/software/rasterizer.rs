@@ -15,11 +15,11 @@ use super::precision::Precision;
 use super::software_pass::{DepthWrites, SoftwareDraws, SoftwarePass};
 use super::targets::{SoftwareTarget, SoftwareTargets, TargetCache};
 use super::view_state::ViewState;
+use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::process::{Access, ClearColor, CpuShader, Draws, Pass, PlannedProcess, TypedCpuShader};
 use crate::quality::VertexFormat;
-use crate::scene::ViewKind;
 use crate::task::catch;
 
 /// Draws frames in one precision, and keeps meshes, materials and targets over frames.
@@ -66,10 +66,8 @@ impl<R: Precision> BeginFrame for Rasterizer<R> {
         let targets = self.targets.lock().update(plan, views)?;
         let mip_schedule = MipSchedule::new(plan, views, (passes, request.sampled_views));
         let pass = |(index, &pass): (usize, &Pass)| {
-            let outdated = mip_schedule.after(index).iter();
-            let outdated_mip_levels =
-                outdated.filter_map(|&(view, target)| targets.find(view, &plan.targets()[target].name));
-            let outdated_mip_levels = outdated_mip_levels.cloned().collect();
+            let found = |&(view, target): &_| targets.get(view, target).cloned().ok_or_else(missing_target);
+            let outdated_mip_levels = mip_schedule.after(index).iter().map(found).collect::<Result<_, _>>()?;
             software_pass(request, (pass, outdated_mip_levels), &shaders[pass.process_index], &targets)
         };
         let passes = passes.iter().enumerate().map(pass).collect::<Result<_, _>>()?;
@@ -167,41 +165,41 @@ fn attachments<R: Precision>(
     pass: Pass,
     targets: &SoftwareTargets<R>,
 ) -> Result<Attachments<R>, BackendError> {
-    let declaration = &request.plan.processes()[pass.process_index].declaration;
-    let missing = |name: &str| BackendError::UnknownTarget { view: pass.view_index, target: name.to_owned() };
-    let of_view = |name: &str| -> Result<SoftwareTarget<R>, BackendError> {
-        targets.find(pass.view_index, name).cloned().ok_or_else(|| missing(name))
-    };
-    let layered = |kind: ViewKind, name: &str| targets.find_layered(kind, name).ok_or_else(|| missing(name));
+    let used = &request.plan.processes()[pass.process_index].targets;
+    let of_view = |index: usize| targets.get(pass.view_index, index).cloned().ok_or_else(missing_target);
     let equations = request.draws[pass.process_index].blend_equations();
-    let color = |(index, (name, clear)): (usize, (&str, Option<ClearColor>))| {
-        let clear = clear.map(|clear| clear_color(clear, request));
-        Ok(ColorAttachment { target: of_view(name)?, clear, equation: equations.get(index).copied() })
-    };
-    let depth = |(name, access): (&str, Access)| {
+    let colors = used.colors.iter().enumerate().map(|(output, color)| {
+        let clear = color.clear.map(|clear| clear_color(clear, request));
+        Ok(ColorAttachment { target: of_view(color.index)?, clear, equation: equations.get(output).copied() })
+    });
+    let depth = |(index, access): (usize, Access)| {
         let is_writable = access.writes_depth();
         let clears = is_writable && access != Access::DrawDepth;
         let tests_equal = access == Access::MatchDepth;
-        Ok(DepthAttachment { target: of_view(name)?, clears, is_writable, tests_equal })
+        Ok(DepthAttachment { target: of_view(index)?, clears, is_writable, tests_equal })
     };
-    let sampled = declaration.accesses.iter().filter_map(|(name, access)| match access {
-        Access::Sample | Access::SamplePrevious => Some(of_view(name).map(|target| vec![target])),
-        Access::SampleView(kind, index) | Access::SampleViewPrevious(kind, index) => {
+    let sampled = used.accesses.iter().filter_map(|&(target, access)| match access {
+        Access::Sample | Access::SamplePrevious => Some(of_view(target).map(|target| vec![target])),
+        Access::SampleView(_, index) | Access::SampleViewPrevious(_, index) => {
             let layer = |view: &Option<usize>| {
-                let found = view.and_then(|view| targets.find(view, name).cloned());
-                let placeholder = || targets.find_placeholder(request.plan.sampled_target(*kind, name)?);
-                found.or_else(placeholder).ok_or_else(|| missing(name))
+                let found = view.and_then(|view| targets.get(view, target).cloned());
+                let placeholder = || targets.find_placeholder(&request.plan.targets()[target]);
+                found.or_else(placeholder).ok_or_else(missing_target)
             };
-            Some(request.sampled_views.find(pass, *index).iter().map(layer).collect())
+            Some(request.sampled_views.find(pass, index).iter().map(layer).collect())
         }
-        Access::SampleLayers(kind) => Some(layered(*kind, name)),
+        Access::SampleLayers(_) => Some(targets.layers(target).ok_or_else(missing_target)),
         _ => None,
     });
     Ok(Attachments {
-        colors: declaration.colors().enumerate().map(color).collect::<Result<_, BackendError>>()?,
-        depth: declaration.depth().map(depth).transpose()?,
+        colors: colors.collect::<Result<_, BackendError>>()?,
+        depth: used.depth.map(depth).transpose()?,
         sampled: sampled.collect::<Result<_, _>>()?,
     })
+}
+
+fn missing_target() -> BackendError {
+    broken_rule("a frame has the targets of its passes")
 }
 
 fn clear_color<R: Precision>(clear: ClearColor, request: &FrameRequest<'_>) -> [R; 4] {

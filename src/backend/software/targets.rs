@@ -14,7 +14,6 @@ use super::tiles::{Tile, Tiling};
 use crate::backend::{BackendError, Picture};
 use crate::process::{Access, FramePlan, PlannedTarget, SampledTexture};
 use crate::raster::{Real, Vector, Vector4};
-use crate::scene::ViewKind;
 use crate::task::JobPanic;
 use crate::view::{PerView, RenderView};
 
@@ -46,17 +45,20 @@ impl<R> Clone for SoftwareTarget<R> {
 
 /// The targets of one frame.
 pub(super) struct SoftwareTargets<R> {
-    /// Of each view its own targets, and its layers of shared ones.
-    views: PerView<Vec<SoftwareTarget<R>>>,
-    /// The targets that all views of a kind share.
-    layered: Vec<Arc<TiledTexture<R>>>,
+    /// Of each view its own targets, and its layers of shared ones: each with its index among the plan's, in ascending
+    /// order.
+    views: PerView<Vec<(usize, SoftwareTarget<R>)>>,
+    /// The targets that all views of a kind share, by their indices among the plan's.
+    layered: Vec<Option<Arc<TiledTexture<R>>>>,
+    /// See [`FramePlan::histories`].
+    histories: Vec<(usize, usize)>,
     /// For passes that sample a view that the frame does not have: a pixel of zeros for each format.
     placeholder: Vec<Arc<TiledTexture<R>>>,
 }
 
 impl<R> Default for SoftwareTargets<R> {
     fn default() -> Self {
-        Self { views: PerView::default(), layered: Vec::new(), placeholder: Vec::new() }
+        Self { views: PerView::default(), layered: Vec::new(), histories: Vec::new(), placeholder: Vec::new() }
     }
 }
 
@@ -66,20 +68,24 @@ impl<R> SoftwareTargets<R> {
         find(self.views.get(view)?, name)
     }
 
+    /// A view's target by its index among the plan's; `None` if views of another kind have it.
+    pub(super) fn get(&self, view: usize, index: usize) -> Option<&SoftwareTarget<R>> {
+        let targets = self.views.get(view)?;
+        targets.binary_search_by_key(&index, |(index, _)| *index).ok().map(|position| &targets[position].1)
+    }
+
     /// Copies what processes of later frames read of the views that this one draws.
     pub(super) fn copy_histories(&self, is_drawn: impl Fn(usize) -> bool)
     where
         R: Precision,
     {
-        for (view, targets) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
-            for copy in targets {
-                let source = copy.texture.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
-                if let Some(source) = source {
-                    let (copy, source) = (&copy.texture, &source.texture);
-                    let (mut copied, tiles) = (copy.tiles.write(), source.tiles.read());
-                    copied.iter_mut().zip(&*tiles).for_each(|(copy, tile)| copy.clone_from(tile));
-                    copy.mip_levels.write().clone_from(&source.mip_levels.read());
-                }
+        for (view, _) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
+            for &(copy, source) in &self.histories {
+                let Some((copy, source)) = self.get(view, copy).zip(self.get(view, source)) else { continue };
+                let (copy, source) = (&copy.texture, &source.texture);
+                let (mut copied, tiles) = (copy.tiles.write(), source.tiles.read());
+                copied.iter_mut().zip(&*tiles).for_each(|(copy, tile)| copy.clone_from(tile));
+                copy.mip_levels.write().clone_from(&source.mip_levels.read());
             }
         }
     }
@@ -90,10 +96,9 @@ impl<R> SoftwareTargets<R> {
         found.map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: 0 })
     }
 
-    /// The layers of a target that all views of a kind share.
-    pub(super) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<Vec<SoftwareTarget<R>>> {
-        let is_wanted = |texture: &&Arc<TiledTexture<R>>| texture.planned.views == kind && texture.planned.name == name;
-        let found = self.layered.iter().find(is_wanted)?;
+    /// The layers of a target that all views of a kind share, by its index among the plan's.
+    pub(super) fn layers(&self, index: usize) -> Option<Vec<SoftwareTarget<R>>> {
+        let found = self.layered.get(index)?.as_ref()?;
         Some((0..found.layers).map(|layer| SoftwareTarget { texture: Arc::clone(found), layer }).collect())
     }
 }
@@ -127,31 +132,32 @@ impl<R: Precision> TargetCache<R> {
         plan: &FramePlan,
         views: &[RenderView],
     ) -> Result<Arc<SoftwareTargets<R>>, BackendError> {
-        let mut next = SoftwareTargets::default();
-        for planned in plan.targets().iter().filter(|planned| planned.layered) {
+        let mut next = SoftwareTargets { histories: plan.histories().collect(), ..SoftwareTargets::default() };
+        for planned in plan.targets() {
+            if !planned.layered {
+                next.layered.push(None);
+                continue;
+            }
             let mut sharing = views.iter().filter(|view| view.kind() == planned.views);
             // Without a view there is still a texture to read: one pixel in which nothing was drawn.
             let size = sharing.clone().next().map_or([1, 1], |view| view.camera.size);
             let layers = sharing.by_ref().count().max(1);
             let has_layers = |kept: &&Arc<TiledTexture<R>>| (layers..=2 * layers).contains(&kept.layers);
-            let mut kept = self.current.layered.iter().filter(|kept| kept.is_for(planned, size));
+            let mut kept = self.current.layered.iter().flatten().filter(|kept| kept.is_for(planned, size));
             let texture = match kept.find(has_layers) {
                 Some(kept) => Arc::clone(kept),
                 None => Arc::new(TiledTexture::new(planned, size, layers)?),
             };
-            next.layered.push(texture);
+            next.layered.push(Some(texture));
         }
         let mut of_views = Vec::with_capacity(views.len());
         for view in views {
             let kept_targets = self.current.views.kept(view);
             let mut targets = Vec::new();
-            for planned in plan.targets().iter().filter(|planned| planned.views == view.kind()) {
-                if planned.layered {
-                    let shared = next.layered.iter().find(|texture| texture.planned == *planned);
-                    targets.extend(
-                        shared
-                            .map(|texture| SoftwareTarget { texture: Arc::clone(texture), layer: view.layer as usize }),
-                    );
+            let of_kind = plan.targets().iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
+            for (index, planned) in of_kind {
+                if let Some(texture) = &next.layered[index] {
+                    targets.push((index, SoftwareTarget { texture: Arc::clone(texture), layer: view.layer as usize }));
                     continue;
                 }
                 let size = planned.size.in_view(view.camera.size);
@@ -163,14 +169,14 @@ impl<R: Precision> TargetCache<R> {
                     Some(kept) => Arc::clone(&kept.texture),
                     None => Arc::new(TiledTexture::new(planned, size, 1)?),
                 };
-                targets.push(SoftwareTarget { texture, layer: 0 });
+                targets.push((index, SoftwareTarget { texture, layer: 0 }));
             }
             of_views.push(targets);
         }
         next.views = PerView::new(views, of_views);
-        for (target, access) in plan.processes().iter().flat_map(|planned| &planned.declaration.accesses) {
-            let (Access::SampleView(views, _) | Access::SampleViewPrevious(views, _)) = *access else { continue };
-            if let Some(planned) = plan.sampled_target(views, target)
+        for &(target, access) in plan.processes().iter().flat_map(|process| &process.targets.accesses) {
+            let planned = &plan.targets()[target];
+            if matches!(access, Access::SampleView(..) | Access::SampleViewPrevious(..))
                 && next.find_placeholder(planned).is_none()
             {
                 let placeholder = match self.current.find_placeholder(planned) {
@@ -187,8 +193,8 @@ impl<R: Precision> TargetCache<R> {
 }
 
 /// The one of a view's targets that has this name.
-fn find<'a, R>(targets: &'a [SoftwareTarget<R>], name: &str) -> Option<&'a SoftwareTarget<R>> {
-    targets.iter().find(|target| target.texture.planned.name == name)
+fn find<'a, R>(targets: &'a [(usize, SoftwareTarget<R>)], name: &str) -> Option<&'a SoftwareTarget<R>> {
+    targets.iter().map(|(_, target)| target).find(|target| target.texture.planned.name == name)
 }
 
 impl<R: Precision> TiledTexture<R> {

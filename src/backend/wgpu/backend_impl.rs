@@ -10,9 +10,7 @@ use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, check_device, loss_or, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::pipelines::{PipelineVariant, ProcessPipelines, shader_label};
-use super::recording::{
-    cached_bundle, encode_after_segments, encode_pass, encode_passes, encode_segment, record_bundle,
-};
+use super::recording::{PassEncoder, encode_after_segments, encode_pass, encode_passes};
 use super::resources::check_mesh;
 use super::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
 use super::streaming::Streamer;
@@ -266,16 +264,17 @@ impl FrameRecorder for WgpuBackend {
     fn record(
         &self,
         frame: &WgpuFrame,
-        &PassRequest { frame: request, index, list, .. }: &PassRequest<'_>,
+        request: &PassRequest<'_>,
         mut parts: Range<usize>,
         emit: &mut dyn FnMut(WgpuPart),
     ) -> Result<(), BackendError> {
-        let pass = frame.pass(index);
-        let encoders = pass.strategy.encoder_count(list.bundle_count());
+        let pass = frame.pass(request.index);
+        let encoders = pass.strategy.encoder_count(request.list.bundle_count());
+        let encoder = PassEncoder::new(&self.device, frame, request);
         // Cached bundles need no error scope, which locks the device twice.
         pass.timing.time_parallel(|| {
             while !parts.is_empty()
-                && let Some(cached) = cached_bundle(frame, index, list, parts.start)
+                && let Some(cached) = encoder.cached_bundle(parts.start)
             {
                 emit(cached);
                 parts.start += 1;
@@ -285,8 +284,8 @@ impl FrameRecorder for WgpuBackend {
             return Ok(());
         }
         let record = |part| match encoders {
-            1 => record_bundle(&self.device, frame, index, list, part).map(RecordedPart::Bundle),
-            _ => encode_segment(&self.device, frame, request, index, list, part),
+            1 => encoder.record_bundle(part).map(RecordedPart::Bundle),
+            _ => encoder.encode_segment(part),
         };
         let all = || parts.map(record).try_for_each(|part| part.map(|part| emit(WgpuPart(part))));
         // One error scope for all other parts.
@@ -359,7 +358,7 @@ impl WgpuBackend {
         let pass = frame.pass(index);
         if is_split(parts) {
             if frame.generates_mip_levels(index) {
-                let encode = || encode_after_segments(&self.device, frame, request.frame, index);
+                let encode = || encode_after_segments(&self.device, frame, request);
                 let last = pass.timing.time_serial(|| with_error_scope(&self.device, &pass.label, encode)).flatten();
                 parts.push(WgpuPart(last.inspect_err(|error| self.fail_frame(error))?));
             }

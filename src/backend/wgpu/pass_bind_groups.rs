@@ -3,13 +3,14 @@
 use super::frame::{PassResources, WgpuPassState};
 use super::pipelines::ProcessPipelines;
 use super::resources::{BindingResource, CachedBindGroup, StorageBuffers, WgpuTargets};
+use crate::backend::error::broken_rule;
 use crate::backend::{BackendError, FrameRequest};
-use crate::process::{Access, Pass, ShaderResource};
+use crate::process::{Access, Pass, PlannedProcess, ShaderResource};
 
 /// Updates `@group(2)` and `@group(3)` of a pass: makes them anew if something else is to be bound.
 ///
 /// # Errors
-/// If the device refuses a resource of the engine's.
+/// If the device refuses a resource of the engine's, or a target is missing. The latter is a bug in Drawloom.
 pub(super) fn update_bind_groups(
     device: &wgpu::Device,
     request: &FrameRequest<'_>,
@@ -19,26 +20,30 @@ pub(super) fn update_bind_groups(
     pass: &mut WgpuPassState,
 ) -> Result<(), BackendError> {
     let Pass { process_index: process, view_index: view } = pass.pass;
-    let declaration = &request.plan.processes()[process].declaration;
+    let PlannedProcess { declaration, targets: used, .. } = &request.plan.processes()[process];
 
     let parameters = pass.parameter_bytes().and_then(|bytes| resources.parameters.binding(bytes.start, bytes.len()));
     let parameters = parameters.map(|binding| (0, BindingResource::Buffer(binding)));
-    let sampled = |(name, access): &(String, Access)| match access {
-        Access::Sample | Access::SamplePrevious => targets.find(view, name).map(|target| &target.sampled),
-        Access::SampleView(kind, index) | Access::SampleViewPrevious(kind, index) => {
-            let views = request.sampled_views.find(pass.pass, *index);
-            let planned = request.plan.sampled_target(*kind, name)?;
-            targets.find_sampled(views, planned, declaration.sampled_views[*index].shape)
+    let sampled = |&(target, access): &(usize, Access)| match access {
+        Access::Sample | Access::SamplePrevious => targets.get(view, target).map(|target| &target.sampled),
+        Access::SampleView(_, index) | Access::SampleViewPrevious(_, index) => {
+            let views = request.sampled_views.find(pass.pass, index);
+            let planned = (target, &request.plan.targets()[target]);
+            targets.find_sampled(views, planned, declaration.sampled_views[index].shape)
         }
-        Access::SampleLayers(views) => targets.find_layered(*views, name).map(|(_, array)| array),
+        Access::SampleLayers(_) => targets.layered(target).map(|(_, array)| array),
         _ => None,
     };
-    let sampled = (1..).zip(declaration.accesses.iter().filter_map(sampled).map(BindingResource::Texture));
+    let sampled = used.accesses.iter().filter_map(sampled);
+    let samples = declaration.samples().count();
+    if sampled.clone().count() != samples {
+        return Err(broken_rule("a frame has the targets that its passes sample"));
+    }
+    let sampled = (1..).zip(sampled.map(BindingResource::Texture));
     let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
-    let samples = declaration.samples().count() as u32;
     let shared = declaration.bound_buffers().filter_map(|(buffer, _)| buffers.find(buffer));
     let shared = shared.map(|buffer| BindingResource::Buffer(buffer.as_entire_buffer_binding()));
-    let bound = parameters.into_iter().chain(sampled).chain((1 + samples..).zip(shared));
+    let bound = parameters.into_iter().chain(sampled).chain((1 + samples as u32..).zip(shared));
     pass.process_bind_group = CachedBindGroup::update(before, device, &pass.label, layout, bound)?;
 
     let columns = declaration.columns.iter().filter_map(|column| resources.objects.column(*column));

@@ -66,9 +66,10 @@ impl WgpuBackend {
                 let descriptor = wgpu::CommandEncoderDescriptor { label: Some("copies of targets") };
                 let mut encoder = self.device.create_command_encoder(&descriptor);
                 frame.read_backs.iter().for_each(|copy| copy.encode(&mut encoder));
-                frame.targets.copy_histories(&mut encoder, |view| drawn.contains(&view));
-                encoder.finish()
+                frame.targets.copy_histories(&mut encoder, |view| drawn.contains(&view))?;
+                Ok::<_, BackendError>(encoder.finish())
             });
+            let copies = copies.transpose()?;
             let mut finished = finished.into_iter();
             self.submit_up_to_fences(&mut finished, inner_places)?;
             let index = self.queue().submit(finished.chain(copies).chain(copy));

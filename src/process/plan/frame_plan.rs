@@ -10,18 +10,19 @@ use super::buffers::buffers_of;
 use super::columns::{check_columns, columns_of};
 use super::material_types::{check_material_types, material_types_of};
 use super::planned_process::ProcessId;
-use super::planned_target::{Attachments, check_blending, check_stencil, targets_of};
+use super::planned_target::{
+    Attachments, check_blending, check_stencil, placeholder_shadow_map, reads_shadow_map, targets_of,
+};
 use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
 use super::sampled_views::{check_sampled_views, sampled_target};
 use super::view_group::view_groups;
 use super::{
-    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, ViewGroup,
+    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, TargetIndices,
+    ViewGroup,
 };
 use crate::graph::{GraphProblem, Schedule};
-use crate::process::{
-    Access, BufferLayout, DeclaredAttribute, Draws, Format, RenderProcess, ShadowCasters, TargetSize,
-};
+use crate::process::{BufferLayout, DeclaredAttribute, Draws, RenderProcess};
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
 use crate::unwind::{discard_all, emit};
 use crate::view::RenderView;
@@ -116,6 +117,7 @@ impl FramePlan {
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
         for (index, planned) in processes.iter_mut().enumerate() {
             planned.id = ProcessId { plan: identity, index };
+            planned.targets = TargetIndices::new(planned, &targets)?;
         }
         Ok(Self {
             identity,
@@ -183,7 +185,7 @@ impl FramePlan {
     /// views, it is the target of this name in views of another kind: its pixel has the same format. Where a history
     /// has no copy for that reason, it is the target that it would be copied from.
     pub fn sampled_target(&self, views: ViewKind, name: &str) -> Option<&PlannedTarget> {
-        sampled_target(&self.targets, views, name)
+        sampled_target(&self.targets, views, name).map(|index| &self.targets[index])
     }
 
     /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
@@ -208,6 +210,19 @@ impl FramePlan {
     /// The targets that views of each kind have.
     pub fn targets(&self) -> &[PlannedTarget] {
         &self.targets
+    }
+
+    /// The index of the target of this name in views of a kind.
+    #[cfg(any(feature = "wgpu", feature = "software"))]
+    pub(crate) fn target_index(&self, views: ViewKind, name: &str) -> Option<usize> {
+        super::target_indices::target_index(&self.targets, views, name)
+    }
+
+    /// The targets that are copied at the end of each frame: the index of each copy, and that of what is copied.
+    #[cfg(any(feature = "wgpu", feature = "software"))]
+    pub(crate) fn histories(&self) -> impl Iterator<Item = (usize, usize)> {
+        let source = |copy: &PlannedTarget| self.target_index(copy.views, copy.copy_of.as_deref()?);
+        self.targets.iter().enumerate().filter_map(move |(index, copy)| Some((index, source(copy)?)))
     }
 
     /// The pixels of the targets that a process, by index, draws into; those of the picture if it draws into none.
@@ -270,36 +285,6 @@ impl FramePlan {
 }
 
 static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(0);
-
-/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
-/// texture to bind.
-fn placeholder_shadow_map(slot_names: &[String], added: &[(Option<usize>, PlannedProcess)]) -> Option<PlannedTarget> {
-    let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
-    let is_drawn = added.iter().any(|(_, other)| {
-        other.declaration.views.rules().is_shadow_map
-            && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
-    });
-    let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
-    (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
-        name: ShadowCasters::TARGET.to_owned(),
-        views: ViewKind::Shadow,
-        format: Format::Depth32Float,
-        stored: false,
-        layered: true,
-        size: TargetSize::Picture,
-        multisampled: false,
-        mipmapped: false,
-        output: false,
-        copy_of: None,
-    })
-}
-
-fn reads_shadow_map(planned: &PlannedProcess) -> bool {
-    planned.declaration.accesses.iter().any(|(target, access)| {
-        let (Access::SampleLayers(views) | Access::SampleView(views, _)) = access else { return false };
-        target == ShadowCasters::TARGET && views.rules().is_shadow_map
-    })
-}
 
 /// The last plan with a process drops it, on whatever thread that is.
 impl Drop for FramePlan {

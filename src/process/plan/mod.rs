@@ -16,6 +16,7 @@ mod planned_target;
 mod process_graph;
 mod resource_names;
 mod sampled_views;
+mod target_indices;
 mod view_arrays;
 mod view_group;
 
@@ -28,5 +29,6 @@ pub use planned_process::PlannedProcess;
 pub(crate) use planned_process::ProcessId;
 pub use planned_target::{AttachmentExtent, PlannedTarget};
 pub use sampled_views::SampledViews;
+pub(crate) use target_indices::TargetIndices;
 pub(crate) use view_arrays::ViewArray;
 pub use view_group::{ViewGroup, ViewOrder};

@@ -3,7 +3,7 @@
 use std::iter;
 use std::sync::Arc;
 
-use super::{PlanError, ProcessError};
+use super::{PlanError, ProcessError, TargetIndices};
 #[cfg(feature = "wgpu")]
 use crate::process::RequestLog;
 use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
@@ -19,6 +19,8 @@ pub struct PlannedProcess {
     pub name: String,
     /// What it declared.
     pub declaration: Declaration,
+    /// The targets that it uses.
+    pub(crate) targets: TargetIndices,
     /// What it is known by in all plans of a renderer.
     pub(crate) id: ProcessId,
     /// Whether it draws in the kind of views that it declares, and not in a further one.
@@ -72,6 +74,7 @@ impl PlannedProcess {
             Self {
                 process: Arc::clone(process),
                 name: name.clone(),
+                targets: TargetIndices::default(),
                 id: ProcessId::default(),
                 is_of_own_kind: views == own_kind,
                 #[cfg(feature = "wgpu")]

@@ -3,7 +3,7 @@
 use super::mip_levels::{check_mip_levels, mip_levels_error};
 use super::resource_names::views_of_output;
 use super::{PlanError, PlannedProcess, ProcessError};
-use crate::process::{Access, BlendEquation, Declaration, Draws, Format, TargetSize, previous_name};
+use crate::process::{Access, BlendEquation, Declaration, Draws, Format, ShadowCasters, TargetSize, previous_name};
 use crate::scene::{Blend, ViewKind};
 
 /// A target that each view of one kind has.
@@ -387,6 +387,39 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
         }
     }
     Ok(copies)
+}
+
+/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
+/// texture to bind.
+pub(super) fn placeholder_shadow_map(
+    slot_names: &[String],
+    added: &[(Option<usize>, PlannedProcess)],
+) -> Option<PlannedTarget> {
+    let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
+    let is_drawn = added.iter().any(|(_, other)| {
+        other.declaration.views.rules().is_shadow_map
+            && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
+    });
+    let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
+    (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
+        name: ShadowCasters::TARGET.to_owned(),
+        views: ViewKind::Shadow,
+        format: Format::Depth32Float,
+        stored: false,
+        layered: true,
+        size: TargetSize::Picture,
+        multisampled: false,
+        mipmapped: false,
+        output: false,
+        copy_of: None,
+    })
+}
+
+pub(super) fn reads_shadow_map(planned: &PlannedProcess) -> bool {
+    planned.declaration.accesses.iter().any(|(target, access)| {
+        let (Access::SampleLayers(views) | Access::SampleView(views, _)) = access else { return false };
+        target == ShadowCasters::TARGET && views.rules().is_shadow_map
+    })
 }
 
 fn accesses(processes: &[PlannedProcess]) -> impl Iterator<Item = (&PlannedProcess, &String, Access)> {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::target_indices::target_index;
 use super::{Pass, PlanError, PlannedProcess, PlannedTarget};
 use crate::process::{Access, SampledShape, SampledView, source_of_previous};
 use crate::scene::{Camera, ViewKind, child_name};
@@ -110,7 +111,8 @@ pub(super) fn check_sampled_views(processes: &[PlannedProcess], targets: &[Plann
                 continue;
             };
             let draws_views = processes.iter().any(|other| other.declaration.views == views);
-            let found = sampled_target(targets, views, target).filter(|found| found.views == views || !draws_views);
+            let found = sampled_target(targets, views, target).map(|index| &targets[index]);
+            let found = found.filter(|found| found.views == views || !draws_views);
             let found = found.filter(|found| access.is_previous() || found.name == *target);
             let SampledView { name: view, shape } = planned.declaration.sampled_views[index].clone();
             let process = planned.name.clone();
@@ -140,15 +142,10 @@ pub(super) fn has_raw_access(processes: &[PlannedProcess], target: &PlannedTarge
     accesses.any(|(name, access)| *name == target.name && access.is_raw())
 }
 
-/// See [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
-pub(super) fn sampled_target<'a>(
-    targets: &'a [PlannedTarget],
-    views: ViewKind,
-    name: &str,
-) -> Option<&'a PlannedTarget> {
-    let named = |name| {
-        let named = || targets.iter().filter(move |target| target.name == name);
-        named().find(|target| target.views == views).or_else(|| named().next())
+/// The index of [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+pub(super) fn sampled_target(targets: &[PlannedTarget], views: ViewKind, name: &str) -> Option<usize> {
+    let named = |name: &str| {
+        target_index(targets, views, name).or_else(|| targets.iter().position(|target| target.name == name))
     };
     named(name).or_else(|| named(source_of_previous(name)?))
 }

@@ -39,14 +39,13 @@ impl FramePlan {
     pub(crate) fn view_arrays(&self, views: &[RenderView]) -> Vec<ViewArray> {
         let mut arrays: Vec<ViewArray> = Vec::new();
         for planned in self.processes() {
-            for (target, access) in &planned.declaration.accesses {
-                let Access::SampleView(kind, index) = *access else { continue };
+            for &(target_index, access) in &planned.targets.accesses {
+                let Access::SampleView(kind, index) = access else { continue };
                 let sampled = &planned.declaration.sampled_views[index];
-                if sampled.shape == SampledShape::Picture {
+                // Of another kind if no process draws the views that it samples.
+                if sampled.shape == SampledShape::Picture || self.targets()[target_index].views != kind {
                     continue;
                 }
-                let is_sampled = |other: &&super::PlannedTarget| other.views == kind && other.name == *target;
-                let Some(target_index) = self.targets().iter().position(|other| is_sampled(&other)) else { continue };
                 let layer_count = sampled.shape.view_count();
                 for (name, view_indices) in numbered_views(views, kind, &sampled.name, layer_count) {
                     let known =

@@ -6,14 +6,15 @@ use super::frame_buffers::FrameBuffers;
 use super::generated_uploads::GeneratedUploads;
 use super::pass_state::WgpuPassState;
 use super::pending_uploads::PendingUploads;
+use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::wgpu::pipelines::ProcessPipelines;
 use crate::backend::wgpu::read_back::{ReadBackCopy, WgpuReadBack, new_read_back};
 use crate::backend::wgpu::resources::{
-    BindGroupLayouts, LightMeshes, MeshSnapshot, SnapshotToken, StorageBuffers, ViewTarget, WgpuTargets,
+    BindGroupLayouts, LightMeshes, MeshSnapshot, SnapshotToken, StorageBuffers, WgpuTargets,
 };
 use crate::backend::wgpu::streaming::FrameUse;
-use crate::backend::{BackendError, FrameRequest};
 use crate::process::Pass;
 
 /// A frame in flight through the wgpu backend.
@@ -78,18 +79,19 @@ impl WgpuFrame {
     }
 
     /// Generates the mip levels that a pass, by index in the frame, leaves out of date.
+    ///
+    /// # Errors
+    /// If a target is missing, or what generates its mip levels. This is a bug in Drawloom.
     pub(crate) fn generate_mip_levels(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        request: &FrameRequest<'_>,
         pass: usize,
-    ) {
+    ) -> Result<(), BackendError> {
         for &(view, target) in self.mip_schedule.after(pass) {
-            let target = self.targets.find(view, &request.plan.targets()[target].name);
-            if let Some(levels) = target.and_then(ViewTarget::mip_levels) {
-                levels.generate(encoder);
-            }
+            let levels = self.targets.of_view(view, target)?.mip_levels();
+            levels.ok_or_else(|| broken_rule("a target has what generates its mip levels"))?.generate(encoder);
         }
+        Ok(())
     }
 
     /// The state of a pass, by index in the frame.

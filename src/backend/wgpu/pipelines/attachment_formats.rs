@@ -2,10 +2,9 @@
 
 use crate::backend::wgpu::resources::{SampledTarget, sample_count, shape_dimension, texture_format};
 use crate::process::{
-    Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Declaration, Format, FramePlan, Stencil,
-    StencilOperation,
+    Access, BlendComponent, BlendEquation, BlendFactor, Comparison, Format, FramePlan, PlannedProcess, PlannedTarget,
+    Stencil, StencilOperation,
 };
-use crate::scene::ViewKind;
 
 /// The formats of the targets that a process draws into and samples, and how it uses buffers.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,44 +32,34 @@ pub(super) struct DepthAttachmentFormat {
 }
 
 impl AttachmentFormats {
-    pub(super) fn new(plan: &FramePlan, declaration: &Declaration) -> Self {
-        let planned = |views: ViewKind, target: &str| {
-            plan.targets().iter().find(|planned| planned.views == views && planned.name == target)
-        };
-        let format_of =
-            |views, target: &str| planned(views, target).map_or(Format::Rgba8Unorm, |planned| planned.format);
-        let colors = declaration.colors().map(|(target, _)| format_of(declaration.views, target));
+    pub(super) fn new(plan: &FramePlan, process: &PlannedProcess) -> Self {
+        let PlannedProcess { declaration, targets, .. } = process;
+        let planned = |index: usize| &plan.targets()[index];
+        let colors = targets.colors.iter().map(|color| planned(color.index).format);
         let (colors, can_be_blended) =
             colors.map(|format| (Some(texture_format(format)), format.can_be_blended())).unzip();
-        let depth = declaration.depth().map(|(target, access)| DepthAttachmentFormat {
-            format: format_of(declaration.views, target),
+        let depth = targets.depth.map(|(target, access)| DepthAttachmentFormat {
+            format: planned(target).format,
             writes_depth: access.writes_depth(),
             writes_stencil: access.writes(),
             access,
         });
-        let sampled = declaration.accesses.iter().filter_map(|(target, access)| match access {
-            Access::Sample | Access::SamplePrevious => {
-                let format = format_of(declaration.views, target);
-                let multisampled = planned(declaration.views, target).is_some_and(|planned| planned.multisampled);
-                Some(SampledTarget { format, dimension: wgpu::TextureViewDimension::D2, multisampled })
-            }
-            Access::SampleView(views, index) | Access::SampleViewPrevious(views, index) => {
-                let planned = plan.sampled_target(*views, target)?;
-                let (format, multisampled) = (planned.format, planned.multisampled);
-                let dimension = shape_dimension(declaration.sampled_views[*index].shape);
-                Some(SampledTarget { format, dimension, multisampled })
-            }
-            Access::SampleLayers(views) => {
-                let dimension = wgpu::TextureViewDimension::D2Array;
-                Some(SampledTarget { format: format_of(*views, target), dimension, multisampled: false })
-            }
-            _ => None,
+        let sampled = targets.accesses.iter().filter_map(|&(target, access)| {
+            let dimension = match access {
+                Access::Sample | Access::SamplePrevious => wgpu::TextureViewDimension::D2,
+                Access::SampleView(_, index) | Access::SampleViewPrevious(_, index) => {
+                    shape_dimension(declaration.sampled_views[index].shape)
+                }
+                Access::SampleLayers(_) => wgpu::TextureViewDimension::D2Array,
+                _ => return None,
+            };
+            let &PlannedTarget { format, multisampled, .. } = planned(target);
+            Some(SampledTarget { format, dimension, multisampled })
         });
         let writes_buffers = declaration.bound_buffers().map(|(_, writes)| writes);
         let (sampled, writes_buffers) = (sampled.collect(), writes_buffers.collect());
-        let drawn = declaration.colors().map(|(target, _)| target).chain(declaration.depth().map(|(target, _)| target));
-        let mut drawn = drawn.filter_map(|target| planned(declaration.views, target));
-        let samples = drawn.next().map_or(1, |planned| sample_count(planned.multisampled));
+        let mut drawn = targets.colors.iter().map(|color| color.index).chain(targets.depth.map(|(target, _)| target));
+        let samples = drawn.next().map_or(1, |target| sample_count(planned(target).multisampled));
         Self { colors, can_be_blended, depth, samples, sampled, writes_buffers }
     }
 }

@@ -35,7 +35,7 @@ impl PipelineInputs {
         Self {
             name: planned.name.clone(),
             key: PipelineKey::new(draws, quality).into_owned(),
-            attachments: AttachmentFormats::new(plan, &planned.declaration),
+            attachments: AttachmentFormats::new(plan, planned),
             attributes: planned.declaration.attributes.clone(),
             array_count: array_count(&planned.declaration),
             resources: draws.resources().iter().map(|resource| binding_type(features, resource)).collect(),
@@ -72,7 +72,7 @@ impl PipelineInputs {
             && self.may_clamp == may_clamp(&planned.declaration)
             && self.array_count == array_count(&planned.declaration)
             && self.attributes == planned.declaration.attributes
-            && self.attachments == AttachmentFormats::new(plan, &planned.declaration)
+            && self.attachments == AttachmentFormats::new(plan, planned)
     }
 
     /// Whether they still fit what their process draws.

@@ -6,23 +6,47 @@ use std::ops::Range;
 
 use wgpu::util::RenderEncoder;
 
+use super::pass_encoder::PassEncoder;
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
-use crate::backend::wgpu::frame::{WgpuFrame, WgpuPassState};
 use crate::backend::wgpu::pipelines::PipelineVariant;
 use crate::backend::wgpu::resources::{MeshPageIndices, SubdividedMesh, attribute_of};
-use crate::command::{Batch, DrawList};
+use crate::backend::wgpu::strategy::PassSegment;
+use crate::command::Batch;
+
+impl PassEncoder<'_> {
+    /// Records the batches of a segment directly into the pass.
+    ///
+    /// # Errors
+    /// If a resource of the pass is missing. This is a bug in Drawloom.
+    pub(super) fn record_batches(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        segment: PassSegment,
+        bundles: Range<usize>,
+    ) -> Result<(), BackendError> {
+        let pipelines = self.pipelines.variants();
+        let subdivided = self.frame.buffers.subdivided().read();
+        let indices = self.state.partial_indices.read();
+        let partial_indices = indices.buffer();
+        let recorder = BatchRecorder { pass: self, pipelines: &pipelines, subdivided: &subdivided, partial_indices };
+        let batches = match bundles.clone().next_back() {
+            Some(last) => self.list.bundle_range(bundles.start).start..self.list.bundle_range(last).end,
+            None => 0..0,
+        };
+        let mut render_pass = self.begin(encoder, segment)?;
+        if batches.is_empty() { Ok(()) } else { recorder.draw(&mut render_pass, batches) }
+    }
+}
 
 /// Records the batches of a pass.
-pub(crate) struct BatchRecorder<'a> {
-    pub(crate) frame: &'a WgpuFrame,
-    pub(crate) pass: &'a WgpuPassState,
-    pub(crate) list: &'a DrawList,
-    pub(crate) pipelines: &'a HashMap<PipelineVariant, wgpu::RenderPipeline>,
-    pub(crate) subdivided: &'a SubdividedMeshes<SubdividedMesh>,
+pub(super) struct BatchRecorder<'a> {
+    pub(super) pass: &'a PassEncoder<'a>,
+    pub(super) pipelines: &'a HashMap<PipelineVariant, wgpu::RenderPipeline>,
+    pub(super) subdivided: &'a SubdividedMeshes<SubdividedMesh>,
     /// The indices of partial batches' remaining triangles.
-    pub(crate) partial_indices: Option<&'a wgpu::Buffer>,
+    pub(super) partial_indices: Option<&'a wgpu::Buffer>,
 }
 
 impl<'a> BatchRecorder<'a> {
@@ -31,16 +55,16 @@ impl<'a> BatchRecorder<'a> {
     ///
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.
-    pub(crate) fn draw(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
-        self.set_bind_groups(encoder);
+    pub(super) fn draw(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
+        self.pass.bind_groups().for_each(|(index, group)| encoder.set_bind_group(index, Some(group), &[]));
         let mut bound = None;
         let mut start = batches.start;
-        let meshes = &self.frame.meshes;
-        for run in self.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
-            let variant = PipelineVariant::of_batch(meshes, &run[0]).clamping(self.pass.clamps_depth);
+        let meshes = &self.pass.frame.meshes;
+        for run in self.pass.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
+            let variant = PipelineVariant::of_batch(meshes, &run[0]).clamping(self.pass.state.clamps_depth);
             let end = start + run.len();
             let Some(pipeline) = self.pipelines.get(&variant) else {
-                if !self.frame.pipelines(self.pass.pass).is_unreadable(&variant) {
+                if !self.pass.pipelines.is_unreadable(&variant) {
                     return Err(broken_rule("a pipeline is created before it is used"));
                 }
                 start = end;
@@ -75,15 +99,15 @@ impl<'a> BatchRecorder<'a> {
         batches: Range<usize>,
         bound: &mut Option<MeshPageIndices>,
     ) -> Result<(), BackendError> {
-        let Some(pages) = self.frame.meshes.pages(&self.list.batches[batches.start]) else {
+        let Some(pages) = self.pass.frame.meshes.pages(&self.pass.list.batches[batches.start]) else {
             // An error unless it is yet to arrive.
-            return self.frame.meshes.mesh_range(&self.list.batches[batches.start]).map(|_| ());
+            return self.pass.frame.meshes.mesh_range(&self.pass.list.batches[batches.start]).map(|_| ());
         };
         if *bound != Some(pages) {
             self.set_pages(encoder, pages)?;
             *bound = Some(pages);
         }
-        if self.list.is_whole() {
+        if self.pass.list.is_whole() {
             self.draw_each(encoder, batches)
         } else {
             self.draw_with_partial(encoder, pages, batches)
@@ -100,7 +124,7 @@ impl<'a> BatchRecorder<'a> {
         let mut whole = batches.start..batches.start;
         let mut binds_partial_indices = false;
         for index in batches {
-            let Some(remaining) = self.frame.meshes.remaining(self.list, index) else {
+            let Some(remaining) = self.pass.frame.meshes.remaining(self.pass.list, index) else {
                 whole.end = index + 1;
                 continue;
             };
@@ -119,8 +143,8 @@ impl<'a> BatchRecorder<'a> {
                 let indices = indices.ok_or_else(|| broken_rule("indices are uploaded before they are used"))?;
                 encoder.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
             }
-            let batch = &self.list.batches[index];
-            if let Some(mesh) = self.frame.meshes.mesh_range(batch)? {
+            let batch = &self.pass.list.batches[index];
+            if let Some(mesh) = self.pass.frame.meshes.mesh_range(batch)? {
                 encoder.draw_indexed(remaining, mesh.base_vertex, batch.first..batch.first + batch.count);
             }
         }
@@ -132,8 +156,8 @@ impl<'a> BatchRecorder<'a> {
 
     /// Draws each of these whole batches with a draw call of its own.
     fn draw_each(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
-        for batch in &self.list.batches[batches] {
-            if let Some(mesh) = self.frame.meshes.mesh_range(batch)? {
+        for batch in &self.pass.list.batches[batches] {
+            if let Some(mesh) = self.pass.frame.meshes.mesh_range(batch)? {
                 let indices = mesh.first_index..mesh.first_index + mesh.index_count;
                 encoder.draw_indexed(indices, mesh.base_vertex, batch.first..batch.first + batch.count);
             }
@@ -147,7 +171,7 @@ impl<'a> BatchRecorder<'a> {
             let mesh = mesh.ok_or_else(|| broken_rule("a mesh is subdivided before it is drawn"))?;
             let Some(mesh) = &mesh.geometry else { continue };
             encoder.set_vertex_buffer(0, Some(mesh.vertices.slice(..)));
-            for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+            for (slot, attribute) in (1..).zip(self.pass.pipelines.attributes()) {
                 encoder.set_vertex_buffer(slot, Some(attribute_of(&mesh.attributes, attribute.layout)?.slice(..)));
             }
             encoder.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -158,10 +182,10 @@ impl<'a> BatchRecorder<'a> {
 
     /// Draws meshes in the engine's own buffers.
     fn draw_imported_meshes(&self, encoder: &mut impl RenderEncoder<'a>, run: &[Batch]) -> Result<(), BackendError> {
-        let pipelines = self.frame.pipelines(self.pass.pass);
+        let pipelines = self.pass.pipelines;
         let defaults = pipelines.attribute_defaults();
         let defaults = defaults.ok_or_else(|| broken_rule("attributes have defaults before they are drawn"))?;
-        let meshes = &self.frame.meshes.imported_meshes;
+        let meshes = &self.pass.frame.meshes.imported_meshes;
         for batch in run {
             let mesh = meshes.get(batch.mesh).ok_or_else(missing_mesh_error)?;
             mesh.set_buffers(encoder, pipelines.attributes(), defaults);
@@ -174,27 +198,17 @@ impl<'a> BatchRecorder<'a> {
         Ok(())
     }
 
-    pub(crate) fn set_bind_groups(&self, encoder: &mut impl RenderEncoder<'a>) {
-        encoder.set_bind_group(0, self.pass.frame_bind_group.as_ref(), &[]);
-        encoder.set_bind_group(1, self.frame.buffers.materials_bind_group(), &[]);
-        for (index, own) in [(2, &self.pass.process_bind_group), (3, &self.pass.engine_bind_group)] {
-            if let Some(own) = own {
-                encoder.set_bind_group(index, Some(&own.group), &[]);
-            }
-        }
-    }
-
     fn set_pages(&self, encoder: &mut impl RenderEncoder<'a>, pages: MeshPageIndices) -> Result<(), BackendError> {
-        let buffers = self.frame.meshes.vertex_buffers(pages)?;
+        let buffers = self.pass.frame.meshes.vertex_buffers(pages)?;
         encoder.set_vertex_buffer(0, Some(buffers.vertices.slice(..)));
-        for (slot, attribute) in (1..).zip(self.frame.pipelines(self.pass.pass).attributes()) {
+        for (slot, attribute) in (1..).zip(self.pass.pipelines.attributes()) {
             encoder.set_vertex_buffer(slot, Some(attribute_of(&buffers.attributes, attribute.layout)?.slice(..)));
         }
         self.set_index_page(encoder, pages)
     }
 
     fn set_index_page(&self, encoder: &mut impl RenderEncoder<'a>, pages: MeshPageIndices) -> Result<(), BackendError> {
-        encoder.set_index_buffer(self.frame.meshes.index_buffer(pages)?.slice(..), wgpu::IndexFormat::Uint32);
+        encoder.set_index_buffer(self.pass.frame.meshes.index_buffer(pages)?.slice(..), wgpu::IndexFormat::Uint32);
         Ok(())
     }
 }

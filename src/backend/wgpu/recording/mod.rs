@@ -1,11 +1,9 @@
 //! From batches to commands of the device.
 
 mod batch_recorder;
-mod begin_pass;
 mod bundles;
-mod compute;
 mod encode_pass;
-mod record_pass;
+mod pass_encoder;
 
-pub(crate) use bundles::{cached_bundle, record_bundle};
-pub(crate) use encode_pass::{encode_after_segments, encode_pass, encode_passes, encode_segment};
+pub(crate) use encode_pass::{encode_after_segments, encode_pass, encode_passes};
+pub(crate) use pass_encoder::PassEncoder;

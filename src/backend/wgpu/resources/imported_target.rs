@@ -34,21 +34,17 @@ impl ImportedTarget {
         if named.peek().is_none() {
             return Err(self.refused("there is no such view"));
         }
-        let target_in = |view: &RenderView| {
-            let mut targets = plan.targets().iter().filter(|planned| planned.views == view.kind());
-            targets.find(|planned| planned.name == self.target)
-        };
-        let found = named.find_map(|(index, view)| Some((index, view, target_in(view)?)));
-        let (view_index, view, planned) = found.ok_or_else(|| self.refused("the view has no such target"))?;
+        let found = named.find_map(|(index, view)| Some((index, view, plan.target_index(view.kind(), &self.target)?)));
+        let (view_index, view, target_index) = found.ok_or_else(|| self.refused("the view has no such target"))?;
+        let planned = &plan.targets()[target_index];
         self.check(plan, planned, planned.size.in_view(view.camera.size))?;
-        let is_planned = |target: usize| std::ptr::eq(&plan.targets()[target], planned);
-        let mut arrays = plan.view_arrays(views).into_iter().filter(|array| is_planned(array.target_index));
+        let mut arrays = plan.view_arrays(views).into_iter().filter(|array| array.target_index == target_index);
         if arrays.any(|array| array.view_indices.contains(&Some(view_index))) {
             return Err(
                 self.refused("that target cannot be imported, because a process samples it as a layer of an array")
             );
         }
-        Ok(ResolvedImport { view_index, planned, texture: self.texture.clone() })
+        Ok(ResolvedImport { view_index, target_index, planned, texture: self.texture.clone() })
     }
 
     fn refused(&self, problem: impl Into<String>) -> BackendError {
@@ -100,6 +96,7 @@ impl ImportedTarget {
 /// An imported texture, and the target that it takes the place of.
 pub(crate) struct ResolvedImport<'a> {
     pub(super) view_index: usize,
+    pub(super) target_index: usize,
     pub(super) planned: &'a PlannedTarget,
     pub(super) texture: wgpu::Texture,
 }

@@ -36,11 +36,9 @@ impl PlaceholderTargets {
     pub(super) fn updated(&self, device: &wgpu::Device, plan: &FramePlan) -> Result<Self, BackendError> {
         let mut updated = Self::default();
         for process in plan.processes() {
-            for (target, access) in &process.declaration.accesses {
-                let (Access::SampleView(views, index) | Access::SampleViewPrevious(views, index)) = *access else {
-                    continue;
-                };
-                let Some(planned) = plan.sampled_target(views, target) else { continue };
+            for &(target, access) in &process.targets.accesses {
+                let (Access::SampleView(_, index) | Access::SampleViewPrevious(_, index)) = access else { continue };
+                let planned = &plan.targets()[target];
                 let shape = process.declaration.sampled_views[index].shape;
                 if updated.find(planned, shape).is_some() {
                     continue;
@@ -50,7 +48,7 @@ impl PlaceholderTargets {
                     // wgpu clears a texture before it is first read.
                     None => {
                         let kind = TextureKind { size: [1, 1], ..TextureKind::of(planned, [1, 1]) };
-                        let texture = new_texture(device, target, kind, shape.view_count())?;
+                        let texture = new_texture(device, &planned.name, kind, shape.view_count())?;
                         let (_, texture) = new_views(&texture, planned.format, &shape_descriptor(shape));
                         let PlannedTarget { format, multisampled, .. } = *planned;
                         Placeholder { format, multisampled, shape, texture }

@@ -10,18 +10,21 @@ use super::target_mip_levels::{MipGenerator, MipPipelines};
 use super::target_texture::{TextureKind, new_texture, new_views, texture_bytes};
 use super::transient_targets::{TransientTargets, uses_transient};
 use super::view_array::{ViewArrayTexture, layer_descriptor};
+use crate::backend::error::broken_rule;
 use crate::backend::{BackendError, FrameRequest, TargetMemory};
 use crate::process::{Format, Pass, PlannedTarget, SampledShape, SampledViews};
-use crate::scene::ViewKind;
 use crate::view::{PerView, RenderView, ViewId};
 
 /// The targets of one frame.
 #[derive(Clone, Default)]
 pub(crate) struct WgpuTargets {
-    /// For each view its own targets, and its layers of the shared ones.
-    views: PerView<Vec<ViewTarget>>,
-    /// The targets that all views of a kind share.
-    layered: Vec<LayeredTarget>,
+    /// For each view its own targets, and its layers of the shared ones: each with its index among the plan's, in
+    /// ascending order. A frame may have thousands of views, so a view has no entries for targets of other kinds.
+    views: PerView<Vec<(usize, ViewTarget)>>,
+    /// The targets that all views of a kind share, by their indices among the plan's.
+    layered: Vec<Option<LayeredTarget>>,
+    /// See [`FramePlan::histories`](crate::process::FramePlan::histories).
+    histories: Vec<(usize, usize)>,
     /// Those that transient targets share.
     transient: Vec<TransientSlot>,
     /// Those whose layers are targets of several views.
@@ -93,15 +96,29 @@ impl ViewTarget {
 }
 
 impl WgpuTargets {
-    /// The target of one view by its name.
+    /// The target of one view by its name, for what an engine asks for.
     pub(crate) fn find(&self, view: usize, name: &str) -> Option<&ViewTarget> {
         find(self.views.get(view)?, name)
     }
 
-    /// The array that all views of a kind share.
-    pub(crate) fn find_layered(&self, kind: ViewKind, name: &str) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
-        let found = self.layered.iter().find(|target| target.planned.views == kind && target.planned.name == name);
-        found.map(|target| (&target.texture, &target.array))
+    /// The target of one view by its index among the plan's; `None` if views of another kind have it.
+    pub(crate) fn get(&self, view: usize, index: usize) -> Option<&ViewTarget> {
+        let targets = self.views.get(view)?;
+        targets.binary_search_by_key(&index, |(index, _)| *index).ok().map(|position| &targets[position].1)
+    }
+
+    /// The target of one view by its index among the plan's.
+    ///
+    /// # Errors
+    /// If the view does not have it. This is a bug in Drawloom.
+    pub(crate) fn of_view(&self, view: usize, index: usize) -> Result<&ViewTarget, BackendError> {
+        self.get(view, index).ok_or_else(|| broken_rule("a frame has the targets of its passes"))
+    }
+
+    /// The array that all views of a kind share, by its index among the plan's targets.
+    pub(crate) fn layered(&self, index: usize) -> Option<(&wgpu::Texture, &wgpu::TextureView)> {
+        let found = self.layered.get(index)?.as_ref()?;
+        Some((&found.texture, &found.array))
     }
 
     /// A target of one or several views, one for each layer, as a shader samples it. Zeros in place of views that the
@@ -109,22 +126,29 @@ impl WgpuTargets {
     pub(crate) fn find_sampled(
         &self,
         views: &[Option<usize>],
-        planned: &PlannedTarget,
+        (target, planned): (usize, &PlannedTarget),
         shape: SampledShape,
     ) -> Option<&wgpu::TextureView> {
         let found = views.iter().flatten().find_map(|view| match shape {
-            SampledShape::Picture => self.find(*view, &planned.name).map(|target| &target.sampled),
-            _ => self.arrays.iter().find_map(|array| array.find(*view, &planned.name, shape)),
+            SampledShape::Picture => self.get(*view, target).map(|target| &target.sampled),
+            _ => self.arrays.iter().find_map(|array| array.find(*view, target, shape)),
         });
         found.or_else(|| self.placeholders.find(planned, shape))
     }
 
     /// Copies what processes of later frames read of the views that this one draws.
-    pub(crate) fn copy_histories(&self, encoder: &mut wgpu::CommandEncoder, is_drawn: impl Fn(usize) -> bool) {
-        for (view, targets) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
-            for copy in targets {
-                let source = copy.planned.copy_of.as_ref().and_then(|source| self.find(view, source));
-                let Some(source) = source else { continue };
+    ///
+    /// # Errors
+    /// If the target of a copy is missing. This is a bug in Drawloom.
+    pub(crate) fn copy_histories(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        is_drawn: impl Fn(usize) -> bool,
+    ) -> Result<(), BackendError> {
+        for (view, _) in self.views.iter().enumerate().filter(|(view, _)| is_drawn(*view)) {
+            for &(copy, source) in &self.histories {
+                let Some(copy) = self.get(view, copy) else { continue };
+                let source = self.of_view(view, source)?;
                 let origin = wgpu::Origin3d { z: source.layer, ..wgpu::Origin3d::ZERO };
                 for mip_level in 0..copy.texture.mip_level_count() {
                     let from = wgpu::TexelCopyTextureInfo { origin, mip_level, ..source.texture.as_image_copy() };
@@ -134,11 +158,12 @@ impl WgpuTargets {
                 }
             }
         }
+        Ok(())
     }
 
     /// Whether processes of later frames read something of this one.
     pub(crate) fn have_histories(&self) -> bool {
-        self.views.iter().flatten().any(|target| target.planned.copy_of.is_some())
+        self.views.iter().flatten().any(|(_, target)| target.planned.copy_of.is_some())
     }
 
     /// The memory of those that are not imported.
@@ -149,14 +174,15 @@ impl WgpuTargets {
     /// Computes the memory of these targets, none of which is imported.
     fn computed_memory(&self) -> TargetMemory {
         let mut memory = TargetMemory::default();
-        for target in self.views.iter().flatten().filter(|target| target.storage != TargetStorage::Layer) {
+        let targets = self.views.iter().flatten().map(|(_, target)| target);
+        for target in targets.filter(|target| target.storage != TargetStorage::Layer) {
             let bytes = texture_bytes(target.planned.format, &target.texture);
             memory.dedicated_bytes += bytes;
             if !target.is_transient() {
                 memory.add_texture(bytes);
             }
         }
-        let layered = self.layered.iter().map(|target| (&target.planned, &target.texture));
+        let layered = self.layered.iter().flatten().map(|target| (&target.planned, &target.texture));
         let arrays = self.arrays.iter().map(|array| (&array.planned, &array.texture));
         let arrays = layered.chain(arrays).map(|(planned, texture)| (planned.format, texture));
         for (format, texture) in arrays.chain(self.small.textures().map(|(kind, texture)| (kind.format, texture))) {
@@ -178,8 +204,8 @@ pub(crate) struct TargetCache {
     /// it may be cached.
     plan: Option<u64>,
     views: Vec<(ViewId, [u32; 2], u32, bool)>,
-    /// The targets that are not among the current ones because they were imported: the view's index, and the name.
-    imported: Vec<(usize, String)>,
+    /// The targets that are not among the current ones because they were imported: the indices of view and target.
+    imported: Vec<(usize, usize)>,
     /// What decides which targets share textures, beside the above: see [`uses_transient`]. `None` if none may.
     order: Option<(Vec<Pass>, SampledViews)>,
     /// Created when a plan has a target with mip levels for the first time.
@@ -205,18 +231,14 @@ impl TargetCache {
         }
         let mut with_imports = WgpuTargets::clone(&self.current);
         for import in imports {
-            let ResolvedImport { view_index, planned, texture } = import;
-            let (planned, texture) = (Arc::new(PlannedTarget::clone(planned)), texture.clone());
+            let &ResolvedImport { view_index, target_index, planned, ref texture } = import;
+            let (planned, texture) = (Arc::new(planned.clone()), texture.clone());
             let (view, sampled) = new_views(&texture, planned.format, &import.view_descriptor());
-            with_imports.views[*view_index].push(ViewTarget {
-                planned,
-                texture,
-                view,
-                sampled,
-                layer: 0,
-                mip_levels: None,
-                storage: TargetStorage::Own,
-            });
+            let storage = TargetStorage::Own;
+            let imported = ViewTarget { planned, texture, view, sampled, layer: 0, mip_levels: None, storage };
+            let targets = &mut with_imports.views[view_index];
+            let position = targets.partition_point(|(index, _)| *index < target_index);
+            targets.insert(position, (target_index, imported));
         }
         Ok(Arc::new(with_imports))
     }
@@ -236,8 +258,7 @@ impl TargetCache {
         let key = |view: &RenderView| (view.id, view.camera.size, view.layer, !view.camera.redraw.is_every_frame());
         let requested = || views.iter().map(key);
         let are_same_views = self.views.iter().copied().eq(requested());
-        let imported = || imports.iter().map(|import| (import.view_index, import.planned.name.as_str()));
-        let known = self.imported.iter().map(|(view, target)| (*view, target.as_str()));
+        let imported = || imports.iter().map(|import| (import.view_index, import.target_index));
         let is_same_order = match &self.order {
             Some((known, known_views)) => {
                 let using = passes.iter().filter(|pass| uses_transient(plan, views, **pass));
@@ -245,16 +266,19 @@ impl TargetCache {
             }
             None => !transient,
         };
-        if self.plan == Some(plan.identity()) && are_same_views && known.eq(imported()) && is_same_order {
+        if self.plan == Some(plan.identity())
+            && are_same_views
+            && self.imported.iter().copied().eq(imported())
+            && is_same_order
+        {
             return Ok(());
         }
         // If an error occurs below, no targets are current.
         self.plan = None;
-        let mut next = WgpuTargets::default();
-        for planned in plan.targets().iter().filter(|planned| planned.layered) {
-            next.layered.push(self.layered_target(device, planned, views)?);
-        }
-        let is_imported = |view: usize, target: &str| imported().any(|import| import == (view, target));
+        let mut next = WgpuTargets { histories: plan.histories().collect(), ..WgpuTargets::default() };
+        let layered = |planned: &PlannedTarget| planned.layered.then(|| self.layered_target(device, planned, views));
+        next.layered = plan.targets().iter().map(|planned| layered(planned).transpose()).collect::<Result<_, _>>()?;
+        let is_imported = |view: usize, target: usize| imported().any(|import| import == (view, target));
         let order = transient.then(|| {
             let using = passes.iter().filter(|pass| uses_transient(plan, views, **pass));
             (using.copied().collect::<Vec<_>>(), sampled_views.clone())
@@ -270,9 +294,8 @@ impl TargetCache {
             next.arrays.push(array);
         }
         let shared = order.as_ref().map_or_else(TransientTargets::default, |(passes, sampled_views)| {
-            let is_left_out = |view: usize, target: usize| {
-                layers.contains_key(&(view, target)) || is_imported(view, &plan.targets()[target].name)
-            };
+            let is_left_out =
+                |view: usize, target: usize| layers.contains_key(&(view, target)) || is_imported(view, target);
             TransientTargets::new(plan, views, (passes, sampled_views), is_left_out)
         });
         next.transient = self.transient_slots(device, shared.textures())?;
@@ -285,7 +308,7 @@ impl TargetCache {
             let (mut wanted, mut positions) = (Vec::new(), Vec::new());
             for (index, view) in views.iter().enumerate() {
                 let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
-                for (target_index, planned) in of_kind.filter(|(_, planned)| !is_imported(index, &planned.name)) {
+                for (target_index, planned) in of_kind.filter(|(target, _)| !is_imported(index, *target)) {
                     let (position, kind) = ((index, target_index), TextureKind::of(planned, view.camera.size));
                     let has_storage =
                         layers.contains_key(&position) || shared.texture_of(index, target_index).is_some();
@@ -303,8 +326,8 @@ impl TargetCache {
         let mut of_views = Vec::with_capacity(views.len());
         for (index, view) in views.iter().enumerate() {
             let of_kind = planned.iter().enumerate().filter(|(_, planned)| planned.views == view.kind());
-            let own = of_kind.filter(|(_, planned)| !is_imported(index, &planned.name));
-            let targets = own.map(|(target_index, planned)| {
+            let own = of_kind.filter(|(target, _)| !is_imported(index, *target));
+            let target = |target_index: usize, planned: &Arc<PlannedTarget>| {
                 if let Some(slot) = shared.texture_of(index, target_index).and_then(|slot| next.transient.get(slot)) {
                     let TransientSlot { texture, view, sampled, mip_levels, .. } = slot.clone();
                     let planned = Arc::clone(planned);
@@ -321,17 +344,15 @@ impl TargetCache {
                 if let Some((texture, layer)) = layers.get(&(index, target_index)) {
                     return Ok(self.layer_target((planned, texture), view, *layer));
                 }
-                if !planned.layered {
-                    return self.own_target(device, planned, view);
+                match &next.layered[target_index] {
+                    Some(layered) => Ok(self.layer_target((planned, &layered.texture), view, view.layer)),
+                    None => self.own_target(device, planned, view),
                 }
-                let layered = next.layered.iter().find(|layered| *layered.planned == **planned);
-                let missing = || BackendError::BrokenRule { rule: "every shared target is created first".to_owned() };
-                let layered = layered.ok_or_else(missing)?;
-                Ok(self.layer_target((&layered.planned, &layered.texture), view, view.layer))
-            });
-            of_views.push(targets.collect::<Result<Vec<_>, _>>()?);
+            };
+            let targets = own.map(|(index, planned)| Ok((index, target(index, planned)?)));
+            of_views.push(targets.collect::<Result<Vec<_>, BackendError>>()?);
         }
-        let written = of_views.iter_mut().flatten();
+        let written = of_views.iter_mut().flatten().map(|(_, target)| target);
         let mipmapped = written.filter(|target| target.planned.mipmapped && target.planned.copy_of.is_none());
         for target in mipmapped.filter(|target| target.mip_levels.is_none()) {
             let pipelines = self.mip_pipelines.get_or_insert_with(|| MipPipelines::new(device));
@@ -345,7 +366,7 @@ impl TargetCache {
         self.plan = Some(plan.identity());
         self.views.clear();
         self.views.extend(requested());
-        self.imported = imported().map(|(view, target)| (view, target.to_owned())).collect();
+        self.imported = imported().collect();
         self.order = order;
         Ok(())
     }
@@ -376,7 +397,7 @@ impl TargetCache {
     pub(crate) fn forget_histories(&mut self) {
         if self.current.have_histories() {
             let all = Arc::make_mut(&mut self.current).views.slots_mut();
-            all.iter_mut().for_each(|targets| targets.retain(|target| target.planned.copy_of.is_none()));
+            all.iter_mut().for_each(|targets| targets.retain(|(_, target)| target.planned.copy_of.is_none()));
             // The next frame has other targets than these.
             self.plan = None;
         }
@@ -453,7 +474,7 @@ impl TargetCache {
             wgpu::Extent3d { depth_or_array_layers: extent.depth_or_array_layers, ..size } == extent
                 && layers.contains(&size.depth_or_array_layers)
         };
-        let mut cached = self.current.layered.iter().filter(|cached| *cached.planned == *planned);
+        let mut cached = self.current.layered.iter().flatten().filter(|cached| *cached.planned == *planned);
         if let Some(cached) = cached.find(|cached| fits(cached.texture.size())) {
             return Ok(cached.clone());
         }
@@ -475,6 +496,6 @@ impl TargetCache {
 }
 
 /// The one of a view's targets that has this name.
-fn find<'a>(targets: &'a [ViewTarget], name: &str) -> Option<&'a ViewTarget> {
-    targets.iter().find(|target| target.planned.name == name)
+fn find<'a>(targets: &'a [(usize, ViewTarget)], name: &str) -> Option<&'a ViewTarget> {
+    targets.iter().map(|(_, target)| target).find(|target| target.planned.name == name)
 }

@@ -112,19 +112,18 @@ fn can_be_transient(plan: &FramePlan, planned: &PlannedTarget) -> bool {
 /// The life of each of the plan's targets in each view; `None` for those that no pass uses.
 fn lives(plan: &FramePlan, views: &[RenderView], passes: &[Pass], sampled_views: &SampledViews) -> Vec<Option<Life>> {
     let targets = plan.targets();
-    let indices: HashMap<_, _> =
-        targets.iter().enumerate().map(|(index, planned)| ((planned.views, planned.name.as_str()), index)).collect();
     let mut lives: Vec<Option<Life>> = vec![None; views.len() * targets.len()];
     for (pass_index, pass) in passes.iter().enumerate() {
-        for (name, access) in &plan.processes()[pass.process_index].declaration.accesses {
-            let sampled = match *access {
+        for &(target_index, access) in &plan.processes()[pass.process_index].targets.accesses {
+            let sampled = match access {
                 Access::SampleView(_, index) => sampled_views.find(*pass, index),
                 // An array and a history, which are not transient.
                 Access::SampleLayers(_) | Access::SampleViewPrevious(..) => &[],
                 _ => &[Some(pass.view_index)],
             };
-            for view_index in sampled.iter().flatten() {
-                let Some(target_index) = indices.get(&(views[*view_index].kind(), name.as_str())) else { continue };
+            // No process draws a view that has another kind than the target.
+            let views = sampled.iter().flatten().filter(|view| views[**view].kind() == targets[target_index].views);
+            for view_index in views {
                 let overwrites = access.format().is_some();
                 let life = &mut lives[view_index * targets.len() + target_index];
                 let life = life.get_or_insert(Life { first: pass_index, last: pass_index, is_overwritten: overwrites });

@@ -1,0 +1,194 @@
+//! The targets that a process uses, by index.
+
+use super::resource_names::resource_name;
+use super::sampled_views::sampled_target;
+use super::{PlanError, PlannedProcess, PlannedTarget};
+use crate::graph::GraphProblem;
+use crate::process::{Access, ClearColor, Declaration};
+use crate::scene::ViewKind;
+
+/// The targets that a process uses, as indices of the [plan's](super::FramePlan::targets). Its declaration names them;
+/// backends find them by index, once the plan is made.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(
+    not(any(feature = "wgpu", feature = "software")),
+    expect(dead_code, reason = "only backends that draw have attachments")
+)]
+pub(crate) struct TargetIndices {
+    /// All of them, and how they are used, in the order declared. What the process samples of other views may be a
+    /// target of views of another kind: see [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+    pub(crate) accesses: Vec<(usize, Access)>,
+    /// The colour targets in the order of the shader's outputs.
+    pub(crate) colors: Vec<ColorTarget>,
+    /// The depth target, and how it is used.
+    pub(crate) depth: Option<(usize, Access)>,
+}
+
+/// A target that a process draws into as colour.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend resolves targets"))]
+pub(crate) struct ColorTarget {
+    pub(crate) index: usize,
+    /// What it is cleared to, if it is cleared.
+    pub(crate) clear: Option<ClearColor>,
+    /// The target that it is resolved into.
+    pub(crate) resolved_into: Option<usize>,
+}
+
+impl TargetIndices {
+    /// # Errors
+    /// If there is no target of a name that the process uses: the graph took another resource for it.
+    pub(super) fn new(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<Self, PlanError> {
+        let Declaration { views, accesses, resolves, .. } = &planned.declaration;
+        let missing = |views: ViewKind, name: &str| {
+            let (resource, readers) = (resource_name(views, name), vec![planned.name.clone()]);
+            PlanError::Graph(GraphProblem::MissingProducer { resource, output: false, readers })
+        };
+        let mut indices = Self::default();
+        for (name, access) in accesses {
+            let of_views = access.views(*views);
+            let index = match access {
+                Access::SampleView(..) | Access::SampleViewPrevious(..) => sampled_target(targets, of_views, name),
+                _ => target_index(targets, of_views, name),
+            };
+            let index = index.ok_or_else(|| missing(of_views, name))?;
+            indices.accesses.push((index, *access));
+            if access.is_depth() {
+                indices.depth = Some((index, *access));
+            }
+            let clear = match access {
+                Access::ClearColor(_, clear) => Some(*clear),
+                Access::DrawOver => None,
+                _ => continue,
+            };
+            let resolve = resolves.iter().find(|(source, _)| source == name);
+            let into =
+                resolve.map(|(_, into)| target_index(targets, *views, into).ok_or_else(|| missing(*views, into)));
+            let resolved_into = into.transpose()?;
+            indices.colors.push(ColorTarget { index, clear, resolved_into });
+        }
+        Ok(indices)
+    }
+}
+
+/// The index of the target of this name in views of a kind.
+pub(super) fn target_index(targets: &[PlannedTarget], views: ViewKind, name: &str) -> Option<usize> {
+    targets.iter().position(|planned| planned.views == views && planned.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::FramePlan;
+    use super::*;
+    use crate::process::{Declare, Draws, Format, FullScreen, RenderProcess, previous_name};
+
+    struct TestProcess<F>(&'static str, F);
+
+    impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for TestProcess<F> {
+        fn name(&self) -> &str {
+            self.0
+        }
+
+        fn declare(&self, declare: &mut Declare) {
+            (self.1)(declare);
+            declare.keep();
+        }
+
+        fn draws(&self) -> Draws<'_> {
+            Draws::FullScreen(FullScreen::default())
+        }
+    }
+
+    fn process(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> Arc<dyn RenderProcess> {
+        Arc::new(TestProcess(name, declare))
+    }
+
+    const BLACK: ClearColor = ClearColor::Value([0.0; 4]);
+
+    /// Processes with targets of the same names in views of two kinds.
+    fn plan() -> FramePlan {
+        let surfaces = process("surfaces", |declare| {
+            declare.also_views(ViewKind::Reflection);
+            declare.clears_color("samples", Format::Rgba8Unorm, BLACK);
+            declare.clears_color("other samples", Format::Rgba8Unorm, BLACK);
+            declare.clears_depth("depth", Format::Depth32Float);
+            for target in ["samples", "other samples", "depth"] {
+                declare.multisampled(target);
+            }
+            declare.resolves("other samples", "resolved", Format::Rgba8Unorm);
+        });
+        let picture = process("picture", |declare| {
+            declare.samples("resolved");
+            declare.samples_previous("picture");
+            declare.samples_view(ViewKind::Reflection, "mirror", "resolved");
+            declare.samples_view_previous(ViewKind::Reflection, "mirror", "resolved");
+            declare.samples_layers(ViewKind::Shadow, "maps");
+            declare.clears_color("picture", Format::Rgba8Unorm, BLACK);
+        });
+        let overlay = process("overlay", |declare| declare.draws_over("picture"));
+        let maps = process("maps", |declare| {
+            declare.views(ViewKind::Shadow);
+            declare.clears_depth_layer("maps", Format::Depth32Float);
+        });
+        FramePlan::new(Vec::new(), vec![maps, overlay, picture, surfaces], &[]).unwrap()
+    }
+
+    #[test]
+    fn indices_are_those_of_the_targets_that_a_process_declares() {
+        let plan = plan();
+        let known: Vec<_> = plan.targets().iter().map(|planned| (planned.views, planned.name.as_str())).collect();
+        assert_eq!(plan.processes().len(), 5);
+        for PlannedProcess { declaration, targets, name, .. } in plan.processes() {
+            let own = declaration.views;
+            let declared = declaration.accesses.iter().map(|(target, access)| (access.views(own), target.as_str()));
+            assert!(targets.accesses.iter().map(|(index, _)| known[*index]).eq(declared), "{name}");
+            let accesses = declaration.accesses.iter().map(|(_, access)| *access);
+            assert!(targets.accesses.iter().map(|(_, access)| *access).eq(accesses), "{name}");
+            let colors = targets.colors.iter().map(|color| (known[color.index], color.clear));
+            assert!(colors.eq(declaration.colors().map(|(target, clear)| ((own, target), clear))), "{name}");
+            let depth = targets.depth.map(|(index, access)| (known[index], access));
+            assert_eq!(depth, declaration.depth().map(|(target, access)| ((own, target), access)), "{name}");
+            let resolved: Vec<_> = targets.colors.iter().map(|color| color.resolved_into.map(|to| known[to])).collect();
+            match name.as_str() {
+                "surfaces" => assert_eq!(resolved, [None, Some((own, "resolved"))]),
+                _ => assert!(resolved.iter().all(Option::is_none), "{name}"),
+            }
+        }
+    }
+
+    #[test]
+    fn histories_are_copies_of_targets_of_the_same_views() {
+        let plan = plan();
+        let name = |index: usize| (plan.targets()[index].views, plan.targets()[index].name.clone());
+        let histories: Vec<_> = plan.histories().map(|(copy, source)| (name(copy), name(source))).collect();
+        let history = |views, target: &str| ((views, previous_name(target)), (views, target.to_owned()));
+        assert_eq!(histories, [history(ViewKind::Main, "picture"), history(ViewKind::Reflection, "resolved")]);
+    }
+
+    #[test]
+    fn what_no_view_draws_has_the_index_of_the_same_target_in_other_views() {
+        let picture = process("picture", |declare| {
+            declare.samples_view(ViewKind::Reflection, "mirror", "picture");
+            declare.clears_color("picture", Format::Rgba8Unorm, BLACK);
+        });
+        let plan = FramePlan::new(Vec::new(), vec![picture], &[]).unwrap();
+        let indices: Vec<_> = plan.processes()[0].targets.accesses.iter().map(|(index, _)| *index).collect();
+        assert_eq!((indices, plan.targets().len()), (vec![0, 0], 1));
+    }
+
+    #[test]
+    fn a_target_that_only_the_graph_knows_by_its_name_is_missing() {
+        // The graph names the maps of shadow views like this.
+        let reader = process("reader", |declare| declare.samples("shadow: maps"));
+        let maps = process("maps", |declare| {
+            declare.views(ViewKind::Shadow);
+            declare.clears_depth_layer("maps", Format::Depth32Float);
+        });
+        let error = FramePlan::new(Vec::new(), vec![reader, maps], &[]).err();
+        let readers = vec!["reader".to_owned()];
+        let missing = GraphProblem::MissingProducer { resource: "shadow: maps".to_owned(), output: false, readers };
+        assert_eq!(error, Some(PlanError::Graph(missing)));
+    }
+}
