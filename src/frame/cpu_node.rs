@@ -22,7 +22,7 @@ use crate::task::Worker;
 /// use drawloom::graph::NodeError;
 /// use drawloom::scene::NodeColumn;
 /// use drawloom::task::Worker;
-/// use drawloom::{CpuNode, FrameData, NodeAccesses, NodeFrame};
+/// use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
 ///
 /// /// Lets objects rise and fall, before the frame reads where they are.
 /// struct Waves<'a> {

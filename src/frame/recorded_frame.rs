@@ -69,7 +69,7 @@ impl<B: Backend> RecordedFrame<B> {
     ///
     /// ```
     /// # use std::time::Duration;
-    /// # use drawloom::{FramePlace, Recorded, Submitter, backend::Backend};
+    /// # use drawloom::{FencePoint, RecordedFrame, Submitter, backend::Backend};
     /// # fn submit<B: Backend>(mut recorded: RecordedFrame<B>, submitter: &Submitter<B>) -> Result<(), Box<dyn std::error::Error>> {
     /// let mirror_is_drawn = recorded.fence_at(FencePoint::View(1))?;
     /// let frame_is_drawn = recorded.fence_at(FencePoint::End)?;

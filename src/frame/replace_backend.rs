@@ -36,7 +36,7 @@ impl<B: Backend> Renderer<B> {
     /// ```
     /// use drawloom::backend::{Backend, BackendError};
     /// use drawloom::scene::SceneRef;
-    /// use drawloom::{FrameError, Renderer, SubmitError, Submitted, Submitter};
+    /// use drawloom::{FrameError, Renderer, SubmitError, SubmittedFrame, Submitter};
     ///
     /// /// Draws a frame, on a new device if this one is lost. `open` makes a backend on a new device, as when the engine started.
     /// fn draw<B: Backend>(

@@ -53,7 +53,7 @@ use crate::unwind::emit;
 /// # use drawloom::process::Deferred;
 /// # use drawloom::task::Scheduler;
 /// use drawloom::scene::{Camera, Scene, SceneRef};
-/// use drawloom::{BudgetedView, Renderer, QualityLevel, ViewBudget, ViewForm};
+/// use drawloom::{BudgetedView, Renderer, QualityLevel, ViewBudget, ViewVariant};
 ///
 /// # let scheduler = Arc::new(Scheduler::new(2)?);
 /// # let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;

@@ -158,7 +158,7 @@
 //! # use drawloom::glam::DVec3;
 //! # use drawloom::scene::{Camera, Scene};
 //! # use drawloom::task::Scheduler;
-//! use drawloom::process::{Declare, Deferred, Draws, FullScreen, Place, RenderProcess};
+//! use drawloom::process::{Declare, Deferred, Draws, FullScreen, InjectionPoint, RenderProcess};
 //! use drawloom::scene::Blend;
 //!
 //! /// A glow at the horizon, added to what the lights leave.

@@ -20,7 +20,7 @@ impl Declare {
     ///
     /// ```
     /// use drawloom::command::Selection;
-    /// use drawloom::process::{CommandDraws, Declare, Draws, Place, RenderProcess};
+    /// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess};
     /// use drawloom::scene::{LayerMask, ViewKind};
     ///
     /// const MIRROR: LayerMask = LayerMask::layer(5);
@@ -123,7 +123,7 @@ impl Declare {
     /// resolved into. A raw pass cannot sample views.
     ///
     /// ```
-    /// use drawloom::process::{Declare, Place};
+    /// use drawloom::process::{Declare, InjectionPoint};
     /// use drawloom::scene::ViewKind;
     ///
     /// /// A screen that shows the camera `lens`, which may see the screen.

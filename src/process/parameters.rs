@@ -20,7 +20,7 @@ use parking_lot::{Mutex, ReentrantMutex};
 /// that.
 ///
 /// ```
-/// use drawloom::process::{Declare, Draws, FullScreen, Parameters, Place, RenderProcess};
+/// use drawloom::process::{Declare, Draws, FullScreen, Parameters, InjectionPoint, RenderProcess};
 /// use drawloom::scene::Blend;
 ///
 /// /// Fog over what was drawn, of a density per metre.

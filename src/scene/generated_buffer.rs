@@ -33,7 +33,7 @@ use crate::leaked_guards::unlock;
 /// use drawloom::graph::NodeError;
 /// use drawloom::scene::{GeneratedBuffer, Vertex};
 /// use drawloom::task::Worker;
-/// use drawloom::{CpuNode, NodeAccesses, NodeFrame};
+/// use drawloom::{CpuNode, NodeAccesses, NodeContext};
 ///
 /// struct Sea {
 ///     vertices: GeneratedBuffer<Vertex>,

@@ -19,7 +19,7 @@ use bytemuck::Pod;
 ///
 /// ```
 /// use drawloom::command::Selection;
-/// use drawloom::process::{CommandDraws, Declare, Draws, Place, RenderProcess, SURFACE_SHADER};
+/// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess, SURFACE_SHADER};
 /// use drawloom::scene::{Material, MaterialType, Scene};
 ///
 /// /// A surface that glows by how it faces the viewer.

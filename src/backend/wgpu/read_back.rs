@@ -31,7 +31,7 @@ struct Progress {
 #[derive(Debug)]
 enum State {
     /// Its frame is not submitted.
-    RecordedFrame,
+    Recorded,
     /// The device may not be done with it.
     Submitted(wgpu::SubmissionIndex),
     Done,
@@ -50,8 +50,8 @@ impl WgpuReadBack {
     pub fn try_read(&self) -> Result<Option<Picture>, BackendError> {
         poll(&self.device, wgpu::PollType::Poll)?;
         match &*self.progress.state.lock() {
-            State::RecordedFrame if Arc::strong_count(&self.progress) == 1 => Err(BackendError::NotSubmitted),
-            State::RecordedFrame | State::Submitted(_) => Ok(None),
+            State::Recorded if Arc::strong_count(&self.progress) == 1 => Err(BackendError::NotSubmitted),
+            State::Recorded | State::Submitted(_) => Ok(None),
             State::Done => self.picture().map(Some),
             State::Failed(message) => Err(BackendError::DeviceLost { message: message.clone() }),
         }
@@ -74,14 +74,14 @@ impl WgpuReadBack {
             // Another thread may have submitted it meanwhile.
             index = submitted(&self.progress.state.lock());
         }
-        if index.is_none() && matches!(*self.progress.state.lock(), State::RecordedFrame) {
+        if index.is_none() && matches!(*self.progress.state.lock(), State::Recorded) {
             return Err(BackendError::NotSubmitted);
         }
         poll(&self.device, wgpu::PollType::Wait { submission_index: index, timeout: None })?;
         // The device is done with the frame, so the callback has run, or another thread that polled is about to run it.
         let deadline = Instant::now() + Self::MAX_CALLBACK_DELAY;
         let mut state = self.progress.state.lock();
-        while matches!(*state, State::RecordedFrame | State::Submitted(_)) {
+        while matches!(*state, State::Recorded | State::Submitted(_)) {
             if self.progress.ended.wait_until(&mut state, deadline).timed_out() {
                 return Err(BackendError::Timeout { timeout: Self::MAX_CALLBACK_DELAY });
             }
@@ -158,7 +158,7 @@ impl ReadBackCopy {
         // Set only after the request, so a thread that sees it and waits for the submission finds the buffer mapped.
         // Another thread may have polled already.
         let mut state = progress.state.lock();
-        if matches!(*state, State::RecordedFrame) {
+        if matches!(*state, State::Recorded) {
             *state = State::Submitted(index.clone());
         }
     }
@@ -208,7 +208,7 @@ pub(crate) fn new_read_back(
         mapped_at_creation: false,
     };
     let buffer = with_error_scope(device, target, || device.create_buffer(&descriptor))?;
-    let progress = Arc::new(Progress { state: Mutex::new(State::RecordedFrame), ended: Condvar::new() });
+    let progress = Arc::new(Progress { state: Mutex::new(State::Recorded), ended: Condvar::new() });
     let copy = ReadBackCopy { target: found, origin, size, buffer: buffer.clone(), progress: Arc::clone(&progress) };
     Ok((WgpuReadBack { device: device.clone(), buffer, size, format, progress }, copy))
 }

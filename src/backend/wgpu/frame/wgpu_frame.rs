@@ -21,7 +21,7 @@ use crate::process::Pass;
 pub struct WgpuFrame {
     /// Counted from the backend's first frame.
     pub(crate) number: u64,
-    /// [`FrameRequest::workers`].
+    /// [`FrameRequest::workers`](crate::backend::FrameRequest::workers).
     pub(crate) workers: usize,
     /// One for each render process.
     pub(crate) pipelines: Arc<[Arc<ProcessPipelines>]>,
