@@ -15,7 +15,8 @@ use super::planned_target::{
 };
 use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
-use super::sampled_views::{check_sampled_views, sampled_target};
+use super::sampled_views::check_sampled_views;
+use super::target_indices::sampled_target;
 use super::view_group::view_groups;
 use super::{
     AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, TargetIndices,

@@ -3,10 +3,10 @@
 use std::iter;
 use std::sync::Arc;
 
-use super::{PlanError, ProcessError, TargetIndices};
+use super::{PlanError, ProcessError};
 #[cfg(feature = "wgpu")]
 use crate::process::RequestLog;
-use crate::process::{Access, BufferAccess, BufferOffset, Declaration, Declare, Draws, RenderProcess};
+use crate::process::{Access, BufferAccess, BufferOffset, ClearColor, Declaration, Declare, Draws, RenderProcess};
 use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
 
@@ -28,6 +28,34 @@ pub struct PlannedProcess {
     /// What its raw pass asks for.
     #[cfg(feature = "wgpu")]
     pub(crate) requests: Arc<RequestLog>,
+}
+
+/// The targets that a process uses, as indices of the [plan's](super::FramePlan::targets). Its declaration names them;
+/// backends find them by index, once the plan is made.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(
+    not(any(feature = "wgpu", feature = "software")),
+    expect(dead_code, reason = "only backends that draw have attachments")
+)]
+pub(crate) struct TargetIndices {
+    /// All of them, and how they are used, in the order declared. What the process samples of other views may be a
+    /// target of views of another kind: see [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+    pub(crate) accesses: Vec<(usize, Access)>,
+    /// The colour targets in the order of the shader's outputs.
+    pub(crate) colors: Vec<ColorTarget>,
+    /// The depth target, and how it is used.
+    pub(crate) depth: Option<(usize, Access)>,
+}
+
+/// A target that a process draws into as colour.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend resolves targets"))]
+pub(crate) struct ColorTarget {
+    pub(crate) index: usize,
+    /// What it is cleared to, if it is cleared.
+    pub(crate) clear: Option<ClearColor>,
+    /// The target that it is resolved into.
+    pub(crate) resolved_into: Option<usize>,
 }
 
 /// What a process of a name, for one kind of view, is known by in all plans of a renderer: the first of these plans that

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::target_indices::target_index;
+use super::target_indices::sampled_target;
 use super::{Pass, PlanError, PlannedProcess, PlannedTarget};
 use crate::process::{Access, SampledShape, SampledView, source_of_previous};
 use crate::scene::{Camera, ViewKind, child_name};
@@ -140,12 +140,4 @@ pub(super) fn has_raw_access(processes: &[PlannedProcess], target: &PlannedTarge
     let of_kind = processes.iter().filter(|planned| planned.declaration.views == target.views);
     let mut accesses = of_kind.flat_map(|planned| &planned.declaration.accesses);
     accesses.any(|(name, access)| *name == target.name && access.is_raw())
-}
-
-/// The index of [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
-pub(super) fn sampled_target(targets: &[PlannedTarget], views: ViewKind, name: &str) -> Option<usize> {
-    let named = |name: &str| {
-        target_index(targets, views, name).or_else(|| targets.iter().position(|target| target.name == name))
-    };
-    named(name).or_else(|| named(source_of_previous(name)?))
 }

@@ -1,41 +1,15 @@
 //! The targets that a process uses, by index.
 
+use super::planned_process::ColorTarget;
 use super::resource_names::resource_name;
-use super::sampled_views::sampled_target;
-use super::{PlanError, PlannedProcess, PlannedTarget};
+use super::{PlanError, PlannedProcess, PlannedTarget, TargetIndices};
 use crate::graph::GraphProblem;
-use crate::process::{Access, ClearColor, Declaration};
+use crate::process::{Access, Declaration, source_of_previous};
 use crate::scene::ViewKind;
 
-/// The targets that a process uses, as indices of the [plan's](super::FramePlan::targets). Its declaration names them;
-/// backends find them by index, once the plan is made.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(
-    not(any(feature = "wgpu", feature = "software")),
-    expect(dead_code, reason = "only backends that draw have attachments")
-)]
-pub(crate) struct TargetIndices {
-    /// All of them, and how they are used, in the order declared. What the process samples of other views may be a
-    /// target of views of another kind: see [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
-    pub(crate) accesses: Vec<(usize, Access)>,
-    /// The colour targets in the order of the shader's outputs.
-    pub(crate) colors: Vec<ColorTarget>,
-    /// The depth target, and how it is used.
-    pub(crate) depth: Option<(usize, Access)>,
-}
-
-/// A target that a process draws into as colour.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu backend resolves targets"))]
-pub(crate) struct ColorTarget {
-    pub(crate) index: usize,
-    /// What it is cleared to, if it is cleared.
-    pub(crate) clear: Option<ClearColor>,
-    /// The target that it is resolved into.
-    pub(crate) resolved_into: Option<usize>,
-}
-
 impl TargetIndices {
+    /// The targets of a process among those of its plan.
+    ///
     /// # Errors
     /// If there is no target of a name that the process uses: the graph took another resource for it.
     pub(super) fn new(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<Self, PlanError> {
@@ -76,13 +50,21 @@ pub(super) fn target_index(targets: &[PlannedTarget], views: ViewKind, name: &st
     targets.iter().position(|planned| planned.views == views && planned.name == name)
 }
 
+/// The index of [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+pub(super) fn sampled_target(targets: &[PlannedTarget], views: ViewKind, name: &str) -> Option<usize> {
+    let named = |name: &str| {
+        target_index(targets, views, name).or_else(|| targets.iter().position(|target| target.name == name))
+    };
+    named(name).or_else(|| named(source_of_previous(name)?))
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use super::super::FramePlan;
     use super::*;
-    use crate::process::{Declare, Draws, Format, FullScreen, RenderProcess, previous_name};
+    use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, previous_name};
 
     struct TestProcess<F>(&'static str, F);
 

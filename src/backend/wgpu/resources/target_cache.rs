@@ -107,10 +107,8 @@ impl WgpuTargets {
         targets.binary_search_by_key(&index, |(index, _)| *index).ok().map(|position| &targets[position].1)
     }
 
-    /// The target of one view by its index among the plan's.
-    ///
     /// # Errors
-    /// If the view does not have it. This is a bug in Drawloom.
+    /// As [`Self::get`], if the view does not have the target. This is a bug in Drawloom.
     pub(crate) fn of_view(&self, view: usize, index: usize) -> Result<&ViewTarget, BackendError> {
         self.get(view, index).ok_or_else(|| broken_rule("a frame has the targets of its passes"))
     }
