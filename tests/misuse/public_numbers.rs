@@ -81,6 +81,10 @@ const RESULTS: &[&str] = &[
     "backend::FrameRequest::",
     "backend::PassRequest::",
     "backend::Backend::",
+    "backend::FrameRecorder::",
+    "backend::BackendLayer::",
+    // Each layer.
+    "L::",
     "backend::SoftwareBackend::",
     "backend::NullBackend::",
     "backend::WgpuBackend::",
