@@ -19,7 +19,6 @@ pub(super) struct PassMode {
     /// Whether the view can test for occlusion.
     pub(super) tests_occlusion: bool,
     /// Whether the scene has meshes whose triangles are culled.
-    #[cfg_attr(not(feature = "occlusion"), expect(dead_code, reason = "only a stage of culling reads it"))]
     pub(super) has_cullable_meshes: bool,
 }
 

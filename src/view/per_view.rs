@@ -25,6 +25,7 @@ impl<T> Default for PerView<T> {
 
 impl<T: Default> PerView<T> {
     /// The values of these views.
+    #[cfg(any(feature = "software", feature = "wgpu", test))]
     pub(crate) fn new(views: &[RenderView], values: impl IntoIterator<Item = T>) -> Self {
         let mut of_views = Self::default();
         of_views.set_views(views, |_| {});
@@ -82,6 +83,7 @@ impl<T> PerView<T> {
     }
 
     /// The values in the order of their views.
+    #[cfg(any(feature = "software", feature = "wgpu", test))]
     pub(crate) fn iter(&self) -> impl Iterator<Item = &T> {
         self.ids.iter().map(|id| &self.values[id.slot as usize])
     }

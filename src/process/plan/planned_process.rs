@@ -33,10 +33,6 @@ pub struct PlannedProcess {
 /// The targets that a process uses, as indices of the [plan's](super::FramePlan::targets). Its declaration names them;
 /// backends find them by index, once the plan is made.
 #[derive(Clone, Debug, Default)]
-#[cfg_attr(
-    not(any(feature = "wgpu", feature = "software")),
-    expect(dead_code, reason = "only backends that draw have attachments")
-)]
 pub(crate) struct TargetIndices {
     /// All of them, and how they are used, in the order declared. What the process samples of other views may be a
     /// target of views of another kind: see [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
