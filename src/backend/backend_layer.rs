@@ -97,6 +97,8 @@ backend_layer! {
     /// the [inner ones](BackendExtras::inner_extras), and returns itself from `extras`. `examples/logging_backend.rs`
     /// does both.
     ///
+    /// An inner backend belongs to one renderer: what it keeps of views, it keeps by that renderer's identities.
+    ///
     /// A backend whose frames, parts or commands are types of its own implements [`Backend`] and [`FrameRecorder`].
     trait BackendLayer;
 

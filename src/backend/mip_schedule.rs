@@ -142,7 +142,7 @@ mod tests {
         let (mut frames, mut generations, mut repeated) = (0, 0, 0);
         for seed in 0..500 {
             let mut random = Rng::with_seed(seed);
-            let Ok(plan) = FramePlan::new(Vec::new(), random_processes(&mut random), &[]) else { continue };
+            let Ok(plan) = FramePlan::new(random_processes(&mut random), &[]) else { continue };
             let view = |name: &str, kind: ViewKind| {
                 RenderView::new(&Camera { kind, ..Camera::looking_at(name, DVec3::Z, DVec3::ZERO) })
             };

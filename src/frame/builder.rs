@@ -1,5 +1,6 @@
 //! Builds a renderer.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::plan_cache::{PlanCache, with_quality};
@@ -109,7 +110,7 @@ impl<B: Backend> RendererBuilder<B> {
         let backend = self.backend;
         let blends_floats = backend.can_blend_floats();
         let deferred = deferred.map(|deferred| deferred.with_float_blending(blends_floats));
-        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps, None)?;
+        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps, HashMap::new())?;
         let submitter = Submitter::new(backend.clone(), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))
     }

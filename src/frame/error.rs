@@ -183,6 +183,7 @@ impl FrameError {
             _ => None,
         }
     }
+
     /// The error of a frame's run. If a pass was not finished, the error has the name that `finish_of` gives that pass,
     /// by index: the job of another pass of its encoder may have met it.
     pub(super) fn of_run(error: RunError, finish_of: impl FnOnce(usize) -> String) -> Self {

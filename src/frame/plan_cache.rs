@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::process::{Deferred, FramePlan, PlanError, RenderProcess, Requirements};
+use crate::process::{Deferred, FramePlan, PlanError, ProcessId, RenderProcess, Requirements};
 use crate::quality::Quality;
 use crate::scene::{Camera, Light, ViewKind};
 use crate::task::{JobPanic, catch};
@@ -19,10 +19,14 @@ pub(super) struct PlanCache {
     shadow_maps: ShadowMaps,
     compiled: HashMap<Requirements, Arc<FramePlan>>,
     current: Arc<FramePlan>,
+    process_ids: ProcessIds,
 }
 
+/// The ids of processes, by kind of views and name: those of this cache's plans, and of the cache before.
+type ProcessIds = HashMap<(ViewKind, String), ProcessId>;
+
 impl PlanCache {
-    /// A cache with the plan of an empty scene. Its processes have the ids that they have in the plan `before`.
+    /// A cache with the plan of an empty scene. Processes that are known have these ids in all plans.
     ///
     /// # Errors
     /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend
@@ -32,7 +36,7 @@ impl PlanCache {
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: Vec<String>,
         shadow_maps: ShadowMaps,
-        before: Option<&FramePlan>,
+        mut process_ids: ProcessIds,
     ) -> Result<Self, PlanError> {
         if let Some(problem) = shadow_maps.problem() {
             return Err(PlanError::ShadowMaps { problem });
@@ -47,10 +51,10 @@ impl PlanCache {
         let kept = kept_requirements(deferred.as_ref())?;
         let nothing = Requirements::default().union(kept);
         let mut current = compile(deferred.as_ref(), &processes, &outputs, &nothing)?;
-        before.iter().for_each(|before| current.inherit_process_ids(before));
+        current.share_process_ids(&mut process_ids);
         let current = Arc::new(current);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
-        Ok(Self { deferred, kept: Some(kept), processes, outputs, shadow_maps, compiled, current })
+        Ok(Self { deferred, kept: Some(kept), processes, outputs, shadow_maps, compiled, current, process_ids })
     }
 
     /// A cache with another deferred pipeline.
@@ -58,8 +62,11 @@ impl PlanCache {
     /// # Errors
     /// As [`PlanCache::new`].
     pub(super) fn with_deferred(&self, deferred: Deferred) -> Result<Self, PlanError> {
-        let Self { processes, outputs, shadow_maps, current, .. } = self;
-        Self::new(Some(deferred), processes.clone(), outputs.clone(), *shadow_maps, Some(&**current))
+        let Self { processes, outputs, shadow_maps, compiled, current, .. } = self;
+        let planned = compiled.values().chain([current]).flat_map(|plan| plan.processes());
+        // Those of caches before this one are not needed, and would become ever more.
+        let ids = planned.map(|planned| ((planned.declaration.views, planned.name.clone()), planned.id)).collect();
+        Self::new(Some(deferred), processes.clone(), outputs.clone(), *shadow_maps, ids)
     }
 
     /// The deferred pipeline, if there is one.
@@ -140,8 +147,7 @@ impl PlanCache {
             return Ok(Arc::clone(plan));
         }
         let mut plan = compile(Some(deferred), &self.processes, &self.outputs, &requirements)?;
-        let known = self.compiled.values().chain([&self.current]);
-        known.for_each(|known| plan.inherit_process_ids(known));
+        plan.share_process_ids(&mut self.process_ids);
         let plan = Arc::new(plan);
         self.compiled.insert(requirements, Arc::clone(&plan));
         Ok(plan)
@@ -208,7 +214,6 @@ mod tests {
     use glam::{DVec3, Vec3};
 
     use super::*;
-    use crate::process::ProcessId;
 
     /// The processes of a plan by name and kind of views, each with its id.
     fn ids_of(plan: &FramePlan) -> HashMap<(String, ViewKind), ProcessId> {
@@ -219,7 +224,8 @@ mod tests {
     #[test]
     fn a_process_has_the_same_id_in_all_plans() {
         let mut cache =
-            PlanCache::new(Some(Deferred::to_picture()), Vec::new(), Vec::new(), ShadowMaps::default(), None).unwrap();
+            PlanCache::new(Some(Deferred::to_picture()), Vec::new(), Vec::new(), ShadowMaps::default(), HashMap::new())
+                .unwrap();
         let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
         let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
         let mirror = Camera { kind: ViewKind::Reflection, ..Camera::looking_at("mirror", DVec3::Z, DVec3::ZERO) };
@@ -232,9 +238,10 @@ mod tests {
         };
         check(&cache.select(&[lamp], false, &[]).unwrap());
         check(&cache.select(&[lamp, sun], true, &[]).unwrap());
-        check(&cache.select(&[sun], true, &[mirror]).unwrap());
+        check(&cache.select(&[sun], true, std::slice::from_ref(&mirror)).unwrap());
         let mut replaced = cache.with_deferred(Deferred::to_picture()).unwrap();
         check(replaced.current());
         check(&replaced.select(&[], false, &[]).unwrap());
+        check(&replaced.select(&[lamp, sun], true, &[mirror]).unwrap());
     }
 }

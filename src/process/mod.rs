@@ -57,7 +57,7 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
-pub(crate) use plan::{FramePasses, ProcessId, ViewArray};
+pub(crate) use plan::{ChainSlot, FramePasses, ProcessId, ViewArray};
 pub use plan::{FramePlan, Pass};
 pub use plan::{PlanError, ProcessError};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
@@ -85,9 +85,7 @@ pub(crate) use raw_access::{RawAccess, RequestLog};
 pub mod internal {
     pub use super::declaration::{Declaration, DeclaredAttribute};
     pub use super::deferred::Requirements;
-    pub use super::plan::{
-        AttachmentExtent, ChainSlot, PlannedProcess, PlannedTarget, SampledViews, ViewGroup, ViewOrder,
-    };
+    pub use super::plan::{AttachmentExtent, PlannedProcess, PlannedTarget, SampledViews, ViewGroup, ViewOrder};
     pub use super::sampled_view::{SampledShape, SampledView};
     pub use super::storage_buffer::BufferAccess;
 }

@@ -32,7 +32,7 @@ fn broken_rule(calls: impl FnOnce(&NullFrame, &DrawList, &FrameRequest<'_>) -> R
     let list = renderer.draw_list("geometry buffer", 0).unwrap().clone();
 
     let geometry_buffer = GeometryBuffer::new(GeometryFormats::default());
-    let plan = FramePlan::new(Vec::new(), vec![Arc::new(geometry_buffer)], &["diffuse".to_owned()]).unwrap();
+    let plan = FramePlan::new(vec![Arc::new(geometry_buffer)], &["diffuse".to_owned()]).unwrap();
     let views = [RenderView::new(&scene.cameras[0])];
     let mut objects = ObjectTable::default();
     objects.update(&scene.as_scene_ref());

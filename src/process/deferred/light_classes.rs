@@ -6,6 +6,8 @@ use crate::view::LightClass;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct LightClasses(u32);
 
+const _: () = assert!(LightClass::COUNT <= u32::BITS as usize);
+
 impl LightClasses {
     pub(super) fn insert(&mut self, class: LightClass) {
         self.0 |= 1 << class.index();

@@ -6,7 +6,7 @@ use crate::process::RenderProcess;
 
 /// A slot of a chain: a list of processes whose order is known.
 #[derive(Clone)]
-pub struct ChainSlot {
+pub(crate) struct ChainSlot {
     /// The name of the process that comes with the crate for this slot, also if another replaces it.
     pub name: String,
     /// The process in the slot; `None` if the frame has none there.

@@ -1,5 +1,6 @@
 //! From a list of processes to what a frame does, in order.
 
+use std::collections::HashMap;
 #[cfg(feature = "wgpu")]
 use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -54,22 +55,18 @@ impl FramePlan {
     /// Orders processes by what they read and write, and drops those on which no output depends. Where reads and writes
     /// leave the order open, the earlier [`ViewKind`] goes first, then the process that was added first (M 10.4).
     ///
+    /// # Errors
+    /// See [`PlanError`].
+    pub fn new(processes: Vec<Arc<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
+        Self::for_views(Vec::new(), processes, outputs, |_| true)
+    }
+
+    /// The plan of frames that have the kinds of views that `is_present` tells, with a chain.
+    ///
     /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot
     /// may be empty because the frame needs no such process; other processes may still be ordered before or after it.
     /// The chain does not order its processes against writers of the same target that are outside of it. They draw in
     /// reflections what they draw in main views.
-    ///
-    /// # Errors
-    /// See [`PlanError`].
-    pub fn new(
-        chain: Vec<ChainSlot>,
-        processes: Vec<Arc<dyn RenderProcess>>,
-        outputs: &[String],
-    ) -> Result<Self, PlanError> {
-        Self::for_views(chain, processes, outputs, |_| true)
-    }
-
-    /// The plan of frames that have the kinds of views that `is_present` tells.
     ///
     /// # Errors
     /// See [`PlanError`].
@@ -142,15 +139,10 @@ impl FramePlan {
         self.identity
     }
 
-    /// Gives the processes the ids that those of the same name and kind of views have in another plan.
-    pub(crate) fn inherit_process_ids(&mut self, other: &Self) {
+    /// Gives the processes the ids that are known of their names and kinds of views, and makes the others known.
+    pub(crate) fn share_process_ids(&mut self, known: &mut HashMap<(ViewKind, String), ProcessId>) {
         for planned in &mut self.processes {
-            let is_same = |known: &&PlannedProcess| {
-                known.name == planned.name && known.declaration.views == planned.declaration.views
-            };
-            if let Some(known) = other.processes.iter().find(is_same) {
-                planned.id = known.id;
-            }
+            planned.id = *known.entry((planned.declaration.views, planned.name.clone())).or_insert(planned.id);
         }
     }
 
@@ -322,7 +314,7 @@ mod tests {
     }
 
     fn plan(processes: Vec<Arc<dyn RenderProcess>>) -> Result<FramePlan, PlanError> {
-        FramePlan::new(Vec::new(), processes, &["picture".to_owned()])
+        FramePlan::new(processes, &["picture".to_owned()])
     }
 
     fn shipped() -> Vec<Arc<dyn RenderProcess>> {
@@ -389,7 +381,7 @@ mod tests {
         let error = plan(processes).err().unwrap();
         assert!(matches!(&error, PlanError::WrongFormat { process, .. } if process == "depth test"), "{error}");
 
-        let error = FramePlan::new(Vec::new(), shipped(), &["unknown".to_owned()]).err().unwrap().to_string();
+        let error = FramePlan::new(shipped(), &["unknown".to_owned()]).err().unwrap().to_string();
         assert!(error.contains("unknown"), "{error}");
         assert!(plan(Vec::new()).is_err());
     }
@@ -415,7 +407,7 @@ mod tests {
     }
 
     fn groups_of(processes: Vec<Arc<dyn RenderProcess>>) -> Vec<(Vec<ViewKind>, ViewOrder)> {
-        let plan = FramePlan::new(Vec::new(), processes, &[]).unwrap();
+        let plan = FramePlan::new(processes, &[]).unwrap();
         plan.view_groups().iter().map(|group| (group.kinds.clone(), group.order)).collect()
     }
 
@@ -433,7 +425,7 @@ mod tests {
         let one_by_one = [Shadow, Main, Reflection].map(|kind| (vec![kind], ViewByView));
         assert_eq!(groups_of(processes()), one_by_one);
 
-        let plan = FramePlan::new(Vec::new(), processes(), &[]).unwrap();
+        let plan = FramePlan::new(processes(), &[]).unwrap();
         let view = |kind| RenderView::new(&Camera { kind, ..Camera::looking_at("", DVec3::Z, DVec3::ZERO) });
         let views = [view(Main), view(Main), view(Reflection), view(Shadow)];
         let order: Vec<_> = plan.passes(&views).unwrap().passes.iter().map(|pass| pass.view_index).collect();
@@ -450,7 +442,7 @@ mod tests {
             view_process("second", Main, Some("c"), Some(("b", Reflection))),
             view_process("casters", Shadow, Some("maps"), None),
         ];
-        let plan = FramePlan::new(Vec::new(), mutual, &[]).unwrap();
+        let plan = FramePlan::new(mutual, &[]).unwrap();
         let groups = plan.view_groups();
         assert_eq!((groups[0].kinds.as_slice(), groups[0].order), ([Shadow].as_slice(), ViewByView));
         assert_eq!((groups[1].kinds.as_slice(), groups[1].order), ([Reflection, Main].as_slice(), ProcessByProcess));

@@ -20,7 +20,7 @@ mod target_indices;
 mod view_arrays;
 mod view_group;
 
-pub use chain::ChainSlot;
+pub(crate) use chain::ChainSlot;
 pub use error::{PlanError, ProcessError};
 pub(crate) use frame_passes::FramePasses;
 pub use frame_plan::FramePlan;

@@ -114,7 +114,7 @@ mod tests {
             declare.views(ViewKind::Shadow);
             declare.clears_depth_layer("maps", Format::Depth32Float);
         });
-        FramePlan::new(Vec::new(), vec![maps, overlay, picture, surfaces], &[]).unwrap()
+        FramePlan::new(vec![maps, overlay, picture, surfaces], &[]).unwrap()
     }
 
     #[test]
@@ -155,7 +155,7 @@ mod tests {
             declare.samples_view(ViewKind::Reflection, "mirror", "picture");
             declare.clears_color("picture", Format::Rgba8Unorm, BLACK);
         });
-        let plan = FramePlan::new(Vec::new(), vec![picture], &[]).unwrap();
+        let plan = FramePlan::new(vec![picture], &[]).unwrap();
         let indices: Vec<_> = plan.processes()[0].targets.accesses.iter().map(|(index, _)| *index).collect();
         assert_eq!((indices, plan.targets().len()), (vec![0, 0], 1));
     }
@@ -168,7 +168,7 @@ mod tests {
             declare.views(ViewKind::Shadow);
             declare.clears_depth_layer("maps", Format::Depth32Float);
         });
-        let error = FramePlan::new(Vec::new(), vec![reader, maps], &[]).err();
+        let error = FramePlan::new(vec![reader, maps], &[]).err();
         let readers = vec!["reader".to_owned()];
         let missing = GraphProblem::MissingProducer { resource: "shadow: maps".to_owned(), output: false, readers };
         assert_eq!(error, Some(PlanError::Graph(missing)));

@@ -195,7 +195,7 @@ mod tests {
     fn pipelines_that_are_prepared_twice_or_for_another_quality_are_there_once() {
         let (device, _) = noop_device();
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
-        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let (planned, draws) = (&plan.processes()[0], plan.draws().unwrap());
         let layouts = BindGroupLayouts::new(&device);
         let mut cache = PipelineCache::new(false);

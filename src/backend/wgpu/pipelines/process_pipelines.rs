@@ -342,7 +342,7 @@ mod tests {
     fn inserting_no_pipelines_does_not_wait_for_recording() {
         let (device, _) = noop_device();
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
-        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();
         let quality = Quality::balanced();
         let layouts = BindGroupLayouts::new(&device);
@@ -366,7 +366,7 @@ mod tests {
     fn frames_add_pipelines_while_others_are_created() {
         let (device, _) = noop_device();
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
-        let plan = FramePlan::new(Vec::new(), vec![process], &["diffuse".to_owned()]).unwrap();
+        let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();
         let layouts = BindGroupLayouts::new(&device);
         let quality = Quality::balanced();

@@ -323,7 +323,7 @@ mod tests {
                 .filter(|_| random.usize(0..4) == 0)
                 .map(|index| format!("target {index}.0"))
                 .collect();
-            let plan = FramePlan::new(Vec::new(), processes, &outputs).ok()?;
+            let plan = FramePlan::new(processes, &outputs).ok()?;
             let views = random_views(&mut random);
             let frame_passes = plan.passes(&views).ok()?;
             let (passes, sampled_views) = (frame_passes.passes, frame_passes.sampled_views);

@@ -51,7 +51,8 @@ impl ViewArrayTexture {
         (0..).zip(&self.array.view_indices).filter_map(|(layer, view)| view.map(|view| (view, layer)))
     }
 
-    /// The texture that a shader binds to sample a target, by its index among the plan's, in this shape, if one of its layers is that of the view.
+    /// The texture that a shader binds to sample a target, by its index among the plan's, in this shape, if one of its
+    /// layers is that of the view.
     pub(super) fn find(&self, view: usize, target: usize, shape: SampledShape) -> Option<&wgpu::TextureView> {
         let shape = self.array.shapes.iter().position(|known| *known == shape)?;
         let is_found = self.array.target_index == target && self.array.view_indices.contains(&Some(view));
