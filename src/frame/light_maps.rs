@@ -39,7 +39,6 @@ const MAX_RANGE_GROWTH: f32 = 1.125;
 
 /// A cached light with its current brightness.
 pub(super) fn with_brightness_of(mut cached: Light, light: &Light) -> Light {
-    let mut light = *light;
-    *cached.fields().color = *light.fields().color;
+    *cached.fields_mut().color = *light.fields().color;
     cached
 }

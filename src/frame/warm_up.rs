@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{FrameError, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::process::Requirements;
-use crate::scene::{Camera, Changes, Light, LightFields, SceneRef};
+use crate::scene::{Camera, Changes, Light, LightFieldsMut, SceneRef};
 use crate::view::LightClass;
 
 /// Frames to draw while a world is loaded, whose pictures are not shown.
@@ -104,7 +104,7 @@ fn shining_from(camera: &Camera, mut light: Light) -> Light {
     let along = (camera.orientation * Vec3::NEG_Z).normalize();
     // Behind the near plane the volume of a light with a short range would not be seen.
     let at = camera.position + along.as_dvec3() * f64::from(camera.near);
-    let LightFields { position, direction, color, .. } = light.fields();
+    let LightFieldsMut { position, direction, color, .. } = light.fields_mut();
     *color = color.max(Vec3::ONE);
     if let Some(position) = position {
         *position = at;

@@ -70,6 +70,21 @@ pub enum Light {
     },
 }
 
+/// The position, direction, colour and range of a light, by the kind of reference that `$light` is: what a kind lacks is
+/// `None`.
+macro_rules! fields_of {
+    ($light:expr) => {
+        match $light {
+            Light::Directional { direction, illuminance, .. } => (None, Some(direction), illuminance, None),
+            Light::Point { position, intensity, range, .. } => (Some(position), None, intensity, Some(range)),
+            Light::Spot { position, direction, intensity, range, .. }
+            | Light::Hemispherical { position, direction, intensity, range, .. } => {
+                (Some(position), Some(direction), intensity, Some(range))
+            }
+        }
+    };
+}
+
 impl Light {
     /// The range at which the brightest channel of `intensity` has fallen to 1/255: 16·√I.
     pub fn range_for(intensity: Vec3) -> f32 {
@@ -88,64 +103,42 @@ impl Light {
 
     /// Whether objects cast shadows in this light.
     pub fn casts_shadow(&self) -> bool {
-        let mut light = *self;
-        light.fields().casts_shadow
+        let (Self::Directional { casts_shadow, .. }
+        | Self::Point { casts_shadow, .. }
+        | Self::Spot { casts_shadow, .. }
+        | Self::Hemispherical { casts_shadow, .. }) = self;
+        *casts_shadow
     }
 
     /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional
     /// light, which reaches everything.
     pub fn bounding_sphere(&self) -> Option<(DVec3, f32)> {
-        let mut light = *self;
-        let LightFields { position, range, .. } = light.fields();
+        let LightFields { position, range, .. } = self.fields();
         Some((*position?, *range?))
     }
 
     /// The light's fields, whatever its kind.
     #[inline]
-    pub(crate) fn fields(&mut self) -> LightFields<'_> {
-        match self {
-            Self::Directional { direction, illuminance, casts_shadow } => LightFields {
-                position: None,
-                direction: Some(direction),
-                color: illuminance,
-                range: None,
-                cone: None,
-                casts_shadow: *casts_shadow,
-            },
-            Self::Point { position, intensity, range, casts_shadow } => LightFields {
-                position: Some(position),
-                direction: None,
-                color: intensity,
-                range: Some(range),
-                cone: None,
-                casts_shadow: *casts_shadow,
-            },
-            Self::Spot { position, direction, intensity, range, inner_angle, outer_angle, casts_shadow } => {
-                LightFields {
-                    position: Some(position),
-                    direction: Some(direction),
-                    color: intensity,
-                    range: Some(range),
-                    cone: Some([*inner_angle, *outer_angle]),
-                    casts_shadow: *casts_shadow,
-                }
-            }
-            Self::Hemispherical { position, direction, intensity, range, casts_shadow } => LightFields {
-                position: Some(position),
-                direction: Some(direction),
-                color: intensity,
-                range: Some(range),
-                cone: None,
-                casts_shadow: *casts_shadow,
-            },
-        }
+    pub(crate) fn fields(&self) -> LightFields<'_> {
+        let (position, direction, color, range) = fields_of!(self);
+        let cone = match self {
+            Self::Spot { inner_angle, outer_angle, .. } => Some([*inner_angle, *outer_angle]),
+            Self::Directional { .. } | Self::Point { .. } | Self::Hemispherical { .. } => None,
+        };
+        LightFields { position, direction, color, range, cone }
+    }
+
+    /// Those that can be changed whatever the kind.
+    pub(crate) fn fields_mut(&mut self) -> LightFieldsMut<'_> {
+        let (position, direction, color, range) = fields_of!(self);
+        LightFieldsMut { position, direction, color, range }
     }
 
     /// The same light, but ending where the illuminance of its brightest channel has fallen to `cut_off`, if that is
     /// nearer than its range: see [`Quality::light_cut_off`](crate::quality::Quality::light_cut_off). A `cut_off` of 0
     /// changes nothing, and none changes a directional light, which does not fall off.
     pub(crate) fn cut_off_at(mut self, cut_off: f32) -> Self {
-        if let LightFields { range: Some(range), color, .. } = self.fields()
+        if let LightFieldsMut { range: Some(range), color, .. } = self.fields_mut()
             && cut_off > 0.0
         {
             // No quotient of two f32 leaves the range of f64. The range of a light must not be 0.
@@ -157,15 +150,13 @@ impl Light {
 
     /// Whether the light is black.
     pub(crate) fn is_dark(&self) -> bool {
-        let mut light = *self;
-        *light.fields().color == Vec3::ZERO
+        *self.fields().color == Vec3::ZERO
     }
 
     /// # Errors
     /// If a number is not finite or out of its range. `index` is the light's index in the scene, for the message.
     pub(crate) fn check(&self, index: usize) -> Result<(), SceneError> {
-        let mut light = *self;
-        let LightFields { position, direction, color, range, cone, .. } = light.fields();
+        let LightFields { position, direction, color, range, cone } = self.fields();
         let problem = position
             .zip(range)
             .and_then(|(position, range)| position_problem(*position, *range))
@@ -178,14 +169,21 @@ impl Light {
 
 /// The fields of a light of any kind; `None` where its kind has none.
 pub(crate) struct LightFields<'a> {
-    pub(crate) position: Option<&'a mut DVec3>,
-    pub(crate) direction: Option<&'a mut Vec3>,
+    pub(crate) position: Option<&'a DVec3>,
+    pub(crate) direction: Option<&'a Vec3>,
     /// The intensity, or the illuminance.
-    pub(crate) color: &'a mut Vec3,
-    pub(crate) range: Option<&'a mut f32>,
+    pub(crate) color: &'a Vec3,
+    pub(crate) range: Option<&'a f32>,
     /// The angles from the axis at which it begins to fade and at which it ends.
     pub(crate) cone: Option<[f32; 2]>,
-    pub(crate) casts_shadow: bool,
+}
+
+/// See [`LightFields`].
+pub(crate) struct LightFieldsMut<'a> {
+    pub(crate) position: Option<&'a mut DVec3>,
+    pub(crate) direction: Option<&'a mut Vec3>,
+    pub(crate) color: &'a mut Vec3,
+    pub(crate) range: Option<&'a mut f32>,
 }
 
 /// The kind of a [`Light`].

@@ -64,7 +64,7 @@ pub use level_of_detail::LevelOfDetail;
 #[cfg(feature = "wgpu")]
 pub(crate) use light::LightVolume;
 pub use light::{Light, LightKind};
-pub(crate) use light::{LightFields, ShadowProjection};
+pub(crate) use light::{LightFields, LightFieldsMut, ShadowProjection};
 pub use material::{Blend, Material, Texture};
 pub use material_predicate::MaterialPredicate;
 pub use material_type::{MaterialLayout, MaterialType, MaterialValues};

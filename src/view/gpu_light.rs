@@ -42,8 +42,7 @@ impl GpuLight {
     /// The layout of `light` for a camera at `origin`. `shadow_map` is the view that draws its shadow map, if any.
     pub fn new(light: &Light, origin: DVec3, shadow_map: Option<&RenderView>) -> Self {
         let relative = |position: DVec3| (position - origin).as_vec3();
-        let mut fields = *light;
-        let LightFields { position, direction, color, range, cone, .. } = fields.fields();
+        let LightFields { position, direction, color, range, cone } = light.fields();
         let [cone_begin, cone_end] = cone.map_or([0.0; 2], |angles| angles.map(f32::cos));
         let mut gpu_light = Self {
             position: position.map_or(Vec3::ZERO, |position| relative(*position)),

@@ -104,8 +104,7 @@ impl ShadowMaps {
         if !light.casts_shadow() || self.problem().is_some() {
             return Vec::new();
         }
-        let mut fields = *light;
-        let LightFields { position, direction, range, cone, .. } = fields.fields();
+        let LightFields { position, direction, range, cone, .. } = light.fields();
         let position = position.copied().unwrap_or_default();
         let direction = direction.copied().unwrap_or(Vec3::NEG_Z);
         let range = range.copied().unwrap_or_default();

@@ -194,7 +194,6 @@ pub(super) fn exact_light(
 ) -> ShaderLight<f64> {
     let relative = |position: DVec3| Vector3::of(position - camera.exact);
     let mut values = light_as_uploaded(gpu_light);
-    let mut light = *light;
     let LightFields { position, direction, cone, .. } = light.fields();
     if let Some(cone) = cone {
         [values.cone_begin, values.cone_end] = cone.map(|angle| f64::from(angle).cos());
