@@ -6,10 +6,7 @@ use std::sync::Weak;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use super::attributes::attributes_of;
-use super::buffers::buffers_of;
-use super::columns::{check_columns, columns_of};
-use super::material_types::{check_material_types, material_types_of};
+use super::frame_passes::view_groups;
 use super::planned_process::ProcessId;
 use super::planned_target::{
     Attachments, check_blending, check_stencil, placeholder_shadow_map, reads_shadow_map, targets_of,
@@ -17,8 +14,8 @@ use super::planned_target::{
 use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
 use super::sampled_views::check_sampled_views;
+use super::shared_declarations::{SharedDeclarations, check_columns, check_material_types};
 use super::target_indices::sampled_target;
-use super::view_group::view_groups;
 use super::{
     AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, TargetIndices,
     ViewGroup,
@@ -39,10 +36,7 @@ pub struct FramePlan {
     /// Pairs of processes, by index: the first comes before the second.
     dependencies: Vec<(usize, usize)>,
     targets: Vec<PlannedTarget>,
-    columns: Vec<ColumnLayout>,
-    material_types: Vec<MaterialLayout>,
-    attributes: Vec<DeclaredAttribute>,
-    buffers: Vec<BufferLayout>,
+    shared: SharedDeclarations,
     /// Of each process.
     attachments: Vec<Attachments>,
     /// The graph of the processes, whose nodes are the indices of the processes before they were ordered.
@@ -108,8 +102,7 @@ impl FramePlan {
         let mut targets = targets_of(&processes, outputs)?;
         targets.extend(placeholder.filter(|_| processes.iter().any(reads_shadow_map)));
         check_sampled_views(&processes, &targets)?;
-        let (columns, material_types) = (columns_of(&processes)?, material_types_of(&processes)?);
-        let (attributes, buffers) = (attributes_of(&processes)?, buffers_of(&processes)?);
+        let shared = SharedDeclarations::new(&processes)?;
         let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
         // Relaxed: identities are compared for equality only.
         let identity = NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed);
@@ -124,10 +117,7 @@ impl FramePlan {
             view_groups,
             dependencies: edges,
             targets,
-            columns,
-            material_types,
-            attributes,
-            buffers,
+            shared,
             attachments,
             schedule,
             dot: OnceLock::new(),
@@ -225,22 +215,22 @@ impl FramePlan {
 
     /// The columns of objects that the processes read, each once.
     pub fn columns(&self) -> &[ColumnLayout] {
-        &self.columns
+        &self.shared.columns
     }
 
     /// The material types that the processes read, each once.
     pub fn material_types(&self) -> &[MaterialLayout] {
-        &self.material_types
+        &self.shared.material_types
     }
 
     /// The attributes of vertices that the processes read, each once.
     pub fn attributes(&self) -> &[DeclaredAttribute] {
-        &self.attributes
+        &self.shared.attributes
     }
 
     /// The buffers that the processes share, each once.
     pub fn buffers(&self) -> &[BufferLayout] {
-        &self.buffers
+        &self.shared.buffers
     }
 
     /// # Errors

@@ -1,4 +1,4 @@
-//! A process and its declaration.
+//! A process and its declaration, and its passes.
 
 use std::iter;
 use std::sync::Arc;
@@ -160,4 +160,13 @@ impl PlannedProcess {
             None
         }
     }
+}
+
+/// One process in one view: recorded as a unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Pass {
+    /// The process's index in [`FramePlan::processes`](super::FramePlan::processes).
+    pub process_index: usize,
+    /// The view's index among the frame's views.
+    pub view_index: usize,
 }
