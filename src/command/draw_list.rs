@@ -1,9 +1,18 @@
-//! What one pass draws.
+//! What one pass draws, and what of it belongs to static groups.
 
 use std::ops::{DerefMut, Range};
 
-use super::draw_list_static_groups::{BATCHES_PER_BUNDLE, DrawListStaticGroups};
-use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand, Version};
+use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand};
+
+/// The version of something that is kept from frame to frame: equal versions have equal contents, so what is derived
+/// from one need not be derived again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Version {
+    /// The renderer's frame that made it, counted from 1; 0 for what no frame has made.
+    pub frame: u64,
+    /// Its index among what that frame made of the same kind.
+    pub index: usize,
+}
 
 /// What one pass draws: sorted commands, the batches they merge into, and the objects of each batch.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +53,7 @@ struct SegmentRun {
 impl DrawList {
     /// The most batches in a bundle, and their number unless a [`Granularity`](crate::Granularity) asks for fewer:
     /// smaller bundles cost up to three times as much per draw.
-    pub const BATCHES_PER_BUNDLE: usize = BATCHES_PER_BUNDLE;
+    pub const BATCHES_PER_BUNDLE: usize = 256;
 
     /// Sets the number of batches in a bundle, from 1 to [`BATCHES_PER_BUNDLE`](Self::BATCHES_PER_BUNDLE). Bundles of
     /// static groups are recorded once and keep that size.
@@ -313,6 +322,87 @@ impl PartialEq for DrawList {
 }
 
 impl Eq for DrawList {}
+
+/// What a draw list has of [static groups](crate::scene::StaticGroup): the objects of all of them, and the batches of
+/// those that the view executes. Both come before those of other objects, and do not change with these.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DrawListStaticGroups {
+    /// The version of the objects.
+    version: Version,
+    /// The number of objects.
+    objects: usize,
+    /// The version of the executed static groups.
+    executed: Version,
+    /// The number of objects that are drawn, and of their batches.
+    drawn: usize,
+    batches: usize,
+}
+
+impl DrawListStaticGroups {
+    /// The version of the objects of static groups: a backend that holds those of this version need not upload them
+    /// again.
+    pub fn version(&self) -> Version {
+        self.version
+    }
+
+    /// The number of objects of all static groups, executed or not.
+    pub fn object_count(&self) -> usize {
+        self.objects
+    }
+
+    /// The number of objects that are drawn.
+    pub fn drawn_count(&self) -> usize {
+        self.drawn
+    }
+
+    /// The number of batches that are drawn.
+    pub fn batch_count(&self) -> usize {
+        self.batches
+    }
+
+    /// The number of bundles that are drawn.
+    pub fn bundle_count(&self) -> usize {
+        self.batches.div_ceil(DrawList::BATCHES_PER_BUNDLE)
+    }
+
+    /// Prepares for other objects, and returns whether they are others: then none is executed.
+    fn set_objects(&mut self, version: Version, objects: usize) -> bool {
+        let differs = self.version != version;
+        if differs {
+            *self = Self { version, objects, ..Self::default() };
+        }
+        differs
+    }
+
+    /// Prepares for other executed static groups, and returns whether they are others.
+    fn set_executed(&mut self, version: Version) -> bool {
+        let differs = self.executed != version;
+        if differs {
+            *self = Self { executed: version, drawn: 0, batches: 0, ..*self };
+        }
+        differs
+    }
+
+    /// Counts what is executed.
+    fn set_drawn(&mut self, objects: usize, batches: usize) {
+        (self.drawn, self.batches) = (objects, batches);
+    }
+
+    /// The indices of the batches of a bundle.
+    fn bundle_range(&self, index: usize) -> Range<usize> {
+        let start = index * DrawList::BATCHES_PER_BUNDLE;
+        start..self.batches.min(start + DrawList::BATCHES_PER_BUNDLE)
+    }
+}
+
+/// Lists are equal whatever they were made from.
+impl PartialEq for DrawListStaticGroups {
+    fn eq(&self, other: &Self) -> bool {
+        (self.objects, self.drawn, self.batches) == (other.objects, other.drawn, other.batches)
+    }
+}
+
+impl Eq for DrawListStaticGroups {}
 
 #[cfg(test)]
 mod tests {

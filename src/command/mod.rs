@@ -3,29 +3,23 @@
 //! 10.5).
 
 mod binned_segment;
-mod bins;
 mod bucket;
 mod draw_list;
 mod draw_state;
-mod instance;
 mod key_packer;
-mod draw_list_static_groups;
 mod partition;
 mod radix_sort;
-mod render_command;
 mod selection;
 mod sort;
 mod sort_key;
 mod splitters;
-mod version;
 
-pub use bucket::Batch;
+pub(crate) use bucket::instance;
+pub use bucket::{Batch, RenderCommand};
 pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
-pub(crate) use instance::instance;
 pub(crate) use internal::*;
 pub(crate) use partition::Partition;
-pub use render_command::RenderCommand;
 pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypes, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
@@ -34,10 +28,8 @@ pub use sort_key::SortKey;
 /// the interface.
 #[doc(hidden)]
 pub mod internal {
-    pub use super::binned_segment::BinnedSegment;
-    pub use super::bins::{Bin, Bins};
+    pub use super::binned_segment::{Bin, BinnedSegment, Bins};
     pub use super::bucket::Bucket;
-    pub use super::draw_list_static_groups::DrawListStaticGroups;
+    pub use super::draw_list::{DrawListStaticGroups, Version};
     pub use super::splitters::Splitters;
-    pub use super::version::Version;
 }

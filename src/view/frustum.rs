@@ -1,14 +1,158 @@
-//! The view frustum as planes, with conservative tests against bounding volumes.
+//! The view frustum as planes, with conservative tests against bounding volumes, and the bounding spheres of objects as
+//! a structure of arrays, for SIMD culling.
 
 use std::array::from_fn;
 
 use glam::{DVec3, Vec3};
 use multiversion::multiversion;
 
-use super::BoundingSpheres;
-use super::camera_planes::{CameraPlanes, PairSlopes};
 use crate::bit_set::BITS_PER_WORD;
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection};
+
+/// A bounding sphere in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingSphere {
+    /// The centre in metres.
+    pub center: DVec3,
+    /// The radius in metres.
+    pub radius: f32,
+}
+
+impl BoundingSphere {
+    /// The sphere that no frustum intersects.
+    pub const EMPTY: Self = Self { center: DVec3::ZERO, radius: f32::NEG_INFINITY };
+}
+
+/// The bounding spheres of [`BoundingSpheres::COUNT`] objects, one array for each coordinate: a test loads only the
+/// coordinates that it needs, and tests several spheres with one instruction.
+#[derive(Clone, Debug)]
+pub struct BoundingSpheres {
+    /// World-space x, y and z in metres.
+    centers: [[f64; Self::COUNT]; 3],
+    /// In metres.
+    radii: [f32; Self::COUNT],
+}
+
+impl BoundingSpheres {
+    /// The number of spheres.
+    pub const COUNT: usize = 256;
+
+    /// Returns the sphere at `entry`.
+    ///
+    /// # Panics
+    /// If `entry` is not below [`BoundingSpheres::COUNT`].
+    #[inline]
+    pub fn get(&self, entry: usize) -> BoundingSphere {
+        let [x, y, z] = &self.centers;
+        BoundingSphere { center: DVec3::new(x[entry], y[entry], z[entry]), radius: self.radii[entry] }
+    }
+
+    /// Replaces the sphere at `entry`.
+    ///
+    /// # Panics
+    /// If `entry` is not below [`BoundingSpheres::COUNT`].
+    #[inline]
+    pub fn set(&mut self, entry: usize, bounds: BoundingSphere) {
+        for (coordinates, coordinate) in self.centers.iter_mut().zip(bounds.center.to_array()) {
+            coordinates[entry] = coordinate;
+        }
+        self.radii[entry] = bounds.radius;
+    }
+
+    /// Replaces the eight spheres from `entry` on.
+    #[inline(always)]
+    pub(super) fn set_packet(&mut self, entry: usize, centers: &[[f64; LANES]; 3], radii: &[f32; LANES]) {
+        for (coordinates, new) in self.centers.iter_mut().zip(centers) {
+            coordinates[entry..entry + LANES].copy_from_slice(new);
+        }
+        self.radii[entry..entry + LANES].copy_from_slice(radii);
+    }
+
+    /// The centres' world-space x, y and z in metres.
+    pub fn coordinates(&self) -> &[[f64; Self::COUNT]; 3] {
+        &self.centers
+    }
+
+    /// The radii in metres.
+    pub fn radii(&self) -> &[f32; Self::COUNT] {
+        &self.radii
+    }
+}
+
+impl Default for BoundingSpheres {
+    /// All spheres are [`BoundingSphere::EMPTY`].
+    fn default() -> Self {
+        Self { centers: [[0.0; Self::COUNT]; 3], radii: [BoundingSphere::EMPTY.radius; Self::COUNT] }
+    }
+}
+
+/// The planes of a camera's frustum, without tolerance, in metres.
+struct CameraPlanes {
+    /// The left and right planes, and the bottom and top planes.
+    pairs: [PairSlopes; 2],
+    /// Of each pair.
+    offsets: [f64; 2],
+    /// A point f metres along the view direction is not before the near plane if f + near ≥ 0.
+    near: f32,
+    /// It is not beyond the far plane if far − f ≥ 0.
+    far: f32,
+}
+
+/// The slopes of two opposite planes: a point c metres aside of the view direction and f metres along it is between
+/// them if slope · f + offset ≥ |scale · c − skew · f|.
+#[derive(Clone, Copy)]
+struct PairSlopes {
+    slope: f64,
+    scale: f64,
+    skew: f64,
+}
+
+impl PairSlopes {
+    const PARALLEL: Self = Self { slope: 0.0, scale: 1.0, skew: 0.0 };
+
+    /// Planes through the camera: half their distance at 1 m, and how far their middle is aside of the view direction
+    /// there.
+    fn of_tangents(half: f64, middle: f64) -> Self {
+        // The longer normal of the two has unit length.
+        let scale = 1.0 / (half + middle.abs()).hypot(1.0);
+        Self { slope: half * scale, scale, skew: middle * scale }
+    }
+
+    /// The inward normal of the left or lower plane, with a sign of 1, or the right or upper one, with -1: along the
+    /// axis of the pair, and along the view direction.
+    fn normal(self, sign: f64) -> [f64; 2] {
+        [self.scale * sign, self.slope - self.skew * sign]
+    }
+}
+
+impl CameraPlanes {
+    fn new(camera: &Camera) -> Self {
+        let [width, height] = camera.size.map(f64::from);
+        let half = camera.projection.half_height();
+        let halves = [half * width / height, half];
+        let (pairs, offsets) = match camera.projection {
+            Projection::Perspective { .. } => {
+                let middle = |pair: usize| halves[pair] * f64::from(camera.shift[pair]);
+                (from_fn(|pair| PairSlopes::of_tangents(halves[pair], middle(pair))), [0.0; 2])
+            }
+            Projection::Orthographic { .. } => ([PairSlopes::PARALLEL; 2], halves),
+            Projection::Paraboloid => ([PairSlopes::PARALLEL; 2], [f64::from(camera.far); 2]),
+        };
+        let near = match camera.projection {
+            // Objects in front of the near plane of a shadow map cast shadows too.
+            _ if camera.clamps_depth() => f32::INFINITY,
+            // Filtering at the disc's rim reads a few texels beyond it.
+            Projection::Paraboloid => camera.far * PARABOLOID_MARGIN,
+            // Its near plane is the clip plane, which may be nearer.
+            _ if camera.clip_plane.is_some() => 0.0,
+            _ => -camera.near,
+        };
+        Self { pairs, offsets, near, far: camera.far }
+    }
+}
+
+/// How far a paraboloid view extends behind its camera, as a share of its range.
+const PARABOLOID_MARGIN: f32 = 0.05;
 
 /// The volume that a camera sees, within six planes: a pyramid, a box or a hemisphere.
 ///

@@ -1,11 +1,15 @@
-//! Which level of detail an object is drawn at in a view.
+//! The level of detail that each object is drawn at in a view, by the errors of its mesh's levels.
+
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use glam::{DVec2, DVec3};
+use parking_lot::RwLock;
 
-use super::level_errors::LevelErrors;
-use super::{BoundingSphere, RenderView};
+use super::{BoundingSphere, ObjectBlock, ObjectTable, RenderView, UsedMeshes};
+use crate::bit_set::BitWord;
+use crate::command::Version;
 use crate::quality::Quality;
-use crate::scene::Projection;
+use crate::scene::{Assets, LevelOfDetail, Mesh, Projection, SceneRef};
 
 /// Chooses levels of detail in a view by their errors in its picture: see [`Quality::level_of_detail`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,6 +88,138 @@ impl LevelSelector {
             Magnification::Orthographic(pixels) => pixels,
             Magnification::Paraboloid(pixels) => pixels / (offset.length() - radius).max(self.near),
         }
+    }
+}
+
+/// The errors of the levels of the meshes that objects use, by slot. The meshes themselves are much larger.
+#[derive(Debug, Default)]
+pub(crate) struct MeshLevels {
+    /// The identity and revision of the mesh collection that this was built from, and the revision of the used meshes.
+    version: Option<(u64, u64, u64)>,
+    /// For each slot, up to the last mesh with levels.
+    errors: Vec<LevelErrors>,
+}
+
+/// The errors of a mesh's coarser levels, in metres in object space. They ascend.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LevelErrors {
+    count: usize,
+    errors: [f32; LevelOfDetail::MAX_COUNT],
+}
+
+impl LevelErrors {
+    /// Those of at most [`LevelOfDetail::MAX_COUNT`] levels, the finest first.
+    pub(super) fn of(errors: impl ExactSizeIterator<Item = f32>) -> Self {
+        let mut levels = Self { count: errors.len(), ..Self::default() };
+        levels.errors.iter_mut().zip(errors).for_each(|(own, error)| *own = error);
+        levels
+    }
+
+    /// The coarsest level whose error is at most `largest` metres in object space.
+    pub(super) fn coarsest(&self, largest: f64) -> u32 {
+        let errors = &self.errors[..self.count];
+        errors.iter().take_while(|error| f64::from(**error) <= largest).count() as u32
+    }
+}
+
+impl MeshLevels {
+    /// Rebuilds the table if the meshes have changed, or others are used.
+    pub(crate) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
+        let version = (assets.meshes.identity(), assets.meshes.revision(), used.revision());
+        if self.version == Some(version) {
+            return;
+        }
+        self.version = Some(version);
+        self.errors.clear();
+        for (handle, mesh) in
+            assets.iter::<Mesh>().filter(|(handle, mesh)| !mesh.levels().is_empty() && used.contains(*handle))
+        {
+            self.errors.resize(handle.index() as usize, LevelErrors::default());
+            self.errors.push(LevelErrors::of(mesh.levels().iter().map(LevelOfDetail::error)));
+        }
+    }
+
+    /// Whether no mesh has levels.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.errors.is_empty()
+    }
+
+    /// Whether the mesh in a slot has levels.
+    pub(crate) fn contains(&self, slot: u32) -> bool {
+        self.get(slot).is_some()
+    }
+
+    /// The errors of the mesh in a slot; `None` if it has no levels.
+    pub(super) fn get(&self, slot: u32) -> Option<&LevelErrors> {
+        self.errors.get(slot as usize).filter(|levels| levels.count > 0)
+    }
+}
+
+/// The level of detail of each object that a view sees. It is kept from frame to frame, because a level depends on the
+/// one before.
+#[derive(Debug, Default)]
+pub(crate) struct ObjectLevels {
+    /// By the index of an object. An object that the view does not see keeps the level that it had. When an object is
+    /// removed, the last object takes its index and its level.
+    levels: Vec<AtomicU8>,
+    /// Whether a level changed since the latest [`ObjectLevels::complete`].
+    has_changed: AtomicBool,
+    version: RwLock<Version>,
+}
+
+/// Coarser than any level: of an object that has none yet.
+const UNCHOSEN: u8 = u8::MAX;
+
+impl ObjectLevels {
+    /// Makes room for this number of objects.
+    pub(crate) fn resize(&mut self, objects: usize) {
+        self.levels.resize_with(objects, || AtomicU8::new(UNCHOSEN));
+    }
+
+    /// Chooses the levels of the `visible` objects of a word. Jobs that choose at the same time must have different
+    /// words.
+    pub(crate) fn choose(
+        &self,
+        selector: &LevelSelector,
+        (scene, table, meshes): (&SceneRef<'_>, &ObjectTable, &MeshLevels),
+        visible: BitWord,
+    ) {
+        if visible.mask == 0 {
+            return;
+        }
+        let block = table.block(visible.index() / ObjectBlock::WORDS);
+        for object in visible.indices() {
+            let entry = object % ObjectBlock::SIZE;
+            // Relaxed, here and below: jobs that read the levels depend on this job.
+            let before = self.levels[object].load(Ordering::Relaxed);
+            let level = meshes.get(block.draws[entry].mesh).map_or(0, |errors| {
+                let scale = scene.scale_column().get(object).abs().max_element();
+                selector.level(block.spheres.get(entry), scale, errors, before.into()) as u8
+            });
+            if level != before {
+                self.levels[object].store(level, Ordering::Relaxed);
+                self.has_changed.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Call it once, after all levels have been chosen. If they differ from those before, they get `version`, which no
+    /// others have.
+    pub(crate) fn complete(&self, version: Version) {
+        if self.has_changed.swap(false, Ordering::Relaxed) {
+            *self.version.write() = version;
+        }
+    }
+
+    /// The version that the latest different levels got.
+    pub(crate) fn version(&self) -> Version {
+        *self.version.read()
+    }
+
+    /// The level of an object that the view sees.
+    #[inline]
+    pub(crate) fn get(&self, object: usize) -> u32 {
+        self.levels[object].load(Ordering::Relaxed).into()
     }
 }
 
