@@ -3,14 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::backend_trait::{Backend, BackendExtras, FrameRecorder};
+use super::backend_trait::{Backend, BackendExtras, FrameRecorder, ReadBack};
 use super::error::BackendError;
-use super::frame_fence::FrameFence;
-use super::read_back::ReadBack;
-use super::requests::{FrameRequest, PassRequest};
-use super::scene_limits::SceneLimits;
-use super::target_memory::TargetMemory;
-use super::view_queue::ViewQueue;
+use super::requests::{FrameFence, FrameRequest, PassRequest, SceneLimits, TargetMemory, ViewQueue};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};

@@ -4,12 +4,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::error::BackendError;
-use super::frame_fence::FrameFence;
-use super::read_back::ReadBack;
-use super::requests::{FrameRequest, PassRequest};
-use super::scene_limits::SceneLimits;
-use super::target_memory::TargetMemory;
-use super::view_queue::ViewQueue;
+use super::picture::Picture;
+use super::requests::{FrameFence, FrameRequest, PassRequest, SceneLimits, TargetMemory, ViewQueue};
 use crate::command::DrawState;
 use crate::process::{Draws, FramePlan};
 use crate::quality::{Quality, VertexFormat};
@@ -265,4 +261,20 @@ impl BackendExtras for NoExtras {
     fn inner_extras(&self) -> Option<&dyn BackendExtras> {
         None
     }
+}
+
+/// A target as one frame leaves it, on its way to the CPU: see [`Backend::read_back`](super::Backend::read_back).
+pub trait ReadBack: Send {
+    /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It
+    /// does not wait.
+    ///
+    /// # Errors
+    /// If the frame was dropped, or the device is lost.
+    fn try_read(&self) -> Result<Option<Picture>, BackendError>;
+
+    /// Waits until the device is done with the frame, which is submitted, and returns the pixels.
+    ///
+    /// # Errors
+    /// If the frame is not submitted, or the device is lost.
+    fn read(&self) -> Result<Picture, BackendError>;
 }

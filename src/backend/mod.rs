@@ -3,7 +3,6 @@
 mod backend_layer;
 mod backend_trait;
 mod error;
-mod frame_fence;
 mod guarded_backend;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod mip_generation;
@@ -11,15 +10,11 @@ mod mip_generation;
 mod mip_schedule;
 mod null;
 mod picture;
-mod read_back;
 mod requests;
-mod scene_limits;
 #[cfg(feature = "software")]
 mod software;
 #[cfg(any(feature = "wgpu", feature = "software"))]
 mod subdivision_cache;
-mod target_memory;
-mod view_queue;
 #[cfg(feature = "wgpu")]
 mod wgpu;
 
@@ -32,21 +27,16 @@ pub use self::wgpu::{
     WgpuResources, WgpuSubmission, WindowDevice, WindowSurface,
 };
 pub use backend_layer::BackendLayer;
-pub use backend_trait::{Backend, BackendExtras, FrameRecorder, NoExtras};
+pub use backend_trait::{Backend, BackendExtras, FrameRecorder, NoExtras, ReadBack};
 pub use error::BackendError;
-pub use frame_fence::FrameFence;
 pub(crate) use guarded_backend::{CallPanic, GuardedBackend};
 pub use null::NullBackend;
 pub use picture::Picture;
-pub use read_back::ReadBack;
 #[cfg(feature = "software")]
 pub(crate) use requests::ViewRequest;
-pub use requests::{FrameRequest, PassRequest};
-pub use scene_limits::SceneLimits;
+pub use requests::{FrameFence, FrameRequest, PassRequest, SceneLimits, TargetMemory, ViewQueue};
 #[cfg(feature = "software")]
 pub use software::{SoftwareBackend, SoftwareSubmission};
-pub use target_memory::TargetMemory;
-pub use view_queue::ViewQueue;
 
 /// For the tests of this repository. No part of the interface.
 #[doc(hidden)]

@@ -6,14 +6,9 @@ use std::sync::Arc;
 
 use parking_lot::Mutex;
 
-use super::backend_trait::{Backend, BackendExtras, FrameRecorder};
+use super::backend_trait::{Backend, BackendExtras, FrameRecorder, ReadBack};
 use super::error::BackendError;
-use super::frame_fence::FrameFence;
-use super::read_back::ReadBack;
-use super::requests::{FrameRequest, PassRequest};
-use super::scene_limits::SceneLimits;
-use super::target_memory::TargetMemory;
-use super::view_queue::ViewQueue;
+use super::requests::{FrameFence, FrameRequest, PassRequest, SceneLimits, TargetMemory, ViewQueue};
 use crate::command::{DrawList, DrawState};
 use crate::process::{Draws, FramePlan, Pass};
 use crate::quality::{Quality, VertexFormat};

@@ -1,4 +1,4 @@
-//! What frames request of a backend.
+//! What frames request of a backend and give to it, within its limits.
 
 use std::array;
 use std::sync::Arc;
@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use glam::Vec3;
 
-use super::{BackendError, SceneLimits};
+use super::BackendError;
 use crate::command::DrawList;
+use crate::fence::FenceSetter;
 use crate::process::{Draws, FramePlan, Pass, SampledViews};
 use crate::quality::Quality;
 use crate::scene::{GeneratedContents, Light, SceneRef};
-use crate::view::{GpuView, LightTable, ObjectTable, RenderView, SceneIssues};
+use crate::view::{GpuLight, GpuObject, GpuView, LightTable, ObjectTable, RenderView, SceneIssues};
 
 /// Everything that a backend needs to know of a frame.
 #[derive(Clone, Copy)]
@@ -137,6 +138,109 @@ impl PassRequest<'_> {
 fn divide_by_costs(time: Duration, costs: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item = Duration> {
     let (time, all) = (time.as_nanos() as u64, costs.clone().sum::<u64>());
     costs.map(move |cost| Duration::from_nanos(time * cost / all))
+}
+
+/// What a backend can hold of a scene: the limits of its device's buffers and textures. A frame draws what is within
+/// them, leaves out the rest, and counts it among its [scene issues](crate::FrameStatistics::scene_issues).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneLimits {
+    /// The size of the largest buffer, in bytes: what the lights of all views can take together.
+    pub buffer_bytes: u64,
+    /// The most bytes of a buffer that a shader can read: all objects, a [column](crate::scene::ObjectColumn), all
+    /// materials, their values of a [type](crate::scene::MaterialType), or the lights of a view. In each of them, every
+    /// object, material slot or light has an element.
+    pub binding_bytes: u64,
+    /// The most layers of a texture: what shadow maps can take together. Lights without room for theirs are counted as
+    /// [`ShadowMapLimit`](crate::view::IssueReason::ShadowMapLimit).
+    pub texture_layers: u32,
+}
+
+impl SceneLimits {
+    /// No limits but those of memory, and 256 layers of a texture, as most devices have.
+    pub const NONE: Self = Self { buffer_bytes: u64::MAX, binding_bytes: u64::MAX, texture_layers: 256 };
+
+    /// The maximum number of objects if shaders read columns of up to `column_stride` bytes an object. Each object also
+    /// takes 64 bytes itself. Objects at higher indices are counted as
+    /// [`ObjectLimit`](crate::view::IssueReason::ObjectLimit).
+    pub fn max_objects(&self, column_stride: usize) -> usize {
+        elements(self.binding_bytes, column_stride.max(size_of::<GpuObject>()))
+    }
+
+    /// The most lights that a view can have, each layer of shadow maps counted as another one if a light has several.
+    /// Lights that come later in the scene are counted as [`LightLimit`](crate::view::IssueReason::LightLimit).
+    pub fn max_lights(&self) -> usize {
+        elements(self.binding_bytes, size_of::<GpuLight>())
+    }
+}
+
+impl Default for SceneLimits {
+    /// [`SceneLimits::NONE`].
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+fn elements(bytes: u64, stride: usize) -> usize {
+    usize::try_from(bytes / stride as u64).unwrap_or(usize::MAX)
+}
+
+/// The queue of one view: its finished passes in order, ready to submit (M 10.3).
+#[derive(Debug)]
+pub struct ViewQueue<T> {
+    /// The view's index.
+    pub view: usize,
+    /// The passes, each with its commands.
+    pub passes: Vec<(Pass, T)>,
+}
+
+/// A fence that the device sets at a place in a frame.
+#[derive(Debug)]
+pub struct FrameFence {
+    /// The number of passes before the place, in submission order. If it is that of all passes, the place is the end of
+    /// the frame, after everything that the backend adds.
+    pub passes: usize,
+    /// Sets the fence.
+    pub setter: FenceSetter,
+}
+
+impl FrameFence {
+    /// Sets the fences whose places come after this many passes at most, of fences that are in the order of their
+    /// places. For devices that have done what is submitted when the call returns.
+    ///
+    /// ```
+    /// # use drawloom::backend::FrameFence;
+    /// # use drawloom::fence::Fence;
+    /// let (setter, middle) = Fence::new("after two passes");
+    /// let mut fences = vec![FrameFence { passes: 2, setter }];
+    /// FrameFence::set_up_to(1, &mut fences);
+    /// assert!(!middle.is_set());
+    /// FrameFence::set_up_to(2, &mut fences);
+    /// assert!(middle.is_set());
+    /// ```
+    pub fn set_up_to(passes: usize, fences: &mut Vec<Self>) {
+        let reached = fences.iter().take_while(|fence| fence.passes <= passes).count();
+        fences.drain(..reached).for_each(|fence| fence.setter.set());
+    }
+}
+
+/// The memory of a frame's targets, without those that the engine imports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TargetMemory {
+    /// The number of textures. One that several targets share counts once.
+    pub textures: usize,
+    /// The size of these textures in bytes.
+    pub bytes: u64,
+    /// What their size would be if no [transient targets](super::WgpuBackend::transient_targets) shared a texture.
+    pub dedicated_bytes: u64,
+}
+
+#[cfg(feature = "wgpu")]
+impl TargetMemory {
+    /// Counts a texture of this size.
+    pub(crate) fn add_texture(&mut self, bytes: u64) {
+        self.textures += 1;
+        self.bytes += bytes;
+    }
 }
 
 #[cfg(test)]

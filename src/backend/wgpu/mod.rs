@@ -19,11 +19,9 @@ mod backend;
 mod backend_impl;
 mod begin_frame;
 mod error_scope;
-mod fences;
 mod frame;
 #[cfg(test)]
 mod noop_device;
-mod pass_bind_groups;
 mod pipeline_library;
 mod pipelines;
 mod read_back;
@@ -32,11 +30,9 @@ mod resources;
 mod strategy;
 mod streaming;
 mod submission;
-mod submit_frame;
 mod surface_error;
 mod surface_formats;
 mod timing;
-mod uploaded_picture;
 mod window_surface;
 
 pub use backend::{WgpuBackend, WgpuResources};

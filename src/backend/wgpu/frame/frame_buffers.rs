@@ -9,8 +9,7 @@ use parking_lot::{Mutex, RwLock};
 
 use super::allotment::allot;
 use super::material_buffer::MaterialBuffer;
-use super::object_buffers::ObjectBuffers;
-use super::object_lists::ObjectLists;
+use super::object_buffers::{ObjectBuffers, ObjectLists};
 use super::pass_state::{FrameRanges, PassId, WgpuPassState};
 use super::resource_bytes::ResourceBytes;
 use crate::backend::subdivision_cache::SubdividedMeshes;

@@ -1,10 +1,16 @@
-//! The buffers of a frame's objects, and what is written to them.
+//! The buffers of a frame's objects and of the lists of objects that passes draw, and what is written to them.
 
 use std::num::NonZeroU64;
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{CountedQueue, ObjectBuffer, check_storage_binding_size};
+use parking_lot::Mutex;
+
+use crate::backend::wgpu::error_scope::{poll, refused, with_error_scope};
+use crate::backend::wgpu::resources::{
+    ALIGNMENT, CountedQueue, GrowingBuffer, check_storage_binding_size, size_with_headroom,
+};
+use crate::backend::{BackendError, SceneLimits};
 use crate::scene::{ColumnLayout, SceneRef};
 use crate::view::{GpuObject, ObjectTable};
 
@@ -19,7 +25,7 @@ pub(crate) struct ObjectBuffers {
 }
 
 impl ObjectBuffers {
-    /// Buffers without room. `maps_memory`: see [`shares_memory`](crate::backend::wgpu::resources::shares_memory).
+    /// Buffers without room. `maps_memory`: see [`shares_memory`].
     pub(crate) fn new(maps_memory: bool) -> Self {
         let gpu_objects = ObjectBuffer::new("objects", maps_memory);
         Self { gpu_objects, columns: Vec::new(), maps_memory, max_binding: 0 }
@@ -195,5 +201,290 @@ fn for_each_part(objects: &ObjectTable, range: Range<usize>, visit: Visit<'_>) {
     for (block, part) in ObjectTable::block_ranges(range) {
         let gpu_objects = &objects.block(block).gpu_objects[part.start % ObjectTable::BLOCK_SIZE..][..part.len()];
         visit(part, bytemuck::cast_slice(gpu_objects));
+    }
+}
+
+/// A buffer with an element for each of a frame's objects. Where the device shares the CPU's memory, jobs write
+/// straight into it while it is mapped, so nothing is staged, and nothing copied when the frame is submitted.
+///
+/// A mapping is requested only when the device is done with all submissions that use the buffer. wgpu would grant a
+/// request that was made and cancelled before when the submission of that time is done, while a later one still reads
+/// the buffer.
+struct ObjectBuffer {
+    label: &'static str,
+    on_device: GrowingBuffer,
+    /// `None` if writes are staged.
+    usage: Option<Arc<Mutex<Usage>>>,
+}
+
+/// Who uses a buffer that can be mapped.
+#[derive(Debug, Default)]
+struct Usage {
+    /// The number of submissions that use it, and the number of those that the device is done with.
+    submitted: u64,
+    done: u64,
+    is_mapped: bool,
+    /// Whether wgpu refused to map it.
+    is_refused: bool,
+}
+
+impl Usage {
+    /// Whether the buffer may be mapped. Before its first submission it may have writes that are staged, and not
+    /// submitted.
+    fn is_idle(&self) -> bool {
+        self.submitted > 0 && self.done == self.submitted
+    }
+}
+
+impl ObjectBuffer {
+    /// A buffer without room. `maps_memory`: see [`shares_memory`].
+    fn new(label: &'static str, maps_memory: bool) -> Self {
+        use wgpu::BufferUsages;
+        let usage = if maps_memory { BufferUsages::STORAGE | BufferUsages::MAP_WRITE } else { BufferUsages::STORAGE };
+        Self { label, on_device: GrowingBuffer::new(label, usage), usage: maps_memory.then(Arc::default) }
+    }
+
+    fn on_device(&self) -> &GrowingBuffer {
+        &self.on_device
+    }
+
+    /// Makes room for `bytes`. Returns whether the buffer was reallocated, and lost its contents.
+    ///
+    /// # Errors
+    /// If the device allows no buffer of that size.
+    fn reserve(&mut self, device: &wgpu::Device, bytes: usize) -> Result<bool, BackendError> {
+        let reallocated = self.on_device.reserve(device, bytes)?;
+        if reallocated {
+            // Submissions of the earlier buffer say nothing about this one.
+            self.usage = self.usage.as_ref().map(|_| Arc::default());
+        }
+        Ok(reallocated)
+    }
+
+    /// Whether a frame can write at once: the buffer is mapped, or can be, or is not meant to be.
+    fn is_ready(&self) -> bool {
+        self.usage.as_ref().is_none_or(|usage| {
+            let usage = usage.lock();
+            usage.is_mapped || usage.is_idle()
+        })
+    }
+
+    /// Maps the buffer if the device is done with it. Otherwise writes are staged.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn map(&mut self, device: &wgpu::Device) -> Result<(), BackendError> {
+        let Some((usage, buffer)) = self.usage.as_ref().zip(self.on_device.buffer()) else { return Ok(()) };
+        if self.is_mapped() || !usage.lock().is_idle() {
+            return Ok(());
+        }
+        let in_callback = Arc::clone(usage);
+        let mapped = move |result: Result<_, _>| {
+            let mut usage = in_callback.lock();
+            (usage.is_mapped, usage.is_refused) = (result.is_ok(), result.is_err());
+        };
+        with_error_scope(device, self.label, || buffer.map_async(wgpu::MapMode::Write, .., mapped))?;
+        poll(device, wgpu::PollType::Poll)?;
+        let maps_memory = !usage.lock().is_refused;
+        if !self.is_mapped() {
+            // A new buffer, without the request. It is pending if a frame was dropped whose staged writes the device
+            // still executes.
+            *self = Self::new(self.label, maps_memory);
+        }
+        Ok(())
+    }
+
+    /// A view of a range in bytes, to write through; `None` if writes are staged. Views at the same time must not
+    /// overlap.
+    ///
+    /// # Errors
+    /// If wgpu refuses.
+    fn mapped(&self, bytes: Range<usize>) -> Result<Option<wgpu::BufferViewMut>, BackendError> {
+        let Some(buffer) = self.on_device.buffer().filter(|_| self.is_mapped()) else { return Ok(None) };
+        let view = buffer.get_mapped_range_mut(bytes.start as u64..bytes.end as u64);
+        view.map(Some).map_err(|error| refused(self.label, error.to_string()))
+    }
+
+    /// Gives the buffer to the device, before a submission that reads it.
+    fn unmap(&self) {
+        let Some((usage, buffer)) = self.usage.as_ref().zip(self.on_device.buffer()) else { return };
+        let mut usage = usage.lock();
+        usage.submitted += 1;
+        if std::mem::take(&mut usage.is_mapped) {
+            buffer.unmap();
+        }
+    }
+
+    /// Notices when the device is done with the submission, which was the latest one of the queue.
+    fn await_submission(&self, queue: &wgpu::Queue) {
+        let Some(usage) = &self.usage else { return };
+        let (usage, number) = (Arc::clone(usage), usage.lock().submitted);
+        queue.on_submitted_work_done(move || {
+            let mut usage = usage.lock();
+            usage.done = usage.done.max(number);
+        });
+    }
+
+    fn is_mapped(&self) -> bool {
+        self.usage.as_ref().is_some_and(|usage| usage.lock().is_mapped)
+    }
+}
+
+/// Whether a device reads the CPU's own memory as fast as any other. Devices with memory of their own read the CPU's
+/// through a bus.
+pub(crate) fn shares_memory(adapter: &wgpu::AdapterInfo) -> bool {
+    use wgpu::{Backend, DeviceType};
+    adapter.backend == Backend::Noop || matches!(adapter.device_type, DeviceType::IntegratedGpu | DeviceType::Cpu)
+}
+
+/// The lists of objects that passes of commands draw, one after the other: in one buffer, or in several of equal size
+/// where one would be larger than the device allows. A list lies in one of them.
+pub(super) struct ObjectLists {
+    /// At least one.
+    buffers: Vec<GrowingBuffer>,
+    /// The size of a list, in bytes.
+    stride: usize,
+    /// The lists in a buffer.
+    per_buffer: usize,
+}
+
+impl ObjectLists {
+    pub(super) fn new() -> Self {
+        Self { buffers: vec![new_buffer()], stride: 0, per_buffer: usize::MAX }
+    }
+
+    /// Makes room for `lists` lists of `objects` objects each. Returns whether what the lists held is lost.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    pub(super) fn reserve(
+        &mut self,
+        device: &wgpu::Device,
+        (lists, objects): (usize, usize),
+        limits: SceneLimits,
+    ) -> Result<bool, BackendError> {
+        let needed = objects * size_of::<u32>();
+        // Headroom is for what fits beside it.
+        let max_stride = limits.binding_bytes.min(limits.buffer_bytes / lists.max(1) as u64);
+        let stride = size_with_headroom(self.stride, needed, max_stride);
+        let per_buffer = usize::try_from(limits.buffer_bytes / stride as u64).unwrap_or(usize::MAX).max(1);
+        let mut is_lost = (self.stride, self.per_buffer) != (stride, per_buffer);
+        (self.stride, self.per_buffer) = (stride, per_buffer);
+        let count = lists.div_ceil(per_buffer).max(1);
+        is_lost |= count > self.buffers.len();
+        self.buffers.resize_with(count, new_buffer);
+        for (index, buffer) in self.buffers.iter_mut().enumerate() {
+            let lists = lists.saturating_sub(index * per_buffer).min(per_buffer);
+            is_lost |= buffer.reserve(device, (lists * stride).max(ALIGNMENT))?;
+        }
+        Ok(is_lost)
+    }
+
+    /// The maximum number of lists of `objects` objects each that one buffer holds without headroom.
+    pub(super) fn max_in_one_buffer(objects: usize, limits: SceneLimits) -> u64 {
+        limits.buffer_bytes / (objects * size_of::<u32>()).next_multiple_of(ALIGNMENT) as u64
+    }
+
+    /// The bytes of a list, by its place among all lists, as if these were in one buffer. The layout requires a binding
+    /// even if a pass has no list; it reads nothing from it.
+    pub(super) fn bytes_of(&self, list: &Range<usize>) -> Range<usize> {
+        if list.is_empty() { 0..ALIGNMENT } else { list.start * self.stride..list.end * self.stride }
+    }
+
+    /// Those bytes, to be bound.
+    pub(super) fn binding(&self, bytes: &Range<usize>) -> Option<wgpu::BufferBinding<'_>> {
+        let (buffer, offset) = self.position(bytes.start);
+        self.buffers.get(buffer)?.binding(offset, bytes.len())
+    }
+
+    /// Writes to a list that begins at `start`.
+    pub(super) fn write(&self, uploads: &CountedQueue, start: usize, offset: usize, bytes: &[u8]) {
+        let (buffer, start) = self.position(start);
+        if let Some(buffer) = self.buffers.get(buffer) {
+            buffer.write(uploads, start + offset, bytes);
+        }
+    }
+
+    /// Their sizes in bytes.
+    pub(super) fn sizes(&self) -> impl Iterator<Item = u64> {
+        self.buffers.iter().map(GrowingBuffer::size)
+    }
+
+    /// The buffer in which a list begins, and where.
+    fn position(&self, start: usize) -> (usize, usize) {
+        let bytes_per_buffer = self.per_buffer.saturating_mul(self.stride.max(1));
+        (start / bytes_per_buffer, start % bytes_per_buffer)
+    }
+}
+
+fn new_buffer() -> GrowingBuffer {
+    GrowingBuffer::new("object indices", wgpu::BufferUsages::STORAGE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+
+    fn submit(buffer: &ObjectBuffer, queue: &wgpu::Queue) {
+        buffer.unmap();
+        queue.submit([]);
+        buffer.await_submission(queue);
+    }
+
+    fn can_write(buffer: &ObjectBuffer, bytes: Range<usize>) -> bool {
+        buffer.mapped(bytes).unwrap().is_some()
+    }
+
+    #[test]
+    fn a_buffer_is_mapped_when_the_device_is_done_with_it() {
+        let (device, queue) = noop_device();
+        let mut buffer = ObjectBuffer::new("objects", true);
+        for bytes in [1_000, 4_000] {
+            buffer.reserve(&device, bytes).unwrap();
+            buffer.map(&device).unwrap();
+            assert!(!buffer.is_ready() && !can_write(&buffer, 0..64), "new, so the first frame is staged");
+            for _frame in 0..3 {
+                submit(&buffer, &queue);
+                assert!(!buffer.is_ready());
+                buffer.map(&device).unwrap();
+                assert!(!can_write(&buffer, 0..64), "nobody has polled");
+                poll(&device, wgpu::PollType::Poll).unwrap();
+                assert!(buffer.is_ready());
+                buffer.map(&device).unwrap();
+                let views = [0..64, 64..bytes].map(|bytes| buffer.mapped(bytes).unwrap());
+                assert!(views.iter().all(Option::is_some));
+                assert!(buffer.mapped(32..96).is_err(), "views must not overlap");
+            }
+        }
+    }
+
+    #[test]
+    fn the_end_of_an_earlier_submission_does_not_free_the_buffer() {
+        let (device, queue) = noop_device();
+        let mut buffer = ObjectBuffer::new("objects", true);
+        buffer.reserve(&device, 64).unwrap();
+        submit(&buffer, &queue);
+        buffer.unmap();
+        poll(&device, wgpu::PollType::Poll).unwrap();
+        assert!(!buffer.is_ready());
+        queue.submit([]);
+        buffer.await_submission(&queue);
+        poll(&device, wgpu::PollType::Poll).unwrap();
+        assert!(buffer.is_ready());
+        submit(&buffer, &queue);
+        buffer.reserve(&device, 1 << 20).unwrap();
+        poll(&device, wgpu::PollType::Poll).unwrap();
+        assert!(!buffer.is_ready(), "the submission read another buffer");
+    }
+
+    #[test]
+    fn without_mapping_writes_are_staged() {
+        let (device, queue) = noop_device();
+        let mut buffer = ObjectBuffer::new("objects", false);
+        buffer.reserve(&device, 64).unwrap();
+        submit(&buffer, &queue);
+        buffer.map(&device).unwrap();
+        assert!(buffer.is_ready() && !can_write(&buffer, 0..64));
     }
 }

@@ -1,18 +1,20 @@
-//! The state of one pass in a frame's buffers.
+//! The state of one pass in a frame's buffers: its bind groups, its strategy, its cached bundles, and what recording it
+//! cost.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Instant;
 
 use drawloom_jobs::internal::CostSample;
-use parking_lot::RwLock;
+use parking_lot::{Mutex, RwLock};
 
-use super::bundle_cache::BundleCache;
-use super::pass_statistics::WgpuPassStatistics;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{CachedBindGroup, CountedQueue, GrowingBuffer};
+use crate::backend::subdivision_cache::{CachedSubdivision, SubdividedMeshes, subdivision_of};
+use crate::backend::wgpu::pipelines::ProcessPipelines;
+use crate::backend::wgpu::resources::{CachedBindGroup, CountedQueue, GrowingBuffer, SubdividedMesh};
 use crate::backend::wgpu::strategy::{EncodingStrategy, PassStrategy, RecordingStrategy};
-use crate::backend::wgpu::timing::PassTiming;
-use crate::command::Version;
+use crate::command::{Batch, Version};
 use crate::process::{Draws, FramePlan, Pass, ProcessId};
 use crate::view::{RenderView, ViewId};
 
@@ -227,4 +229,226 @@ impl WgpuPassState {
 
 fn new_index_buffer() -> GrowingBuffer {
     GrowingBuffer::new("remaining triangles", wgpu::BufferUsages::INDEX)
+}
+
+/// The inputs that all bundles of a pass have in common. Pipelines determine the formats of targets; the snapshot
+/// determines the meshes' ranges in their pages.
+#[derive(Clone)]
+pub(crate) struct BundleKey {
+    pub(crate) frame_bind_group: wgpu::BindGroup,
+    pub(crate) materials_bind_group: wgpu::BindGroup,
+    pub(crate) process_bind_group: Option<wgpu::BindGroup>,
+    pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
+    /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being
+    /// overwritten: they are not replayed with another snapshot.
+    pub(crate) meshes: u64,
+    pub(crate) pipelines: Arc<ProcessPipelines>,
+    /// See [`WgpuPassState`].
+    pub(crate) clamps_depth: bool,
+}
+
+impl PartialEq for BundleKey {
+    fn eq(&self, other: &Self) -> bool {
+        self.frame_bind_group == other.frame_bind_group
+            && self.materials_bind_group == other.materials_bind_group
+            && self.process_bind_group == other.process_bind_group
+            && self.engine_bind_group == other.engine_bind_group
+            && (self.meshes, self.clamps_depth) == (other.meshes, other.clamps_depth)
+            && Arc::ptr_eq(&self.pipelines, &other.pipelines)
+    }
+}
+
+/// The bundles of a pass, as the latest frame with these buffers drew them.
+///
+/// A bundle's inputs are compared as a whole. The cache keeps them alive, so that no other object can get their
+/// identity.
+#[derive(Default)]
+pub(crate) struct BundleCache {
+    key: Option<BundleKey>,
+    bundles: Mutex<Vec<Option<CachedBundle>>>,
+}
+
+struct CachedBundle {
+    batches: Vec<Batch>,
+    /// The subdivided meshes that the batches draw, in order.
+    subdivided: Vec<Arc<CachedSubdivision<SubdividedMesh>>>,
+    bundle: wgpu::RenderBundle,
+}
+
+impl BundleCache {
+    /// Whether an earlier frame has left bundles.
+    pub(crate) fn is_warm(&mut self) -> bool {
+        self.key.is_some() && !self.bundles.get_mut().is_empty()
+    }
+
+    /// Drops everything.
+    pub(crate) fn clear(&mut self) {
+        self.key = None;
+        *self.bundles.get_mut() = Vec::new();
+    }
+
+    /// Begins a frame: drops all bundles if the key changed.
+    pub(crate) fn begin_frame(&mut self, key: BundleKey) {
+        if self.key.as_ref() != Some(&key) {
+            self.bundles.get_mut().clear();
+            self.key = Some(key);
+        }
+    }
+
+    /// Makes room for this many bundles, and drops further ones.
+    pub(crate) fn set_bundle_count(&self, bundles: usize) {
+        self.bundles.lock().resize_with(bundles, || None);
+    }
+
+    /// The bundle at an index, if it draws these batches.
+    pub(crate) fn get(
+        &self,
+        index: usize,
+        batches: &[Batch],
+        subdivided: &SubdividedMeshes<SubdividedMesh>,
+    ) -> Option<wgpu::RenderBundle> {
+        let bundles = self.bundles.lock();
+        let cached = bundles.get(index)?.as_ref()?;
+        let draws_same =
+            drawn_subdivisions(batches, subdivided).map(Arc::as_ptr).eq(cached.subdivided.iter().map(Arc::as_ptr));
+        (cached.batches == batches && draws_same).then(|| cached.bundle.clone())
+    }
+
+    /// Replaces the bundle at an index.
+    pub(crate) fn insert(
+        &self,
+        index: usize,
+        batches: &[Batch],
+        subdivided: &SubdividedMeshes<SubdividedMesh>,
+        bundle: wgpu::RenderBundle,
+    ) {
+        let subdivisions = drawn_subdivisions(batches, subdivided).cloned();
+        let mut bundles = self.bundles.lock();
+        let Some(slot) = bundles.get_mut(index) else { return };
+        match slot {
+            Some(cached) => {
+                cached.batches.clear();
+                cached.batches.extend_from_slice(batches);
+                cached.subdivided.clear();
+                cached.subdivided.extend(subdivisions);
+                cached.bundle = bundle;
+            }
+            None => {
+                *slot = Some(CachedBundle { batches: batches.to_vec(), subdivided: subdivisions.collect(), bundle })
+            }
+        }
+    }
+}
+
+fn drawn_subdivisions<'a>(
+    batches: &'a [Batch],
+    subdivided: &'a SubdividedMeshes<SubdividedMesh>,
+) -> impl Iterator<Item = &'a Arc<CachedSubdivision<SubdividedMesh>>> {
+    let subdivided_batches = batches.iter().filter(|batch| batch.state.subdivision_level() > 0);
+    subdivided_batches.filter_map(|batch| subdivided.get(&subdivision_of(batch)))
+}
+
+/// What recording a pass cost. The frame's jobs write it, with relaxed atomics; the thread that submits the frame reads
+/// it, and the hand-over of the frame to that thread orders both.
+#[derive(Default)]
+pub(crate) struct PassTiming {
+    /// In nanoseconds, summed over all workers: the recording of parts.
+    parallel_time: AtomicU64,
+    parts: AtomicUsize,
+    /// In nanoseconds: the work of one thread.
+    serial_time: AtomicU64,
+    batches: AtomicUsize,
+    bundles: AtomicUsize,
+    recorded_bundles: AtomicUsize,
+    replayed_bundles: AtomicUsize,
+}
+
+impl PassTiming {
+    /// Sets the size of the pass.
+    pub(crate) fn set_size(&self, batches: usize, bundles: usize, parts: usize) {
+        self.batches.store(batches, Ordering::Relaxed);
+        self.bundles.store(bundles, Ordering::Relaxed);
+        self.parts.store(parts, Ordering::Relaxed);
+    }
+
+    /// Times work that several workers may do at once.
+    pub(crate) fn time_parallel<R>(&self, work: impl FnOnce() -> R) -> R {
+        time(&self.parallel_time, work)
+    }
+
+    /// Times work that only one thread does.
+    pub(crate) fn time_serial<R>(&self, work: impl FnOnce() -> R) -> R {
+        time(&self.serial_time, work)
+    }
+
+    /// Adds a time in nanoseconds that one thread spent on the pass, measured with that of other passes.
+    pub(crate) fn add_serial(&self, nanoseconds: u64) {
+        self.serial_time.fetch_add(nanoseconds, Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_bundle(&self, is_replayed: bool) {
+        let counter = if is_replayed { &self.replayed_bundles } else { &self.recorded_bundles };
+        counter.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn batches(&self) -> usize {
+        self.batches.load(Ordering::Relaxed)
+    }
+
+    /// The batches of the pass; `None` if it was not recorded.
+    pub(crate) fn latest_batches(&self) -> Option<usize> {
+        (self.total() > 0.0).then(|| self.batches())
+    }
+
+    pub(crate) fn bundles(&self) -> usize {
+        self.bundles.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn recorded_bundles(&self) -> usize {
+        self.recorded_bundles.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn replayed_bundles(&self) -> usize {
+        self.replayed_bundles.load(Ordering::Relaxed)
+    }
+
+    /// In nanoseconds, summed over all workers.
+    pub(crate) fn total(&self) -> f64 {
+        (self.parallel_time.load(Ordering::Relaxed) + self.serial_time.load(Ordering::Relaxed)) as f64
+    }
+
+    /// The critical path in nanoseconds, on `workers` workers that do nothing else.
+    pub(crate) fn critical_path(&self, workers: usize) -> f64 {
+        let shared = self.parts.load(Ordering::Relaxed).min(workers).max(1);
+        self.parallel_time.load(Ordering::Relaxed) as f64 / shared as f64
+            + self.serial_time.load(Ordering::Relaxed) as f64
+    }
+}
+
+fn time<R>(counter: &AtomicU64, work: impl FnOnce() -> R) -> R {
+    let start = Instant::now();
+    let result = work();
+    counter.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+    result
+}
+
+/// How one pass of the frame that was submitted last was recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WgpuPassStatistics {
+    /// The render process's name.
+    pub process: String,
+    /// The view's index.
+    pub view: usize,
+    /// How its batches were recorded.
+    pub recording: RecordingStrategy,
+    /// How it was encoded.
+    pub encoding: EncodingStrategy,
+    /// The number of encoders that it was split over; 0 if it is in the encoder of the pass before it.
+    pub encoders: usize,
+    /// The number of batches that it draws.
+    pub batches: usize,
+    /// The number of bundles recorded for it.
+    pub recorded_bundles: usize,
+    /// The number of cached bundles that it replays.
+    pub replayed_bundles: usize,
 }

@@ -1,6 +1,6 @@
 //! Textures of the engine's own that take the place of targets.
 
-use super::bind_group_layouts::texture_format;
+use super::bind_groups::texture_format;
 use crate::backend::BackendError;
 use crate::process::{Access, FramePlan, PlannedTarget};
 use crate::view::RenderView;

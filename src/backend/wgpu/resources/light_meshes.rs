@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use super::buffers::filled_buffer;
-use super::counted_queue::CountedQueue;
+use super::buffers::{CountedQueue, filled_buffer};
 use crate::backend::BackendError;
 use crate::scene::{LightKind, LightVolume};
 

@@ -3,13 +3,12 @@
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
-use super::attribute_set::AttributeBuffers;
-use super::counted_queue::CountedQueue;
+use super::buffers::CountedQueue;
 use super::imported_meshes::ImportedMeshes;
 use super::mesh_pages::{MeshBytes, MeshLocation, MeshPages, MeshTarget, PageSizes};
 use super::mesh_snapshot::{CoarserLevels, MeshPageIndices, MeshRange, MeshSnapshot};
 use super::snapshot_lifetimes::SnapshotLifetimes;
-use super::vertex_layout::with_vertex_bytes;
+use super::vertex_data::{AttributeBuffers, with_vertex_bytes};
 use crate::backend::BackendError;
 use crate::handle::Handle;
 use crate::process::DeclaredAttribute;

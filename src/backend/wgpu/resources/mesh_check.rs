@@ -1,7 +1,7 @@
 //! Whether a device can draw a mesh.
 
 use super::mesh_pages::{INDEX, index_count};
-use super::vertex_layout::vertex_stride;
+use super::vertex_data::vertex_stride;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 use crate::quality::VertexFormat;

@@ -3,10 +3,9 @@
 use std::mem;
 use std::sync::Arc;
 
-use super::attribute_set::{AttributeBuffers, AttributeSet};
 use super::buffers::new_buffer;
 use super::page_set::{PageBuffers, PageRange, PageSet};
-use super::vertex_layout::vertex_stride;
+use super::vertex_data::{AttributeBuffers, AttributeSet, vertex_stride};
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::quality::VertexFormat;

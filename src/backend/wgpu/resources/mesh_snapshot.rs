@@ -4,10 +4,10 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::attribute_set::AttributeBuffers;
 use super::imported_meshes::ImportedMeshes;
 use super::mesh_pages::VertexBuffers;
 use super::snapshot_lifetimes::SnapshotToken;
+use super::vertex_data::AttributeBuffers;
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::missing_mesh_error;

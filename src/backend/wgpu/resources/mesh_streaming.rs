@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
 
-use super::counted_queue::CountedQueue;
+use super::buffers::CountedQueue;
 use super::mesh_cache::{MeshCache, MeshVersion};
 use super::mesh_pages::{MeshLocation, MeshTarget, PageSizes};
 use super::mesh_snapshot::MeshSnapshot;

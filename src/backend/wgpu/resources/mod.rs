@@ -1,12 +1,8 @@
 //! Buffers, textures and bind group layouts on the device.
 
-mod attribute_set;
-mod bind_group_layouts;
+mod bind_groups;
 mod buffers;
-mod cached_bind_group;
 mod imported_meshes;
-mod gpu_material;
-mod growing_buffer;
 mod imported_target;
 mod light_meshes;
 mod material_cache;
@@ -16,15 +12,12 @@ mod mesh_pages;
 mod mesh_room;
 mod mesh_snapshot;
 mod mesh_streaming;
-mod mirrored_buffer;
-mod object_buffer;
 mod page_set;
 mod placeholder_targets;
 mod range_allocator;
 mod small_targets;
 mod snapshot_lifetimes;
 mod storage_buffers;
-mod subdivided_mesh;
 mod target_cache;
 mod target_mip_levels;
 mod target_texture;
@@ -32,17 +25,16 @@ mod texture_arrays;
 mod texture_layers;
 mod texture_streaming;
 mod transient_targets;
-mod counted_queue;
-mod vertex_layout;
+mod vertex_data;
 mod view_array;
 
-pub(crate) use attribute_set::vertex_format;
-pub(crate) use bind_group_layouts::{
-    BindGroupLayouts, SampledTarget, binding_type, engine_layout, process_layout, texture_format,
+pub(crate) use bind_groups::{
+    BindGroupLayouts, BindingResource, CachedBindGroup, SampledTarget, binding_type, engine_layout, process_layout,
+    texture_format,
 };
-pub(crate) use cached_bind_group::{BindingResource, CachedBindGroup};
-pub(crate) use counted_queue::CountedQueue;
-pub(crate) use growing_buffer::{ALIGNMENT, GrowingBuffer, check_storage_binding_size, size_with_headroom};
+pub(crate) use buffers::{
+    ALIGNMENT, CountedQueue, GrowingBuffer, MirroredBuffer, check_storage_binding_size, size_with_headroom,
+};
 pub(crate) use imported_meshes::{ImportedMeshes, VertexSlot, VertexStreamLayouts};
 pub(crate) use imported_target::ImportedTarget;
 pub(crate) use light_meshes::LightMeshes;
@@ -52,15 +44,12 @@ pub(crate) use mesh_check::{check_mesh, fits_in_buffers};
 pub(crate) use mesh_pages::MeshTarget;
 pub(crate) use mesh_snapshot::{MeshPageIndices, MeshSnapshot, attribute_of};
 pub(crate) use mesh_streaming::{EndOfUpload, Placed, Unplaced};
-pub(crate) use mirrored_buffer::MirroredBuffer;
-pub(crate) use object_buffer::{ObjectBuffer, shares_memory};
 pub(crate) use snapshot_lifetimes::{LastReader, SnapshotToken};
 pub(crate) use storage_buffers::StorageBuffers;
-pub(crate) use subdivided_mesh::SubdividedMesh;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
 pub(crate) use target_texture::sample_count;
 pub(crate) use texture_arrays::{TextureArrays, TextureLocation};
 pub(crate) use texture_layers::{copy_rows, layer_bytes};
 pub(crate) use texture_streaming::ArrayBudget;
-pub(crate) use vertex_layout::{vertex_attributes, vertex_stride};
+pub(crate) use vertex_data::{SubdividedMesh, vertex_attributes, vertex_format, vertex_stride};
 pub(crate) use view_array::shape_dimension;

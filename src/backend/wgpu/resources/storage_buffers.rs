@@ -1,7 +1,6 @@
 //! The buffers that processes share.
 
-use super::buffers::new_buffer;
-use super::growing_buffer::check_storage_binding_size;
+use super::buffers::{check_storage_binding_size, new_buffer};
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::process::{BufferLayout, FramePlan};

@@ -1,6 +1,6 @@
 //! The mip levels of targets, generated on the device.
 
-use super::bind_group_layouts::texture_format;
+use super::bind_groups::texture_format;
 use crate::process::Format;
 
 /// The pipelines that generate mip levels: one for each format of a target that has had some.

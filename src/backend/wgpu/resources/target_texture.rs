@@ -1,6 +1,6 @@
 //! Textures for targets, and the views of them.
 
-use super::bind_group_layouts::texture_format;
+use super::bind_groups::texture_format;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_level_count;
 use crate::backend::wgpu::error_scope::with_error_scope;

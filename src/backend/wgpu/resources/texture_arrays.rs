@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
-use super::counted_queue::CountedQueue;
+use super::buffers::CountedQueue;
 use super::snapshot_lifetimes::{SnapshotLifetimes, SnapshotToken};
 use super::texture_layers::{TextureLayers, copy_layer, layer_bytes, new_array};
 use crate::backend::BackendError;

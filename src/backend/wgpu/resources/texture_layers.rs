@@ -1,6 +1,6 @@
 //! One texture array, and which of its layers are in use.
 
-use super::counted_queue::CountedQueue;
+use super::buffers::CountedQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::backend::wgpu::error_scope::{loss_or, refused};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::counted_queue::CountedQueue;
+use super::buffers::CountedQueue;
 use super::mesh_streaming::{EndOfUpload, Placed, Unplaced};
 use super::snapshot_lifetimes::LastReader;
 use super::texture_arrays::{ResidentTexture, TextureArrays, TextureLocation};

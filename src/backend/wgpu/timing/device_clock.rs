@@ -2,10 +2,7 @@
 
 use std::time::Duration;
 
-use super::device_pass_times::DevicePassTimes;
-use super::queries::{new_query_set, timestamp_bytes};
-use super::readback::{ReadbackPool, read_timestamps};
-use super::timestamps::DeviceTiming;
+use super::timestamps::{DevicePassTimes, DeviceTiming, ReadbackPool, new_query_set, read_timestamps, timestamp_bytes};
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{poll, with_error_scope};
 use crate::backend::wgpu::resources::GrowingBuffer;

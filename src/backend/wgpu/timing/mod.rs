@@ -1,16 +1,9 @@
-//! How long passes take: to record on the CPU, and to draw on the device.
+//! When the device draws each pass.
 
 mod device_clock;
-mod device_pass_times;
-mod pass_timing;
-mod queries;
-mod readback;
-mod tick_period;
 mod timestamps;
 
-pub(crate) use pass_timing::PassTiming;
-pub(crate) use readback::TimestampReadback;
-pub(crate) use timestamps::{DeviceTiming, Timestamps};
+pub(crate) use timestamps::{DeviceTiming, TimestampReadback, Timestamps};
 
 pub use device_clock::DeviceClock;
-pub use device_pass_times::{DevicePassTime, DevicePassTimes};
+pub use timestamps::{DevicePassTime, DevicePassTimes};

@@ -1,10 +1,38 @@
-//! Vertex attributes on the device: a buffer for each attribute that processes read.
+//! The vertices and vertex attributes of meshes in the device's memory.
 
-use super::buffers::{filled_buffer, new_buffer};
-use super::counted_queue::CountedQueue;
+use super::buffers::{CountedQueue, filled_buffer, new_buffer};
 use crate::backend::BackendError;
 use crate::process::DeclaredAttribute;
-use crate::scene::{AttributeFormat, AttributeLayout, Mesh};
+use crate::quality::VertexFormat;
+use crate::scene::{AttributeFormat, AttributeLayout, Mesh, PackedVertex, Vertex};
+
+/// Bytes per vertex.
+pub(crate) fn vertex_stride(format: VertexFormat) -> u64 {
+    let bytes = match format {
+        VertexFormat::Full => size_of::<Vertex>(),
+        VertexFormat::Packed => size_of::<PackedVertex>(),
+    };
+    bytes as u64
+}
+
+/// `VertexInput` in `drawloom.wgsl`. Shaders read floats in either format, and ignore the fourth component of a packed
+/// normal.
+pub(crate) fn vertex_attributes(format: VertexFormat) -> &'static [wgpu::VertexAttribute] {
+    const FULL: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
+    const PACKED: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm8x4, 2 => Float16x2];
+    match format {
+        VertexFormat::Full => &FULL,
+        VertexFormat::Packed => &PACKED,
+    }
+}
+
+/// Calls `upload` with the bytes of a mesh's vertices in this format.
+pub(crate) fn with_vertex_bytes<T>(mesh: &Mesh, format: VertexFormat, upload: impl FnOnce(&[u8]) -> T) -> T {
+    match format {
+        VertexFormat::Full => upload(bytemuck::cast_slice(mesh.vertices())),
+        VertexFormat::Packed => upload(bytemuck::cast_slice(&mesh.packed_vertices())),
+    }
+}
 
 /// The attributes that processes have read so far. A page of vertices has a buffer for each of them, in which a vertex
 /// has the same index as in the buffer of vertices.
@@ -99,5 +127,36 @@ pub(crate) fn vertex_format(format: AttributeFormat) -> wgpu::VertexFormat {
         AttributeFormat::Uint32(3) => VertexFormat::Uint32x3,
         AttributeFormat::Uint32(_) => VertexFormat::Uint32x4,
         AttributeFormat::Unorm8x4 => VertexFormat::Unorm8x4,
+    }
+}
+
+/// A subdivided mesh on the device, in buffers of its own.
+pub(crate) struct SubdividedMesh {
+    pub(crate) vertices: wgpu::Buffer,
+    pub(crate) indices: wgpu::Buffer,
+    pub(crate) attributes: AttributeBuffers,
+    pub(crate) index_count: u32,
+}
+
+impl SubdividedMesh {
+    /// # Errors
+    /// If the device has no room.
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        uploads: &CountedQueue,
+        mesh: &Mesh,
+        format: VertexFormat,
+        attributes: AttributeBuffers,
+    ) -> Result<Self, BackendError> {
+        let upload = |label, bytes: &[u8], usage| filled_buffer(device, uploads, label, bytes, usage);
+        let indices = bytemuck::cast_slice(mesh.indices());
+        Ok(Self {
+            vertices: with_vertex_bytes(mesh, format, |vertices| {
+                upload("subdivided vertices", vertices, wgpu::BufferUsages::VERTEX)
+            })?,
+            indices: upload("subdivided indices", indices, wgpu::BufferUsages::INDEX)?,
+            attributes,
+            index_count: mesh.indices().len() as u32,
+        })
     }
 }
