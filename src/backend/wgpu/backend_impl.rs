@@ -252,7 +252,7 @@ impl FrameRecorder for WgpuBackend {
             pipelines.share();
         }
         if pipelines.has_unreadable() {
-            count_unreadable(frame, request, (pipelines, list, pass.clamps_depth));
+            count_unreadable(frame, request, pipelines, list, pass.clamps_depth);
         }
         Ok(())
     }
@@ -399,7 +399,9 @@ fn mark_drawn(frame: &WgpuFrame, request: &FrameRequest<'_>, list: &DrawList) {
 fn count_unreadable(
     frame: &WgpuFrame,
     request: &FrameRequest<'_>,
-    (pipelines, list, clamps_depth): (&ProcessPipelines, &DrawList, bool),
+    pipelines: &ProcessPipelines,
+    list: &DrawList,
+    clamps_depth: bool,
 ) {
     for batch in &list.batches {
         if pipelines.is_unreadable(&PipelineVariant::of_batch(&frame.meshes, batch).clamping(clamps_depth)) {

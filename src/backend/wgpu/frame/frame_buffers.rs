@@ -170,7 +170,7 @@ impl FrameBuffers {
         let processes = request.plan.processes().iter().zip(request.draws);
         let bytes = processes.map(|(planned, draws)| bytes_of_process(materials, planned, draws));
         buffers.bytes.update(device, uploads, bytes)?;
-        let lost_lists = buffers.object_lists.reserve(device, (lists, listed), request.limits)?;
+        let lost_lists = buffers.object_lists.reserve(device, lists, listed, request.limits)?;
         reallocated |= lost_lists;
         for mirrored in [&mut buffers.views, &mut buffers.lights] {
             reallocated |= mirrored.upload(device, uploads)?;

@@ -360,7 +360,8 @@ impl ObjectLists {
     pub(super) fn reserve(
         &mut self,
         device: &wgpu::Device,
-        (lists, objects): (usize, usize),
+        lists: usize,
+        objects: usize,
         limits: SceneLimits,
     ) -> Result<bool, BackendError> {
         let needed = objects * size_of::<u32>();
