@@ -17,10 +17,10 @@
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
 //! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |
 //! | `Deformation`: `declare`, `shader`, `resources`, `cpu_shader` | `process/deferred/deformation.rs`, in calls of the process that deforms | as that of the process |
-//! //! | `CpuNode`: `name`, `declare` | `frame/borrowed_nodes.rs` | `FrameError::Panicked` with the node |
+//! //! | `CpuNode`: `name`, `declare` | `frame/nodes/borrowed_nodes.rs` | `FrameError::Panicked` with the node |
 //! | `CpuNode`: `width`, `run` and others | in jobs, caught where a graph runs its nodes | `FrameError::Panicked` with the node |
-//! | predicates of materials | `frame/view_filter.rs` | `FrameError::FilterPanicked` |
-//! | what follows a submission | `frame/frame_loop.rs` | `FrameLoopError::Panicked` |
+//! | predicates of materials | `frame/views/view_visibility.rs` | `FrameError::FilterPanicked` |
+//! | what follows a submission | `frame/frame_loop/mod.rs` | `FrameLoopError::Panicked` |
 //! | loads | `scene/asset_loader.rs` | `LoadError` |
 //! | what the engine passes to a call, or asks itself, on its own thread: `Parameters::update`, `MaterialPredicate::contains`, `Deferred::names`, `output` and `quality`, `SurfaceFrame::present`, iterators and writers | there | unwinds to the caller; nothing has changed but values of the engine's |
 //! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`], in which processes and deformations are wrapped when they are added | nothing |

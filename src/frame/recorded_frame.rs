@@ -1,22 +1,24 @@
-//! Recorded frames, and their submission on the device thread.
+//! Recorded frames with their view queues, their submission on the device thread, and what becomes of them.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::view_cache::InFlight;
-use super::view_queues::ViewQueues;
+use parking_lot::Mutex;
+
+use super::encoders::PassRecording;
 use super::views::FrameViews;
-use super::{FencePoint, FrameError, FrameStatistics, SubmitError};
+use super::views::view_cache::InFlight;
+use super::{FrameError, FrameStatistics, SubmitError};
 #[cfg(feature = "wgpu")]
 use crate::backend::WgpuFrame;
-use crate::backend::{Backend, BackendError, FrameFence, GuardedBackend, ReadBack, ViewQueue};
+use crate::backend::{Backend, BackendError, FrameFence, FrameRequest, GuardedBackend, ReadBack, ViewQueue};
 use crate::fence::Fence;
 use crate::process::{FramePlan, Pass};
 use crate::scene::Camera;
 use crate::task::{JobPanic, catch};
 use crate::timeline::Timeline;
-use crate::unwind::{CaughtSpan, Contained};
+use crate::unwind::{CaughtSpan, Contained, discard};
 use crate::view::RenderView;
 
 /// A recorded frame. It borrows nothing, so the scene is free again, and it may be sent to the device thread. If it is
@@ -252,4 +254,154 @@ pub struct SubmittedFrame<B: Backend> {
     pub submission: B::Submission,
     /// The frame's statistics.
     pub statistics: FrameStatistics,
+}
+
+/// The queues of a frame, by view index.
+pub(super) struct ViewQueues<T>(Vec<ViewQueue<T>>);
+
+impl<T> ViewQueues<T> {
+    pub(super) fn as_slice(&self) -> &[ViewQueue<T>] {
+        &self.0
+    }
+
+    /// The queues that are submitted one after the other: each view's whole queue, or several for a view whose passes
+    /// alternate with those of other views.
+    pub(super) fn in_submission_order(mut self, order: &[Pass]) -> Vec<ViewQueue<T>> {
+        let passes_by_view = order.chunk_by(|one, next| one.view_index == next.view_index);
+        let take = |passes: &[Pass]| {
+            let view = passes[0].view_index;
+            // A whole queue is moved, not copied: nothing is left to split off.
+            let later = self.0[view].passes.split_off(passes.len());
+            ViewQueue { view, passes: std::mem::replace(&mut self.0[view].passes, later) }
+        };
+        passes_by_view.map(take).collect()
+    }
+}
+
+/// Commands are the backend's: their destructors may panic.
+impl<T> Drop for ViewQueues<T> {
+    fn drop(&mut self) {
+        self.0.iter_mut().flat_map(|queue| queue.passes.drain(..)).for_each(discard);
+    }
+}
+
+/// One queue for each view, its passes in the order of the plan.
+///
+/// # Errors
+/// If a pass is not finished. This is a bug in Drawloom.
+pub(super) fn view_queues<B: Backend>(
+    request: &FrameRequest<'_>,
+    recordings: &mut [PassRecording<B>],
+) -> Result<ViewQueues<B::Commands>, FrameError> {
+    // A process has at most one pass in a view.
+    let empty = |view| ViewQueue { view, passes: Vec::with_capacity(request.plan.processes().len()) };
+    let mut queues = ViewQueues((0..request.views.len()).map(empty).collect());
+    for (&pass, recording) in request.passes.iter().zip(recordings) {
+        let missing = || BackendError::BrokenRule { rule: "every pass is finished before its frame is".to_owned() };
+        queues.0[pass.view_index].passes.push((pass, recording.take().ok_or_else(missing)?));
+    }
+    Ok(queues)
+}
+
+/// What becomes of a recorded frame. Later frames that keep a view which it draws share this with it.
+pub(super) struct FrameOutcome {
+    state: Mutex<State>,
+}
+
+enum State {
+    /// It is neither submitted nor dropped, and keeps views that these frames draw, or that frames draw which they keep
+    /// views of in turn.
+    InFlight(Vec<Arc<FrameOutcome>>),
+    Submitted,
+    /// It was dropped, or its submission failed.
+    Lost,
+}
+
+impl FrameOutcome {
+    /// Of a frame that keeps views which `earlier` frames draw.
+    pub(super) fn in_flight<'a>(earlier: impl Iterator<Item = &'a Arc<Self>>) -> Self {
+        let mut pending: Vec<Arc<Self>> = Vec::new();
+        let mut add = |frame: &Arc<Self>| {
+            if !frame.is_submitted() && !pending.iter().any(|known| Arc::ptr_eq(known, frame)) {
+                pending.push(Arc::clone(frame));
+            }
+        };
+        for frame in earlier {
+            if let State::InFlight(earlier) = &*frame.state.lock() {
+                earlier.iter().for_each(&mut add);
+            }
+            add(frame);
+        }
+        Self { state: Mutex::new(State::InFlight(pending)) }
+    }
+
+    pub(super) fn is_submitted(&self) -> bool {
+        matches!(*self.state.lock(), State::Submitted)
+    }
+
+    /// Whether what the frame draws is lost, or will be, because a frame that it relies on is lost.
+    pub(super) fn is_lost(&self) -> bool {
+        match &*self.state.lock() {
+            // Each of them is older, so no two wait for each other's lock. Those that these rely on are among them.
+            State::InFlight(earlier) => earlier.iter().any(|frame| matches!(*frame.state.lock(), State::Lost)),
+            State::Submitted => false,
+            State::Lost => true,
+        }
+    }
+
+    pub(super) fn submit(&self) {
+        self.end(State::Submitted);
+    }
+
+    pub(super) fn lose(&self) {
+        self.end(State::Lost);
+    }
+
+    fn end(&self, state: State) {
+        let before = std::mem::replace(&mut *self.state.lock(), state);
+        // The earlier frames are not needed any more, which keeps the chains of frames short.
+        drop(before);
+    }
+}
+
+/// A place in the order in which a frame is submitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FencePoint<'a> {
+    /// After everything that a process draws in a view, and all that is submitted before that.
+    Pass {
+        /// The process's name.
+        process: &'a str,
+        /// The view's index.
+        view: usize,
+    },
+    /// After all passes of a view, by index.
+    View(usize),
+    /// After the whole frame, its read-backs included.
+    End,
+}
+
+impl FencePoint<'_> {
+    /// The number of passes before the place, of a frame whose passes are submitted in this order. `None` if the frame
+    /// has no such pass, as for views that are [cached](crate::scene::Redraw).
+    pub(super) fn passes_before<'a>(self, order: &[Pass], process_name: impl Fn(usize) -> &'a str) -> Option<usize> {
+        let is_last = |pass: &Pass| match self {
+            Self::Pass { process, view } => pass.view_index == view && process_name(pass.process_index) == process,
+            Self::View(view) => pass.view_index == view,
+            Self::End => true,
+        };
+        match self {
+            Self::End => Some(order.len()),
+            Self::Pass { .. } | Self::View(_) => order.iter().rposition(is_last).map(|last| last + 1),
+        }
+    }
+}
+
+impl std::fmt::Display for FencePoint<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Pass { process, view } => write!(formatter, "process {process:?} in view {view}"),
+            Self::View(view) => write!(formatter, "view {view}"),
+            Self::End => write!(formatter, "the end"),
+        }
+    }
 }

@@ -1,15 +1,18 @@
-//! Statistics of a frame.
+//! Statistics of a frame, and warnings of what is not drawn as requested.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use super::static_group_statistics::StaticGroupStatistics;
-use super::tables::{FrameTables, PassTable};
+use super::stages::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
+#[cfg(feature = "wgpu")]
+use crate::process::{Draws, FramePlan, RequestLog};
 use crate::raster::CulledTriangles;
 use crate::scene::{Assets, ViewKind};
 use crate::timeline::{FrameTuning, Timeline, TuningSubject};
-use crate::view::{RenderView, SceneIssue};
+use crate::unwind::emit;
+use crate::view::{IssueReason, RenderView, SceneIssue};
 
 /// Statistics of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -200,5 +203,139 @@ impl LevelStatistics {
             self.triangles += mesh.triangle_count_of(state.level_of_detail()) * count as usize;
             self.full_detail_triangles += mesh.triangle_count() * count as usize;
         }
+    }
+}
+
+/// What a frame did with the scene's [static groups](crate::scene::StaticGroup), which is the number of static groups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StaticGroupStatistics {
+    /// That were recorded by earlier frames, so that views may execute them.
+    pub executable: usize,
+    /// That this frame records.
+    pub recorded: usize,
+    /// With an object that is reported as changed.
+    pub changed: usize,
+}
+
+/// What warnings were about: each is reported when it changes, not in every frame.
+#[derive(Debug, Default)]
+pub(super) struct Warnings {
+    /// The scene issues of the latest frames.
+    reported: Vec<SceneIssue>,
+    /// Processes with raw passes, each with something that it declares, from plans whose frames were observed.
+    #[cfg(feature = "wgpu")]
+    observed: Vec<(String, String)>,
+}
+
+impl Warnings {
+    /// Warns of the scene issues of a frame that are not reported yet. Some of them only drawing finds, so a frame with
+    /// cached views finds a part of these: that many or more were reported.
+    pub(super) fn report(&mut self, scene_issues: &[SceneIssue], has_cached_views: bool) {
+        let is_partial = |reason| {
+            use IssueReason::{CoarseEdges, LightLimit, UndrawableMesh};
+            has_cached_views && matches!(reason, CoarseEdges | LightLimit | UndrawableMesh)
+        };
+        for issue in scene_issues {
+            let is_part = |known: &SceneIssue| {
+                is_partial(known.reason) && known.reason == issue.reason && known.count >= issue.count
+            };
+            let is_reported = self.reported.iter().any(|known| known == issue || is_part(known));
+            // A light that is switched off is no mistake, and what is streamed arrives.
+            let is_expected = matches!(
+                issue.reason,
+                IssueReason::DarkLight | IssueReason::NotResident | IssueReason::TextureNotResident
+            );
+            if is_expected || is_reported {
+                continue;
+            }
+            let SceneIssue { reason, count, first, name } = issue;
+            // A name is the engine's, or a file's.
+            let (reason, name) = (reason.name(), name.as_deref().map(tracing::field::debug));
+            emit(|| tracing::warn!(target: "drawloom", count, first, name, "not drawn as requested: {reason}"));
+        }
+        let before: Vec<_> = self.reported.drain(..).filter(|known| is_partial(known.reason)).collect();
+        self.reported.extend_from_slice(scene_issues);
+        for before in before {
+            match self.reported.iter_mut().find(|known| known.reason == before.reason) {
+                Some(known) if known.count < before.count => *known = before,
+                Some(_) => {}
+                None => self.reported.push(before),
+            }
+        }
+    }
+
+    /// Ends a frame of this plan. Warns of what raw passes have not asked for in the first frames that encoded them,
+    /// though their processes declare it. A process is in many plans: what one of them has shown is not observed again.
+    #[cfg(feature = "wgpu")]
+    pub(super) fn report_unrequested(&mut self, plan: &FramePlan, draws: &[Draws<'_>]) {
+        for (planned, draws) in plan.processes().iter().zip(draws) {
+            let Draws::Raw(_) = draws else { continue };
+            for (resource, is_requested) in planned.requests.end_frame(&planned.declaration) {
+                let declared = (planned.name.clone(), resource);
+                if self.observed.contains(&declared) {
+                    continue;
+                }
+                if !is_requested {
+                    let ((process, resource), frames) = (&declared, RequestLog::OBSERVED_FRAMES);
+                    emit(|| {
+                        tracing::warn!(
+                            target: "drawloom",
+                            %process,
+                            "declares {resource}, which its raw pass has not asked for in {frames} frames"
+                        );
+                    });
+                }
+                self.observed.push(declared);
+            }
+        }
+    }
+}
+
+/// Sums up the thread time of each view's stages while jobs run. It keeps its memory from frame to frame.
+#[derive(Debug, Default)]
+pub(super) struct ViewTimes {
+    /// By view index.
+    nanoseconds: Vec<AtomicU64>,
+}
+
+impl ViewTimes {
+    /// Begins a frame of this many views.
+    pub(super) fn reset(&mut self, views: usize) {
+        self.nanoseconds.clear();
+        self.nanoseconds.resize_with(views, AtomicU64::default);
+    }
+
+    /// Adds the time of a job of one of a view's stages.
+    pub(super) fn add(&self, view: usize, took: Duration) {
+        // Relaxed: a sum, read after the run.
+        self.nanoseconds[view].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    /// Takes away a time that the job of one of the view's stages spends on other views. The job's own time is added
+    /// when it ends; until then the sum may be below 0, and wraps.
+    pub(super) fn subtract(&self, view: usize, took: Duration) {
+        // Relaxed: a sum, read after the run.
+        self.nanoseconds[view].fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    pub(super) fn times(&self) -> impl Iterator<Item = Duration> {
+        self.nanoseconds.iter().map(|view| Duration::from_nanos(view.load(Ordering::Relaxed)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_gives_time_away_before_its_own_is_known() {
+        let mut times = ViewTimes::default();
+        times.reset(2);
+        let nanoseconds = Duration::from_nanos;
+        times.subtract(0, nanoseconds(700));
+        times.add(0, nanoseconds(300));
+        times.add(1, nanoseconds(400));
+        times.add(0, nanoseconds(1000));
+        assert_eq!(times.times().collect::<Vec<_>>(), [600, 400].map(nanoseconds));
     }
 }

@@ -1,5 +1,5 @@
-//! The files of one module do not import each other in circles, so that each can be understood with only those that it
-//! imports.
+//! The folders of one module do not import each other in circles, so that each can be understood with only those that it
+//! imports. Files of one folder may: they are read together.
 //!
 //! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
 //! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a
@@ -19,21 +19,23 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 const MAX_REEXPORTS: usize = 8;
 
 #[test]
-fn files_do_not_import_each_other_in_circles() {
+fn folders_do_not_import_each_other_in_circles() {
     let problems = CRATES.map(|folder| circles(&read_all(&[folder]))).concat();
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
-/// The circles of all modules, in words. Where circles share files, only a shortest one is described.
+/// The circles of all modules that leave a folder, in words. Where circles share files, only a shortest one is
+/// described.
 fn circles(sources: &[Source]) -> Vec<String> {
     let imports = Imports::new(modules_without_tests(sources));
     let mut circles = Vec::new();
     let mut described = BTreeSet::new();
     let mut shortest: Vec<_> = (0..imports.modules.len()).filter_map(|file| imports.circle_through(file)).collect();
-    shortest.sort_by_key(Vec::len);
+    // Of those that share files, one that leaves a folder is described.
+    shortest.sort_by_key(|circle| (!imports.leaves_folder(circle.iter()), circle.len()));
     for circle in shortest {
         let connected = imports.mutual(circle[0]);
-        if described.insert(connected.clone()) {
+        if imports.leaves_folder(connected.iter()) && described.insert(connected.clone()) {
             circles.push(imports.describe(&circle, connected.len()));
         }
     }
@@ -89,6 +91,11 @@ impl<'a> Imports<'a> {
             }
         }
         None
+    }
+
+    /// Whether files are in several folders.
+    fn leaves_folder<'b>(&self, files: impl Iterator<Item = &'b usize>) -> bool {
+        files.map(|file| self.modules[*file].source.path.parent()).collect::<BTreeSet<_>>().len() > 1
     }
 
     /// The files that the file leads to through imports, and that lead back to it.
@@ -265,8 +272,8 @@ fn a_circle_is_found() {
         ("use crate::low::g as f;", "mod deep { use super::super::A; }"),
         ("use super::Bee; #[cfg(not(test))] fn f() {}", "fn f() { use super::a; }"),
     ] {
-        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b.rs", b)]);
-        let circle = "circle: src/low/a.rs:1 imports src/low/b.rs, src/low/b.rs:1 imports src/low/a.rs";
+        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b/mod.rs", b)]);
+        let circle = "circle: src/low/a.rs:1 imports src/low/b/mod.rs, src/low/b/mod.rs:1 imports src/low/a.rs";
         assert_eq!(problems, [circle], "{a}\n{b}");
     }
 }
@@ -279,7 +286,7 @@ fn a_circle_through_a_file_with_children_is_found() {
         ("low/mod.rs", "mod part;\n#[cfg(unix)]\nuse self::part::P;\nstruct L;"),
         ("low/mod.rs", "mod part; pub(crate) use part::P; struct L(P);"),
     ]
-    .map(|parent| (parent, ("low/part.rs", "use super::L;")))
+    .map(|parent| (parent, ("low/part/mod.rs", "use super::L;")))
     {
         let problems = circles_of(&[parent, child]);
         assert_eq!(problems.len(), 1, "{parent:?}\n{problems:?}");
@@ -291,24 +298,36 @@ fn connected_circles_are_described_by_the_shortest() {
     let problems = circles_of(&[
         ("low/mod.rs", "mod a; mod b; mod c; mod d;"),
         ("low/a.rs", "use super::b;"),
-        ("low/b.rs", "\nuse super::c;"),
-        ("low/c.rs", "\n\nuse super::{a, b};"),
+        ("low/b/mod.rs", "\nuse super::c;"),
+        ("low/c/mod.rs", "\n\nuse super::{a, b};"),
         ("low/d.rs", "use super::a;"),
     ]);
-    let circle = "circle: src/low/b.rs:2 imports src/low/c.rs, src/low/c.rs:3 imports src/low/b.rs";
+    let circle = "circle: src/low/b/mod.rs:2 imports src/low/c/mod.rs, src/low/c/mod.rs:3 imports src/low/b/mod.rs";
     assert_eq!(problems, [format!("{circle} (and 1 more files import each other in circles with these)")]);
+}
+
+#[test]
+fn a_circle_within_a_folder_is_allowed() {
+    let root = ("low/mod.rs", "mod a; mod b; mod c;");
+    let files = [root, ("low/a.rs", "use super::b;"), ("low/b.rs", "use super::a;")];
+    assert_eq!(circles_of(&files), [""; 0]);
+    // A third file in a folder of its own makes it one of folders.
+    let problems = circles_of(&[root, ("low/a.rs", "use super::{b, c};"), files[2], ("low/c/mod.rs", "use super::b;")]);
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert!(problems[0].contains("src/low/c/mod.rs"), "{problems:?}");
 }
 
 #[test]
 fn imports_without_a_circle_are_allowed() {
     let root = ("low/mod.rs", "mod a; mod b; #[cfg(test)] mod tests; pub use a::A; pub(super) use b::B;");
     let hidden = "mod a; mod b; pub use internal::*; pub mod internal { pub use super::b::B; }";
-    let problems = circles_of(&[("low/mod.rs", hidden), ("low/a.rs", ""), ("low/b.rs", "use super::a;")]);
+    let problems = circles_of(&[("low/mod.rs", hidden), ("low/a.rs", ""), ("low/b/mod.rs", "use super::a;")]);
     assert_eq!(problems, [""; 0]);
-    let problems = circles_of(&[("low/mod.rs", hidden), ("low/a.rs", "use super::B;"), ("low/b.rs", "use super::a;")]);
+    let problems =
+        circles_of(&[("low/mod.rs", hidden), ("low/a.rs", "use super::B;"), ("low/b/mod.rs", "use super::a;")]);
     assert_eq!(problems.len(), 1, "{problems:?}");
     let items = ("low/mod.rs", "mod part; pub use part::{P as M, part}; #[cfg(test)] use part::Q; struct L;");
-    assert_eq!(circles_of(&[items, ("low/part.rs", "use super::L;")]), [""; 0]);
+    assert_eq!(circles_of(&[items, ("low/part/mod.rs", "use super::L;")]), [""; 0]);
     for (a, b) in [
         ("use super::b::B;", "pub(in crate::low) struct B; fn f(self) {}"),
         ("use super::B;", "//! [`super::A`]\n/* super::A */ fn f() { g(\"super::A\") }"),
@@ -317,7 +336,7 @@ fn imports_without_a_circle_are_allowed() {
         ("use super::B;", "use crate::{low as other, high::a::A};"),
     ] {
         let tests = ("low/tests.rs", "use super::{a, b};");
-        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b.rs", b), tests]);
+        let problems = circles_of(&[root, ("low/a.rs", a), ("low/b/mod.rs", b), tests]);
         assert_eq!(problems, [""; 0], "{a}\n{b}");
     }
 }

@@ -1,4 +1,4 @@
-//! The table of stages in `ARCHITECTURE.md` has the rows of the one in `src/frame/stages.rs`.
+//! The table of stages in `ARCHITECTURE.md` has the rows of the one in `src/frame/stages/mod.rs`.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ type Row = (String, String, Vec<String>);
 #[test]
 fn architecture_has_the_table_of_stages() {
     let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect(path);
-    let (code, text) = (rows_of_code(&read("src/frame/stages.rs")), rows_of_text(&read("ARCHITECTURE.md")));
+    let (code, text) = (rows_of_code(&read("src/frame/stages/mod.rs")), rows_of_text(&read("ARCHITECTURE.md")));
     assert!(code.len() > 20, "{} stages found", code.len());
     assert_eq!(text, code);
 }

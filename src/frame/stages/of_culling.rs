@@ -1,7 +1,7 @@
 //! The stages of culling beyond the view frustum (S 9.6).
 
-use super::super::context::FrameContext;
-use super::super::stage::StageJob;
+use super::context::FrameContext;
+use super::stage::StageJob;
 use crate::backend::Backend;
 use crate::command::Selection;
 use crate::graph::NodeError;
