@@ -17,7 +17,7 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{
-    CommandDraws, Declare, Deferred, Draws, Format, RawPass, RawPassResources, RenderProcess, ToneMapping,
+    CommandDraws, Declare, Deferred, Draws, Format, RawPass, RawPassResources, RenderProcess, ToneMapping, targets,
 };
 use drawloom::scene::{Assets, Blend, Bounds, Camera, Light, Material, Mesh, SceneError, SceneRef};
 use drawloom::task::Scheduler;
@@ -76,7 +76,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         lent_times[FRAMES - 1]
     );
     let submission = last.ok_or("no frame was drawn")?;
-    let mut picture = submission.read(0, "picture")?;
+    let mut picture = submission.read(0, targets::PICTURE)?;
     // Files have red first.
     picture.bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
     file.write([picture.width, picture.height], &picture.bytes)?;
@@ -183,8 +183,8 @@ impl RenderProcess for Glow {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.draws_over("radiance");
-        declare.tests_depth("depth");
+        declare.draws_over(targets::RADIANCE);
+        declare.tests_depth(targets::DEPTH);
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -227,7 +227,7 @@ impl RenderProcess for Present {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.reads("picture");
+        declare.reads(targets::PICTURE);
         // No process reads its output, so it must be kept explicitly.
         declare.keep();
     }
@@ -243,7 +243,7 @@ impl RawPass for Present {
         encoder: &mut wgpu::CommandEncoder,
         resources: &RawPassResources<'_>,
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        let picture = resources.target("picture")?;
+        let picture = resources.target(targets::PICTURE)?;
         let surface = self.surface.texture.lock();
         encoder.copy_texture_to_texture(picture.as_image_copy(), surface.as_image_copy(), picture.size());
         Ok(())

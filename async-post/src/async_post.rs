@@ -95,8 +95,8 @@ impl AsyncPost {
     /// With frames in flight, a frame is recorded before the device has drawn the one before, so its picture is that of
     /// two frames before, where the device limits the frame rate. [`late_picture_alone`](Self::late_picture_alone) is a
     /// frame sooner.
-    pub fn late_picture(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
-        self.late_picture_over(Some(self.0.target.clone()), target.into(), format)
+    pub fn late_picture(&self, target: impl AsRef<str>, format: Format) -> impl RenderProcess + 'static {
+        self.late_picture_over(Some(self.0.target.clone()), target.as_ref().to_owned(), format)
     }
 
     /// The same, for a renderer of its own on the same device, whose frames are only this picture, and transparent
@@ -107,8 +107,8 @@ impl AsyncPost {
     /// one frame more; with more frames in flight it also waits for those that were submitted before it.
     ///
     /// Its scenes have cameras of the same names and sizes, and need no objects.
-    pub fn late_picture_alone(&self, target: impl Into<String>, format: Format) -> impl RenderProcess + 'static {
-        self.late_picture_over(None, target.into(), format)
+    pub fn late_picture_alone(&self, target: impl AsRef<str>, format: Format) -> impl RenderProcess + 'static {
+        self.late_picture_over(None, target.as_ref().to_owned(), format)
     }
 
     fn late_picture_over(&self, source: Option<String>, target: String, format: Format) -> LatePicture {

@@ -8,7 +8,7 @@ mod on_device;
 
 use std::sync::Arc;
 
-use drawloom::process::{PostStep, RenderProcess};
+use drawloom::process::{PostStep, RenderProcess, targets};
 
 use self::kernel::{Kernel, MAX_RADIUS, NAME};
 use self::on_cpu::BloomStep;
@@ -74,7 +74,7 @@ impl Bloom {
 
     /// What it is computed from.
     pub fn source(&self) -> StepSource {
-        StepSource::downsampled("radiance", self.divisor.max(1))
+        StepSource::downsampled(targets::RADIANCE, self.divisor.max(1))
     }
 
     /// The step for a [`AsyncPost`](crate::AsyncPost). Its source must be in

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "software")]
 use drawloom::process::CpuShader;
-use drawloom::process::{ClearColor, Declare, Draws, FullScreen, PostStep, RenderProcess};
+use drawloom::process::{ClearColor, Declare, Draws, FullScreen, PostStep, RenderProcess, targets};
 
 #[cfg(feature = "software")]
 use crate::cpu_shader::{CpuLayer, LayerCpuShader};
@@ -59,7 +59,7 @@ impl RenderProcess for LayerProcess {
     fn declare(&self, declare: &mut Declare) {
         declare.samples(&self.source);
         if self.is_reprojected() {
-            declare.samples("depth");
+            declare.samples(targets::DEPTH);
         }
         declare.clears_color(&self.target, self.step.settings.format, ClearColor::Value([0.0; 4]));
     }

@@ -15,13 +15,13 @@ pub struct StepSource {
 
 impl StepSource {
     /// A target as it is, such as `picture`.
-    pub fn whole(target: impl Into<String>) -> Self {
-        Self { target: target.into(), downsampled: None }
+    pub fn whole(target: impl AsRef<str>) -> Self {
+        Self { target: target.as_ref().to_owned(), downsampled: None }
     }
 
     /// A target with so much less width and height, in [`Format::Rgba16Float`]: each pixel is the mean of `divisor` ×
     /// `divisor`.
-    pub fn downsampled(target: impl Into<String>, divisor: u32) -> Self {
+    pub fn downsampled(target: impl AsRef<str>, divisor: u32) -> Self {
         Self { downsampled: Some((divisor, Format::Rgba16Float)), ..Self::whole(target) }
     }
 }

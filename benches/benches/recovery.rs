@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{BackendError, Picture, WgpuBackend};
-use drawloom::process::{Deferred, ToneMapping};
+use drawloom::process::{Deferred, ToneMapping, targets};
 use drawloom::scene::{Changes, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
@@ -219,7 +219,7 @@ impl Engine {
         let submit = start.elapsed();
         submission.wait()?;
         let until_drawn = noticed.elapsed();
-        let is_same = submission.read(0, "picture")? == expected;
+        let is_same = submission.read(0, targets::PICTURE)? == expected;
         Ok(Recovery { open, replace, prepare, record, submit, until_drawn, usual_frame, is_same })
     }
 
@@ -230,6 +230,6 @@ impl Engine {
         let submission = self.submitter.submit(self.renderer.record(scene)?)?.submission;
         submission.wait()?;
         let took = start.elapsed();
-        Ok((submission.read(0, "picture")?, took))
+        Ok((submission.read(0, targets::PICTURE)?, took))
     }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drawloom::backend::{Picture, SoftwareBackend};
-use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::process::{Deferred, Fxaa, ToneMapping, targets};
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom::view::ShadowMaps;
@@ -88,7 +88,7 @@ impl Runner {
 
     fn frame(&mut self, scene: &Scene) -> Result<(Picture, Duration), Box<dyn Error>> {
         let (submitted, time) = timed_frame(&mut self.renderer, &self.submitter, scene.as_scene_ref(), |_| Ok(()))?;
-        Ok((submitted.submission.read(0, "picture")?, time.cpu))
+        Ok((submitted.submission.read(0, targets::PICTURE)?, time.cpu))
     }
 }
 

@@ -1,7 +1,7 @@
 //! A process that shows what a mirror's view has drawn.
 
 use drawloom::command::Selection;
-use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess};
+use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess, targets};
 use drawloom::scene::{LayerMask, ViewKind};
 
 /// The layer of the mirror's surface.
@@ -20,9 +20,9 @@ impl RenderProcess for Mirror {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterLighting);
-        declare.samples_view(ViewKind::Reflection, VIEW, "radiance");
-        declare.draws_over("radiance");
-        declare.matches_depth("depth");
+        declare.samples_view(ViewKind::Reflection, VIEW, targets::RADIANCE);
+        declare.draws_over(targets::RADIANCE);
+        declare.matches_depth(targets::DEPTH);
     }
 
     fn draws(&self) -> Draws<'_> {

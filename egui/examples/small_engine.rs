@@ -11,7 +11,9 @@ use std::time::Instant;
 
 use drawloom::backend::{WgpuBackend, WindowDevice, WindowSurface};
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{Declare, Deferred, Draws, FullScreen, InjectionPoint, Parameters, RenderProcess, ToneMapping};
+use drawloom::process::{
+    Declare, Deferred, Draws, FullScreen, InjectionPoint, Parameters, RenderProcess, ToneMapping, targets,
+};
 use drawloom::quality::Quality;
 use drawloom::scene::{Blend, Camera, Light, Material, Mesh, RenderObject, Scene, SceneError, SceneRef};
 use drawloom::task::Scheduler;
@@ -70,8 +72,8 @@ impl RenderProcess for Fog {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterTransparency);
-        declare.samples("depth");
-        declare.draws_over("radiance");
+        declare.samples(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {
@@ -125,7 +127,7 @@ impl Engine {
         let Some(frame) = self.surface.acquire(self.window.inner_size())? else { return Ok(()) };
         self.world.update();
         self.world.scene.cameras[0].size = frame.size();
-        self.renderer.backend().import_target("main", "picture", frame.target().clone());
+        self.renderer.backend().import_target("main", targets::PICTURE, frame.target().clone());
         let recorded = self.renderer.record(self.world.as_scene_ref())?;
         self.inspector.add_frame(&self.renderer, &recorded);
         self.submitter.submit(recorded)?;

@@ -34,7 +34,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::Renderer;
 use drawloom::backend::{Picture, WgpuBackend};
-use drawloom::process::{Deferred, ToneMapping};
+use drawloom::process::{Deferred, ToneMapping, targets};
 use drawloom::report::{FrameReport, SchedulerCosts, write_chrome_trace};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
@@ -92,7 +92,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         submission.wait()?;
         let is_shown = [0, arguments.frames / 2, arguments.frames - 1].contains(&frame);
         if let Some(folder) = arguments.out.as_ref().filter(|_| is_shown && arguments.backend == BackendName::Wgpu) {
-            save(folder.join(format!("frame_{frame}.png")), &submission.read(0, "picture")?)?;
+            save(folder.join(format!("frame_{frame}.png")), &submission.read(0, targets::PICTURE)?)?;
         }
     }
     times.sort_unstable();

@@ -6,7 +6,9 @@ use std::ops::Range;
 use drawloom::command::Cull;
 use drawloom::glam::{Vec2, Vec3};
 use drawloom::graph::NodeError;
-use drawloom::process::{Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer};
+use drawloom::process::{
+    Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer, targets,
+};
 use drawloom::scene::{GeneratedBuffer, NodeColumn};
 use drawloom::task::Worker;
 use drawloom::{CpuNode, FrameData, NodeAccesses, NodeContext};
@@ -180,8 +182,8 @@ impl RenderProcess for DrawMirror {
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterTransparency);
         declare.reads_buffer(REFLECTION);
-        declare.tests_depth("depth");
-        declare.draws_over("radiance");
+        declare.tests_depth(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -5,7 +5,9 @@ use std::ops::Range;
 use drawloom::command::Cull;
 use drawloom::glam::Vec3;
 use drawloom::graph::NodeError;
-use drawloom::process::{Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer};
+use drawloom::process::{
+    Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer, targets,
+};
 use drawloom::scene::{Blend, GeneratedBuffer};
 use drawloom::task::Worker;
 use drawloom::{CpuNode, NodeAccesses, NodeContext};
@@ -112,8 +114,8 @@ impl RenderProcess for DrawSparks {
         declare.after("draw mirror");
         declare.reads_buffer(SPARKS);
         declare.reads_arguments(ARGUMENTS);
-        declare.tests_depth("depth");
-        declare.draws_over("radiance");
+        declare.tests_depth(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

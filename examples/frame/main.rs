@@ -25,6 +25,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use drawloom::backend::{Backend, NullBackend, Picture, WgpuBackend};
+use drawloom::process::targets;
 use drawloom::scene::{Mesh, Scene};
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
@@ -129,7 +130,7 @@ fn draw_on_adapter(
     let is_timed = is_timed && backend.device().features().contains(wgpu::Features::TIMESTAMP_QUERY);
     let backend = if is_timed { backend.time_passes()? } else { backend };
     let drawn = draw(arguments, BackendName::Wgpu, scene, |_| backend, WgpuDevice::timed(is_timed))?;
-    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    save(arguments, &drawn.last.submission.read(0, targets::PICTURE)?)?;
     Ok((drawn.report, drawn.log))
 }
 
@@ -142,7 +143,7 @@ fn draw_in_software(
 ) -> Result<(Report, Log), Box<dyn Error>> {
     let make = |scheduler: &Arc<Scheduler>| pipeline::software_backend(Some(name), scheduler);
     let drawn = draw(arguments, name, scene, make, NoDevice)?;
-    save(arguments, &drawn.last.submission.read(0, "picture")?)?;
+    save(arguments, &drawn.last.submission.read(0, targets::PICTURE)?)?;
     Ok((drawn.report.because(reason.map(with_causes)), drawn.log))
 }
 

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use drawloom::backend::{Backend, BackendError, Picture, SoftwareSubmission, WgpuBackend, WgpuSubmission};
+use drawloom::process::{Target, targets};
 use drawloom::scene::Scene;
 use drawloom::task::Scheduler;
 use drawloom_output::{PictureFile, path_text, print_line};
@@ -71,12 +72,19 @@ impl Sequence {
         }
         if let Some(BackendName::Software | BackendName::Reference) = arguments.backend {
             let make = |scheduler: &Arc<Scheduler>| pipeline::software_backend(arguments.backend, scheduler);
-            return self.draw_with(arguments, scene, make, SoftwareSubmission::read);
+            return self.draw_with(arguments, scene, make, |submission: &SoftwareSubmission, view, target| {
+                submission.read(view, target)
+            });
         }
         // The frames beside these may be drawn on an adapter, and pictures of two backends differ in details.
         let backend = open_adapter()
             .map_err(|error| format!("{error}; --backend software draws every frame of a sequence on the CPU"))?;
-        self.draw_with(arguments, scene, |_| backend, WgpuSubmission::read)
+        self.draw_with(
+            arguments,
+            scene,
+            |_| backend,
+            |submission: &WgpuSubmission, view, target| submission.read(view, target),
+        )
     }
 
     fn draw_with<B: Backend>(
@@ -84,7 +92,7 @@ impl Sequence {
         arguments: &Arguments,
         mut scene: Scene,
         make: impl FnOnce(&Arc<Scheduler>) -> B,
-        read: impl Fn(&B::Submission, usize, &str) -> Result<Picture, BackendError>,
+        read: impl Fn(&B::Submission, usize, Target) -> Result<Picture, BackendError>,
     ) -> Result<(), Box<dyn Error>> {
         let (mut renderer, submitter) = pipeline::renderer(arguments, &scene, make)?;
         let progress = ProgressBar::new(self.missing.len() as u64);
@@ -94,7 +102,7 @@ impl Sequence {
             scene.cameras.clone_from(&still);
             scene.cameras.iter_mut().for_each(|camera| placed.apply(camera, self.up));
             let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
-            let picture = read(&submitted.submission, 0, "picture")?;
+            let picture = read(&submitted.submission, 0, targets::PICTURE)?;
             file.write([picture.width, picture.height], &picture.bytes)?;
             progress.inc(1);
         }

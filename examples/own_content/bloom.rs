@@ -1,12 +1,16 @@
 //! A glow around bright objects: `radiance` at a half and a quarter of its size, added to itself.
 
-use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess, TargetSize};
+use drawloom::process::{
+    ClearColor, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess, Target, TargetSize, targets,
+};
 use drawloom::scene::Blend;
+
+const HALF: Target = Target::new("bloom, half");
 
 /// Draws a blurred picture of a target into a smaller one.
 pub struct BloomDown {
-    source: &'static str,
-    target: &'static str,
+    source: Target,
+    target: Target,
     divisor: u32,
     shader: &'static str,
 }
@@ -14,16 +18,16 @@ pub struct BloomDown {
 impl BloomDown {
     /// What is brighter than white, at half the size.
     pub const HALF: Self = Self {
-        source: "radiance",
-        target: "bloom, half",
+        source: targets::RADIANCE,
+        target: HALF,
         divisor: 2,
         shader: concat!(include_str!("bloom_blur.wgsl"), include_str!("bloom_bright.wgsl")),
     };
 
     /// The same at a quarter of the size.
     pub const QUARTER: Self = Self {
-        source: "bloom, half",
-        target: "bloom, quarter",
+        source: HALF,
+        target: Target::new("bloom, quarter"),
         divisor: 4,
         shader: concat!(include_str!("bloom_blur.wgsl"), include_str!("bloom_all.wgsl")),
     };
@@ -31,7 +35,7 @@ impl BloomDown {
 
 impl RenderProcess for BloomDown {
     fn name(&self) -> &str {
-        self.target
+        self.target.name()
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -59,7 +63,7 @@ impl RenderProcess for BloomUp {
         declare.after(BloomDown::HALF.name());
         declare.samples(BloomDown::HALF.target);
         declare.samples(BloomDown::QUARTER.target);
-        declare.draws_over("radiance");
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 
 use drawloom::backend::{Picture, WgpuBackend, WgpuReadBack};
-use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::process::{Deferred, Fxaa, ToneMapping, targets};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, RendererBuilder, Submitter};
 
@@ -84,7 +84,7 @@ impl Engine {
         let builder = builder.process(Selected(Arc::clone(&characters))).process(Outline(characters));
         let (mut renderer, submitter) = self.build(builder)?;
         let recorded = renderer.record(crowd.as_scene_ref(&crowd.columns()))?;
-        Ok(submitter.submit(recorded)?.submission.read(0, "picture")?)
+        Ok(submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?)
     }
 
     fn builder(&self) -> Result<RendererBuilder<WgpuBackend>, Box<dyn Error>> {
@@ -123,6 +123,6 @@ fn draw(
     let mut recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
     let middle = world.camera.size.map(|pixels| pixels / 2);
     let under_cursor = recorded.read_back(0, picking::TARGET, middle, [1, 1])?;
-    let picture = submitter.submit(recorded)?.submission.read(0, "picture")?;
+    let picture = submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?;
     Ok((picture, under_cursor))
 }

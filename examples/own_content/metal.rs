@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 use drawloom::command::Selection;
 use drawloom::glam::{Vec2, Vec3};
 use drawloom::process::{
-    CommandDraws, Declare, Draws, ILLUMINATION_SHADER, InjectionPoint, RenderProcess, ShaderResource,
+    CommandDraws, Declare, Draws, ILLUMINATION_SHADER, InjectionPoint, RenderProcess, ShaderResource, targets,
 };
 use drawloom::scene::{MaterialType, Mesh, SceneError, Topology, Vertex, VertexAttribute};
 use drawloom::wgpu;
@@ -68,8 +68,8 @@ impl RenderProcess for MetalSurfaces {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterLighting);
-        declare.draws_over("radiance");
-        declare.draws_depth("depth");
+        declare.draws_over(targets::RADIANCE);
+        declare.draws_depth(targets::DEPTH);
         declare.reads_materials(METAL);
         declare.reads_attribute(TANGENT, [1.0, 0.0, 0.0, 1.0]);
         declare.reads_attribute(COLOR, [255; 4]);

@@ -4,7 +4,7 @@
 use drawloom::command::Selection;
 use drawloom::process::{
     CommandDraws, Comparison, Declare, Deformation, Draws, Format, InjectionPoint, RenderProcess, SURFACE_SHADER,
-    Stencil,
+    Stencil, Target, targets,
 };
 use drawloom::scene::LayerMask;
 
@@ -12,7 +12,7 @@ use drawloom::scene::LayerMask;
 pub const LAYER: LayerMask = LayerMask::layer(3);
 
 /// The target of the stencil.
-const STENCIL: &str = "stencil of selected objects";
+const STENCIL: Target = Target::new("stencil of selected objects");
 
 /// Sets the stencil where selected objects are, hidden or not.
 pub struct Selected<D>(pub D);
@@ -44,7 +44,7 @@ impl<D: Deformation> RenderProcess for Outline<D> {
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterPostProcessing);
         declare.tests_stencil(STENCIL);
-        declare.draws_over("picture");
+        declare.draws_over(targets::PICTURE);
         self.0.declare(declare);
     }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use drawloom::command::Cull;
 use drawloom::process::{
     ComputeDispatch, Declare, DrawCount, Draws, InjectionPoint, ProceduralDraws, RenderProcess, StorageBuffer,
-    Workgroups,
+    Workgroups, targets,
 };
 use drawloom::scene::Blend;
 
@@ -85,8 +85,8 @@ impl RenderProcess for Draw {
         declare.reads_buffer(PARTICLES);
         declare.reads_buffer(ALIVE);
         declare.reads_arguments(ARGUMENTS);
-        declare.tests_depth("depth");
-        declare.draws_over("radiance");
+        declare.tests_depth(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

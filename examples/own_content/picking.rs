@@ -1,10 +1,10 @@
 //! The object under the cursor: the indices of objects in a target of whole numbers, of which one pixel is read back.
 
 use drawloom::command::Selection;
-use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess};
+use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, RenderProcess, Target};
 
 /// The target of the indices.
-pub const TARGET: &str = "object index";
+pub const TARGET: Target = Target::new("object index");
 
 const NOTHING: u32 = u32::MAX;
 
@@ -13,7 +13,7 @@ pub struct ObjectIndex;
 
 impl RenderProcess for ObjectIndex {
     fn name(&self) -> &str {
-        TARGET
+        TARGET.name()
     }
 
     fn declare(&self, declare: &mut Declare) {

@@ -3,7 +3,9 @@
 
 use drawloom::command::Selection;
 use drawloom::glam::Mat4;
-use drawloom::process::{ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess};
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, InjectionPoint, RenderProcess, Target, targets,
+};
 use drawloom::scene::{Camera, ObjectColumn};
 use drawloom::view::RenderView;
 use parking_lot::Mutex;
@@ -13,7 +15,7 @@ use crate::metal;
 /// How far each object has moved since the last frame, in metres, and 0.
 pub const DISPLACEMENT: ObjectColumn<[f32; 4]> = ObjectColumn::new("displacement");
 
-const MOTION: &str = "motion";
+const MOTION: Target = Target::new("motion");
 
 /// Draws how far each pixel's surface has moved since the last frame, in fractions of the picture.
 #[derive(Default)]
@@ -50,7 +52,7 @@ impl Motion {
 
 impl RenderProcess for Motion {
     fn name(&self) -> &str {
-        MOTION
+        MOTION.name()
     }
 
     fn declare(&self, declare: &mut Declare) {
@@ -58,7 +60,7 @@ impl RenderProcess for Motion {
         declare.at(InjectionPoint::AfterLighting);
         declare.after(metal::NAME);
         declare.clears_color(MOTION, Format::Rg16Float, ClearColor::Value([0.0; 4]));
-        declare.matches_depth("depth");
+        declare.matches_depth(targets::DEPTH);
         declare.reads_column(DISPLACEMENT);
     }
 

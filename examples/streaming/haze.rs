@@ -2,7 +2,7 @@
 
 use drawloom::bytemuck;
 use drawloom::glam::Vec3;
-use drawloom::process::{BlendEquation, Declare, Draws, FullScreen, InjectionPoint, RenderProcess};
+use drawloom::process::{BlendEquation, Declare, Draws, FullScreen, InjectionPoint, RenderProcess, targets};
 
 /// Draws haze over everything, thicker with distance.
 pub struct Haze {
@@ -23,8 +23,8 @@ impl RenderProcess for Haze {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterTransparency);
-        declare.samples("depth");
-        declare.draws_over("radiance");
+        declare.samples(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 use drawloom::Renderer;
 use drawloom::backend::{StreamingBudget, WgpuBackend};
 use drawloom::glam::Vec3;
-use drawloom::process::{Deferred, ToneMapping};
+use drawloom::process::{Deferred, ToneMapping, targets};
 use drawloom::task::Scheduler;
 use drawloom_output::{OutputFile, create_folder, print_diagnostic};
 use drawloom_testing::adapter;
@@ -78,7 +78,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     for _frame in 0..WARM_UP_FRAMES {
         let mut recorded = renderer.record(world.scene.as_scene_ref())?;
         let is_drawn = arguments.backend == BackendName::Wgpu;
-        let picture = is_drawn.then(|| recorded.read_back(0, "picture", [0, 0], arguments.size.0)).transpose()?;
+        let picture =
+            is_drawn.then(|| recorded.read_back(0, targets::PICTURE, [0, 0], arguments.size.0)).transpose()?;
         submitter.submit(recorded)?.submission.wait()?;
         drop(picture);
     }
@@ -95,7 +96,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let mut recorded = renderer.record(world.scene.as_scene_ref())?;
         let share = arguments.share_of(time);
         if arguments.backend == BackendName::Wgpu && pictures.is_due(share) {
-            pictures.add(recorded.read_back(0, "picture", [0, 0], arguments.size.0)?);
+            pictures.add(recorded.read_back(0, targets::PICTURE, [0, 0], arguments.size.0)?);
         }
         let submitted = submitter.submit(recorded)?;
         submitted.submission.wait()?;

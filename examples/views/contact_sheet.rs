@@ -3,7 +3,7 @@
 use drawloom::backend::Picture;
 use drawloom::process::{
     ClearColor, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader, FullScreenPixel, PassInputs,
-    RenderProcess, ShadowCasters,
+    RenderProcess, Target, targets,
 };
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{Light, ViewKind};
@@ -30,7 +30,7 @@ pub const SIZE: [u32; 2] = [COLUMNS * gallery::SIZE[0], ROWS * CELL_HEIGHT];
 #[derive(Clone, Copy, PartialEq)]
 enum Cell {
     /// A target of a view.
-    Picture(ViewKind, &'static str, &'static str),
+    Picture(ViewKind, &'static str, Target),
     /// The shadow maps of a light, three to a row.
     ShadowMaps(ShadowedLight),
     /// The mean of the tiles of a camera.
@@ -97,17 +97,20 @@ impl ShadowedLight {
 
 /// The cells, row by row, and their labels.
 const CELLS: [(Cell, &str); 15] = [
-    (Cell::Picture(ViewKind::Main, "main", "picture"), "main: pool, portals, screen, ball, tree, smoke"),
-    (Cell::Picture(ViewKind::Main, "guest", "picture"), "guest: a second player"),
-    (Cell::Picture(ViewKind::Main, "plan", "picture"), "plan: from above, without perspective"),
-    (Cell::Picture(ViewKind::Reflection, "main/pool", "picture"), "main/pool: mirrored, clipped at the water"),
-    (Cell::Picture(ViewKind::Reflection, "main/portal", "picture"), "main/portal: from the exit's side"),
-    (Cell::Picture(ViewKind::Reflection, "main/portal/portal", "picture"), "main/portal/portal: the portal in itself"),
-    (Cell::Picture(ViewKind::Reflection, "screen", "picture"), "screen: one camera for every viewer"),
+    (Cell::Picture(ViewKind::Main, "main", targets::PICTURE), "main: pool, portals, screen, ball, tree, smoke"),
+    (Cell::Picture(ViewKind::Main, "guest", targets::PICTURE), "guest: a second player"),
+    (Cell::Picture(ViewKind::Main, "plan", targets::PICTURE), "plan: from above, without perspective"),
+    (Cell::Picture(ViewKind::Reflection, "main/pool", targets::PICTURE), "main/pool: mirrored, clipped at the water"),
+    (Cell::Picture(ViewKind::Reflection, "main/portal", targets::PICTURE), "main/portal: from the exit's side"),
+    (
+        Cell::Picture(ViewKind::Reflection, "main/portal/portal", targets::PICTURE),
+        "main/portal/portal: the portal in itself",
+    ),
+    (Cell::Picture(ViewKind::Reflection, "screen", targets::PICTURE), "screen: one camera for every viewer"),
     (Cell::Cube(mirror_ball::PROBE), "probe: the cube map of the ball"),
-    (Cell::Picture(ViewKind::Reflection, impostor::VIEW, "picture"), "impostor: the tree, for its square"),
+    (Cell::Picture(ViewKind::Reflection, impostor::VIEW, targets::PICTURE), "impostor: the tree, for its square"),
     (Cell::Picture(ViewKind::Main, "main", smoke::TARGET), "main: smoke, with a quarter of the pixels"),
-    (Cell::Picture(ViewKind::Main, "detail", "picture"), "detail: one camera"),
+    (Cell::Picture(ViewKind::Main, "detail", targets::PICTURE), "detail: one camera"),
     (Cell::Tiles("tiles"), "detail: the mean of 2 x 2 tiles"),
     (Cell::ShadowMaps(ShadowedLight::Hemispherical), "the shadow map of a ceiling light: a paraboloid"),
     (Cell::ShadowMaps(ShadowedLight::Sun), "the sun's shadow maps: three cascades"),
@@ -170,13 +173,18 @@ impl RenderProcess for ContactSheetRow {
                 Cell::ShadowMaps(light) => {
                     for map in light.maps() {
                         let view = format!("{}{map}", self.shadow_maps[light as usize]);
-                        declare.samples_view(ViewKind::Shadow, &view, ShadowCasters::TARGET);
+                        declare.samples_view(ViewKind::Shadow, &view, targets::SHADOW_MAP);
                     }
                 }
                 Cell::Tiles(view) => {
-                    declare.samples_view_layers(ViewKind::Main, view, "picture", gallery::TILES * gallery::TILES);
+                    declare.samples_view_layers(
+                        ViewKind::Main,
+                        view,
+                        targets::PICTURE,
+                        gallery::TILES * gallery::TILES,
+                    );
                 }
-                Cell::Cube(view) => declare.samples_view_layers(ViewKind::Reflection, view, "picture", 6),
+                Cell::Cube(view) => declare.samples_view_layers(ViewKind::Reflection, view, targets::PICTURE, 6),
             }
         }
         match self.row.checked_sub(1) {

@@ -5,7 +5,7 @@ use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
 use drawloom::process::{
     CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
-    ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    ShaderObject, VARYINGS, VertexInput, VertexOutput, targets,
 };
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{
@@ -96,10 +96,10 @@ impl RenderProcess for Impostor {
         declare.at(InjectionPoint::AfterLighting);
         // What stands in front of it is drawn over it only where depth says so.
         declare.before(Surface::pool().name());
-        declare.samples_view(ViewKind::Reflection, VIEW, "radiance");
-        declare.samples_view(ViewKind::Reflection, VIEW, "depth");
-        declare.draws_over("radiance");
-        declare.draws_depth("depth");
+        declare.samples_view(ViewKind::Reflection, VIEW, targets::RADIANCE);
+        declare.samples_view(ViewKind::Reflection, VIEW, targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
+        declare.draws_depth(targets::DEPTH);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -4,7 +4,7 @@ use drawloom::command::Selection;
 use drawloom::glam::DVec3;
 use drawloom::process::{
     CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
-    ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    ShaderObject, VARYINGS, VertexInput, VertexOutput, targets,
 };
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{Camera, LayerMask, ViewKind};
@@ -40,10 +40,10 @@ impl RenderProcess for MirrorBall {
         declare.also_views(ViewKind::Reflection);
         declare.at(InjectionPoint::AfterLighting);
         declare.after(Surface::screen().name());
-        declare.samples_view_cube(ViewKind::Reflection, PROBE, "radiance");
-        declare.draws_over("radiance");
+        declare.samples_view_cube(ViewKind::Reflection, PROBE, targets::RADIANCE);
+        declare.draws_over(targets::RADIANCE);
         // The pipeline has drawn the ball as a black object.
-        declare.matches_depth("depth");
+        declare.matches_depth(targets::DEPTH);
     }
 
     fn draws(&self) -> Draws<'_> {

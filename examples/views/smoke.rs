@@ -6,7 +6,7 @@ use drawloom::handle::Handle;
 use drawloom::process::{
     BlendEquation, ClearColor, CommandDraws, CpuShader, Declare, Draws, Format, FullScreen, FullScreenCpuShader,
     FullScreenPixel, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess, ShaderObject, ShaderView,
-    TargetSize, VARYINGS, VertexInput, VertexOutput,
+    Target, TargetSize, VARYINGS, VertexInput, VertexOutput, targets,
 };
 use drawloom::raster::{Real, Vector, Vector2, Vector4};
 use drawloom::scene::{Blend, Material, MaterialType, Mesh, RenderObject, Scene, SceneError, ViewKind};
@@ -14,7 +14,7 @@ use drawloom::scene::{Blend, Material, MaterialType, Mesh, RenderObject, Scene, 
 use crate::surface::Surface;
 
 /// The smaller target.
-pub const TARGET: &str = "smoke";
+pub const TARGET: Target = Target::new("smoke");
 
 const SMOKE: MaterialType<u32> = MaterialType::new("smoke");
 
@@ -65,7 +65,7 @@ impl RenderProcess for Smoke {
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
         declare.at(InjectionPoint::AfterTransparency);
-        declare.samples("depth");
+        declare.samples(targets::DEPTH);
         declare.clears_color(TARGET, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
         declare.size(TARGET, TargetSize::Divided(self.divisor));
     }
@@ -107,8 +107,8 @@ impl RenderProcess for UpsampledSmoke {
         declare.also_views(ViewKind::Reflection);
         declare.at(InjectionPoint::AfterTransparency);
         declare.samples(TARGET);
-        declare.samples("depth");
-        declare.draws_over("radiance");
+        declare.samples(targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

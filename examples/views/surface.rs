@@ -3,7 +3,7 @@
 use drawloom::command::Selection;
 use drawloom::process::{
     CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
-    ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    ShaderObject, VARYINGS, VertexInput, VertexOutput, targets,
 };
 use drawloom::raster::{Real, Vector, Vector3, Vector4};
 use drawloom::scene::{LayerMask, ViewKind};
@@ -72,10 +72,10 @@ impl RenderProcess for Surface {
     fn declare(&self, declare: &mut Declare) {
         declare.also_views(ViewKind::Reflection);
         declare.at(InjectionPoint::AfterLighting);
-        declare.samples_view(ViewKind::Reflection, self.name, "radiance");
-        declare.draws_over("radiance");
+        declare.samples_view(ViewKind::Reflection, self.name, targets::RADIANCE);
+        declare.draws_over(targets::RADIANCE);
         // The pipeline has drawn the surface as a black object.
-        declare.matches_depth("depth");
+        declare.matches_depth(targets::DEPTH);
         // Surfaces change the same target, in any order.
         if let Some(before) = Self::all().iter().position(|other| other.name == self.name).filter(|index| *index > 0) {
             declare.after(Self::all()[before - 1].name);

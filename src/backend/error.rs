@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::process::AccessError;
+use crate::process::{AccessError, list_names};
 
 /// An error of a backend or its device.
 #[derive(Debug, thiserror::Error)]
@@ -154,12 +154,14 @@ pub enum BackendError {
     #[error(transparent)]
     Access(AccessError),
     /// The view has no target of the requested name.
-    #[error("view {view} has no target {target:?}")]
+    #[error("view {view} has no target {target:?}, only: {known}")]
     UnknownTarget {
         /// The view's index.
         view: usize,
         /// The requested name.
         target: String,
+        /// The targets that it has.
+        known: String,
     },
     /// The target shared its texture with others, so what it held is gone: see
     /// [`WgpuBackend::transient_targets`](super::WgpuBackend::transient_targets).
@@ -251,6 +253,14 @@ pub enum BackendError {
 
 /// The error for a broken rule between frame and backend. `rule` states what must hold.
 #[cfg(any(feature = "wgpu", feature = "software"))]
+impl BackendError {
+    /// That a view has no target of this name, but those that are `known`.
+    #[cfg(any(feature = "wgpu", feature = "software"))]
+    pub(crate) fn unknown_target<'a>(view: usize, target: &str, known: impl Iterator<Item = &'a str>) -> Self {
+        Self::UnknownTarget { view, target: target.to_owned(), known: list_names(known) }
+    }
+}
+
 pub(crate) fn broken_rule(rule: &str) -> BackendError {
     BackendError::BrokenRule { rule: rule.to_owned() }
 }

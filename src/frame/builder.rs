@@ -59,8 +59,8 @@ impl<B: Backend> RendererBuilder<B> {
     }
 
     /// Names an output of the frame. Processes that lead to no output are dropped.
-    pub fn output(mut self, target: impl Into<String>) -> Self {
-        self.outputs.push(target.into());
+    pub fn output(mut self, target: impl AsRef<str>) -> Self {
+        self.outputs.push(target.as_ref().to_owned());
         self
     }
 

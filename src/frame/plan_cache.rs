@@ -44,13 +44,16 @@ impl PlanCache {
         let all = Requirements::all();
         if let Some(deferred) = &deferred {
             catch_panics(|| deferred.check())?;
-            compile(Some(deferred), &processes, &outputs, &all)?;
+            compile(Some(deferred), &processes, &outputs, &all)?.check_left_out()?;
             let replaced = deferred.clone().with_float_blending(!deferred.blends_floats());
             compile(Some(&replaced), &processes, &outputs, &all)?;
         }
         let kept = kept_requirements(deferred.as_ref())?;
         let nothing = Requirements::default().union(kept);
         let mut current = compile(deferred.as_ref(), &processes, &outputs, &nothing)?;
+        if deferred.is_none() {
+            current.check_left_out()?;
+        }
         current.share_process_ids(&mut process_ids);
         let current = Arc::new(current);
         let compiled = HashMap::from([(nothing, Arc::clone(&current))]);

@@ -129,8 +129,8 @@ impl<B: Backend> RecordedFrame<B> {
     ///
     /// # Errors
     /// If there is no such target, or the backend cannot read it back.
-    pub fn read_back_whole(&mut self, view: usize, target: &str) -> Result<Box<dyn ReadBack>, BackendError> {
-        self.backend.read_back(&mut self.frame, view, target)
+    pub fn read_back_whole(&mut self, view: usize, target: impl AsRef<str>) -> Result<Box<dyn ReadBack>, BackendError> {
+        self.backend.read_back(&mut self.frame, view, target.as_ref())
     }
 
     /// The queue of each view.
@@ -149,10 +149,12 @@ impl<B: Backend<Frame = WgpuFrame>> RecordedFrame<B> {
     /// one pixel:
     ///
     /// ```no_run
-    /// # use drawloom::{RecordedFrame, Submitter, backend::WgpuBackend};
+    /// # use drawloom::{RecordedFrame, Submitter, backend::WgpuBackend, process::Target};
     /// # fn pick(mut recorded: RecordedFrame<WgpuBackend>, submitter: &Submitter<WgpuBackend>, cursor: [u32; 2])
     /// # -> Result<(), Box<dyn std::error::Error>> {
-    /// let under_cursor = recorded.read_back(0, "object index", cursor, [1, 1])?;
+    /// const OBJECT_INDEX: Target = Target::new("object index");
+    ///
+    /// let under_cursor = recorded.read_back(0, OBJECT_INDEX, cursor, [1, 1])?;
     /// submitter.submit(recorded)?;
     /// // In this frame or a later one:
     /// if let Some(pixel) = under_cursor.try_read()? {
@@ -169,11 +171,11 @@ impl<B: Backend<Frame = WgpuFrame>> RecordedFrame<B> {
     pub fn read_back(
         &mut self,
         view: usize,
-        target: &str,
+        target: impl AsRef<str>,
         origin: [u32; 2],
         size: [u32; 2],
     ) -> Result<crate::backend::WgpuReadBack, BackendError> {
-        self.frame.read_back(view, target, [origin, size])
+        self.frame.read_back(view, target.as_ref(), [origin, size])
     }
 }
 

@@ -63,7 +63,7 @@
 //! # use std::sync::Arc;
 //! # use drawloom::Renderer;
 //! # use drawloom::backend::WgpuBackend;
-//! # use drawloom::process::Deferred;
+//! # use drawloom::process::{Deferred, targets};
 //! # use drawloom::scene::{Assets, Material, Mesh, Topology, Vertex};
 //! # use drawloom::task::Scheduler;
 //! use drawloom::glam::{DVec3, Quat, Vec3};
@@ -100,7 +100,8 @@
 //! })?;
 //! println!("{} objects are visible", recorded.statistics().views[0].visible);
 //! let submitted = submitter.submit(recorded)?;
-//! assert!(submitted.submission.texture(0, "picture").is_some());
+//! let (texture, _layer) = submitted.submission.texture(0, targets::PICTURE)?;
+//! println!("the picture is {} pixels wide", texture.width());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -118,7 +119,7 @@
 //! # use std::sync::Arc;
 //! # use drawloom::Renderer;
 //! # use drawloom::backend::{WgpuBackend, WindowSurface};
-//! # use drawloom::process::{Deferred, ToneMapping};
+//! # use drawloom::process::{Deferred, ToneMapping, targets};
 //! # use drawloom::scene::Scene;
 //! # use drawloom::task::Scheduler;
 //! # fn run(
@@ -131,8 +132,8 @@
 //! // When the window asks to be drawn. There is no frame while it is minimised.
 //! if let Some(frame) = surface.acquire(window_size)? {
 //!     world.cameras[0].size = frame.size();
-//!     // "main" is the name of the camera, and "picture" the target that the last step draws.
-//!     renderer.backend().import_target("main", "picture", frame.target().clone());
+//!     // "main" is the name of the camera, and `PICTURE` the target that the last step draws.
+//!     renderer.backend().import_target("main", targets::PICTURE, frame.target().clone());
 //!     let recorded = renderer.record(world.as_scene_ref())?;
 //!     submitter.submit(recorded)?;
 //!     frame.present(|_texture| { /* egui draws over it here */ });
@@ -158,7 +159,7 @@
 //! # use drawloom::glam::DVec3;
 //! # use drawloom::scene::{Camera, Scene};
 //! # use drawloom::task::Scheduler;
-//! use drawloom::process::{Declare, Deferred, Draws, FullScreen, InjectionPoint, RenderProcess};
+//! use drawloom::process::{Declare, Deferred, Draws, FullScreen, InjectionPoint, RenderProcess, targets};
 //! use drawloom::scene::Blend;
 //!
 //! /// A glow at the horizon, added to what the lights leave.
@@ -171,7 +172,7 @@
 //!
 //!     fn declare(&self, declare: &mut Declare) {
 //!         declare.at(InjectionPoint::AfterTransparency);
-//!         declare.draws_over("radiance");
+//!         declare.draws_over(targets::RADIANCE);
 //!     }
 //!
 //!     fn draws(&self) -> Draws<'_> {
@@ -218,7 +219,7 @@
 //! # use drawloom::glam::DVec3;
 //! # use drawloom::scene::{Camera, Scene};
 //! # use drawloom::task::Scheduler;
-//! use drawloom::process::{Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess};
+//! use drawloom::process::{Declare, Deferred, Draws, RawPass, RawPassResources, RenderProcess, targets};
 //!
 //! /// Copies the picture into a texture of the engine's: a thumbnail of a saved game, for example.
 //! struct Thumbnail(wgpu::Texture);
@@ -229,7 +230,7 @@
 //!     }
 //!
 //!     fn declare(&self, declare: &mut Declare) {
-//!         declare.reads("picture");
+//!         declare.reads(targets::PICTURE);
 //!         // Nothing in the frame reads what it writes.
 //!         declare.keep();
 //!     }
@@ -245,7 +246,7 @@
 //!         encoder: &mut wgpu::CommandEncoder,
 //!         resources: &RawPassResources<'_>,
 //!     ) -> Result<(), Box<dyn Error + Send + Sync>> {
-//!         let picture = resources.target("picture")?;
+//!         let picture = resources.target(targets::PICTURE)?;
 //!         encoder.copy_texture_to_texture(picture.as_image_copy(), self.0.as_image_copy(), self.0.size());
 //!         Ok(())
 //!     }

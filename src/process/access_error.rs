@@ -11,16 +11,18 @@ use crate::scene::ViewKind;
 #[non_exhaustive]
 pub enum AccessError {
     /// A target of the view.
-    #[error("process {process:?} asks for target {target:?} in its raw pass, but does not declare it")]
+    #[error("process {process:?} asks for target {target:?} in its raw pass, but declares only: {declared}")]
     UndeclaredTarget {
         /// The process.
         process: String,
         /// The target.
         target: String,
+        /// The targets of the view that it declares.
+        declared: String,
     },
     /// A texture array that all views of a kind share.
     #[error(
-        "process {process:?} asks for target {target:?} of all {} views in its raw pass, but does not declare it",
+        "process {process:?} asks for target {target:?} of all {} views in its raw pass, but declares only: {declared}",
         views.name()
     )]
     UndeclaredLayeredTarget {
@@ -30,6 +32,8 @@ pub enum AccessError {
         views: ViewKind,
         /// The target.
         target: String,
+        /// The targets of such views that it declares.
+        declared: String,
     },
     /// A target that the process declares, but that is no texture array: each view has its own.
     #[error("process {process:?} asks for target {target:?} of all {} views, but each of them has its own", views.name())]

@@ -10,7 +10,7 @@ use crate::scene::{
     ViewKind,
 };
 
-/// Collects what a process reads and writes. Targets have names. Each view of the process's kind has targets of its
+/// Collects what a process reads and writes. Targets have names: a [`Target`](super::Target), or a string. Each view of the process's kind has targets of its
 /// own, of the size of its picture unless [`Declare::size`] says otherwise.
 ///
 /// A process can use only what it declares. What it declares and does not use is warned of through `tracing`: a target,
@@ -35,47 +35,47 @@ impl Declare {
     }
 
     /// Draws into a colour target, cleared first. Colour targets are the shader's outputs in the order declared.
-    pub fn clears_color(&mut self, target: &str, format: Format, clear: ClearColor) {
-        self.access(target, Access::ClearColor(format, clear));
+    pub fn clears_color(&mut self, target: impl AsRef<str>, format: Format, clear: ClearColor) {
+        self.access(target.as_ref(), Access::ClearColor(format, clear));
     }
 
     /// Draws into a colour target over what other processes drew.
-    pub fn draws_over(&mut self, target: &str) {
-        self.access(target, Access::DrawOver);
+    pub fn draws_over(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::DrawOver);
     }
 
     /// Tests and writes a depth target, first cleared to 0: infinitely far away, as depth is reversed. If it has a
     /// [stencil](super::Stencil), that is written and cleared to 0 too.
-    pub fn clears_depth(&mut self, target: &str, format: Format) {
-        self.access(target, Access::ClearDepth(format));
+    pub fn clears_depth(&mut self, target: impl AsRef<str>, format: Format) {
+        self.access(target.as_ref(), Access::ClearDepth(format));
     }
 
     /// Tests and writes a depth target over what another process drew.
-    pub fn draws_depth(&mut self, target: &str) {
-        self.access(target, Access::DrawDepth);
+    pub fn draws_depth(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::DrawDepth);
     }
 
     /// Tests and writes a depth target that all views of its kind share: a texture array with one layer for each view,
     /// first cleared to 0, infinitely far away. The pictures of those views have the same size.
-    pub fn clears_depth_layer(&mut self, target: &str, format: Format) {
-        self.access(target, Access::ClearDepthLayer(format));
+    pub fn clears_depth_layer(&mut self, target: impl AsRef<str>, format: Format) {
+        self.access(target.as_ref(), Access::ClearDepthLayer(format));
     }
 
     /// Tests against the depth that another process wrote, without writing it, and writes the [stencil](super::Stencil)
     /// beside it. What has the stored depth passes the test, so that objects which are drawn already can be marked. In
     /// the map of a directional light, what is beyond the far plane may pass: see [`Self::matches_depth`].
-    pub fn marks_stencil(&mut self, target: &str) {
-        self.access(target, Access::MarkStencil);
+    pub fn marks_stencil(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::MarkStencil);
     }
 
     /// Tests against the [stencil](super::Stencil) beside a depth, whatever the depth, and writes neither.
-    pub fn tests_stencil(&mut self, target: &str) {
-        self.access(target, Access::TestStencil);
+    pub fn tests_stencil(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::TestStencil);
     }
 
     /// Tests against the depth that another process wrote, without writing it.
-    pub fn tests_depth(&mut self, target: &str) {
-        self.access(target, Access::TestDepth);
+    pub fn tests_depth(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::TestDepth);
     }
 
     /// Draws only where its depth equals the depth that another process wrote, without writing it.
@@ -84,22 +84,21 @@ impl Declare {
     /// [`DEPTH_CLIP_FEATURES`](crate::backend::WgpuBackend::DEPTH_CLIP_FEATURES) clamp the depth of what is beyond the
     /// far plane to 0, which equals the cleared depth. A fragment shader that discards pixels whose
     /// `@builtin(position)` has a z of at most 0 draws the same on all devices.
-    pub fn matches_depth(&mut self, target: &str) {
-        self.access(target, Access::MatchDepth);
+    pub fn matches_depth(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::MatchDepth);
     }
 
     /// Reads a target in the shader, at `@group(2)`: the first sampled target is binding 1, the next 2, and so on. The
     /// prelude's `target_sampler` samples it between pixels, if its [format allows that](Format::is_filterable).
     ///
     /// In WGSL it is a `texture_2d<f32>`; a `texture_depth_2d` if its format has depth; a `texture_2d<u32>` for
-    /// [`Format::R32Uint`] and [`Format::Stencil8`]. The targets of the deferred pipeline are listed at
-    /// [`GeometryBuffer`](super::GeometryBuffer):
+    /// [`Format::R32Uint`] and [`Format::Stencil8`]. [`targets`](super::targets) has those of the deferred pipeline:
     ///
     /// ```wgsl
     /// @group(2) @binding(1) var depth_target: texture_depth_2d;
     /// ```
-    pub fn samples(&mut self, target: &str) {
-        self.access(target, Access::Sample);
+    pub fn samples(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::Sample);
     }
 
     /// Reads what a target held at the end of the frame before, in the shader, at `@group(2)` as [`Declare::samples`]
@@ -114,7 +113,7 @@ impl Declare {
     /// A history that is mixed with a share a of each frame ends within r/a of the mean of what it is mixed with, as a
     /// fraction of it. Here r is what a write in the target's format loses: 2⁻¹⁰ for half floats and 2⁻²³ for floats if
     /// the device truncates, half of that if it rounds. So a share of 1/100 needs [`Format::Rgba32Float`].
-    pub fn samples_previous(&mut self, target: &str) {
+    pub fn samples_previous(&mut self, target: impl AsRef<str>) {
         self.access(&previous_name(target), Access::SamplePrevious);
     }
 
@@ -124,9 +123,9 @@ impl Declare {
     ///
     /// The prelude's `view.width`, `view.height` and `clip_of_pixel` are those of the picture: shaders that draw into
     /// targets of other sizes use `textureDimensions`, or the `clip` of `FullScreenPixel`.
-    pub fn size(&mut self, target: &str, size: TargetSize) {
+    pub fn size(&mut self, target: impl AsRef<str>, size: TargetSize) {
         let size = if size == TargetSize::Divided(1) { TargetSize::Picture } else { size };
-        self.declaration.sizes.push((target.to_owned(), size));
+        self.declaration.sizes.push((target.as_ref().to_owned(), size));
     }
 
     /// Makes a target multisampled, so that edges are smooth: four samples per pixel, the number that every device
@@ -141,7 +140,7 @@ impl Declare {
     /// software backend returns an error.
     ///
     /// ```
-    /// use drawloom::process::{ClearColor, Declare, Format};
+    /// use drawloom::process::{ClearColor, Declare, Format, targets};
     ///
     /// fn declare(declare: &mut Declare) {
     ///     declare.clears_color("multisampled colour", Format::Rgba16Float, ClearColor::Background);
@@ -149,24 +148,25 @@ impl Declare {
     ///     declare.multisampled("multisampled colour");
     ///     declare.multisampled("multisampled depth");
     ///     // Tone mapping samples the mean of the four.
-    ///     declare.resolves("multisampled colour", "radiance", Format::Rgba16Float);
+    ///     declare.resolves("multisampled colour", targets::RADIANCE, Format::Rgba16Float);
     /// }
     /// ```
-    pub fn multisampled(&mut self, target: &str) {
-        self.declaration.multisampled.push(target.to_owned());
+    pub fn multisampled(&mut self, target: impl AsRef<str>) {
+        self.declaration.multisampled.push(target.as_ref().to_owned());
     }
 
     /// Creates the target `resolved`, and writes the mean of the samples of `multisampled` into it when the process has
     /// drawn into that. It has the same size, and `format` must be the same. A process resolves a target at most once.
-    pub fn resolves(&mut self, multisampled: &str, resolved: &str, format: Format) {
+    pub fn resolves(&mut self, multisampled: impl AsRef<str>, resolved: impl AsRef<str>, format: Format) {
+        let [multisampled, resolved] = [multisampled.as_ref(), resolved.as_ref()];
         self.declaration.resolves.push((multisampled.to_owned(), resolved.to_owned()));
         self.access(resolved, Access::Resolve(format));
     }
 
     /// Reads the texture array that all views of another kind share, in the shader, at `@group(2)` as
     /// [`Declare::samples`] does. A raw pass finds it as the [layered target](super::RawPassResources::layered_target).
-    pub fn samples_layers(&mut self, views: ViewKind, target: &str) {
-        self.access(target, Access::SampleLayers(views));
+    pub fn samples_layers(&mut self, views: ViewKind, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::SampleLayers(views));
     }
 
     /// Reads an engine's own data of objects in the shader, at `@group(3)`: the first such column is binding 0, the
@@ -286,19 +286,19 @@ impl Declare {
     }
 
     /// A raw pass overwrites a target with its own commands; as a storage texture too, if [`Format::can_be_stored`].
-    pub fn writes(&mut self, target: &str, format: Format) {
-        self.access(target, Access::Write(format));
+    pub fn writes(&mut self, target: impl AsRef<str>, format: Format) {
+        self.access(target.as_ref(), Access::Write(format));
     }
 
     /// A raw pass reads and writes a target with its own commands; as a storage texture too, if
     /// [`Format::can_be_stored`] and it is not multisampled.
-    pub fn changes(&mut self, target: &str) {
-        self.access(target, Access::Change);
+    pub fn changes(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::Change);
     }
 
     /// A raw pass reads a target with its own commands. Nothing checks that it does not write it.
-    pub fn reads(&mut self, target: &str) {
-        self.access(target, Access::Read);
+    pub fn reads(&mut self, target: impl AsRef<str>) {
+        self.access(target.as_ref(), Access::Read);
     }
 
     /// Orders the process after another one, whatever they read and write.
@@ -449,8 +449,8 @@ pub struct DeclaredAttribute {
 
 /// The name of the copy that holds a target's history. The copy is made at the end of each frame: passes read what the
 /// target held in the frame before, and once the frame is submitted, the copy is that of the frame itself.
-pub fn previous_name(target: &str) -> String {
-    format!("{target}{PREVIOUS_SUFFIX}")
+pub fn previous_name(target: impl AsRef<str>) -> String {
+    format!("{}{PREVIOUS_SUFFIX}", target.as_ref())
 }
 
 /// The target whose history has this name; `None` if it is not the name of a history.

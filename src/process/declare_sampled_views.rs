@@ -20,7 +20,7 @@ impl Declare {
     ///
     /// ```
     /// use drawloom::command::Selection;
-    /// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess};
+    /// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess, targets};
     /// use drawloom::scene::{LayerMask, ViewKind};
     ///
     /// const MIRROR: LayerMask = LayerMask::layer(5);
@@ -35,10 +35,10 @@ impl Declare {
     ///
     ///     fn declare(&self, declare: &mut Declare) {
     ///         declare.at(InjectionPoint::AfterLighting);
-    ///         declare.samples_view(ViewKind::Reflection, "mirror", "radiance");
-    ///         declare.draws_over("radiance");
+    ///         declare.samples_view(ViewKind::Reflection, "mirror", targets::RADIANCE);
+    ///         declare.draws_over(targets::RADIANCE);
     ///         // The pipeline has drawn the mirror as an opaque object.
-    ///         declare.matches_depth("depth");
+    ///         declare.matches_depth(targets::DEPTH);
     ///     }
     ///
     ///     fn draws(&self) -> Draws<'_> {
@@ -64,8 +64,8 @@ impl Declare {
     ///     }
     /// }
     /// ```
-    pub fn samples_view(&mut self, views: ViewKind, view: &str, target: &str) {
-        self.sample_shape(views, view, target, SampledShape::Picture);
+    pub fn samples_view(&mut self, views: ViewKind, view: &str, target: impl AsRef<str>) {
+        self.sample_shape(views, view, target.as_ref(), SampledShape::Picture);
     }
 
     /// Reads a target of up to `layers` views in the shader, as the layers of one texture array: all views of a team's
@@ -79,8 +79,8 @@ impl Declare {
     /// A plan is refused if there are 0 layers, more than 256, or if the target is multisampled, layered or used by a
     /// raw pass ([`PlanError::SampledLayers`](super::PlanError::SampledLayers)); a frame, if the targets' sizes differ
     /// ([`FrameError::UnequalLayers`](crate::FrameError::UnequalLayers)).
-    pub fn samples_view_layers(&mut self, views: ViewKind, view: &str, target: &str, layers: u32) {
-        self.sample_shape(views, view, target, SampledShape::Layers(layers));
+    pub fn samples_view_layers(&mut self, views: ViewKind, view: &str, target: impl AsRef<str>, layers: u32) {
+        self.sample_shape(views, view, target.as_ref(), SampledShape::Layers(layers));
     }
 
     /// Reads a target of six views in the shader, as the faces of a cube map: what is reflected by things that are not
@@ -100,8 +100,8 @@ impl Declare {
     ///     return textureSampleLevel(surroundings, target_sampler, cube_direction(reflect(incident, normal)), 0.0);
     /// }
     /// ```
-    pub fn samples_view_cube(&mut self, views: ViewKind, view: &str, target: &str) {
-        self.sample_shape(views, view, target, SampledShape::Cube);
+    pub fn samples_view_cube(&mut self, views: ViewKind, view: &str, target: impl AsRef<str>) {
+        self.sample_shape(views, view, target.as_ref(), SampledShape::Cube);
     }
 
     /// Reads what a target of another view held at the end of the frame before, in the shader, at `@group(2)` as
@@ -123,7 +123,7 @@ impl Declare {
     /// resolved into. A raw pass cannot sample views.
     ///
     /// ```
-    /// use drawloom::process::{Declare, InjectionPoint};
+    /// use drawloom::process::{Declare, InjectionPoint, targets};
     /// use drawloom::scene::ViewKind;
     ///
     /// /// A screen that shows the camera `lens`, which may see the screen.
@@ -131,12 +131,12 @@ impl Declare {
     ///     declare.also_views(ViewKind::Reflection);
     ///     declare.at(InjectionPoint::AfterLighting);
     ///     // In the shader: @group(2) @binding(1) var shown: texture_2d<f32>;
-    ///     declare.samples_view_previous(ViewKind::Reflection, "lens", "radiance");
-    ///     declare.draws_over("radiance");
-    ///     declare.matches_depth("depth");
+    ///     declare.samples_view_previous(ViewKind::Reflection, "lens", targets::RADIANCE);
+    ///     declare.draws_over(targets::RADIANCE);
+    ///     declare.matches_depth(targets::DEPTH);
     /// }
     /// ```
-    pub fn samples_view_previous(&mut self, views: ViewKind, view: &str, target: &str) {
+    pub fn samples_view_previous(&mut self, views: ViewKind, view: &str, target: impl AsRef<str>) {
         let index = self.add_sampled_view(SampledView { name: view.to_owned(), shape: SampledShape::Picture });
         self.access(&previous_name(target), Access::SampleViewPrevious(views, index));
     }

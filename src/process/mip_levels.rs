@@ -28,7 +28,7 @@ impl Declare {
     /// generated.
     ///
     /// ```
-    /// use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
+    /// use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize, targets};
     ///
     /// /// Copies the radiance, so that others sample it blurred.
     /// struct Blurred;
@@ -39,7 +39,7 @@ impl Declare {
     ///     }
     ///
     ///     fn declare(&self, declare: &mut Declare) {
-    ///         declare.samples("radiance");
+    ///         declare.samples(targets::RADIANCE);
     ///         declare.clears_color("blurred", Format::Rgba16Float, ClearColor::Value([0.0; 4]));
     ///         declare.mipmapped("blurred");
     ///     }
@@ -88,7 +88,7 @@ impl Declare {
     ///     }
     /// }
     /// ```
-    pub fn mipmapped(&mut self, target: &str) {
-        self.add_mipmapped(target);
+    pub fn mipmapped(&mut self, target: impl AsRef<str>) {
+        self.add_mipmapped(target.as_ref());
     }
 }

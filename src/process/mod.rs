@@ -35,6 +35,7 @@ mod sampled_view;
 mod shader_resource;
 mod stencil;
 mod storage_buffer;
+mod target;
 mod target_size;
 
 pub use access::{Access, ClearColor};
@@ -51,7 +52,7 @@ use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};
 pub use deferred::{
     COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
-    InjectionPoint, LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency,
+    InjectionPoint, LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency, targets,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
@@ -69,6 +70,8 @@ pub use render_process::RenderProcess;
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};
 pub use storage_buffer::{BufferLayout, BufferOffset, StorageBuffer};
+pub use target::Target;
+pub(crate) use target::list_names;
 pub use target_size::TargetSize;
 
 #[cfg(feature = "software")]

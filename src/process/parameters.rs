@@ -20,7 +20,7 @@ use parking_lot::{Mutex, ReentrantMutex};
 /// that.
 ///
 /// ```
-/// use drawloom::process::{Declare, Draws, FullScreen, Parameters, InjectionPoint, RenderProcess};
+/// use drawloom::process::{Declare, Draws, FullScreen, Parameters, InjectionPoint, RenderProcess, targets};
 /// use drawloom::scene::Blend;
 ///
 /// /// Fog over what was drawn, of a density per metre.
@@ -33,8 +33,8 @@ use parking_lot::{Mutex, ReentrantMutex};
 ///
 ///     fn declare(&self, declare: &mut Declare) {
 ///         declare.at(InjectionPoint::AfterTransparency);
-///         declare.samples("depth");
-///         declare.draws_over("radiance");
+///         declare.samples(targets::DEPTH);
+///         declare.draws_over(targets::RADIANCE);
 ///     }
 ///
 ///     fn draws(&self) -> Draws<'_> {

@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Formatter};
 
 use parking_lot::Mutex;
 
-use super::{AccessError, BufferLayout, Declaration};
+use super::{AccessError, BufferLayout, Declaration, list_names};
 use crate::scene::{ColumnLayout, MaterialLayout, ViewKind};
 
 /// Something that a process declares, and that its raw pass asks for.
@@ -66,7 +66,9 @@ impl<'a> RawAccess<'a> {
     /// # Errors
     /// If the process does not declare the target for its own views.
     pub(super) fn target<T>(&self, name: &str, found: impl FnOnce() -> Option<T>) -> Result<T, AccessError> {
-        let undeclared = |process| AccessError::UndeclaredTarget { process, target: name.to_owned() };
+        let declared = || self.declared_targets(self.declaration.views);
+        let undeclared =
+            |process| AccessError::UndeclaredTarget { process, target: name.to_owned(), declared: declared() };
         self.checked(RawResource::Target(self.declaration.views, name), found, undeclared)
     }
 
@@ -78,10 +80,20 @@ impl<'a> RawAccess<'a> {
         name: &str,
         found: impl FnOnce() -> Option<T>,
     ) -> Result<T, AccessError> {
-        let undeclared = |process| AccessError::UndeclaredLayeredTarget { process, views, target: name.to_owned() };
+        let undeclared = |process| {
+            let declared = self.declared_targets(views);
+            AccessError::UndeclaredLayeredTarget { process, views, target: name.to_owned(), declared }
+        };
         let found = self.checked(RawResource::Target(views, name), || Some(found()), undeclared)?;
         let own = || AccessError::NotLayered { process: self.process.to_owned(), views, target: name.to_owned() };
         found.ok_or_else(|| self.noted(own()))
+    }
+
+    /// The names of the targets of views of a kind that the process declares.
+    fn declared_targets(&self, views: ViewKind) -> String {
+        let Declaration { views: own, accesses, .. } = self.declaration;
+        let of_views = accesses.iter().filter(|(_, access)| access.views(*own) == views);
+        list_names(of_views.map(|(name, _)| name.as_str()))
     }
 
     /// # Errors

@@ -97,7 +97,8 @@ impl RawPassResources<'_> {
     /// # Errors
     /// If the process does not declare that it [reads](super::Declare::reads), [changes](super::Declare::changes) or
     /// [writes](super::Declare::writes) it, or [samples what it held before](super::Declare::samples_previous).
-    pub fn target(&self, name: &str) -> Result<&wgpu::Texture, AccessError> {
+    pub fn target(&self, name: impl AsRef<str>) -> Result<&wgpu::Texture, AccessError> {
+        let name = name.as_ref();
         self.access.target(name, || (self.textures)(name))
     }
 
@@ -106,7 +107,8 @@ impl RawPassResources<'_> {
     /// # Errors
     /// If the process does not declare that it [samples the layers](super::Declare::samples_layers), or, where the
     /// views are of its own kind, uses the target as others; or if the views share no target of this name.
-    pub fn layered_target(&self, views: ViewKind, name: &str) -> Result<&wgpu::Texture, AccessError> {
+    pub fn layered_target(&self, views: ViewKind, name: impl AsRef<str>) -> Result<&wgpu::Texture, AccessError> {
+        let name = name.as_ref();
         self.access.layered_target(views, name, || (self.layered)(views, name))
     }
 }

@@ -19,7 +19,7 @@ use bytemuck::Pod;
 ///
 /// ```
 /// use drawloom::command::Selection;
-/// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess, SURFACE_SHADER};
+/// use drawloom::process::{CommandDraws, Declare, Draws, InjectionPoint, RenderProcess, SURFACE_SHADER, targets};
 /// use drawloom::scene::{Material, MaterialType, Scene};
 ///
 /// /// A surface that glows by how it faces the viewer.
@@ -41,8 +41,8 @@ use bytemuck::Pod;
 ///
 ///     fn declare(&self, declare: &mut Declare) {
 ///         declare.at(InjectionPoint::AfterLighting);
-///         declare.draws_over("radiance");
-///         declare.draws_depth("depth");
+///         declare.draws_over(targets::RADIANCE);
+///         declare.draws_depth(targets::DEPTH);
 ///         declare.reads_materials(GLOW);
 ///     }
 ///

@@ -8,7 +8,7 @@ use drawloom::backend::{BackendError, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
     ClearColor, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RawPass, RawPassResources, RenderProcess,
-    ShadowCasters, StorageBuffer, previous_name,
+    StorageBuffer, previous_name, targets,
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Light, Redraw, Scene, ViewKind};
@@ -58,7 +58,7 @@ impl RenderProcess for Destroys {
         declare.changes("own");
         declare.reads("depth");
         declare.samples_previous("picture");
-        declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         declare.changes_buffer(COUNTS);
         declare.keep();
     }
@@ -82,8 +82,8 @@ impl RawPass for Destroys {
             Target::Own => resources.target("own")?.destroy(),
             Target::Picture => resources.target("picture")?.destroy(),
             Target::Depth => resources.target("depth")?.destroy(),
-            Target::History => resources.target(&previous_name("picture"))?.destroy(),
-            Target::ShadowMaps => resources.layered_target(ViewKind::Shadow, ShadowCasters::TARGET)?.destroy(),
+            Target::History => resources.target(previous_name("picture"))?.destroy(),
+            Target::ShadowMaps => resources.layered_target(ViewKind::Shadow, targets::SHADOW_MAP)?.destroy(),
             Target::Buffer => resources.buffer(COUNTS)?.destroy(),
         }
         Ok(())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{
-    CommandDraws, Declare, Deferred, Draws, FullScreen, Fxaa, PlanError, RenderProcess, ShadowCasters, ToneMapping,
+    CommandDraws, Declare, Deferred, Draws, FullScreen, Fxaa, PlanError, RenderProcess, ToneMapping, targets,
 };
 use drawloom::scene::{Light, Scene, ViewKind};
 use drawloom::task::Scheduler;
@@ -131,7 +131,7 @@ impl RenderProcess for Fog {
 
     fn declare(&self, declare: &mut Declare) {
         declare.samples("depth");
-        declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+        declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         declare.draws_over("radiance");
         declare.after("transparency");
     }
@@ -152,7 +152,7 @@ fn an_engines_process_may_sample_shadow_maps_even_without_lights() {
         drop(renderer.record(scene.as_scene_ref()).unwrap());
         assert_eq!(processes(&renderer).contains(&"shadow casters"), drawn);
         assert!(processes(&renderer).contains(&"fog"));
-        let maps = renderer.plan().targets().iter().filter(|target| target.name == ShadowCasters::TARGET);
+        let maps = renderer.plan().targets().iter().filter(|target| target.name == targets::SHADOW_MAP.name());
         assert_eq!(maps.map(|map| (map.layered, map.views)).collect::<Vec<_>>(), [(true, ViewKind::Shadow)]);
     }
     // Without the deferred pipeline no process draws shadow maps.

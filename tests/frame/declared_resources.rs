@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use drawloom::backend::{BackendError, WgpuBackend};
 use drawloom::process::{
     AccessError, ClearColor, Declare, Deferred, Draws, Format, FullScreen, Fxaa, RawPass, RawPassResources,
-    RenderProcess, ShadowCasters, StorageBuffer, previous_name,
+    RenderProcess, StorageBuffer, previous_name, targets,
 };
 use drawloom::quality::Quality;
 use drawloom::scene::{Material, MaterialType, ObjectColumn, Scene, SceneRef, ViewKind};
@@ -126,29 +126,27 @@ fn access_error(error: &FrameError) -> (AccessError, String) {
 #[test]
 fn what_a_raw_pass_asks_for_without_declaring_it_fails_the_frame() {
     let process = || "asking".to_owned();
+    let undeclared = |target: &str| AccessError::UndeclaredTarget {
+        process: process(),
+        target: target.to_owned(),
+        declared: "\"own\"".to_owned(),
+    };
     let cases: [(Ask, AccessError, &str); 8] = [
-        (
-            |resources| resources.target("other").map(drop),
-            AccessError::UndeclaredTarget { process: process(), target: "other".into() },
-            "\"other\"",
-        ),
+        (|resources| resources.target("other").map(drop), undeclared("other"), "\"other\""),
         (
             // The history of a target that it declares.
-            |resources| resources.target(&previous_name("own")).map(drop),
-            AccessError::UndeclaredTarget { process: process(), target: previous_name("own") },
+            |resources| resources.target(previous_name("own")).map(drop),
+            undeclared(&previous_name("own")),
             "\"own of the frame before\"",
         ),
+        (|resources| resources.target("of no process").map(drop), undeclared("of no process"), "\"of no process\""),
         (
-            |resources| resources.target("of no process").map(drop),
-            AccessError::UndeclaredTarget { process: process(), target: "of no process".into() },
-            "\"of no process\"",
-        ),
-        (
-            |resources| resources.layered_target(ViewKind::Shadow, ShadowCasters::TARGET).map(drop),
+            |resources| resources.layered_target(ViewKind::Shadow, targets::SHADOW_MAP).map(drop),
             AccessError::UndeclaredLayeredTarget {
                 process: process(),
                 views: ViewKind::Shadow,
-                target: ShadowCasters::TARGET.into(),
+                target: targets::SHADOW_MAP.to_string(),
+                declared: "none".to_owned(),
             },
             "\"shadow map\" of all shadow views",
         ),
@@ -203,7 +201,7 @@ fn what_a_raw_pass_asks_for_without_declaring_it_fails_the_frame() {
             |declare| {
                 declare.reads("other");
                 declare.samples_previous("own");
-                declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+                declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
                 declare.reads_column(TINT);
                 declare.reads_materials(METAL);
                 declare.changes_buffer(COUNTS);
@@ -242,17 +240,17 @@ fn a_raw_pass_gets_what_its_process_declares() {
             declare.reads("written");
             declare.changes("cleared");
             declare.samples_previous("cleared");
-            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+            declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
             declare.reads_column(TINT);
             declare.reads_materials(METAL);
             declare.reads_arguments(COUNTS);
         },
         |resources| {
-            let before = resources.target(&previous_name("cleared"))?;
+            let before = resources.target(previous_name("cleared"))?;
             for target in ["written", "cleared"] {
                 assert_eq!(resources.target(target)?.size(), before.size());
             }
-            assert!(resources.layered_target(ViewKind::Shadow, ShadowCasters::TARGET)?.depth_or_array_layers() > 0);
+            assert!(resources.layered_target(ViewKind::Shadow, targets::SHADOW_MAP)?.depth_or_array_layers() > 0);
             assert!(resources.column(TINT)?.buffer.size() >= 48);
             assert!(resources.materials(METAL)?.buffer.size() >= 16);
             assert_eq!(resources.buffer(COUNTS)?.size(), 16);
@@ -264,11 +262,11 @@ fn a_raw_pass_gets_what_its_process_declares() {
         "shadows",
         |declare| {
             declare.views(ViewKind::Shadow);
-            declare.reads(ShadowCasters::TARGET);
+            declare.reads(targets::SHADOW_MAP);
         },
         |resources| {
-            let shared = resources.layered_target(ViewKind::Shadow, ShadowCasters::TARGET)?;
-            assert_eq!(resources.target(ShadowCasters::TARGET)?, shared);
+            let shared = resources.layered_target(ViewKind::Shadow, targets::SHADOW_MAP)?;
+            assert_eq!(resources.target(targets::SHADOW_MAP)?, shared);
             Ok(())
         },
     );

@@ -36,7 +36,10 @@ mod sampled_layers;
 mod sampled_views;
 mod shadow_interval;
 #[cfg(feature = "wgpu")]
+mod shared_pipelines;
+#[cfg(feature = "wgpu")]
 mod streaming;
+mod target_names;
 mod targets;
 mod timeline;
 mod triangles;

@@ -18,9 +18,9 @@ fn clears(declare: &mut Declare, target: &str, format: Format) {
 }
 
 /// The process that is refused, its target, and why.
-fn refused<const N: usize>(processes: [Declaring; N]) -> (String, String, &'static str) {
+fn refused<const N: usize>(processes: [Declaring; N]) -> (String, String, String) {
     match plan_error(processes) {
-        PlanError::MipLevels { process, target, problem } => (process, target, problem),
+        PlanError::MipLevels { process, target, problem } => (process, target, problem.into_owned()),
         other => panic!("another error: {other}"),
     }
 }
@@ -70,7 +70,10 @@ fn only_the_process_that_creates_a_target_gives_it_mip_levels() {
             declare.mipmapped("own");
             declare.keep();
         });
-        assert_eq!(refused([creator, user]), ("user".to_owned(), "own".to_owned(), "it does not create it"));
+        assert_eq!(
+            refused([creator, user]),
+            ("user".to_owned(), "own".to_owned(), "it does not create it, only: none".to_owned())
+        );
     }
 }
 
@@ -88,9 +91,15 @@ fn processes_that_disagree_about_mip_levels_are_named() {
         })
     };
     let (process, target, problem) = refused([creates("one", true), creates("two", false)]);
-    assert_eq!((process.as_str(), target.as_str(), problem), ("two", "own", "another process creates it with them"));
+    assert_eq!(
+        (process.as_str(), target.as_str(), problem.as_str()),
+        ("two", "own", "another process creates it with them")
+    );
     let (process, target, problem) = refused([creates("one", false), creates("two", true)]);
-    assert_eq!((process.as_str(), target.as_str(), problem), ("two", "own", "another process creates it without them"));
+    assert_eq!(
+        (process.as_str(), target.as_str(), problem.as_str()),
+        ("two", "own", "another process creates it without them")
+    );
 }
 
 #[test]

@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::{
-    CommandDraws, Declare, Deferred, Draws, InjectionPoint, PlanError, RenderProcess, ShadowCasters,
-};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, PlanError, RenderProcess, targets};
 use drawloom::scene::{Camera, ClipPlane, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer, Submitter};
@@ -159,7 +157,7 @@ fn targets_without_a_history_are_refused_by_name() {
     let unknown = error("albedo", ViewKind::Reflection);
     let is_named = matches!(
         &unknown,
-        PlanError::UnknownSampledTarget { process, view, target }
+        PlanError::UnknownSampledTarget { process, view, target, .. }
             if process == "mirror" && view == "mirror" && target == "albedo"
     );
     assert!(is_named, "{unknown}");
@@ -169,10 +167,10 @@ fn targets_without_a_history_are_refused_by_name() {
         PlanError::Multisampling { process, target, .. } if process == "mirror" && target == "multisampled"
     );
     assert!(is_named, "{multisampled}");
-    let layered = error(ShadowCasters::TARGET, ViewKind::Shadow);
+    let layered = error(targets::SHADOW_MAP.name(), ViewKind::Shadow);
     let is_named = matches!(
         &layered,
-        PlanError::LayeringMismatch { process, target } if process == "mirror" && target == ShadowCasters::TARGET
+        PlanError::LayeringMismatch { process, target } if process == "mirror" && target == targets::SHADOW_MAP.name()
     );
     assert!(is_named, "{layered}");
 }

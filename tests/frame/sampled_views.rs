@@ -182,7 +182,7 @@ fn a_target_that_no_process_writes_is_an_error() {
     let error = builder.build(scheduler).err().unwrap();
     let named = matches!(
         &error,
-        BuildError::Plan(PlanError::UnknownSampledTarget { process, view, target })
+        BuildError::Plan(PlanError::UnknownSampledTarget { process, view, target, .. })
             if process == "mirror" && view == "mirror" && target == "albedo"
     );
     assert!(named, "{error}");

@@ -6,7 +6,7 @@ use drawloom::Renderer;
 use drawloom::backend::{SoftwareBackend, WgpuBackend};
 use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RenderProcess, ShadowCasters};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, RenderProcess, targets};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{
     Blend, LayerMask, Light, LightKind, Material, MaterialType, RenderObject, Scene, Topology, ViewKind,
@@ -237,7 +237,7 @@ impl RenderProcess for OwnCasters {
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Shadow);
         declare.after("shadow casters");
-        declare.draws_depth(ShadowCasters::TARGET);
+        declare.draws_depth(targets::SHADOW_MAP);
         declare.reads_materials(OWN);
     }
 

@@ -47,7 +47,7 @@ fn levels_are_means_at_every_size_and_in_every_format() {
         let submission = fixture.draw(&atlas_scene());
         for (view, size) in ATLAS_SIZES.into_iter().enumerate() {
             for format in ATLAS_FORMATS {
-                let atlas = submission.numbers(view, &atlas_name(format)).unwrap();
+                let atlas = submission.numbers(view, atlas_name(format)).unwrap();
                 assert_eq!(check_atlas(shown, format, size, &atlas), Ok(()), "{shown:?}");
             }
         }

@@ -181,8 +181,9 @@ fn the_error_names_a_missing_target() {
     let submission = Fixture::new(2, |builder| builder.deferred(deferred())).draw(&field(10));
     for (view, target) in [(0, "pictures"), (2, "picture")] {
         match submission.read(view, target) {
-            Err(BackendError::UnknownTarget { view: named, target: name }) => {
-                assert_eq!((named, &*name), (view, target))
+            Err(BackendError::UnknownTarget { view: named, target: name, known }) => {
+                assert_eq!((named, &*name), (view, target));
+                assert_eq!(known.contains("\"picture\""), view == 0, "{known}");
             }
             other => panic!("{:?}", other.err()),
         }

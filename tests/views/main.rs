@@ -81,7 +81,9 @@ fn built(add: impl FnOnce(Builder) -> Builder) -> Result<(Renderer<WgpuBackend>,
 }
 
 fn contact_sheet() -> Result<(), Failed> {
-    let drawn = drawn_sheet(built(processes::add_to)?, WgpuSubmission::read)?;
+    let drawn = drawn_sheet(built(processes::add_to)?, |submission: &WgpuSubmission, view, target: &str| {
+        submission.read(view, target)
+    })?;
     if std::env::var_os("DRAWLOOM_RENEW_REFERENCES").is_some() {
         drawn.save(stored_sheet())?;
     }
@@ -92,7 +94,10 @@ fn contact_sheet_in_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = SoftwareBackend::new(Arc::clone(&scheduler));
     let built = processes::add_to(Renderer::builder(backend)).build(scheduler)?;
-    expect_stored_sheet(&drawn_sheet(built, SoftwareSubmission::read)?, "drawloom-sheet-in-software.png")
+    expect_stored_sheet(
+        &drawn_sheet(built, |submission: &SoftwareSubmission, view, target: &str| submission.read(view, target))?,
+        "drawloom-sheet-in-software.png",
+    )
 }
 
 /// Draws the contact sheet; `read` reads a target of a view, by index.

@@ -10,6 +10,7 @@ use drawloom::fence::Fence;
 use drawloom::glam::DVec3;
 use drawloom::process::{
     ClearColor, Declare, Deferred, Draws, Format, FullScreen, PostStep, RenderProcess, ShaderResource, ToneMapping,
+    targets,
 };
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
@@ -178,13 +179,13 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Contender<B> {
                 builder.deferred(Deferred::new().post(ToneMapping::default()).post(steps::grade_on_device))
             }
             Kind::LateGrade => {
-                let source = StepSource::whole("picture");
+                let source = StepSource::whole(targets::PICTURE);
                 let post = post.insert(AsyncPost::new(Arc::clone(&scheduler), Grade, source));
                 let late = post.late_picture("late picture", Format::Rgba8Srgb);
                 builder.deferred(Deferred::to_picture()).process(late).output("late picture")
             }
             Kind::LateGradeAlone | Kind::GradeOnCpuInSameFrame => {
-                let source = StepSource::whole("picture");
+                let source = StepSource::whole(targets::PICTURE);
                 post = Some(AsyncPost::new(Arc::clone(&scheduler), Grade, source));
                 builder.deferred(Deferred::to_picture())
             }
@@ -340,7 +341,7 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Waiting<B> {
         let composition = Renderer::builder(second)
             .process(Arc::clone(&compose))
             .process(ToneMapping::default().process("composed", "picture"))
-            .output("picture")
+            .output(targets::PICTURE)
             .build(Arc::clone(&scheduler))?;
         Ok(Self { composition, compose, scene, step: Box::new(bloom.on_cpu()), scheduler })
     }
@@ -363,7 +364,7 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Waiting<B> {
         let frame = StepFrame { picture: &picture, camera, number: 1, scheduler: &self.scheduler };
         let layer = renderer.backend().upload_picture(&self.step.compute(&frame))?;
         let took = start.elapsed();
-        let (radiance, _) = submitted.submission.texture(0, "radiance").ok_or("it is an output")?;
+        let (radiance, _) = submitted.submission.texture(0, targets::RADIANCE)?;
         let view = radiance.create_view(&wgpu::TextureViewDescriptor::default());
         let radiance = ShaderResource::Texture { view, dimension: wgpu::TextureViewDimension::D2 };
         *self.compose.0.lock().expect("no thread panics") = vec![layer.ok_or("wgpu has textures")?, radiance];

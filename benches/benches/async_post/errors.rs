@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Picture, PipelineLibrary, WgpuBackend};
 use drawloom::glam::{DVec3, Quat, Vec3};
-use drawloom::process::{Deferred, ToneMapping};
+use drawloom::process::{Deferred, ToneMapping, targets};
 use drawloom::scene::{Camera, Changes, Light, Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter};
@@ -164,7 +164,7 @@ impl Engine {
                 (post, LayerSettings { strength: 0.5, reprojection, ..LayerSettings::default() })
             }
             Layer::Occlusion => {
-                let post = AsyncPost::new(Arc::clone(&scheduler), AmbientOcclusion, StepSource::whole("depth"));
+                let post = AsyncPost::new(Arc::clone(&scheduler), AmbientOcclusion, StepSource::whole(targets::DEPTH));
                 (post, LayerSettings { blend: LayerBlend::Multiply, reprojection, ..LayerSettings::default() })
             }
         };
@@ -186,7 +186,7 @@ impl Engine {
         let mut recorded = self.renderer.record(world)?;
         self.post.read_back(&mut recorded);
         let number = self.post.statistics()[0].frame;
-        let picture = self.submitter.submit(recorded)?.submission.read(0, "picture")?;
+        let picture = self.submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?;
         let start = Instant::now();
         while self.post.latest(&camera.name).is_none_or(|(latest, _)| latest < number) {
             if start.elapsed() > LONG {

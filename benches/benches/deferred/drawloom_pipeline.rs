@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use drawloom::backend::{Picture, WgpuBackend, WgpuSubmission};
-use drawloom::process::Draws;
+use drawloom::process::{Draws, targets};
 use drawloom::scene::SceneRef;
 use drawloom::{FrameStatistics, Renderer, Submitter};
 use drawloom_benches::stopwatch::{FrameTime, timed_frame};
@@ -50,6 +50,6 @@ impl Contender for DrawloomPipeline {
 
     fn picture(&self) -> Result<Picture, Box<dyn Error>> {
         let submission = self.submission.as_ref().ok_or("no frame was drawn")?;
-        Ok(submission.read(0, "picture")?)
+        Ok(submission.read(0, targets::PICTURE)?)
     }
 }

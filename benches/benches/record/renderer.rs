@@ -53,7 +53,7 @@ impl Technique for Drawloom {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        let texture = self.last.as_ref().and_then(|submission| Some(submission.texture(camera, COLOR)?.0));
+        let texture = self.last.as_ref().and_then(|submission| Some(submission.texture(camera, COLOR).ok()?.0));
         let backend = self.renderer.backend();
         pictures::read(backend.device(), backend.queue(), texture.ok_or("no frame was drawn")?)
     }

@@ -3,7 +3,7 @@
 use drawloom::command::Selection;
 use drawloom::process::{
     CommandDraws, CpuShader, Declare, Draws, InjectionPoint, ObjectCpuShader, ObjectPixel, PassInputs, RenderProcess,
-    ShaderObject, VARYINGS, VertexInput, VertexOutput,
+    ShaderObject, VARYINGS, VertexInput, VertexOutput, targets,
 };
 use drawloom::raster::{Real, Vector, Vector4};
 use drawloom::scene::{LayerMask, ViewKind};
@@ -27,10 +27,10 @@ impl RenderProcess for Mirror {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterLighting);
-        declare.samples_view(ViewKind::Reflection, self.view, "radiance");
-        declare.draws_over("radiance");
+        declare.samples_view(ViewKind::Reflection, self.view, targets::RADIANCE);
+        declare.draws_over(targets::RADIANCE);
         // The pipeline has drawn the surface as a black object.
-        declare.matches_depth("depth");
+        declare.matches_depth(targets::DEPTH);
         self.after.into_iter().for_each(|before| declare.after(before));
     }
 
@@ -85,10 +85,10 @@ impl RenderProcess for Impostor {
 
     fn declare(&self, declare: &mut Declare) {
         declare.at(InjectionPoint::AfterLighting);
-        declare.samples_view(ViewKind::Reflection, IMPOSTOR, "radiance");
-        declare.samples_view(ViewKind::Reflection, IMPOSTOR, "depth");
-        declare.draws_over("radiance");
-        declare.tests_depth("depth");
+        declare.samples_view(ViewKind::Reflection, IMPOSTOR, targets::RADIANCE);
+        declare.samples_view(ViewKind::Reflection, IMPOSTOR, targets::DEPTH);
+        declare.draws_over(targets::RADIANCE);
+        declare.tests_depth(targets::DEPTH);
         // It writes no depth, so mirrors behind it are drawn first.
         MIRRORS.iter().for_each(|(mirror, _)| declare.after(mirror));
     }

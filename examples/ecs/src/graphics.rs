@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Picture, WgpuBackend};
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::Deferred;
+use drawloom::process::{Deferred, targets};
 use drawloom::scene::{Assets, Camera, Changes, Light, Material, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{Renderer, Submitter, wgpu};
@@ -99,7 +99,8 @@ impl Graphics {
         let began = Instant::now();
         let mut recorded = self.renderer.record(scene)?;
         let record = began.elapsed();
-        let read_back = if keeps_picture { Some(recorded.read_back(0, "picture", [0, 0], Self::SIZE)?) } else { None };
+        let read_back =
+            if keeps_picture { Some(recorded.read_back(0, targets::PICTURE, [0, 0], Self::SIZE)?) } else { None };
         let began = Instant::now();
         self.submitter.submit(recorded)?;
         let submit = began.elapsed();

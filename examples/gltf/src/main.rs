@@ -16,7 +16,7 @@ use clap::Parser;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use drawloom::Renderer;
 use drawloom::backend::WgpuBackend;
-use drawloom::process::{Deferred, Fxaa, ToneMapping};
+use drawloom::process::{Deferred, Fxaa, ToneMapping, targets};
 use drawloom::task::Scheduler;
 use drawloom_gltf::{GltfLimits, LoadOptions, World, draw, load};
 use drawloom_output::{PictureFile, path_text, print_diagnostic, print_line};
@@ -115,7 +115,7 @@ fn run(arguments: &Arguments, world: &World, scheduler: Arc<Scheduler>) -> Resul
     let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
-    let picture = submitter.submit(recorded)?.submission.read(0, "picture")?;
+    let picture = submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?;
     arguments.picture.write([picture.width, picture.height], &picture.bytes)?;
     print_line!("{}", describe(world, arguments));
     Ok(())

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use drawloom::backend::{Picture, SurfaceFrame, WgpuBackend, WindowDevice};
 use drawloom::glam::DVec3;
-use drawloom::process::Format;
+use drawloom::process::{Format, targets};
 use drawloom::task::{JobPanic, Scheduler};
 use drawloom::{RecordedFrame, SubmitError};
 use drawloom_egui::Inspector;
@@ -153,7 +153,7 @@ impl Engine {
         for window in self.windows.iter_mut().filter(|window| window.is_due()) {
             window.update(step);
             if let Some(frame) = window.acquire()? {
-                graphics.renderer.backend().import_target(window.name(), "picture", frame.target().clone());
+                graphics.renderer.backend().import_target(window.name(), targets::PICTURE, frame.target().clone());
                 cameras.push(window.camera(&frame));
                 frames.push((window, frame));
             }
@@ -167,7 +167,7 @@ impl Engine {
         let is_last = self.options.frames == Some(self.frames);
         let takes_screenshot = is_last && self.options.screenshot.is_some();
         let read_back =
-            if takes_screenshot { Some(recorded.read_back(0, "picture", [0, 0], first.size)?) } else { None };
+            if takes_screenshot { Some(recorded.read_back(0, targets::PICTURE, [0, 0], first.size)?) } else { None };
 
         let world = (!self.options.still).then_some(&mut self.world);
         submit_and_update(graphics, recorded, frames, &mut self.inspector, |scheduler| match world {

@@ -8,7 +8,7 @@
 //! use std::sync::Arc;
 //!
 //! use drawloom::backend::{Picture, WgpuBackend};
-//! use drawloom::process::{Deferred, Fxaa, ToneMapping};
+//! use drawloom::process::{Deferred, Fxaa, ToneMapping, targets};
 //! use drawloom::task::Scheduler;
 //! use drawloom::{Renderer, wgpu};
 //! use drawloom_gltf::{World, draw};
@@ -26,7 +26,7 @@
 //!     let builder = draw::add_world(builder, deferred, (&device, &queue), world)?;
 //!     let (mut renderer, submitter) = builder.build(scheduler)?;
 //!     let recorded = renderer.record(world.as_scene_ref(&world.columns()))?;
-//!     Ok(submitter.submit(recorded)?.submission.read(0, "picture")?)
+//!     Ok(submitter.submit(recorded)?.submission.read(0, targets::PICTURE)?)
 //! }
 //! ```
 

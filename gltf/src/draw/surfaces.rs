@@ -3,7 +3,7 @@
 use drawloom::command::Selection;
 use drawloom::process::{
     CommandDraws, Declare, Deformation, Draws, ILLUMINATION_SHADER, InjectionPoint, RenderProcess, ShaderResource,
-    ShadowCasters,
+    targets,
 };
 use drawloom::scene::ViewKind;
 
@@ -61,23 +61,23 @@ impl RenderProcess for Surfaces {
         match self.kind {
             SurfaceKind::Blended => {
                 declare.at(InjectionPoint::AfterTransparency);
-                declare.tests_depth("depth");
+                declare.tests_depth(targets::DEPTH);
             }
             SurfaceKind::MaskedCasters => {
                 declare.views(ViewKind::Shadow);
-                declare.draws_depth(ShadowCasters::TARGET);
+                declare.draws_depth(targets::SHADOW_MAP);
             }
             SurfaceKind::Opaque | SurfaceKind::Masked => {
                 declare.at(InjectionPoint::AfterLighting);
-                declare.draws_depth("depth");
+                declare.draws_depth(targets::DEPTH);
             }
         }
         if let Some(previous) = &self.previous {
             declare.after(previous);
         }
         if self.kind != SurfaceKind::MaskedCasters {
-            declare.draws_over("radiance");
-            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+            declare.draws_over(targets::RADIANCE);
+            declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         }
         if let Some(deformation) = &self.deformation {
             deformation.declare(declare);

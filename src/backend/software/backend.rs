@@ -35,7 +35,7 @@ use crate::timeline::{Labels, TuningChoice};
 /// use drawloom::Renderer;
 /// use drawloom::backend::SoftwareBackend;
 /// use drawloom::glam::DVec3;
-/// use drawloom::process::Deferred;
+/// use drawloom::process::{Deferred, targets};
 /// use drawloom::scene::{Camera, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 /// use drawloom::task::Scheduler;
 ///
@@ -53,7 +53,7 @@ use crate::timeline::{Labels, TuningChoice};
 /// scene.cameras.push(Camera { size: [96, 54], ..camera });
 ///
 /// let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
-/// let picture = submitted.submission.read(0, "picture")?;
+/// let picture = submitted.submission.read(0, targets::PICTURE)?;
 /// assert_eq!(picture.bytes.len(), 96 * 54 * 4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

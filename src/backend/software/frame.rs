@@ -63,9 +63,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
     }
 
     fn read_back(&mut self, view: usize, target: &str) -> Result<SoftwareReadBack, BackendError> {
-        if self.targets.find(view, target).is_none() {
-            return Err(BackendError::UnknownTarget { view, target: target.to_owned() });
-        }
+        self.targets.named(view, target)?;
         let (read_back, copy) = new_read_back(view, target);
         self.read_backs.push(copy);
         Ok(read_back)

@@ -30,7 +30,7 @@ pub(super) fn new_read_back(view: usize, target: &str) -> (SoftwareReadBack, Rea
 impl ReadBackCopy {
     /// Copies the target, now that the frame is drawn.
     pub(super) fn drawn(self, targets: &dyn ReadTargets) {
-        *self.picture.lock() = targets.picture(self.view, &self.target);
+        *self.picture.lock() = targets.picture(self.view, &self.target).ok();
     }
 }
 

@@ -19,8 +19,8 @@ impl SoftwareSubmission {
     ///
     /// # Errors
     /// If there is no such target.
-    pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
-        self.targets.picture(view, target).ok_or_else(|| unknown(view, target))
+    pub fn read(&self, view: usize, target: impl AsRef<str>) -> Result<Picture, BackendError> {
+        self.targets.picture(view, target.as_ref())
     }
 
     /// The same as numbers, before they are converted to the format: rows from top to bottom, four numbers a pixel.
@@ -28,18 +28,18 @@ impl SoftwareSubmission {
     ///
     /// # Errors
     /// If there is no such target.
-    pub fn numbers(&self, view: usize, target: &str) -> Result<Vec<[f64; 4]>, BackendError> {
-        self.targets.numbers(view, target).ok_or_else(|| unknown(view, target))
+    pub fn numbers(&self, view: usize, target: impl AsRef<str>) -> Result<Vec<[f64; 4]>, BackendError> {
+        self.targets.numbers(view, target.as_ref())
     }
 }
 
-fn unknown(view: usize, target: &str) -> BackendError {
-    BackendError::UnknownTarget { view, target: target.to_owned() }
-}
-
-/// The targets of a frame in either precision, read by view and name; `None` if there is no such target.
+/// The targets of a frame in either precision, read by view and name.
 pub(super) trait ReadTargets: Send + Sync {
-    fn picture(&self, view: usize, target: &str) -> Option<Picture>;
+    /// # Errors
+    /// If there is no such target.
+    fn picture(&self, view: usize, target: &str) -> Result<Picture, BackendError>;
 
-    fn numbers(&self, view: usize, target: &str) -> Option<Vec<[f64; 4]>>;
+    /// # Errors
+    /// If there is no such target.
+    fn numbers(&self, view: usize, target: &str) -> Result<Vec<[f64; 4]>, BackendError>;
 }

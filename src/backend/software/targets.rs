@@ -68,6 +68,15 @@ impl<R> SoftwareTargets<R> {
         find(self.views.get(view)?, name)
     }
 
+    /// # Errors
+    /// As [`Self::find`], if the view has no such target: the error lists those that it has.
+    pub(super) fn named(&self, view: usize, name: &str) -> Result<&SoftwareTarget<R>, BackendError> {
+        self.find(view, name).ok_or_else(|| {
+            let targets = self.views.get(view).into_iter().flatten();
+            BackendError::unknown_target(view, name, targets.map(|(_, target)| target.texture.planned.name.as_str()))
+        })
+    }
+
     /// A view's target by its index among the plan's; `None` if views of another kind have it.
     pub(super) fn get(&self, view: usize, index: usize) -> Option<&SoftwareTarget<R>> {
         let targets = self.views.get(view)?;
@@ -338,11 +347,11 @@ fn four_channels<R: Precision>(pixel: &[R]) -> Vector4<R> {
 }
 
 impl<R: Precision> ReadTargets for SoftwareTargets<R> {
-    fn picture(&self, view: usize, target: &str) -> Option<Picture> {
-        self.find(view, target).map(|target| target.picture())
+    fn picture(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
+        self.named(view, target).map(|target| target.picture())
     }
 
-    fn numbers(&self, view: usize, target: &str) -> Option<Vec<[f64; 4]>> {
-        self.find(view, target).map(|target| target.numbers())
+    fn numbers(&self, view: usize, target: &str) -> Result<Vec<[f64; 4]>, BackendError> {
+        self.named(view, target).map(|target| target.numbers())
     }
 }

@@ -38,8 +38,8 @@ pub struct WgpuBackend {
     pub(super) uploads: CountedQueue,
     pub(super) layouts: BindGroupLayouts,
     pub(super) pipelines: Mutex<PipelineCache>,
-    /// What is shared with other backends, if the backend is of a [`PipelineLibrary`](super::PipelineLibrary).
-    pub(super) library: Option<SharedPipelines>,
+    /// What processes share, and the backends of a [`PipelineLibrary`](super::PipelineLibrary).
+    pub(super) shared_pipelines: SharedPipelines,
     /// Created when a plan draws lights for the first time.
     pub(super) light_meshes: Mutex<Option<Arc<LightMeshes>>>,
     pub(super) meshes: Mutex<MeshCache>,
@@ -126,7 +126,7 @@ impl WgpuBackend {
             uploads: CountedQueue::new(queue),
             layouts,
             pipelines: Mutex::default(),
-            library: None,
+            shared_pipelines: SharedPipelines::new(false),
             light_meshes: Mutex::default(),
             meshes: Mutex::default(),
             materials: Mutex::default(),
@@ -232,8 +232,8 @@ impl WgpuBackend {
     }
 
     /// Makes the next recorded frame draw into `texture` instead of the target `target` of the camera named `view`: for
-    /// example into a surface's texture instead of `"picture"`. Of several cameras of that name, it is the first one
-    /// that has this target.
+    /// example into a surface's texture instead of [`targets::PICTURE`](crate::process::targets::PICTURE). Of several
+    /// cameras of that name, it is the first one that has this target.
     ///
     /// The texture must be a 2D texture with one layer and one sample per pixel, of the target's size. Its format must
     /// be the target's, or differ only in sRGB; then its `view_formats`, or those of the surface's configuration, must
@@ -246,19 +246,19 @@ impl WgpuBackend {
     /// target again, also if that one fails.
     ///
     /// ```no_run
-    /// # use drawloom::{Renderer, Submitter, backend::WgpuBackend, scene::SceneRef, wgpu};
+    /// # use drawloom::{Renderer, Submitter, backend::WgpuBackend, process::targets, scene::SceneRef, wgpu};
     /// # fn frame(renderer: &mut Renderer<WgpuBackend>, submitter: &Submitter<WgpuBackend>, surface_texture: wgpu::SurfaceTexture,
     /// #     scene: SceneRef<'_>) -> Result<(), Box<dyn std::error::Error>> {
     /// // The pipeline's tone mapping has the format of the surface.
-    /// renderer.backend().import_target("main", "picture", surface_texture.texture.clone());
+    /// renderer.backend().import_target("main", targets::PICTURE, surface_texture.texture.clone());
     /// let recorded = renderer.record(scene)?;
     /// submitter.submit(recorded)?;
     /// renderer.backend().queue().present(surface_texture);
     /// # Ok(())
     /// # }
     /// ```
-    pub fn import_target(&self, view: impl Into<String>, target: impl Into<String>, texture: wgpu::Texture) {
-        let import = ImportedTarget { view: view.into(), target: target.into(), texture };
+    pub fn import_target(&self, view: impl Into<String>, target: impl AsRef<str>, texture: wgpu::Texture) {
+        let import = ImportedTarget { view: view.into(), target: target.as_ref().to_owned(), texture };
         let mut imports = self.imports.lock();
         imports.retain(|other| !other.is_of(&import.view, &import.target));
         imports.push(import);
@@ -380,7 +380,8 @@ impl WgpuBackend {
 /// What a [`WgpuBackend`] keeps on the device from frame to frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WgpuResources {
-    /// The number of pipelines of all render processes drawn so far.
+    /// The number of render pipelines of all processes drawn so far. Processes share those that are the same: of one
+    /// WGSL, with equal formats and state.
     pub pipelines: usize,
     /// The number of textures that the latest frame's views draw into. A shared one counts once.
     pub targets: usize,

@@ -59,20 +59,18 @@ impl Backend for WgpuBackend {
             match found {
                 Some(pipelines) => {
                     let variants = states.iter().flat_map(|state| pipelines.variants_of(*state));
-                    let create = || pipelines.create_missing(&self.device, variants);
+                    let create = || pipelines.create_missing(&self.device, &label, variants);
                     pipelines.insert(with_error_scope(&self.device, &label, create).flatten()?);
-                    pipelines.share();
                 }
                 None => {
                     let create = || {
-                        let (device, layouts, library) = (&self.device, &self.layouts, self.library.as_ref());
-                        let made = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
+                        let (device, shared) = (&self.device, (&self.shared_pipelines, &self.layouts));
+                        let made = ProcessPipelines::new(device, shared, plan, planned, draws, quality)?;
                         let variants = states.iter().flat_map(|state| made.variants_of(*state));
-                        made.insert(made.create_missing(&self.device, variants)?);
+                        made.insert(made.create_missing(&self.device, &label, variants)?);
                         Ok(made)
                     };
                     let made = with_error_scope(&self.device, &label, create).flatten()?;
-                    made.share();
                     self.pipelines.lock().add_prepared(plan, planned, draws, quality, made);
                 }
             }
@@ -239,7 +237,7 @@ impl FrameRecorder for WgpuBackend {
             }
             let runs = list.batches.chunk_by(|one, next| frame.meshes.share_pipeline(one, next));
             let variant = |run: &[Batch]| PipelineVariant::of_batch(&frame.meshes, &run[0]).clamping(pass.clamps_depth);
-            pipelines.create_missing(&self.device, runs.map(variant))
+            pipelines.create_missing(&self.device, &pass.label, runs.map(variant))
         })
         .flatten()
         // Some of the resources just created may be unusable.
@@ -247,10 +245,7 @@ impl FrameRecorder for WgpuBackend {
             self.subdivisions.clear();
             self.fail_frame(error);
         })?;
-        if !created.is_empty() {
-            pipelines.insert(created);
-            pipelines.share();
-        }
+        pipelines.insert(created);
         if pipelines.has_unreadable() {
             count_unreadable(frame, request, pipelines, list, pass.clamps_depth);
         }

@@ -134,10 +134,9 @@ impl WgpuBackend {
         request: &FrameRequest<'_>,
     ) -> Result<Arc<[Arc<ProcessPipelines>]>, BackendError> {
         let FrameRequest { plan, draws, quality, .. } = *request;
-        let library = self.library.as_ref();
         hold_events(|| {
             let mut pipelines = self.pipelines.lock();
-            pipelines.update(&self.device, &self.layouts, library, plan, draws, quality)
+            pipelines.update(&self.device, (&self.shared_pipelines, &self.layouts), plan, draws, quality)
         })
     }
 
@@ -220,7 +219,7 @@ impl WgpuBackend {
             return Err(broken_rule("a frame has the targets that its passes sample"));
         }
         let sampled = (1..).zip(sampled.map(BindingResource::Texture));
-        let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_ref());
+        let (before, layout) = (pass.process_bind_group.take(), pipelines.process_layout.as_deref());
         let shared = declaration.bound_buffers().filter_map(|(buffer, _)| buffers.find(buffer));
         let shared = shared.map(|buffer| BindingResource::Buffer(buffer.as_entire_buffer_binding()));
         let bound = parameters.into_iter().chain(sampled).chain((1 + samples as u32..).zip(shared));
@@ -241,7 +240,7 @@ impl WgpuBackend {
             }
             ShaderResource::Sampler { sampler, .. } => Some(BindingResource::Sampler(sampler)),
         });
-        let (before, layout) = (pass.engine_bind_group.take(), pipelines.engine_layout.as_ref());
+        let (before, layout) = (pass.engine_bind_group.take(), pipelines.engine_layout.as_deref());
         let bound = (0..).zip(columns.map(BindingResource::Buffer).chain(materials).chain(own));
         pass.engine_bind_group = CachedBindGroup::update(before, &self.device, &pass.label, layout, bound)?;
         Ok(())

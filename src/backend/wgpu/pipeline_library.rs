@@ -35,7 +35,7 @@ pub struct PipelineLibrary {
 impl PipelineLibrary {
     /// An empty library of the engine's device.
     pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self { device, queue, shared: SharedPipelines::default() }
+        Self { device, queue, shared: SharedPipelines::new(true) }
     }
 
     /// A backend on the device, as [`WgpuBackend::new`] makes it, that uses and adds to what the library has.
@@ -44,7 +44,7 @@ impl PipelineLibrary {
     /// If the device lacks a feature or a limit, naming it.
     pub fn backend(&self) -> Result<WgpuBackend, BackendError> {
         let backend = WgpuBackend::new(self.device.clone(), self.queue.clone())?;
-        Ok(WgpuBackend { library: Some(self.shared.clone()), ..backend })
+        Ok(WgpuBackend { shared_pipelines: self.shared.clone(), ..backend })
     }
 
     /// Drops all that was compiled, for example after many versions of a shader that is being edited. Renderers keep
@@ -55,6 +55,6 @@ impl PipelineLibrary {
 
     /// The number of pipelines that the library has.
     pub fn pipeline_count(&self) -> usize {
-        self.shared.pipeline_count()
+        self.shared.kept_pipeline_count()
     }
 }

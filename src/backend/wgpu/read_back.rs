@@ -176,8 +176,7 @@ pub(crate) fn new_read_back(
     target: &str,
     [origin, size]: [[u32; 2]; 2],
 ) -> Result<(WgpuReadBack, ReadBackCopy), BackendError> {
-    let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
-    let found = targets.find(view, target).ok_or_else(unknown)?.clone();
+    let found = targets.named(view, target)?.clone();
     if found.is_transient() {
         return Err(BackendError::TransientTarget { view, target: target.to_owned() });
     }

@@ -199,11 +199,17 @@ impl WgpuSubmission {
     }
 
     /// The texture of a view's target, to present or to copy, and the layer that is the target's: 0 but where views
-    /// have targets that are layers of one texture. The next frame draws into the same texture. `None` if there is no
-    /// such target, or it is [transient](super::WgpuBackend::transient_targets).
-    pub fn texture(&self, view: usize, target: &str) -> Option<(&wgpu::Texture, u32)> {
-        let found = self.targets.find(view, target).filter(|target| !target.is_transient())?;
-        Some((&found.texture, found.layer))
+    /// have targets that are layers of one texture. The next frame draws into the same texture.
+    ///
+    /// # Errors
+    /// If there is no such target, or it is [transient](super::WgpuBackend::transient_targets).
+    pub fn texture(&self, view: usize, target: impl AsRef<str>) -> Result<(&wgpu::Texture, u32), BackendError> {
+        let target = target.as_ref();
+        let found = self.targets.named(view, target)?;
+        if found.is_transient() {
+            return Err(BackendError::TransientTarget { view, target: target.to_owned() });
+        }
+        Ok((&found.texture, found.layer))
     }
 
     /// Waits until the device has drawn the frame, however long that takes.
@@ -233,12 +239,12 @@ impl WgpuSubmission {
     /// # Errors
     /// If there is no such target, it is [transient](super::WgpuBackend::transient_targets), or the device refuses or
     /// is lost.
-    pub fn read(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
+    pub fn read(&self, view: usize, target: impl AsRef<str>) -> Result<Picture, BackendError> {
+        let target = target.as_ref();
         self.wait()?;
         // The calls below do not report it, and the wait does not if the frame was drawn before.
         check_device(&self.device)?;
-        let unknown = || BackendError::UnknownTarget { view, target: target.to_owned() };
-        let found = self.targets.find(view, target).ok_or_else(unknown)?;
+        let found = self.targets.named(view, target)?;
         let whole = [found.texture.width(), found.texture.height()];
         let (read_back, copy) = new_read_back(&self.device, &self.targets, view, target, [[0, 0], whole])?;
         let index = with_error_scope(&self.device, target, || {

@@ -39,7 +39,7 @@ pub struct WindowDevice {
 /// use std::sync::Arc;
 ///
 /// use drawloom::backend::{WgpuBackend, WindowDevice, WindowSurface};
-/// use drawloom::process::{Deferred, ToneMapping};
+/// use drawloom::process::{Deferred, ToneMapping, targets};
 /// use drawloom::scene::Scene;
 /// use drawloom::task::Scheduler;
 /// use drawloom::{Renderer, Submitter};
@@ -61,7 +61,7 @@ pub struct WindowDevice {
 /// ) -> Result<(), Box<dyn Error>> {
 ///     let Some(frame) = surface.acquire(window_size)? else { return Ok(()) };
 ///     world.cameras[0].size = frame.size();
-///     renderer.backend().import_target(&world.cameras[0].name, "picture", frame.target().clone());
+///     renderer.backend().import_target(&world.cameras[0].name, targets::PICTURE, frame.target().clone());
 ///     let recorded = renderer.record(world.as_scene_ref())?;
 ///     submitter.submit(recorded)?;
 ///     frame.present(|_texture| { /* a user interface over it */ });

@@ -4,7 +4,7 @@
 mod cpu_shader;
 
 use crate::command::Selection;
-use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess, targets};
 
 /// Draws the depth of every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType) into
 /// `depth` before the geometry buffer, which then stores each pixel once instead of once for each surface that is
@@ -30,7 +30,7 @@ impl RenderProcess for DepthPrePass {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.clears_depth("depth", self.format);
+        declare.clears_depth(targets::DEPTH, self.format);
     }
 
     fn draws(&self) -> Draws<'_> {

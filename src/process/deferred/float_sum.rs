@@ -4,7 +4,7 @@
 mod cpu_shader;
 
 use super::LightSum;
-use crate::process::{BlendEquation, ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
+use crate::process::{BlendEquation, ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, Target, targets};
 
 /// Adds a target of floats, in which other processes have summed small contributions, to the target `radiance` once:
 /// see [`RadianceSum::Float`](crate::quality::RadianceSum::Float). The target's alpha is how much it hides of what
@@ -12,15 +12,16 @@ use crate::process::{BlendEquation, ClearColor, Declare, Draws, Format, FullScre
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FloatSum {
     name: &'static str,
-    target: &'static str,
+    target: Target,
 }
 
 impl FloatSum {
     /// Of what lights add.
-    pub(super) const LIGHTS: Self = Self { name: LightSum::NAME, target: "light sum" };
+    pub(super) const LIGHTS: Self = Self { name: LightSum::NAME, target: Target::new("light sum") };
 
     /// Of blended objects.
-    pub(super) const BLENDED_OBJECTS: Self = Self { name: Self::BLENDED_OBJECTS_NAME, target: "blended sum" };
+    pub(super) const BLENDED_OBJECTS: Self =
+        Self { name: Self::BLENDED_OBJECTS_NAME, target: Target::new("blended sum") };
 
     pub(super) const BLENDED_OBJECTS_NAME: &str = "sum of blended objects";
 
@@ -41,7 +42,7 @@ impl RenderProcess for FloatSum {
 
     fn declare(&self, declare: &mut Declare) {
         declare.samples(self.target);
-        declare.draws_over("radiance");
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -6,7 +6,7 @@ mod cpu_shader;
 use super::GeometryFormats;
 use super::shading::{COLORED_SURFACE_SHADER, SURFACE_SHADER};
 use crate::command::{MaterialShare, Selection};
-use crate::process::{ClearColor, CommandDraws, Declare, Draws, MaskedEntryPoints, RenderProcess};
+use crate::process::{ClearColor, CommandDraws, Declare, Draws, MaskedEntryPoints, RenderProcess, targets};
 use crate::scene::VERTEX_COLOR;
 
 /// Stores what lighting needs of the nearest opaque surface at each pixel, in the targets of L 4.1 and one for
@@ -77,8 +77,11 @@ impl RenderProcess for GeometryBuffer {
     fn declare(&self, declare: &mut Declare) {
         let GeometryFormats { normal, diffuse, radiance, depth } = self.formats;
         let zero = ClearColor::Value([0.0; 4]);
-        let targets =
-            [("normal", normal, zero), ("diffuse", diffuse, zero), ("radiance", radiance, ClearColor::Background)];
+        let targets = [
+            (targets::NORMAL, normal, zero),
+            (targets::DIFFUSE, diffuse, zero),
+            (targets::RADIANCE, radiance, ClearColor::Background),
+        ];
         let first = self.share.index == 0;
         for (target, format, clear) in targets {
             if first {
@@ -91,11 +94,11 @@ impl RenderProcess for GeometryBuffer {
             declare.reads_attribute(VERTEX_COLOR, [1.0; 3]);
         }
         if self.has_depth {
-            declare.matches_depth("depth");
+            declare.matches_depth(targets::DEPTH);
         } else if first {
-            declare.clears_depth("depth", depth);
+            declare.clears_depth(targets::DEPTH, depth);
         } else {
-            declare.draws_depth("depth");
+            declare.draws_depth(targets::DEPTH);
         }
     }
 

@@ -1,6 +1,6 @@
 //! The formats of the geometry buffer's targets.
 
-use crate::process::Format;
+use crate::process::{Format, Target, targets};
 
 /// The formats of the geometry buffer's targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,17 +29,21 @@ impl Default for GeometryFormats {
 
 impl GeometryFormats {
     /// The first target whose format lacks what it needs.
-    pub(super) fn first_unsuitable(&self) -> Option<(&'static str, Format)> {
-        let targets = [("normal", self.normal, 2), ("diffuse", self.diffuse, 3), ("radiance", self.radiance, 3)];
-        let lacks = |(target, format, channels): &(&str, Format, usize)| {
+    pub(super) fn first_unsuitable(&self) -> Option<(Target, Format)> {
+        let targets = [
+            (targets::NORMAL, self.normal, 2),
+            (targets::DIFFUSE, self.diffuse, 3),
+            (targets::RADIANCE, self.radiance, 3),
+        ];
+        let lacks = |(target, format, channels): &(Target, Format, usize)| {
             // Lights are added to radiance.
-            let is_blended = *target == "radiance";
+            let is_blended = *target == targets::RADIANCE;
             format.is_depth_stencil()
                 || format.is_integer()
                 || format.channels() < *channels
                 || (is_blended && !format.can_be_blended())
         };
         let unsuitable = targets.into_iter().find(lacks).map(|(target, format, _)| (target, format));
-        unsuitable.or_else(|| (!self.depth.has_depth()).then_some(("depth", self.depth)))
+        unsuitable.or_else(|| (!self.depth.has_depth()).then_some((targets::DEPTH, self.depth)))
     }
 }

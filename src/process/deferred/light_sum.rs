@@ -5,8 +5,8 @@ mod cpu_shader;
 
 use super::light_tiles::LIGHT_TILES_SHADER;
 use super::shading::{ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, shadow_shader};
-use super::{GeometryFormats, LightClasses, LightTiles, ShadowCasters};
-use crate::process::{Declare, Draws, FullScreen, RenderProcess};
+use super::{GeometryFormats, LightClasses, LightTiles};
+use crate::process::{Declare, Draws, FullScreen, RenderProcess, targets};
 use crate::scene::{Blend, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
@@ -26,7 +26,7 @@ pub(super) struct LightSum {
 impl LightSum {
     pub(super) const NAME: &str = "sum of lights";
 
-    /// `maps` are those that [`ShadowCasters`] draws, if there are any.
+    /// `maps` are those that [`ShadowCasters`](super::ShadowCasters) draws, if there are any.
     pub(super) fn new(classes: LightClasses, formats: GeometryFormats, maps: Option<&ShadowMaps>) -> Self {
         let shader = [
             &formats.normal_encoding_wgsl(),
@@ -57,14 +57,14 @@ impl RenderProcess for LightSum {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.samples("depth");
-        declare.samples("normal");
-        declare.samples("diffuse");
+        declare.samples(targets::DEPTH);
+        declare.samples(targets::NORMAL);
+        declare.samples(targets::DIFFUSE);
         declare.samples(LightTiles::TARGET);
         if self.maps.is_some() {
-            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+            declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         }
-        declare.draws_over("radiance");
+        declare.draws_over(targets::RADIANCE);
     }
 
     fn draws(&self) -> Draws<'_> {

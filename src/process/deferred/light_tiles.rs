@@ -3,7 +3,7 @@
 #[cfg(feature = "software")]
 pub(super) mod cpu_shader;
 
-use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, TargetSize};
+use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, Target, TargetSize};
 
 /// Marks the lights that may reach each tile of 32 × 32 pixels, for a shader that sums lights: so that a pixel tests
 /// those of its tile, and not all.
@@ -16,7 +16,7 @@ pub(super) struct LightTiles;
 
 impl LightTiles {
     pub(super) const NAME: &str = "tiles of lights";
-    pub(super) const TARGET: &str = "light tiles";
+    pub(super) const TARGET: Target = Target::new("light tiles");
 }
 
 /// WGSL that both the process and readers of its target need.

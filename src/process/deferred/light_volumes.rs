@@ -6,8 +6,8 @@ mod cpu_shader;
 use std::borrow::Cow;
 
 use super::shading::{ILLUMINATION_SHADER, shadow_shader};
-use super::{FloatSum, GeometryFormats, ShadowCasters};
-use crate::process::{Declare, Draws, LightDraws, RenderProcess};
+use super::{FloatSum, GeometryFormats};
+use crate::process::{Declare, Draws, LightDraws, RenderProcess, targets};
 use crate::scene::{LightKind, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
@@ -42,7 +42,7 @@ impl LightVolumes {
         Self::of_class(kind, formats, None)
     }
 
-    /// Draws the lights of a kind that have a shadow map, drawn by [`ShadowCasters`].
+    /// Draws the lights of a kind that have a shadow map, drawn by [`ShadowCasters`](super::ShadowCasters).
     pub fn shadowed(kind: LightKind, formats: GeometryFormats, maps: &ShadowMaps) -> Self {
         Self::of_class(kind, formats, Some(maps))
     }
@@ -78,16 +78,16 @@ impl RenderProcess for LightVolumes {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare.samples("depth");
-        declare.samples("normal");
-        declare.samples("diffuse");
+        declare.samples(targets::DEPTH);
+        declare.samples(targets::NORMAL);
+        declare.samples(targets::DIFFUSE);
         if self.maps.is_some() {
-            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+            declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         }
-        declare.tests_depth("depth");
+        declare.tests_depth(targets::DEPTH);
         match self.sum {
             Some(is_first) => FloatSum::LIGHTS.declare_term(declare, is_first),
-            None => declare.draws_over("radiance"),
+            None => declare.draws_over(targets::RADIANCE),
         }
     }
 

@@ -17,6 +17,7 @@ mod injection_point;
 mod requirements;
 mod shading;
 mod shadow_casters;
+pub mod targets;
 mod transparency;
 
 pub use deformation::Deformation;

@@ -8,7 +8,7 @@ use super::{
     LightVolumes, Requirements, ShadowCasters, Transparency,
 };
 use crate::command::MaterialShare;
-use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping};
+use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping, targets};
 use crate::quality::{Quality, RadianceSum};
 use crate::unwind::Contained;
 use crate::view::{LightClass, ShadowMaps};
@@ -178,7 +178,7 @@ impl Deferred {
     /// The target that the frame outputs. Calls [`PostStep::process`] if processes are left out: a panic of a step
     /// unwinds to the caller.
     pub fn output(&self) -> &'static str {
-        if self.steps().next().is_none() { RADIANCE } else { PICTURE }
+        if self.steps().next().is_none() { targets::RADIANCE.name() } else { targets::PICTURE.name() }
     }
 
     /// Sets whether the backend can [blend floats](crate::backend::BackendExtras::can_blend_floats).
@@ -271,7 +271,7 @@ impl Deferred {
     pub(crate) fn check(&self) -> Result<(), PlanError> {
         if let Some((target, format)) = self.formats.first_unsuitable() {
             let process = String::from("geometry buffer");
-            return Err(PlanError::WrongFormat { process, target: target.to_owned(), format });
+            return Err(PlanError::WrongFormat { process, target: target.to_string(), format });
         }
         if let Some(problem) = self.shadow_maps.as_ref().and_then(ShadowMaps::problem) {
             return Err(PlanError::ShadowMaps { problem });
@@ -429,11 +429,11 @@ impl Deferred {
 
     fn post_processing(&self) -> Vec<Arc<dyn RenderProcess>> {
         let mut processes: Vec<Arc<dyn RenderProcess>> = Vec::new();
-        let mut source = RADIANCE.to_owned();
+        let mut source = targets::RADIANCE.to_string();
         let steps: Vec<_> = self.steps().collect();
         for (index, step) in steps.iter().enumerate() {
             let last = index + 1 == steps.len();
-            let target = if last { PICTURE.to_owned() } else { format!("post-processed {}", index + 1) };
+            let target = if last { targets::PICTURE.to_string() } else { format!("post-processed {}", index + 1) };
             processes.push(Arc::new(Contained::new(step.process(&source, &target))));
             source = target;
         }
@@ -446,6 +446,3 @@ impl Default for Deferred {
         Self::new()
     }
 }
-
-const RADIANCE: &str = "radiance";
-const PICTURE: &str = "picture";

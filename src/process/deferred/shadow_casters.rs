@@ -3,7 +3,7 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
-use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, Format, MaskedEntryPoints, RenderProcess, targets};
 use crate::scene::ViewKind;
 
 /// Draws the depth of all opaque objects as seen from each light that casts shadows, into the target `shadow map` of
@@ -13,7 +13,7 @@ use crate::scene::ViewKind;
 /// material has a [`MaterialType`](crate::scene::MaterialType): its `alpha_cutoff`, `opacity`, and the alpha of its
 /// `texture` at the vertices' first texture coordinates decide. If a type finds its holes in another way, its materials
 /// have an `alpha_cutoff` above 0 and an `opacity` of 0, so that they cast no shadow here, and a process of the engine
-/// draws them into [`TARGET`](Self::TARGET) after this one, which the pipeline [keeps](super::Deferred::keep) if
+/// draws them into [`targets::SHADOW_MAP`] after this one, which the pipeline [keeps](super::Deferred::keep) if
 /// processes of the engine read the maps.
 ///
 /// Each map is a view, so its objects are culled, sorted, merged and recorded like those of other views, at the same
@@ -32,9 +32,6 @@ pub struct ShadowCasters {
 }
 
 impl ShadowCasters {
-    /// The target's name.
-    pub const TARGET: &str = "shadow map";
-
     pub(crate) const NAME: &str = "shadow casters";
 }
 
@@ -45,7 +42,7 @@ impl RenderProcess for ShadowCasters {
 
     fn declare(&self, declare: &mut Declare) {
         declare.views(ViewKind::Shadow);
-        declare.clears_depth_layer(Self::TARGET, Format::Depth32Float);
+        declare.clears_depth_layer(targets::SHADOW_MAP, Format::Depth32Float);
     }
 
     fn draws(&self) -> Draws<'_> {

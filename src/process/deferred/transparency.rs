@@ -3,12 +3,12 @@
 #[cfg(feature = "software")]
 mod cpu_shader;
 
+use super::FloatSum;
 use super::shading::{
     COLORED_SURFACE_SHADER, ILLUMINATION_SHADER, LIGHT_BATCHES_SHADER, SURFACE_SHADER, shadow_shader,
 };
-use super::{FloatSum, ShadowCasters};
 use crate::command::Selection;
-use crate::process::{CommandDraws, Declare, Draws, RenderProcess};
+use crate::process::{CommandDraws, Declare, Draws, RenderProcess, targets};
 use crate::scene::{VERTEX_COLOR, ViewKind};
 use crate::view::ShadowMaps;
 
@@ -35,7 +35,7 @@ pub struct Transparency {
 impl Transparency {
     pub(super) const NAME: &str = "transparency";
 
-    /// With the shadow maps that [`ShadowCasters`] draws, if there are any.
+    /// With the shadow maps that [`ShadowCasters`](super::ShadowCasters) draws, if there are any.
     pub fn new(maps: Option<&ShadowMaps>) -> Self {
         Self { shader: shader(SURFACE_SHADER, maps, false), maps: maps.copied(), has_colors: false, sums: false }
     }
@@ -72,13 +72,13 @@ impl RenderProcess for Transparency {
             declare.reads_attribute(VERTEX_COLOR, [1.0; 3]);
         }
         if self.maps.is_some() {
-            declare.samples_layers(ViewKind::Shadow, ShadowCasters::TARGET);
+            declare.samples_layers(ViewKind::Shadow, targets::SHADOW_MAP);
         }
-        declare.tests_depth("depth");
+        declare.tests_depth(targets::DEPTH);
         if self.sums {
             FloatSum::BLENDED_OBJECTS.declare_term(declare, true);
         } else {
-            declare.draws_over("radiance");
+            declare.draws_over(targets::RADIANCE);
         }
     }
 

@@ -1,5 +1,7 @@
 //! Errors in a frame's processes and how they fit together.
 
+use std::borrow::Cow;
+
 use crate::graph::GraphProblem;
 use crate::process::{Format, TargetSize};
 
@@ -10,6 +12,24 @@ pub enum PlanError {
     /// What the processes read and write cannot be ordered.
     #[error(transparent)]
     Graph(#[from] GraphProblem),
+    /// A process uses a target that no process writes.
+    #[error("no process writes target {target:?}, used by {processes}; processes write only: {known}")]
+    UnknownTarget {
+        /// The target, with the kind of its views unless they are main views.
+        target: String,
+        /// The processes that use it.
+        processes: String,
+        /// The targets that processes write.
+        known: String,
+    },
+    /// No process writes an output of the frame.
+    #[error("no process writes the output {target:?}; processes write only: {known}")]
+    UnknownOutput {
+        /// The output.
+        target: String,
+        /// The targets that processes write.
+        known: String,
+    },
     /// A process is declared to come after or before one that the graph does not have.
     #[error("process {process:?} is to come after or before {other:?}, which the plan does not have")]
     UnknownProcess {
@@ -46,7 +66,7 @@ pub enum PlanError {
         /// The target.
         target: String,
         /// What is wrong.
-        problem: &'static str,
+        problem: Cow<'static, str>,
     },
     /// A process draws into targets of different sizes at once, or tests depth of another size.
     #[error("process {process:?} uses targets {:?} and {:?}, which differ in size, in one pass", targets[0], targets[1])]
@@ -68,13 +88,15 @@ pub enum PlanError {
     },
     /// A process reads the history of a target that no process of its views writes, or that is drawn in layers.
     #[error(
-        "process {process:?} reads {target:?}, but no process writes that target in the same views, as one for each view"
+        "process {process:?} reads {target:?}, but the targets that the same views have, one for each view, are only: {known}"
     )]
     NoHistory {
         /// The process.
         process: String,
         /// What it reads.
         target: String,
+        /// The targets that have a history.
+        known: String,
     },
     /// A process samples a target of several views as layers of one texture, which it cannot be.
     #[error(
@@ -124,7 +146,7 @@ pub enum PlanError {
         /// The target.
         target: String,
         /// What is wrong.
-        problem: &'static str,
+        problem: Cow<'static, str>,
     },
     /// A target that cannot have [mip levels](crate::process::Declare::mipmapped) is declared to have them, or
     /// processes disagree whether it has them.
@@ -135,7 +157,7 @@ pub enum PlanError {
         /// The target.
         target: String,
         /// What is wrong.
-        problem: &'static str,
+        problem: Cow<'static, str>,
     },
     /// A process draws into, or tests, targets with different numbers of samples.
     #[error("process {process:?} uses targets {:?} and {:?} in one pass, but only one of them is multisampled", targets[0], targets[1])]
@@ -153,7 +175,7 @@ pub enum PlanError {
         /// The target that it resolves.
         target: String,
         /// What is wrong.
-        problem: &'static str,
+        problem: Cow<'static, str>,
     },
     /// Two processes read material types of one name with values of different sizes.
     #[error(
@@ -212,7 +234,7 @@ pub enum PlanError {
         buffer: &'static str,
     },
     /// A process samples a target of another view that no process writes in any view.
-    #[error("process {process:?} samples {target:?} of the view {view:?}, but no process writes such a target")]
+    #[error("process {process:?} samples {target:?} of the view {view:?}, but processes write only: {known}")]
     UnknownSampledTarget {
         /// The process.
         process: String,
@@ -220,6 +242,8 @@ pub enum PlanError {
         view: String,
         /// The target.
         target: String,
+        /// The targets that processes write in views of that kind.
+        known: String,
     },
     /// The settings of the shadow maps are invalid.
     #[error("invalid shadow map settings: {problem}")]

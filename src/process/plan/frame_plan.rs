@@ -15,7 +15,7 @@ use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
 use super::sampled_views::check_sampled_views;
 use super::shared_declarations::{SharedDeclarations, check_columns, check_material_types};
-use super::target_indices::sampled_target;
+use super::unknown_targets::check_left_out;
 use super::{
     AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, TargetIndices,
     ViewGroup,
@@ -39,6 +39,8 @@ pub struct FramePlan {
     shared: SharedDeclarations,
     /// Of each process.
     attachments: Vec<Attachments>,
+    /// What is wrong with the processes that are left out.
+    left_out: Result<(), PlanError>,
     /// The graph of the processes, whose nodes are the indices of the processes before they were ordered.
     schedule: Schedule<usize>,
     /// Written on first use.
@@ -52,7 +54,9 @@ impl FramePlan {
     /// # Errors
     /// See [`PlanError`].
     pub fn new(processes: Vec<Arc<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
-        Self::for_views(Vec::new(), processes, outputs, |_| true)
+        let plan = Self::for_views(Vec::new(), processes, outputs, |_| true)?;
+        plan.check_left_out()?;
+        Ok(plan)
     }
 
     /// The plan of frames that have the kinds of views that `is_present` tells, with a chain.
@@ -95,8 +99,10 @@ impl FramePlan {
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
         let mut processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
+        let is_left_out = |index| schedule.nodes().all(|(_, kept)| *kept != index);
+        let left_out = check_left_out(&added, is_left_out, placeholder.as_ref());
         if processes.is_empty() {
-            return Err(PlanError::Empty);
+            return Err(left_out.err().unwrap_or(PlanError::Empty));
         }
         let view_groups = view_groups(&processes, &edges);
         let mut targets = targets_of(&processes, outputs)?;
@@ -119,9 +125,19 @@ impl FramePlan {
             targets,
             shared,
             attachments,
+            left_out,
             schedule,
             dot: OnceLock::new(),
         })
+    }
+
+    /// Checks the processes that are left out because no output depends on them, for a plan that has all processes
+    /// which any frame has.
+    ///
+    /// # Errors
+    /// If one of them names a target that no process creates.
+    pub(crate) fn check_left_out(&self) -> Result<(), PlanError> {
+        self.left_out.clone()
     }
 
     /// A number that no other plan of this program has.
@@ -162,13 +178,6 @@ impl FramePlan {
     pub(crate) fn passes(&self, views: &[RenderView]) -> Result<FramePasses, GraphProblem> {
         let parts = self.view_groups.iter().flat_map(|group| group.parts(&self.processes, views)).collect();
         FramePasses::new(&self.processes, &self.dependencies, views, parts)
-    }
-
-    /// The planned target of this name that a process samples in views of a kind. If no process of the frame draws such
-    /// views, it is the target of this name in views of another kind: its pixel has the same format. Where a history
-    /// has no copy for that reason, it is the target that it would be copied from.
-    pub fn sampled_target(&self, views: ViewKind, name: &str) -> Option<&PlannedTarget> {
-        sampled_target(&self.targets, views, name).map(|index| &self.targets[index])
     }
 
     /// What every process draws in this frame, in order: calls [`RenderProcess::draws`] of each.
@@ -281,27 +290,10 @@ mod tests {
     use glam::DVec3;
 
     use super::super::ViewOrder;
+    use super::super::test_process::TestProcess;
     use super::*;
-    use crate::process::{
-        ClearColor, CommandDraws, Declare, Draws, Format, GeometryBuffer, GeometryFormats, LightVolumes, ToneMapping,
-    };
+    use crate::process::{ClearColor, Declare, Format, GeometryBuffer, GeometryFormats, LightVolumes, ToneMapping};
     use crate::scene::{Camera, LightKind};
-
-    struct TestProcess<F>(&'static str, F);
-
-    impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for TestProcess<F> {
-        fn name(&self) -> &str {
-            self.0
-        }
-
-        fn declare(&self, declare: &mut Declare) {
-            (self.1)(declare);
-        }
-
-        fn draws(&self) -> Draws<'_> {
-            Draws::Commands(CommandDraws::default())
-        }
-    }
 
     fn plan(processes: Vec<Arc<dyn RenderProcess>>) -> Result<FramePlan, PlanError> {
         FramePlan::new(processes, &["picture".to_owned()])
@@ -347,7 +339,7 @@ mod tests {
         let mut processes = shipped();
         processes.pop();
         let error = plan(processes).err().unwrap().to_string();
-        assert!(error.contains("nothing writes \"radiance\"") && error.contains("point lights"), "{error}");
+        assert!(error.contains("no process writes target \"radiance\"") && error.contains("point lights"), "{error}");
 
         let mut processes = shipped();
         processes.push(Arc::new(TestProcess("fog", |declare: &mut Declare| declare.after("weather"))));

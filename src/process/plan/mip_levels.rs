@@ -1,7 +1,9 @@
 //! Which targets can have mip levels.
 
+use std::borrow::Cow;
+
 use super::{PlanError, PlannedProcess};
-use crate::process::{Access, Declaration};
+use crate::process::{Access, Declaration, list_names};
 
 /// # Errors
 /// If a process gives mip levels to a target that it does not create, or whose pixels have no mean.
@@ -10,7 +12,10 @@ pub(super) fn check_mip_levels(planned: &PlannedProcess) -> Result<(), PlanError
     for target in mipmapped {
         let created = accesses.iter().find_map(|(name, access)| (name == target).then_some((access, access.format()?)));
         let problem = match created {
-            None => "it does not create it",
+            None => {
+                let problem = format!("it does not create it, only: {}", created_targets(&planned.declaration));
+                return Err(mip_levels_error(planned, target, problem));
+            }
             Some((Access::ClearDepthLayer(_), _)) => "it draws it in layers",
             Some(_) if multisampled.contains(target) => "it is multisampled",
             Some((_, format)) if format.is_depth_stencil() => "it holds depth or a stencil",
@@ -23,6 +28,16 @@ pub(super) fn check_mip_levels(planned: &PlannedProcess) -> Result<(), PlanError
     Ok(())
 }
 
-pub(super) fn mip_levels_error(planned: &PlannedProcess, target: &str, problem: &'static str) -> PlanError {
-    PlanError::MipLevels { process: planned.name.clone(), target: target.to_owned(), problem }
+pub(super) fn mip_levels_error(
+    planned: &PlannedProcess,
+    target: &str,
+    problem: impl Into<Cow<'static, str>>,
+) -> PlanError {
+    PlanError::MipLevels { process: planned.name.clone(), target: target.to_owned(), problem: problem.into() }
+}
+
+/// The names of the targets that a process creates.
+pub(super) fn created_targets(declaration: &Declaration) -> String {
+    let created = declaration.accesses.iter().filter(|(_, access)| access.format().is_some());
+    list_names(created.map(|(name, _)| name.as_str()))
 }

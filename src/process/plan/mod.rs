@@ -11,6 +11,9 @@ mod resource_names;
 mod sampled_views;
 mod shared_declarations;
 mod target_indices;
+#[cfg(test)]
+mod test_process;
+mod unknown_targets;
 mod view_arrays;
 
 pub use error::{PlanError, ProcessError};

@@ -35,7 +35,7 @@ pub struct PlannedProcess {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TargetIndices {
     /// All of them, and how they are used, in the order declared. What the process samples of other views may be a
-    /// target of views of another kind: see [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+    /// target of views of another kind, if no process draws in those.
     pub(crate) accesses: Vec<(usize, Access)>,
     /// The colour targets in the order of the shader's outputs.
     pub(crate) colors: Vec<ColorTarget>,

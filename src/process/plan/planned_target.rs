@@ -1,9 +1,13 @@
 //! The targets that a plan's processes use.
 
-use super::mip_levels::{check_mip_levels, mip_levels_error};
+use std::borrow::Cow;
+
+use super::mip_levels::{check_mip_levels, created_targets, mip_levels_error};
 use super::resource_names::views_of_output;
 use super::{PlanError, PlannedProcess, ProcessError};
-use crate::process::{Access, BlendEquation, Declaration, Draws, Format, ShadowCasters, TargetSize, previous_name};
+use crate::process::{
+    Access, BlendEquation, Declaration, Draws, Format, ShadowCasters, TargetSize, list_names, previous_name, targets,
+};
 use crate::scene::{Blend, ViewKind};
 
 /// A target that each view of one kind has.
@@ -91,11 +95,7 @@ pub(super) fn targets_of(processes: &[PlannedProcess], outputs: &[String]) -> Re
 
 fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, PlanError> {
     let mut targets: Vec<PlannedTarget> = Vec::new();
-    for planned in processes {
-        check_sizes(planned)?;
-        check_multisampling(planned)?;
-        check_mip_levels(planned)?;
-    }
+    processes.iter().try_for_each(check_declared_targets)?;
     for (planned, name, access) in accesses(processes) {
         let Some(format) = access.format() else { continue };
         let views = planned.declaration.views;
@@ -151,6 +151,14 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
     Ok(targets)
 }
 
+/// # Errors
+/// If a process sets the size, the samples or the mip levels of a target wrongly, or of one that it does not create.
+pub(super) fn check_declared_targets(planned: &PlannedProcess) -> Result<(), PlanError> {
+    check_sizes(planned)?;
+    check_multisampling(planned)?;
+    check_mip_levels(planned)
+}
+
 fn size_of(declaration: &Declaration, target: &str) -> TargetSize {
     declaration.sizes.iter().find(|(sized, _)| sized == target).map_or(TargetSize::Picture, |(_, size)| *size)
 }
@@ -164,10 +172,12 @@ fn check_sizes(planned: &PlannedProcess) -> Result<(), PlanError> {
             planned.declaration.accesses.iter().find(|(name, access)| name == target && access.format().is_some());
         let sizes = planned.declaration.sizes.iter().filter(|(sized, _)| sized == target);
         let problem = match created {
-            _ if sizes.count() > 1 => "and sets it again",
-            None => "that it does not create",
-            Some((_, Access::ClearDepthLayer(_))) => "that it draws in layers, which have the size of the pictures",
-            Some(_) if !size.is_valid() => "to a size without pixels",
+            _ if sizes.count() > 1 => "and sets it again".into(),
+            None => format!("that it does not create, only: {}", created_targets(&planned.declaration)).into(),
+            Some((_, Access::ClearDepthLayer(_))) => {
+                "that it draws in layers, which have the size of the pictures".into()
+            }
+            Some(_) if !size.is_valid() => "to a size without pixels".into(),
             Some(_) => continue,
         };
         return Err(PlanError::InvalidSize { process: planned.name.clone(), target: target.clone(), problem });
@@ -186,9 +196,13 @@ fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
         })
     };
     for target in multisampled {
-        let problem = match format_of(target) {
-            None => "it does not clear it, or clears it in layers",
-            Some(format) if !format.can_be_multisampled() => "not every device multisamples its format",
+        let problem: Cow<'static, str> = match format_of(target) {
+            None => {
+                let is_cleared = |access: &Access| matches!(access, Access::ClearColor(..) | Access::ClearDepth(_));
+                let cleared = accesses.iter().filter(|(_, access)| is_cleared(access)).map(|(name, _)| name.as_str());
+                format!("it does not clear it, or clears it in layers; it clears {}", list_names(cleared)).into()
+            }
+            Some(format) if !format.can_be_multisampled() => "not every device multisamples its format".into(),
             Some(_) => continue,
         };
         return Err(multisampling_error(planned, target, problem));
@@ -196,22 +210,25 @@ fn check_multisampling(planned: &PlannedProcess) -> Result<(), PlanError> {
     for (source, into) in resolves {
         let is_drawn = accesses.iter().any(|(name, access)| name == source && access.is_color());
         let problem = match accesses.iter().find(|(name, access)| name == into && access.format().is_some()) {
-            _ if !is_drawn => "it does not draw into it as colour",
-            _ if resolves.iter().filter(|(other, _)| other == source).count() > 1 => "it resolves it twice",
+            _ if !is_drawn => {
+                let drawn = planned.declaration.colors().map(|(name, _)| name);
+                format!("it does not draw into it as colour, only into {}", list_names(drawn)).into()
+            }
+            _ if resolves.iter().filter(|(other, _)| other == source).count() > 1 => "it resolves it twice".into(),
             _ if resolves.iter().filter(|(_, other)| other == into).count() > 1 => {
-                "it resolves another one into the same target"
+                "it resolves another one into the same target".into()
             }
             Some((_, Access::Resolve(format))) if format.can_be_resolved() => continue,
-            Some((_, Access::Resolve(_))) => "not every device resolves its format",
-            _ => "it uses the resolved target in another way too",
+            Some((_, Access::Resolve(_))) => "not every device resolves its format".into(),
+            _ => "it uses the resolved target in another way too".into(),
         };
         return Err(PlanError::Resolve { process: planned.name.clone(), target: source.clone(), problem });
     }
     Ok(())
 }
 
-fn multisampling_error(planned: &PlannedProcess, target: &str, problem: &'static str) -> PlanError {
-    PlanError::Multisampling { process: planned.name.clone(), target: target.to_owned(), problem }
+fn multisampling_error(planned: &PlannedProcess, target: &str, problem: impl Into<Cow<'static, str>>) -> PlanError {
+    PlanError::Multisampling { process: planned.name.clone(), target: target.to_owned(), problem: problem.into() }
 }
 
 /// # Errors
@@ -234,9 +251,9 @@ fn check_attachments(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Res
     for (source, into) in &planned.declaration.resolves {
         let Some((from, to)) = found(source).zip(found(into)) else { continue };
         let problem = if !from.multisampled {
-            "it is not multisampled"
+            "it is not multisampled".into()
         } else if (from.format, from.size, false) != (to.format, to.size, to.multisampled) {
-            "the resolved target has another format or size, or is multisampled"
+            "the resolved target has another format or size, or is multisampled".into()
         } else {
             continue;
         };
@@ -383,7 +400,11 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
                 copies.push(PlannedTarget { name, copy_of, stored: false, output: false, ..source.clone() });
             }
             _ if is_of_other_view => {}
-            _ => return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone() }),
+            _ => {
+                let known = targets.iter().filter(|known| known.views == views && !known.layered);
+                let known = list_names(known.map(|known| known.name.as_str()));
+                return Err(PlanError::NoHistory { process: planned.name.clone(), target: name.clone(), known });
+            }
         }
     }
     Ok(copies)
@@ -398,11 +419,11 @@ pub(super) fn placeholder_shadow_map(
     let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
     let is_drawn = added.iter().any(|(_, other)| {
         other.declaration.views.rules().is_shadow_map
-            && other.declaration.written().any(|target| target == ShadowCasters::TARGET)
+            && other.declaration.written().any(|target| target == targets::SHADOW_MAP.name())
     });
     let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
     (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
-        name: ShadowCasters::TARGET.to_owned(),
+        name: targets::SHADOW_MAP.to_string(),
         views: ViewKind::Shadow,
         format: Format::Depth32Float,
         stored: false,
@@ -418,7 +439,7 @@ pub(super) fn placeholder_shadow_map(
 pub(super) fn reads_shadow_map(planned: &PlannedProcess) -> bool {
     planned.declaration.accesses.iter().any(|(target, access)| {
         let (Access::SampleLayers(views) | Access::SampleView(views, _)) = access else { return false };
-        target == ShadowCasters::TARGET && views.rules().is_shadow_map
+        target == targets::SHADOW_MAP.name() && views.rules().is_shadow_map
     })
 }
 

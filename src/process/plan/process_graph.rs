@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::resource_names::{buffer_name, resource_name, views_of_output};
+use super::unknown_targets::error_of_graph;
 use super::{PlanError, PlannedProcess, PlannedTarget};
 use crate::graph::{CompileError, FrameGraph, NodeId, Schedule};
 use crate::process::{Access, BufferAccess, Declaration, InjectionPoint, RenderProcess, previous_name};
@@ -39,7 +40,7 @@ pub(super) fn compile(
     let schedule = graph.compile_with_outputs_of(|index| sampled_resources(added, &added[*index].1));
     schedule.map_err(|CompileError { graph, problem, .. }| {
         // What the outputs themselves lack is named before what the views lack that they sample.
-        PlanError::Graph(graph.compile().map_or_else(|error| error.problem, |_| problem))
+        error_of_graph(added, graph.compile().map_or_else(|error| error.problem, |_| problem))
     })
 }
 

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::target_indices::sampled_target;
 use super::{Pass, PlanError, PlannedProcess, PlannedTarget};
-use crate::process::{Access, SampledShape, SampledView, source_of_previous};
+use crate::process::{Access, SampledShape, SampledView, list_names, source_of_previous};
 use crate::scene::{Camera, ViewKind, child_name};
 use crate::view::RenderView;
 
@@ -118,7 +118,10 @@ pub(super) fn check_sampled_views(processes: &[PlannedProcess], targets: &[Plann
             let process = planned.name.clone();
             let target = source_of_previous(target).filter(|_| access.is_previous()).unwrap_or(target).to_owned();
             let Some(found) = found else {
-                return Err(PlanError::UnknownSampledTarget { process, view, target });
+                let known = targets.iter().filter(|known| known.copy_of.is_none());
+                let known = known.filter(|known| known.views == views || !draws_views);
+                let known = list_names(known.map(|known| known.name.as_str()));
+                return Err(PlanError::UnknownSampledTarget { process, view, target, known });
             };
             let problem = match shape {
                 SampledShape::Picture => continue,

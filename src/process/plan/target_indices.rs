@@ -3,8 +3,7 @@
 use super::planned_process::ColorTarget;
 use super::resource_names::resource_name;
 use super::{PlanError, PlannedProcess, PlannedTarget, TargetIndices};
-use crate::graph::GraphProblem;
-use crate::process::{Access, Declaration, source_of_previous};
+use crate::process::{Access, Declaration, list_names, source_of_previous};
 use crate::scene::ViewKind;
 
 impl TargetIndices {
@@ -15,8 +14,12 @@ impl TargetIndices {
     pub(super) fn new(planned: &PlannedProcess, targets: &[PlannedTarget]) -> Result<Self, PlanError> {
         let Declaration { views, accesses, resolves, .. } = &planned.declaration;
         let missing = |views: ViewKind, name: &str| {
-            let (resource, readers) = (resource_name(views, name), vec![planned.name.clone()]);
-            PlanError::Graph(GraphProblem::MissingProducer { resource, output: false, readers })
+            let known: Vec<_> = targets.iter().map(|known| resource_name(known.views, &known.name)).collect();
+            PlanError::UnknownTarget {
+                target: resource_name(views, name),
+                processes: list_names([planned.name.as_str()].into_iter()),
+                known: list_names(known.iter().map(String::as_str)),
+            }
         };
         let mut indices = Self::default();
         for (name, access) in accesses {
@@ -50,7 +53,9 @@ pub(super) fn target_index(targets: &[PlannedTarget], views: ViewKind, name: &st
     targets.iter().position(|planned| planned.views == views && planned.name == name)
 }
 
-/// The index of [`FramePlan::sampled_target`](super::FramePlan::sampled_target).
+/// The index of the target of this name that a process samples in views of a kind. If no process of the frame draws
+/// such views, it is the target of this name in views of another kind: its pixel has the same format. Where a history
+/// has no copy for that reason, it is the target that it would be copied from.
 pub(super) fn sampled_target(targets: &[PlannedTarget], views: ViewKind, name: &str) -> Option<usize> {
     let named = |name: &str| {
         target_index(targets, views, name).or_else(|| targets.iter().position(|target| target.name == name))
@@ -63,28 +68,15 @@ mod tests {
     use std::sync::Arc;
 
     use super::super::FramePlan;
+    use super::super::test_process::TestProcess;
     use super::*;
-    use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess, previous_name};
-
-    struct TestProcess<F>(&'static str, F);
-
-    impl<F: Fn(&mut Declare) + Send + Sync> RenderProcess for TestProcess<F> {
-        fn name(&self) -> &str {
-            self.0
-        }
-
-        fn declare(&self, declare: &mut Declare) {
-            (self.1)(declare);
-            declare.keep();
-        }
-
-        fn draws(&self) -> Draws<'_> {
-            Draws::FullScreen(FullScreen::default())
-        }
-    }
+    use crate::process::{ClearColor, Declare, Format, RenderProcess, previous_name};
 
     fn process(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> Arc<dyn RenderProcess> {
-        Arc::new(TestProcess(name, declare))
+        Arc::new(TestProcess(name, move |declaration: &mut Declare| {
+            declare(declaration);
+            declaration.keep();
+        }))
     }
 
     const BLACK: ClearColor = ClearColor::Value([0.0; 4]);
@@ -169,8 +161,7 @@ mod tests {
             declare.clears_depth_layer("maps", Format::Depth32Float);
         });
         let error = FramePlan::new(vec![reader, maps], &[]).err();
-        let readers = vec!["reader".to_owned()];
-        let missing = GraphProblem::MissingProducer { resource: "shadow: maps".to_owned(), output: false, readers };
-        assert_eq!(error, Some(PlanError::Graph(missing)));
+        let (target, processes) = ("shadow: maps".to_owned(), "\"reader\"".to_owned());
+        assert_eq!(error, Some(PlanError::UnknownTarget { known: "\"shadow: maps\"".to_owned(), target, processes }));
     }
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::PostStep;
 use super::shipped_step::{BoundStep, ShippedStep, declare_step};
-use crate::process::{Declare, Draws, Format, FullScreen, RenderProcess};
+use crate::process::{Declare, Draws, Format, FullScreen, RenderProcess, targets};
 use crate::quality::{Quality, ToneCurve};
 
 /// Maps radiance, which is unlimited, to a picture: exposure, then a curve, then sRGB. Negative radiance, from
@@ -99,7 +99,7 @@ impl RenderProcess for ToneMapping {
     }
 
     fn declare(&self, declare: &mut Declare) {
-        declare_step(declare, "radiance", "picture", self.format);
+        declare_step(declare, targets::RADIANCE.name(), targets::PICTURE.name(), self.format);
     }
 
     fn draws(&self) -> Draws<'_> {

@@ -34,7 +34,7 @@ impl RenderProcess for Own {
         if in_main && in_reflections {
             declare.also_views(ViewKind::Reflection);
         }
-        declare.clears_color(&self.process.target(), Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
+        declare.clears_color(self.process.target(), Format::Rgba8Unorm, ClearColor::Value([0.0; 4]));
         self.process.samples.iter().for_each(|target| declare.samples(target));
         self.process.draws_over.iter().for_each(|target| declare.draws_over(target));
         self.process.histories.iter().for_each(|target| declare.samples_previous(target));

@@ -5,7 +5,7 @@ use drawloom_testing::scenes::everything::{everything, without_shadow};
 use libtest_mimic::Failed;
 
 use super::cost::drawn;
-use super::{BYTES_OF_A_MAP, GLASS_STATES, OPAQUE_STATES, OPAQUE_STATES_IN_MAPS, deferred};
+use super::{BYTES_OF_A_MAP, GLASS_STATES, LIGHT_PIPELINES, OPAQUE_STATES, OPAQUE_STATES_IN_MAPS, deferred};
 use crate::fixture::Fixture;
 
 /// A change of the scene; the number of cached plans after it is first drawn, and the number of new pipelines then.
@@ -48,9 +48,8 @@ const STEPS: &[Step] = &[
     }),
 ];
 
-/// The pipelines for objects in maps, for opaque objects and for glass, for eight classes of lights, and for tone
-/// mapping.
-const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES) as usize + 8 + 1;
+/// The pipelines for objects in maps, for opaque objects and for glass, for lights, and for tone mapping.
+const EVERY_PIPELINE: usize = (OPAQUE_STATES_IN_MAPS + OPAQUE_STATES + GLASS_STATES + LIGHT_PIPELINES + 1) as usize;
 
 /// Makes this many of the glass materials opaque.
 fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {

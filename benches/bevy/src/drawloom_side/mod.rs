@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
-use drawloom::process::Deferred;
+use drawloom::process::{Deferred, targets};
 use drawloom::scene::SceneRef;
 use drawloom::task::{JobPanic, Scheduler};
 use drawloom::{FrameStatistics, Renderer, Submitter, wgpu};
@@ -110,7 +110,7 @@ impl Contender for Drawloom {
     }
 
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
-        let texture = self.last.as_ref().and_then(|submission| Some(submission.texture(camera, "picture")?.0));
+        let texture = self.last.as_ref().and_then(|submission| Some(submission.texture(camera, targets::PICTURE).ok()?.0));
         let backend = self.renderer.backend();
         pictures::read(backend.device(), backend.queue(), texture.ok_or("no frame was drawn")?)
     }

@@ -16,9 +16,7 @@ pub(super) fn compile_shader(
     before: &str,
     own: &[(&'static str, &str)],
 ) -> Result<wgpu::ShaderModule, BackendError> {
-    let source: Vec<_> = std::iter::once(before).chain(own.iter().map(|(_, text)| *text)).collect();
-    let source = source.join("\n");
-    let source = wgpu::ShaderSource::Wgsl(source.into());
+    let source = wgpu::ShaderSource::Wgsl(complete_text(before, own).into());
     let mut created = None;
     let outcome = with_error_scope(device, process, || {
         created = Some(device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(process), source }));
@@ -28,6 +26,17 @@ pub(super) fn compile_shader(
         Ok(()) => Ok(module),
         Err(error) => Err(located(process, before, own, &module).unwrap_or(error)),
     }
+}
+
+/// What errors call the shader of a process.
+pub(crate) fn shader_label(process: &str) -> String {
+    format!("the shader of {process:?}")
+}
+
+/// The text that is compiled: a process's own texts of WGSL behind what the crate puts before them.
+pub(super) fn complete_text(before: &str, own: &[(&'static str, &str)]) -> String {
+    let texts: Vec<_> = std::iter::once(before).chain(own.iter().map(|(_, text)| *text)).collect();
+    texts.join("\n")
 }
 
 /// The first error of a shader at its line; `None` if it is not in one of the process's own texts, which follow after

@@ -3,6 +3,7 @@
 mod attachment_formats;
 mod compile_shader;
 mod compiled_shader;
+mod interner;
 mod pipeline_cache;
 mod pipeline_inputs;
 mod pipeline_key;
@@ -13,8 +14,9 @@ mod undeclared_discards;
 mod unused_bindings;
 mod vertex_buffers;
 
-pub(crate) use pipeline_cache::{PipelineCache, shader_label};
+pub(crate) use compile_shader::shader_label;
+pub(crate) use pipeline_cache::PipelineCache;
 pub(crate) use pipeline_key::fixed_state;
 pub(crate) use pipeline_variant::PipelineVariant;
 pub(crate) use process_pipelines::ProcessPipelines;
-pub(crate) use shared_pipelines::SharedPipelines;
+pub(crate) use shared_pipelines::{SharedPipelines, SharedRenderPipeline};

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 
+use super::compile_shader::shader_label;
 use super::pipeline_key::PipelineKey;
 use super::process_pipelines::ProcessPipelines;
 use super::shared_pipelines::SharedPipelines;
@@ -53,8 +54,7 @@ impl PipelineCache {
     pub(crate) fn update(
         &mut self,
         device: &wgpu::Device,
-        layouts: &BindGroupLayouts,
-        library: Option<&SharedPipelines>,
+        (shared, layouts): (&SharedPipelines, &BindGroupLayouts),
         plan: &FramePlan,
         draws: &[Draws<'_>],
         quality: &Quality,
@@ -82,10 +82,14 @@ impl PipelineCache {
                     let working = self.working.get(&planned.name).cloned();
                     let working = working.filter(|old| old.inputs.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
-                        let created = ProcessPipelines::new(device, layouts, library, plan, planned, draws, quality)?;
+                        let created = ProcessPipelines::new(device, (shared, layouts), plan, planned, draws, quality)?;
                         if let Some(working) = &working {
                             // Only a pipeline shows that a shader lacks an entry point, or reads what there is not.
-                            created.insert(created.create_missing(device, working.variants().keys().cloned())?);
+                            created.insert(created.create_missing(
+                                device,
+                                &label,
+                                working.variants().keys().cloned(),
+                            )?);
                         }
                         Ok(created)
                     };
@@ -97,7 +101,6 @@ impl PipelineCache {
                         _ => match (with_error_scope(device, &label, create).flatten(), &working) {
                             (Ok(created), _) => {
                                 self.failed.remove(&planned.name);
-                                created.share();
                                 Arc::new(created)
                             }
                             (Err(error), Some(working)) => {
@@ -165,12 +168,15 @@ impl PipelineCache {
         }
     }
 
-    /// The number of pipelines.
+    /// The number of render pipelines, each once, however many processes share it.
     pub(crate) fn pipeline_count(&self) -> usize {
-        let mut distinct: Vec<_> = self.all().collect();
-        distinct.sort_by_key(|pipelines| Arc::as_ptr(pipelines));
-        distinct.dedup_by_key(|pipelines| Arc::as_ptr(pipelines));
-        distinct.into_iter().map(|pipelines| pipelines.variants().len()).sum()
+        let mut distinct = Vec::new();
+        for pipelines in self.all() {
+            distinct.extend(pipelines.variants().values().map(|pipeline| wgpu::RenderPipeline::clone(pipeline)));
+        }
+        distinct.sort_unstable();
+        distinct.dedup();
+        distinct.len()
     }
 
     /// The pipelines of the processes of all plans, and those that no plan uses yet.
@@ -178,11 +184,6 @@ impl PipelineCache {
         let of_plans = self.plans.values().flat_map(|cached| cached.processes.iter());
         of_plans.chain(self.prepared.iter().map(|(_, pipelines)| pipelines))
     }
-}
-
-/// What errors call the shader of a process.
-pub(crate) fn shader_label(process: &str) -> String {
-    format!("the shader of {process:?}")
 }
 
 #[cfg(test)]
@@ -197,10 +198,10 @@ mod tests {
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
         let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let (planned, draws) = (&plan.processes()[0], plan.draws().unwrap());
-        let layouts = BindGroupLayouts::new(&device);
+        let (layouts, shared) = (BindGroupLayouts::new(&device), SharedPipelines::new(false));
         let mut cache = PipelineCache::new(false);
         let prepare = |cache: &mut PipelineCache, quality: &Quality| {
-            let made = ProcessPipelines::new(&device, &layouts, None, &plan, planned, &draws[0], quality).unwrap();
+            let made = ProcessPipelines::new(&device, (&shared, &layouts), &plan, planned, &draws[0], quality).unwrap();
             cache.add_prepared(&plan, planned, &draws[0], quality, made);
         };
         let [other, quality] = [Quality::exact(), Quality::fast()];
@@ -211,13 +212,13 @@ mod tests {
         }
         // A frame takes what is prepared, and what comes late is dropped.
         let prepared = Arc::clone(&cache.prepared[0].1);
-        let used = cache.update(&device, &layouts, None, &plan, &draws, &quality).unwrap();
+        let used = cache.update(&device, (&shared, &layouts), &plan, &draws, &quality).unwrap();
         assert!(Arc::ptr_eq(&used[0], &prepared) && cache.prepared.is_empty());
         prepare(&mut cache, &quality);
         assert!(cache.prepared.is_empty());
         // What is prepared for another quality does not change what frames use.
         prepare(&mut cache, &other);
-        let used = cache.update(&device, &layouts, None, &plan, &draws, &quality).unwrap();
+        let used = cache.update(&device, (&shared, &layouts), &plan, &draws, &quality).unwrap();
         assert!(Arc::ptr_eq(&used[0], &prepared));
     }
 }

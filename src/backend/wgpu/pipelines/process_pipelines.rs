@@ -8,14 +8,15 @@ use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use super::attachment_formats::{AttachmentFormats, DepthAttachmentFormat, blend_state};
+use super::compile_shader::shader_label;
 use super::compiled_shader::CompiledShader;
 use super::pipeline_inputs::PipelineInputs;
 use super::pipeline_key::VertexSource;
 use super::pipeline_variant::PipelineVariant;
-use super::shared_pipelines::SharedPipelines;
+use super::shared_pipelines::{RenderPipelineDescription, SharedGroupLayout, SharedPipelines, SharedRenderPipeline};
 use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout, process_layout};
+use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout_entries, process_layout_entries};
 use crate::backend::wgpu::strategy::StrategySet;
 use crate::command::{Cull, DrawState};
 use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
@@ -27,32 +28,31 @@ use crate::unwind::emit_unlocked;
 pub(crate) struct ProcessPipelines {
     pub(super) inputs: PipelineInputs,
     /// Of `@group(2)`; `None` for a process without parameters and sampled targets.
-    pub(crate) process_layout: Option<wgpu::BindGroupLayout>,
+    pub(crate) process_layout: Option<SharedGroupLayout>,
     /// Of `@group(3)`; `None` for a process that reads neither columns nor resources of the engine's own.
-    pub(crate) engine_layout: Option<wgpu::BindGroupLayout>,
+    pub(crate) engine_layout: Option<SharedGroupLayout>,
     /// The [values](attribute_defaults) that its attributes have in meshes that lack them; made for the first imported
     /// mesh.
     attribute_defaults: OnceLock<wgpu::Buffer>,
     /// `None` for a raw pass.
     shader: Option<CompiledShader>,
-    variants: RwLock<HashMap<PipelineVariant, wgpu::RenderPipeline>>,
+    variants: RwLock<HashMap<PipelineVariant, SharedRenderPipeline>>,
     /// The variants of meshes of which the shader cannot read an attribute.
     unreadable: RwLock<HashSet<PipelineVariant>>,
-    /// `None` if the backend shares no pipelines.
-    library: Option<SharedPipelines>,
+    /// What it shares with other processes.
+    shared: SharedPipelines,
     /// The tuner of each view's pass.
     tuners: Mutex<Vec<Option<Tuner>>>,
 }
 
 impl ProcessPipelines {
-    /// Compiles the shader of a process, or takes that of the library.
+    /// Compiles the shader of a process, unless another process has the same.
     ///
     /// # Errors
     /// If it does not compile.
     pub(crate) fn new(
         device: &wgpu::Device,
-        layouts: &BindGroupLayouts,
-        library: Option<&SharedPipelines>,
+        (shared, layouts): (&SharedPipelines, &BindGroupLayouts),
         plan: &FramePlan,
         planned: &PlannedProcess,
         draws: &Draws<'_>,
@@ -62,14 +62,16 @@ impl ProcessPipelines {
         let PipelineInputs { key, attachments, array_count, resources, .. } = &inputs;
         let is_compute = key.vertices == VertexSource::Compute;
         let AttachmentFormats { sampled, writes_buffers, .. } = attachments;
-        let process_layout = process_layout(device, key.parameter_bytes, sampled, writes_buffers, is_compute);
-        let engine_layout = engine_layout(device, *array_count, resources, is_compute);
-        let shader = match library.and_then(|library| library.shader(&inputs)) {
-            _ if key.vertices == VertexSource::None => None,
-            Some(compiled) => Some(compiled),
-            None => {
+        let label = shader_label(&planned.name);
+        let entries = process_layout_entries(key.parameter_bytes, sampled, writes_buffers, is_compute);
+        let process_layout = shared.group_layout(device, &label, entries)?;
+        let engine_layout =
+            shared.group_layout(device, &label, engine_layout_entries(*array_count, resources, is_compute))?;
+        let shader = match key.vertices {
+            VertexSource::None => None,
+            _ => {
                 let own = [process_layout.as_ref(), engine_layout.as_ref()];
-                Some(CompiledShader::new(device, layouts, own, &planned.declaration, &inputs, draws)?)
+                Some(CompiledShader::new(device, (shared, layouts), own, &planned.declaration, &inputs, draws)?)
             }
         };
         let pipelines = Self {
@@ -80,13 +82,11 @@ impl ProcessPipelines {
             shader,
             variants: RwLock::default(),
             unreadable: RwLock::default(),
-            library: library.cloned(),
+            shared: shared.clone(),
             tuners: Mutex::default(),
         };
         if let Some(state) = pipelines.inputs.key.state {
-            for variant in pipelines.variants_of(state) {
-                pipelines.insert(pipelines.create(device, variant)?);
-            }
+            pipelines.insert(pipelines.create_missing(device, &label, pipelines.variants_of(state))?);
         }
         Ok(pipelines)
     }
@@ -104,29 +104,30 @@ impl ProcessPipelines {
     }
 
     /// Creates the missing ones of these pipelines, but for those of meshes of which the shader cannot read an
-    /// attribute. [Insert](Self::insert) them only if the device reports no error.
+    /// attribute. Errors are those of `label`.
     ///
     /// # Errors
-    /// If a resource cannot be made.
+    /// If the device refuses one.
     pub(crate) fn create_missing(
         &self,
         device: &wgpu::Device,
+        label: &str,
         variants: impl Iterator<Item = PipelineVariant>,
-    ) -> Result<HashMap<PipelineVariant, wgpu::RenderPipeline>, BackendError> {
+    ) -> Result<HashMap<PipelineVariant, SharedRenderPipeline>, BackendError> {
         let is_missing =
             |variant: &PipelineVariant| !self.variants().contains_key(variant) && !self.is_unreadable(variant);
         // No lock is held while the driver compiles, so that frames go on meanwhile.
         let missing: HashSet<_> = variants.filter(is_missing).collect();
         let mut created = HashMap::new();
         for variant in missing {
-            match self.create(device, variant.clone()) {
+            match self.create(device, label, &variant) {
                 Err(problem @ BackendError::AttributeFormatMismatch { .. }) => {
                     self.unreadable.write().insert(variant);
                     emit_unlocked(move || {
                         tracing::warn!(target: "drawloom", %problem, "objects with this mesh are left out by this process");
                     });
                 }
-                found => created.extend(found?),
+                found => created.extend(found?.map(|pipeline| (variant, pipeline))),
             }
         }
         Ok(created)
@@ -143,7 +144,7 @@ impl ProcessPipelines {
     }
 
     /// Adds created pipelines.
-    pub(crate) fn insert(&self, created: impl IntoIterator<Item = (PipelineVariant, wgpu::RenderPipeline)>) {
+    pub(crate) fn insert(&self, created: impl IntoIterator<Item = (PipelineVariant, SharedRenderPipeline)>) {
         let mut created = created.into_iter().peekable();
         // Recording holds the read lock. Mostly there is no pipeline to add, and then this does not wait for it.
         if created.peek().is_some() {
@@ -151,22 +152,14 @@ impl ProcessPipelines {
         }
     }
 
-    /// Adds the shader and all pipelines to the library, if there is one. Call it only if the device has reported no
-    /// error.
-    pub(crate) fn share(&self) {
-        if let Some((library, shader)) = self.library.as_ref().zip(self.shader.as_ref()) {
-            library.add(&self.inputs, shader, &self.variants());
-        }
-    }
-
     /// The pipelines.
-    pub(crate) fn variants(&self) -> RwLockReadGuard<'_, HashMap<PipelineVariant, wgpu::RenderPipeline>> {
+    pub(crate) fn variants(&self) -> RwLockReadGuard<'_, HashMap<PipelineVariant, SharedRenderPipeline>> {
         self.variants.read()
     }
 
     /// The pipeline of a compute shader; `None` for a process that draws.
     pub(crate) fn compute(&self) -> Option<&wgpu::ComputePipeline> {
-        self.shader.as_ref()?.compute.as_ref()
+        self.shader.as_ref()?.compute.as_deref()
     }
 
     /// Describes bundles for passes of this process.
@@ -207,12 +200,13 @@ impl ProcessPipelines {
     /// `None` for a raw pass, which has no pipeline.
     ///
     /// # Errors
-    /// If the shader cannot read an attribute of a mesh.
+    /// If the shader cannot read an attribute of a mesh, or the device refuses the pipeline.
     fn create(
         &self,
         device: &wgpu::Device,
-        variant: PipelineVariant,
-    ) -> Result<Option<(PipelineVariant, wgpu::RenderPipeline)>, BackendError> {
+        label: &str,
+        variant: &PipelineVariant,
+    ) -> Result<Option<SharedRenderPipeline>, BackendError> {
         let Some(shader) = &self.shader else { return Ok(None) };
         let state = variant.state;
         let PipelineInputs { name, key, attachments, attributes, .. } = &self.inputs;
@@ -237,10 +231,6 @@ impl ProcessPipelines {
             }
             None => VertexBuffers::new(key.vertices, attributes),
         };
-        let shared = self.library.as_ref().and_then(|library| library.pipeline(&self.inputs, &variant));
-        if let Some(pipeline) = shared {
-            return Ok(Some((variant, pipeline)));
-        }
         let masked = key.masked.as_ref().filter(|_| state.is_masked());
         let entry_point = match (key.vertices, masked) {
             (VertexSource::Meshes(_), Some([vertex, _])) => &**vertex,
@@ -262,15 +252,11 @@ impl ProcessPipelines {
         let [clamped, clamped_masked] = &key.clamped_fragments;
         let clamped = if masked.is_some() { clamped_masked } else { clamped };
         let fragment = clamped.as_ref().filter(|_| variant.clamps_depth && !clamps_pixels).or(fragment);
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: None,
-            layout: Some(&shader.layout),
-            vertex: wgpu::VertexState {
-                module: &shader.module,
-                entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &buffers.layouts(),
-            },
+        let description = RenderPipelineDescription {
+            layout: wgpu::PipelineLayout::clone(&shader.layout),
+            module: wgpu::ShaderModule::clone(&shader.module),
+            vertex: entry_point.to_owned(),
+            buffers,
             primitive: wgpu::PrimitiveState {
                 topology,
                 strip_index_format,
@@ -289,17 +275,10 @@ impl ProcessPipelines {
                 let writes_depth = key.writes_depth && may_write_depth;
                 depth.pipeline_state_of(writes_depth, self.depth_compare(depth), key.stencil)
             }),
-            multisample: wgpu::MultisampleState { count: attachments.samples, ..wgpu::MultisampleState::default() },
-            fragment: fragment.map(|entry_point| wgpu::FragmentState {
-                module: &shader.module,
-                entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &targets,
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        Ok(Some((variant, pipeline)))
+            samples: attachments.samples,
+            fragment: fragment.map(|entry_point| (entry_point.clone().into_owned(), targets)),
+        };
+        self.shared.render_pipeline(device, label, description).map(Some)
     }
 
     /// Depth is reversed: nearer is greater.
@@ -345,15 +324,16 @@ mod tests {
         let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();
         let quality = Quality::balanced();
-        let layouts = BindGroupLayouts::new(&device);
+        let (layouts, shared) = (BindGroupLayouts::new(&device), SharedPipelines::new(false));
         let pipelines =
-            ProcessPipelines::new(&device, &layouts, None, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
+            ProcessPipelines::new(&device, (&shared, &layouts), &plan, &plan.processes()[0], &draws[0], &quality)
+                .unwrap();
 
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {
             let recording = pipelines.variants();
             scope.spawn(|| {
-                pipelines.insert(pipelines.create_missing(&device, std::iter::empty()).unwrap());
+                pipelines.insert(pipelines.create_missing(&device, "none", std::iter::empty()).unwrap());
                 sender.send(()).unwrap();
             });
             let inserted = receiver.recv_timeout(Duration::from_secs(10));
@@ -368,17 +348,18 @@ mod tests {
         let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
         let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
         let draws = plan.draws().unwrap();
-        let layouts = BindGroupLayouts::new(&device);
+        let (layouts, shared) = (BindGroupLayouts::new(&device), SharedPipelines::new(false));
         let quality = Quality::balanced();
         let pipelines =
-            ProcessPipelines::new(&device, &layouts, None, &plan, &plan.processes()[0], &draws[0], &quality).unwrap();
+            ProcessPipelines::new(&device, (&shared, &layouts), &plan, &plan.processes()[0], &draws[0], &quality)
+                .unwrap();
 
         let [first, second] = [Cull::Back, Cull::Nothing]
             .map(|cull| PipelineVariant::of_pages(DrawState::new(Topology::TriangleList, cull, Blend::None)));
         let (sender, receiver) = mpsc::channel();
         std::thread::scope(|scope| {
             let of_frame = || {
-                let created = pipelines.create_missing(&device, std::iter::once(second.clone())).unwrap();
+                let created = pipelines.create_missing(&device, "second", std::iter::once(second.clone())).unwrap();
                 pipelines.insert(created);
                 sender.send(()).unwrap();
             };
@@ -387,7 +368,7 @@ mod tests {
                 scope.spawn(of_frame);
                 is_added = receiver.recv_timeout(Duration::from_secs(10)).is_ok();
             });
-            pipelines.insert(pipelines.create_missing(&device, prepared).unwrap());
+            pipelines.insert(pipelines.create_missing(&device, "first", prepared).unwrap());
             assert!(is_added, "the frame waits");
         });
         assert_eq!(pipelines.variants().len(), 2);

@@ -9,8 +9,10 @@ use crate::process::{DeclaredAttribute, FIRST_OWN_LOCATION};
 use crate::scene::{AttributeFormat, NORMAL, NumberKind, POSITION, StreamAttribute, UV};
 
 /// The vertex buffers of a pipeline, each with its attributes, in the order of their slots.
+#[derive(PartialEq, Eq, Hash)]
 pub(super) struct VertexBuffers(Vec<VertexBuffer>);
 
+#[derive(PartialEq, Eq, Hash)]
 struct VertexBuffer {
     /// Bytes from one vertex to the next; 0 if all vertices have the same.
     stride: u64,

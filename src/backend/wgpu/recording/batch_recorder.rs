@@ -11,7 +11,7 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
 use crate::backend::wgpu::frame::{RecordedPart, WgpuPart};
-use crate::backend::wgpu::pipelines::PipelineVariant;
+use crate::backend::wgpu::pipelines::{PipelineVariant, SharedRenderPipeline};
 use crate::backend::wgpu::resources::{MeshPageIndices, SubdividedMesh, attribute_of};
 use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::command::Batch;
@@ -44,7 +44,7 @@ impl PassEncoder<'_> {
 /// Records the batches of a pass.
 pub(super) struct BatchRecorder<'a> {
     pub(super) pass: &'a PassEncoder<'a>,
-    pub(super) pipelines: &'a HashMap<PipelineVariant, wgpu::RenderPipeline>,
+    pub(super) pipelines: &'a HashMap<PipelineVariant, SharedRenderPipeline>,
     pub(super) subdivided: &'a SubdividedMeshes<SubdividedMesh>,
     /// The indices of partial batches' remaining triangles.
     pub(super) partial_indices: Option<&'a wgpu::Buffer>,

@@ -63,14 +63,13 @@ pub(crate) struct SampledTarget {
 }
 
 /// The layout of a process's `@group(2)`: its parameters if it has some, then the targets that it samples, then its
-/// buffers, each with whether its shader writes it. `None` if it has none of them.
-pub(crate) fn process_layout(
-    device: &wgpu::Device,
+/// buffers, each with whether its shader writes it.
+pub(crate) fn process_layout_entries(
     parameter_bytes: usize,
     samples: &[SampledTarget],
     writes_buffers: &[bool],
     is_compute: bool,
-) -> Option<wgpu::BindGroupLayout> {
+) -> Vec<wgpu::BindGroupLayoutEntry> {
     let [stages, fragment] = stages(is_compute);
     let mut entries = Vec::new();
     if parameter_bytes > 0 {
@@ -93,23 +92,19 @@ pub(crate) fn process_layout(
         // Not every device lets vertex shaders write.
         entries.push(entry(binding, if *writes { fragment } else { stages }, storage(*writes)));
     }
-    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("process"), entries: &entries };
-    (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+    entries
 }
 
 /// The layout of a process's `@group(3)`: arrays for the columns of objects and the materials that it reads, then the
-/// resources of the engine's own. `None` if it has neither.
-pub(crate) fn engine_layout(
-    device: &wgpu::Device,
+/// resources of the engine's own.
+pub(crate) fn engine_layout_entries(
     arrays: usize,
     resources: &[wgpu::BindingType],
     is_compute: bool,
-) -> Option<wgpu::BindGroupLayout> {
+) -> Vec<wgpu::BindGroupLayoutEntry> {
     let [stages, _] = stages(is_compute);
     let types = std::iter::repeat_n(storage(false), arrays).chain(resources.iter().copied());
-    let entries: Vec<_> = (0..).zip(types).map(|(binding, ty)| entry(binding, stages, ty)).collect();
-    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("engine"), entries: &entries };
-    (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
+    (0..).zip(types).map(|(binding, ty)| entry(binding, stages, ty)).collect()
 }
 
 /// The stages of a process's shaders, and those that sample targets and write buffers.

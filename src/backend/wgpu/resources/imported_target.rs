@@ -2,7 +2,7 @@
 
 use super::bind_groups::texture_format;
 use crate::backend::BackendError;
-use crate::process::{Access, FramePlan, PlannedTarget};
+use crate::process::{Access, FramePlan, PlannedTarget, list_names};
 use crate::view::RenderView;
 
 /// A texture of the engine's own that takes the place of a view's target in one frame.
@@ -35,7 +35,13 @@ impl ImportedTarget {
             return Err(self.refused("there is no such view"));
         }
         let found = named.find_map(|(index, view)| Some((index, view, plan.target_index(view.kind(), &self.target)?)));
-        let (view_index, view, target_index) = found.ok_or_else(|| self.refused("the view has no such target"))?;
+        let (view_index, view, target_index) = found.ok_or_else(|| {
+            let is_of_view = |planned: &&PlannedTarget| {
+                views.iter().any(|view| view.name() == self.view && view.kind() == planned.views)
+            };
+            let known = plan.targets().iter().filter(is_of_view).map(|planned| planned.name.as_str());
+            self.refused(format!("the view has no such target, only: {}", list_names(known)))
+        })?;
         let planned = &plan.targets()[target_index];
         self.check(plan, planned, planned.size.in_view(view.camera.size))?;
         let mut arrays = plan.view_arrays(views).into_iter().filter(|array| array.target_index == target_index);

@@ -29,8 +29,8 @@ mod vertex_data;
 mod view_array;
 
 pub(crate) use bind_groups::{
-    BindGroupLayouts, BindingResource, CachedBindGroup, SampledTarget, binding_type, engine_layout, process_layout,
-    texture_format,
+    BindGroupLayouts, BindingResource, CachedBindGroup, SampledTarget, binding_type, engine_layout_entries,
+    process_layout_entries, texture_format,
 };
 pub(crate) use buffers::{
     ALIGNMENT, CountedQueue, GrowingBuffer, MirroredBuffer, check_storage_binding_size, size_with_headroom,

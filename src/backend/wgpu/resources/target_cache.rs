@@ -101,6 +101,15 @@ impl WgpuTargets {
         find(self.views.get(view)?, name)
     }
 
+    /// # Errors
+    /// As [`Self::find`], if the view has no such target: the error lists those that it has.
+    pub(crate) fn named(&self, view: usize, name: &str) -> Result<&ViewTarget, BackendError> {
+        self.find(view, name).ok_or_else(|| {
+            let targets = self.views.get(view).into_iter().flatten();
+            BackendError::unknown_target(view, name, targets.map(|(_, target)| target.planned.name.as_str()))
+        })
+    }
+
     /// The target of one view by its index among the plan's; `None` if views of another kind have it.
     pub(crate) fn get(&self, view: usize, index: usize) -> Option<&ViewTarget> {
         let targets = self.views.get(view)?;
