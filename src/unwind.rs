@@ -13,7 +13,7 @@
 //! | `Backend` and `BackendExtras`: `begin`, `uploaded_bytes`, `counters` and others | `backend/guarded_backend.rs` | `FrameError::Panicked` with the call; of `read_back` `BackendError::Panicked`; of `submit` `SubmitError::Panicked`; of `discard_frame` `FrameError::DiscardPanicked` |
 //! | `FrameRecorder` in jobs: `upload_objects`, `prepare`, `record`, `finish` and others; `RenderProcess` and `RawPass` there | `frame/stages`, caught where a graph runs its nodes | `FrameError::Panicked` with process, view and stage |
 //! | `BackendExtras::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
-//! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `ProcessError::Panicked`, or `PlanError::Panicked` |
+//! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `PlanError::ProcessPanicked`, or `PlanError::Panicked` |
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
 //! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |
 //! | `Deformation`: `declare`, `shader`, `resources`, `cpu_shader` | `process/deferred/deformation.rs`, in calls of the process that deforms | as that of the process |

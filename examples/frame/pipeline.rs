@@ -36,7 +36,7 @@ pub fn renderer<B: Backend>(
 }
 
 fn has_vertex_colors(scene: &Scene) -> bool {
-    scene.assets().iter::<Mesh>().any(|(_, mesh)| mesh.attribute(VERTEX_COLOR.layout()).is_some())
+    scene.assets().iter::<Mesh>().any(|(_, mesh)| mesh.attribute(VERTEX_COLOR).is_some())
 }
 
 /// wgpu on the machine's best adapter.

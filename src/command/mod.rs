@@ -20,7 +20,8 @@ pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use internal::*;
 pub(crate) use partition::Partition;
-pub use selection::{Blending, DrawOrder, MaterialShare, MaterialTypes, Selection};
+pub(crate) use selection::{Blending, MaterialShare, MaterialTypes};
+pub use selection::{DrawOrder, Selection};
 pub(crate) use sort::{SortScratch, sort};
 pub use sort_key::SortKey;
 

@@ -2,26 +2,26 @@
 
 use bytemuck::Pod;
 
-use crate::scene::{Blend, ColumnLayout, LayerMask, MaterialLayout, MaterialType, ObjectColumn};
+use crate::scene::{Blend, LayerMask, MaterialLayout, MaterialType, ObjectColumn};
 
 /// Which objects a process draws, and in which order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Selection {
     /// By blending.
-    pub blending: Blending,
+    pub(crate) blending: Blending,
     /// By material.
-    pub materials: MaterialShare,
+    pub(crate) materials: MaterialShare,
     /// By the type of the material.
-    pub material_types: MaterialTypes,
+    pub(crate) material_types: MaterialTypes,
     /// By layer: objects that belong to one of these layers.
-    pub layers: LayerMask,
+    pub(crate) layers: LayerMask,
     /// Objects that belong to one of these layers are left out.
-    pub excluded_layers: LayerMask,
+    pub(crate) excluded_layers: LayerMask,
     /// By the layers that the view shows, which [`Camera::layers`](crate::scene::Camera::layers) sets: objects must
     /// belong to one of these as well.
-    pub visible_layers: LayerMask,
+    pub(crate) visible_layers: LayerMask,
     /// In which order they are drawn.
-    pub order: DrawOrder,
+    pub(crate) order: DrawOrder,
 }
 
 impl Selection {
@@ -107,13 +107,8 @@ pub enum DrawOrder {
     FrontToBack,
     /// The farthest first, with the same precision: where what is drawn depends on what is behind it.
     BackToFront,
-    /// By a number that the engine has for each object, the smallest first: see [`DrawOrder::by`]. It is the first
-    /// `u32` of each element.
-    ByColumn(ColumnLayout),
-}
-
-impl DrawOrder {
-    /// By a column of the scene. The process need not declare that it reads it.
+    /// By a number that the engine has for each object, the smallest first: a column of the scene. The process need not
+    /// declare that it reads it.
     ///
     /// ```
     /// use drawloom::command::{DrawOrder, Selection};
@@ -121,17 +116,15 @@ impl DrawOrder {
     ///
     /// const DECAL_ORDER: ObjectColumn<u32> = ObjectColumn::new("decal order");
     ///
-    /// let decals = Selection::BLENDED.in_order(DrawOrder::by(DECAL_ORDER));
+    /// let decals = Selection::BLENDED.in_order(DrawOrder::ByColumn(DECAL_ORDER));
     /// # assert_ne!(decals, Selection::BLENDED);
     /// ```
-    pub const fn by(column: ObjectColumn<u32>) -> Self {
-        Self::ByColumn(column.layout())
-    }
+    ByColumn(ObjectColumn<u32>),
 }
 
 /// Objects by how they blend with the target's colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Blending {
+pub(crate) enum Blending {
     /// Objects without blending.
     #[default]
     Opaque,
@@ -143,7 +136,7 @@ pub enum Blending {
 
 /// Objects by their material types.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum MaterialTypes {
+pub(crate) enum MaterialTypes {
     /// All.
     #[default]
     Any,
@@ -156,7 +149,7 @@ pub enum MaterialTypes {
 impl MaterialTypes {
     /// Whether it contains materials of a type; `None` stands for those without one.
     #[inline]
-    pub fn contains(self, material_type: Option<MaterialLayout>) -> bool {
+    pub(crate) fn contains(self, material_type: Option<MaterialLayout>) -> bool {
         match self {
             Self::Any => true,
             Self::Shipped => material_type.is_none(),
@@ -168,16 +161,16 @@ impl MaterialTypes {
 /// A share of the materials: those whose slot modulo `of` is `index`. The shares 0 to `of` − 1 are disjoint and contain
 /// every material, so a process that is added once per share splits its work by material (L 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct MaterialShare {
+pub(crate) struct MaterialShare {
     /// Which share, counted from 0.
-    pub index: u32,
+    pub(crate) index: u32,
     /// The number of shares; 0 counts as 1.
-    pub of: u32,
+    pub(crate) of: u32,
 }
 
 impl MaterialShare {
     /// Every material.
-    pub const ALL: Self = Self { index: 0, of: 1 };
+    pub(crate) const ALL: Self = Self { index: 0, of: 1 };
 }
 
 impl Default for MaterialShare {

@@ -4,7 +4,7 @@ use super::encoders::{FailedPass, PassFailure};
 use crate::backend::{BackendError, CallPanic};
 use crate::fence::FenceError;
 use crate::graph::{GraphProblem, NodeError, RunError};
-use crate::process::{PlanError, ProcessError};
+use crate::process::PlanError;
 use crate::quality::QualityError;
 use crate::scene::{SceneError, ViewKind};
 use crate::task::JobPanic;
@@ -86,7 +86,7 @@ pub enum FrameError {
         /// What the panic said.
         message: String,
     },
-    /// The processes that the scene requires make no frame.
+    /// What the processes declare or draw is invalid, or the scene lacks what they read.
     #[error(transparent)]
     Plan(#[from] PlanError),
     /// The scene cannot be drawn.
@@ -123,9 +123,6 @@ pub enum FrameError {
         /// What the panic said.
         message: String,
     },
-    /// What a process declares or draws is invalid.
-    #[error(transparent)]
-    Process(#[from] ProcessError),
     /// A callback of the scheduler panicked.
     #[error(transparent)]
     Scheduler(#[from] JobPanic),

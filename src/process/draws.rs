@@ -65,7 +65,7 @@ pub struct CommandDraws<'a> {
     /// Which faces of the objects are drawn.
     pub face_culling: FaceCulling,
     /// The blend equation of each colour target, in the order declared; if empty, each object's material decides.
-    /// Another number of equations is an [error](super::ProcessError::BlendEquationCount). Objects that are drawn by
+    /// Another number of equations is an [error](super::PlanError::BlendEquationCount). Objects that are drawn by
     /// equations hide nothing from culling.
     pub blend_equations: Vec<BlendEquation>,
     /// Whether depth is written. Objects with a blending material write none, unless there are `blend_equations`.
@@ -191,9 +191,9 @@ impl Draws<'_> {
     }
 
     /// The column by which it orders objects; `None` if it orders them in another way.
-    pub fn order_column(&self) -> Option<ColumnLayout> {
+    pub(crate) fn order_column(&self) -> Option<ColumnLayout> {
         match self.selection()?.order {
-            DrawOrder::ByColumn(column) => Some(column),
+            DrawOrder::ByColumn(column) => Some(column.layout()),
             _ => None,
         }
     }

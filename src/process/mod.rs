@@ -38,15 +38,15 @@ mod storage_buffer;
 mod target;
 mod target_size;
 
-pub use access::{Access, ClearColor};
+pub use access::ClearColor;
 pub use access_error::AccessError;
 pub use blend_equation::{BlendComponent, BlendEquation, BlendFactor};
 pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
 pub use cpu_shader::{
-    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials,
-    ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject,
-    ShaderView, VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
+    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
+    ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
+    VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
 };
 use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};
@@ -58,9 +58,9 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use parameters::Parameters;
+pub use plan::PlanError;
 pub(crate) use plan::{ChainSlot, FramePasses, ProcessId, ViewArray};
 pub use plan::{FramePlan, Pass};
-pub use plan::{PlanError, ProcessError};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
 pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
@@ -69,13 +69,13 @@ pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};
-pub use storage_buffer::{BufferLayout, BufferOffset, StorageBuffer};
+pub use storage_buffer::{BufferOffset, StorageBuffer};
 pub use target::Target;
 pub(crate) use target::list_names;
 pub use target_size::TargetSize;
 
 #[cfg(feature = "software")]
-pub(crate) use cpu_shader::TypedCpuShader;
+pub(crate) use cpu_shader::{LightCpuShader, TypedCpuShader};
 pub(crate) use internal::*;
 #[cfg(feature = "wgpu")]
 pub(crate) use prelude::{FIRST_OWN_LOCATION, prelude_with};
@@ -86,9 +86,10 @@ pub(crate) use raw_access::{RawAccess, RequestLog};
 /// interface.
 #[doc(hidden)]
 pub mod internal {
+    pub use super::access::Access;
     pub use super::declaration::{Declaration, DeclaredAttribute};
     pub use super::deferred::Requirements;
     pub use super::plan::{AttachmentExtent, PlannedProcess, PlannedTarget, SampledViews, ViewGroup, ViewOrder};
     pub use super::sampled_view::{SampledShape, SampledView};
-    pub use super::storage_buffer::BufferAccess;
+    pub use super::storage_buffer::{BufferAccess, BufferLayout};
 }

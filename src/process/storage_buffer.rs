@@ -42,8 +42,13 @@ impl<T: Pod> StorageBuffer<T> {
         self
     }
 
+    /// Its size in bytes.
+    pub const fn bytes(self) -> u64 {
+        self.layout.bytes
+    }
+
     /// Its name and size.
-    pub const fn layout(self) -> BufferLayout {
+    pub(crate) const fn layout(self) -> BufferLayout {
         self.layout
     }
 
@@ -121,7 +126,7 @@ pub struct BufferLayout {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BufferOffset {
     /// The buffer.
-    pub buffer: BufferLayout,
+    pub(crate) buffer: BufferLayout,
     /// The offset from its beginning, in bytes.
     pub bytes: u64,
 }

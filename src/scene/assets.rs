@@ -1,5 +1,7 @@
 //! The collection of meshes, materials and textures.
 
+use sealed::Stored;
+
 use super::{Material, Mesh, SceneError, Texture};
 use crate::handle::{Handle, SlotReserver, Slots, StaleHandle};
 
@@ -167,34 +169,13 @@ impl AssetReservers {
 }
 
 /// A type that [`Assets`] stores: [`Mesh`], [`Material`] and [`Texture`].
-pub trait Asset: Sized + Send + sealed::Sealed + 'static {
-    #[doc(hidden)]
-    fn slots(assets: &Assets) -> &Slots<Self>;
-    #[doc(hidden)]
-    fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
-    /// A handle of an asset that is to be loaded.
-    #[doc(hidden)]
-    fn reserve(slots: &AssetReservers) -> Handle<Self>;
-    #[doc(hidden)]
-    fn as_mesh(_handle: Handle<Self>) -> Option<Handle<Mesh>> {
-        None
-    }
-    /// The priorities by slot; `None` for a type without.
-    #[doc(hidden)]
-    fn priorities(_assets: &Assets) -> Option<&Vec<i32>> {
-        None
-    }
-    #[doc(hidden)]
-    fn priorities_mut(_assets: &mut Assets) -> Option<&mut Vec<i32>> {
-        None
-    }
-    #[doc(hidden)]
-    fn check(&self, _assets: &Assets) -> Result<(), SceneError> {
-        Ok(())
-    }
-}
+pub trait Asset: sealed::Stored {}
 
-impl Asset for Mesh {
+impl Asset for Mesh {}
+impl Asset for Material {}
+impl Asset for Texture {}
+
+impl Stored for Mesh {
     fn reserve(slots: &AssetReservers) -> Handle<Self> {
         slots.meshes.reserve()
     }
@@ -220,7 +201,7 @@ impl Asset for Mesh {
     }
 }
 
-impl Asset for Material {
+impl Stored for Material {
     fn reserve(slots: &AssetReservers) -> Handle<Self> {
         slots.materials.reserve()
     }
@@ -241,7 +222,7 @@ impl Asset for Material {
     }
 }
 
-impl Asset for Texture {
+impl Stored for Texture {
     fn reserve(slots: &AssetReservers) -> Handle<Self> {
         slots.textures.reserve()
     }
@@ -264,8 +245,26 @@ impl Asset for Texture {
 }
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for super::Mesh {}
-    impl Sealed for super::Material {}
-    impl Sealed for super::Texture {}
+    use super::{AssetReservers, Assets, Handle, Mesh, SceneError, Slots};
+
+    /// Only the crate knows how assets are stored.
+    pub trait Stored: Sized + Send + 'static {
+        fn slots(assets: &Assets) -> &Slots<Self>;
+        fn slots_mut(assets: &mut Assets) -> &mut Slots<Self>;
+        /// A handle of an asset that is to be loaded.
+        fn reserve(slots: &AssetReservers) -> Handle<Self>;
+        fn as_mesh(_handle: Handle<Self>) -> Option<Handle<Mesh>> {
+            None
+        }
+        /// The priorities by slot; `None` for a type without.
+        fn priorities(_assets: &Assets) -> Option<&Vec<i32>> {
+            None
+        }
+        fn priorities_mut(_assets: &mut Assets) -> Option<&mut Vec<i32>> {
+            None
+        }
+        fn check(&self, _assets: &Assets) -> Result<(), SceneError> {
+            Ok(())
+        }
+    }
 }

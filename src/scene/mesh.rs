@@ -185,8 +185,22 @@ impl Mesh {
         Ok(self)
     }
 
-    /// The values of an attribute, one for each vertex; `None` if the mesh does not have it in that format.
-    pub fn attribute(&self, layout: AttributeLayout) -> Option<&[u8]> {
+    /// The bytes of the values of an attribute, one for each vertex; `None` if the mesh does not have it in that format.
+    ///
+    /// ```
+    /// # use drawloom::scene::{Mesh, Topology, VERTEX_COLOR, Vertex};
+    /// # let corners = vec![Vertex::default(); 3];
+    /// # let mesh = Mesh::new("triangle", Topology::TriangleList, corners, vec![0, 1, 2])?;
+    /// let mesh = mesh.with_attribute(VERTEX_COLOR, &[[1.0, 0.5, 0.0]; 3])?;
+    /// assert_eq!(mesh.attribute(VERTEX_COLOR).map(<[u8]>::len), Some(36));
+    /// # Ok::<(), drawloom::scene::SceneError>(())
+    /// ```
+    pub fn attribute<T: AttributeValue>(&self, attribute: VertexAttribute<T>) -> Option<&[u8]> {
+        self.attribute_of(attribute.layout())
+    }
+
+    /// The values of the attribute with this layout.
+    pub(crate) fn attribute_of(&self, layout: AttributeLayout) -> Option<&[u8]> {
         let known = self.attributes.iter().find(|known| known.layout == layout);
         known.map(|known| known.bytes.as_slice())
     }
@@ -429,8 +443,8 @@ mod tests {
         let broken = mesh.clone().with_attribute(WEIGHT, &[[0.0; 2], [0.0, f32::INFINITY], [0.0; 2]]);
         assert_eq!(problem_of(broken), "is not finite at vertex 1");
         let mesh = mesh.with_attribute(WEIGHT, &[[0.5; 2]; 3]).unwrap();
-        assert_eq!(mesh.attribute(WEIGHT.layout()).map(<[u8]>::len), Some(24));
-        assert_eq!(mesh.attribute(VertexAttribute::<[f32; 3]>::new("weight").layout()), None);
+        assert_eq!(mesh.attribute(WEIGHT).map(<[u8]>::len), Some(24));
+        assert_eq!(mesh.attribute(VertexAttribute::<[f32; 3]>::new("weight")), None);
         let same_name = mesh.with_attribute(VertexAttribute::<u32>::new("weight"), &[1; 3]);
         assert_eq!(problem_of(same_name), "is there already");
     }

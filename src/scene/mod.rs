@@ -67,7 +67,7 @@ pub use light::{Light, LightKind};
 pub(crate) use light::{LightFields, LightFieldsMut, ShadowProjection};
 pub use material::{Blend, Material, Texture};
 pub use material_predicate::MaterialPredicate;
-pub use material_type::{MaterialLayout, MaterialType, MaterialValues};
+pub use material_type::{MaterialType, MaterialValues};
 pub use mesh::{Bounds, Mesh, Vertex};
 #[cfg(feature = "wgpu")]
 pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, VertexStream};
@@ -75,7 +75,7 @@ pub use mesh_buffers::{IndexBuffer, MeshBuffers, StreamAttribute, StreamLayout, 
 pub(crate) use mesh_buffers::{NORMAL, NumberKind, POSITION, UV};
 pub(crate) use node_column::Column;
 pub use node_column::{ChunkInUse, ColumnChunk, NodeColumn, WrittenColumn, WrittenColumns};
-pub use object_column::{ColumnLayout, ColumnValues, ObjectColumn};
+pub use object_column::{ColumnValues, ObjectColumn};
 pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use projection::Projection;
@@ -84,7 +84,7 @@ pub use scene_ref::SceneRef;
 pub use static_group::StaticGroup;
 pub use topology::Topology;
 pub(crate) use transform::is_unit;
-pub use vertex_attribute::{AttributeFormat, AttributeLayout, AttributeValue, VERTEX_COLOR, VertexAttribute};
+pub use vertex_attribute::{AttributeValue, VERTEX_COLOR, VertexAttribute};
 pub use view_filter::{FilteredObjects, ViewFilter};
 pub use view_kind::ViewKind;
 pub use whole_picture::WholePicture;
@@ -93,5 +93,8 @@ pub use whole_picture::WholePicture;
 #[doc(hidden)]
 pub mod internal {
     pub use super::generated_buffer::{GeneratedContents, GeneratedLayout};
+    pub use super::material_type::MaterialLayout;
+    pub use super::object_column::ColumnLayout;
     pub use super::packed_vertex::PackedVertex;
+    pub use super::vertex_attribute::{AttributeFormat, AttributeLayout};
 }

@@ -47,7 +47,7 @@ impl<T: Pod> ObjectColumn<T> {
     }
 
     /// Its name and the size of an element.
-    pub const fn layout(self) -> ColumnLayout {
+    pub(crate) const fn layout(self) -> ColumnLayout {
         ColumnLayout { name: self.name, stride: size_of::<T>() }
     }
 
@@ -65,6 +65,20 @@ impl<T> Clone for ObjectColumn<T> {
 }
 
 impl<T> Copy for ObjectColumn<T> {}
+
+impl<T> PartialEq for ObjectColumn<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl<T> Eq for ObjectColumn<T> {}
+
+impl<T> std::hash::Hash for ObjectColumn<T> {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        self.name.hash(state);
+    }
+}
 
 impl<T> std::fmt::Debug for ObjectColumn<T> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -95,7 +109,7 @@ impl<'a> ColumnValues<'a> {
     }
 
     /// The name of the column and the size of an element.
-    pub fn layout(&self) -> ColumnLayout {
+    pub(crate) fn layout(&self) -> ColumnLayout {
         self.layout
     }
 

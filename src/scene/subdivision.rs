@@ -279,7 +279,7 @@ mod tests {
             if limit == usize::MAX {
                 prop_assert!(fine.longest_edge() <= longest);
             }
-            let again: &[[f32; 3]] = bytemuck::cast_slice(fine.attribute(POSITION.layout()).unwrap());
+            let again: &[[f32; 3]] = bytemuck::cast_slice(fine.attribute(POSITION).unwrap());
             prop_assert!(fine.vertices().iter().map(|vertex| &vertex.position).eq(again));
             prop_assert!(longest_of(&fine) <= f64::from(fine.longest_edge()));
             prop_assert!((area(&fine) / area(&whole) - 1.0).abs() < 1e-4, "{} {}", area(&fine), area(&whole));
@@ -287,7 +287,7 @@ mod tests {
                 let normals = triangle.map(|corner| Vec3::from(fine.vertices()[corner as usize].normal));
                 prop_assert!(SIDES.contains(&normals[0]) && normals == [normals[0]; 3]);
                 let side = |corner: u32| {
-                    let sides: &[u32] = bytemuck::cast_slice(fine.attribute(SIDE.layout()).unwrap());
+                    let sides: &[u32] = bytemuck::cast_slice(fine.attribute(SIDE).unwrap());
                     SIDES[sides[corner as usize] as usize]
                 };
                 prop_assert_eq!(triangle.map(side), normals);

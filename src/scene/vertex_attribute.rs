@@ -41,7 +41,7 @@ impl<T: AttributeValue> VertexAttribute<T> {
     }
 
     /// Its name and format.
-    pub const fn layout(self) -> AttributeLayout {
+    pub(crate) const fn layout(self) -> AttributeLayout {
         AttributeLayout { name: self.name, format: T::FORMAT }
     }
 }
@@ -154,25 +154,24 @@ impl AttributeFormat {
     }
 }
 
-/// A value of an attribute.
-pub trait AttributeValue: Pod + sealed::Sealed {
-    /// Its format.
-    const FORMAT: AttributeFormat;
-}
+/// A value of an attribute: one to four `f32` or `u32`, or four bytes.
+pub trait AttributeValue: Pod + sealed::HasFormat {}
 
 mod sealed {
     /// Only the crate knows formats.
-    pub trait Sealed {}
+    pub trait HasFormat {
+        const FORMAT: super::AttributeFormat;
+    }
 }
 
 macro_rules! attribute_values {
     ($($value:ty => $format:expr),* $(,)?) => {
         $(
-            impl sealed::Sealed for $value {}
-
-            impl AttributeValue for $value {
+            impl sealed::HasFormat for $value {
                 const FORMAT: AttributeFormat = $format;
             }
+
+            impl AttributeValue for $value {}
         )*
     };
 }

@@ -246,7 +246,7 @@ impl Fill<'_> {
     pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
         let camera = &self.view.camera;
         let numbers = match self.selection.order {
-            DrawOrder::ByColumn(column) => self.scene.column(column),
+            DrawOrder::ByColumn(column) => self.scene.column(column.layout()),
             _ => None,
         };
         let order = OrderKeys {

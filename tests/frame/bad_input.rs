@@ -8,7 +8,7 @@ use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec2, Vec3};
 use drawloom::process::{
     CommandDraws, ComputeDispatch, Declare, Deferred, DrawCount, Draws, Format, GeometryBuffer, GeometryFormats,
-    LightVolumes, PlanError, ProceduralDraws, ProcessError, RenderProcess, StorageBuffer, ToneMapping, Workgroups,
+    LightVolumes, PlanError, ProceduralDraws, RenderProcess, StorageBuffer, ToneMapping, Workgroups,
 };
 use drawloom::scene::{
     Bounds, Camera, Changes, ClipPlane, ColumnValues, Light, LightKind, Mesh, ObjectColumn, Projection, Scene,
@@ -182,7 +182,7 @@ fn columns_that_do_not_fit_are_refused_by_name() {
     let (tints, narrow) = ([[0.0; 4]; 11], [0.0; 10]);
     let missing = error_of_columns(&[]);
     assert!(
-        matches!(&missing, FrameError::Process(ProcessError::MissingColumn { process, column: "tint" }) if process == "tinted"),
+        matches!(&missing, FrameError::Plan(PlanError::MissingColumn { process, column: "tint" }) if process == "tinted"),
         "{missing}"
     );
     let unequal = error_of_columns(&[TINT.values(&tints[..9])]);
@@ -194,7 +194,7 @@ fn columns_that_do_not_fit_are_refused_by_name() {
     let other_size = error_of_columns(&[ObjectColumn::<f32>::new("tint").values(&narrow)]);
     let is_named = matches!(
         &other_size,
-        FrameError::Process(ProcessError::ColumnSize { process, column: "tint", declared: 16, found: 4 }) if process == "tinted"
+        FrameError::Plan(PlanError::ColumnSize { process, column: "tint", declared: 16, found: 4 }) if process == "tinted"
     );
     assert!(is_named, "{other_size}");
 }

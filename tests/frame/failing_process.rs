@@ -4,9 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use drawloom::backend::NullBackend;
-use drawloom::process::{
-    Declare, Deferred, Draws, FullScreen, PlanError, PostStep, ProcessError, RenderProcess, ToneMapping,
-};
+use drawloom::process::{Declare, Deferred, Draws, FullScreen, PlanError, PostStep, RenderProcess, ToneMapping};
 use drawloom::quality::Quality;
 use drawloom::task::Scheduler;
 use drawloom::{BuildError, FrameError, Renderer};
@@ -49,7 +47,7 @@ fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_succeeds() {
                 assert!(!broken);
                 assert_eq!(submitter.submit(recorded).unwrap().submission.passes.len(), 12);
             }
-            Err(FrameError::Process(ProcessError::Panicked { process, message })) => {
+            Err(FrameError::Plan(PlanError::ProcessPanicked { process, message })) => {
                 assert!(broken);
                 assert_eq!((process.as_str(), message.as_str()), ("fragile", "the glass is broken"));
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
-use drawloom::command::{Blending, Selection};
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Deformation, Draws, Format, RenderProcess};
 use drawloom::quality::{CullingVolume, Quality};
@@ -271,7 +271,7 @@ impl RenderProcess for Glass {
     }
 
     fn draws(&self) -> Draws<'_> {
-        let selection = Selection { blending: Blending::Blended, ..Selection::ALL };
+        let selection = Selection::BLENDED;
         Draws::Commands(CommandDraws { selection, ..CommandDraws::default() })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::command::{DrawOrder, Selection};
-use drawloom::process::{CommandDraws, Declare, Draws, Format, ProcessError, RenderProcess};
+use drawloom::process::{CommandDraws, Declare, Draws, Format, PlanError, RenderProcess};
 use drawloom::scene::{Changes, ObjectColumn, Scene, SceneError, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
@@ -86,7 +86,7 @@ fn objects_are_drawn_by_a_number_of_the_engines() {
         expected.sort_by_key(|object| numbers[*object as usize]);
         expected
     };
-    let mut renderer = renderer(DrawOrder::by(NUMBER), 2);
+    let mut renderer = renderer(DrawOrder::ByColumn(NUMBER), 2);
     let mut frame = |numbers: &[u32], changes| {
         let columns = [NUMBER.values(numbers)];
         objects_of(&mut renderer, SceneRef { columns: &columns, changes, ..scene.as_scene_ref() })
@@ -103,11 +103,11 @@ fn objects_are_drawn_by_a_number_of_the_engines() {
 #[test]
 fn a_missing_order_and_an_unreported_change_of_it_are_named() {
     let scene = field(100);
-    let mut renderer = renderer(DrawOrder::by(NUMBER), 1);
+    let mut renderer = renderer(DrawOrder::ByColumn(NUMBER), 1);
     let error = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err();
     let is_named = matches!(
         &error,
-        FrameError::Process(ProcessError::MissingColumn { process, column: "number" }) if process == "ordered"
+        FrameError::Plan(PlanError::MissingColumn { process, column: "number" }) if process == "ordered"
     );
     assert!(is_named, "{error}");
     let mut numbers = vec![1; 100];

@@ -6,8 +6,8 @@ use bytemuck::Pod;
 use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::process::{
-    BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, PlanError, ProcessError,
-    RenderProcess, StorageBuffer, TargetSize,
+    BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, PlanError, RenderProcess,
+    StorageBuffer, TargetSize,
 };
 use drawloom::scene::{Blend, Material, MaterialType, ViewKind};
 use drawloom::task::Scheduler;
@@ -246,7 +246,7 @@ fn what_cannot_be_blended_is_named() {
     let error = renderer.record(field(3).as_scene_ref()).map(drop).unwrap_err();
     let is_named = matches!(
         &error,
-        FrameError::Process(ProcessError::CannotBlend { process, target, format: Format::R32Float })
+        FrameError::Plan(PlanError::CannotBlend { process, target, format: Format::R32Float })
             if process == "sum" && target == "sum"
     );
     assert!(is_named, "{error}");
@@ -279,7 +279,7 @@ fn blend_equations_fit_the_targets() {
     let error = record(Format::R32Float, vec![replace, add]).unwrap_err();
     let is_named = matches!(
         &error,
-        FrameError::Process(ProcessError::CannotBlend { process, target, format: Format::R32Float })
+        FrameError::Plan(PlanError::CannotBlend { process, target, format: Format::R32Float })
             if process == "mixed" && target == "other"
     );
     assert!(is_named, "{error}");

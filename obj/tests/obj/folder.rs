@@ -60,7 +60,7 @@ pub fn mesh(imported: &Imported, object: usize) -> &Mesh {
 
 /// The colours of the vertices of the first object; empty if they have none.
 pub fn colors(imported: &Imported) -> Vec<[f32; 3]> {
-    let bytes = mesh(imported, 0).attribute(VERTEX_COLOR.layout()).unwrap_or_default();
+    let bytes = mesh(imported, 0).attribute(VERTEX_COLOR).unwrap_or_default();
     let numbers: Vec<f32> = bytes.as_chunks().0.iter().copied().map(f32::from_ne_bytes).collect();
     numbers.as_chunks().0.to_vec()
 }

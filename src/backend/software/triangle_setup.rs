@@ -228,7 +228,7 @@ fn vertex_input<R: Real>(mesh: &Mesh, index: usize, attributes: &[DeclaredAttrib
     let vertex = mesh.vertices()[index];
     let value_of = |&DeclaredAttribute { layout, ref default }: &DeclaredAttribute| {
         let stride = layout.format.bytes();
-        let value = mesh.attribute(layout).map_or(default.as_slice(), |values| &values[index * stride..][..stride]);
+        let value = mesh.attribute_of(layout).map_or(default.as_slice(), |values| &values[index * stride..][..stride]);
         Vector(layout.format.numbers(value).map(R::of))
     };
     let is_color = |attribute: &DeclaredAttribute| attribute.layout == VERTEX_COLOR.layout();

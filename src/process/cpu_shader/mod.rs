@@ -18,7 +18,8 @@ pub use inputs::{
     FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight,
     ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
-pub use interface::{CpuShader, FullScreenCpuShader, LightCpuShader, ObjectCpuShader};
+pub(crate) use interface::LightCpuShader;
+pub use interface::{CpuShader, FullScreenCpuShader, ObjectCpuShader};
 pub use prelude::{bounded_uv, direction_from_octahedral, octahedral_from_direction};
 
 pub(crate) use interface::TypedCpuShader;

@@ -42,7 +42,7 @@ impl GeometryBuffer {
 
     /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over
     /// them: all shares are recorded at the same time.
-    pub fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
+    pub(crate) fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
         let name = if share.of <= 1 {
             String::from("geometry buffer")
         } else {

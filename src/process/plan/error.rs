@@ -259,27 +259,9 @@ pub enum PlanError {
         /// Those that there may be.
         known: String,
     },
-    /// A process could not say what it reads and writes.
-    #[error(transparent)]
-    Process(#[from] ProcessError),
-    /// `RenderProcess::name`, `PostStep::process` or `PostStep::with_quality` panicked.
-    #[error("a process or a step of post-processing panicked while the frame was planned: {message}")]
-    Panicked {
-        /// The message of the panic.
-        message: String,
-    },
-    /// No process is left, because none leads to an output.
-    #[error("no process leads to an output")]
-    Empty,
-}
-
-/// An error in a process's declaration or draws.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProcessError {
-    /// It panicked in `declare` or `draws`.
+    /// A process panicked in `declare` or `draws`.
     #[error("process {process:?} panicked in `declare` or `draws`: {message}")]
-    Panicked {
+    ProcessPanicked {
         /// The process.
         process: String,
         /// What the panic said.
@@ -388,4 +370,13 @@ pub enum ProcessError {
         /// The target.
         target: String,
     },
+    /// `RenderProcess::name`, `PostStep::process` or `PostStep::with_quality` panicked.
+    #[error("a process or a step of post-processing panicked while the frame was planned: {message}")]
+    Panicked {
+        /// The message of the panic.
+        message: String,
+    },
+    /// No process is left, because none leads to an output.
+    #[error("no process leads to an output")]
+    Empty,
 }

@@ -17,8 +17,7 @@ use super::sampled_views::check_sampled_views;
 use super::shared_declarations::{SharedDeclarations, check_columns, check_material_types};
 use super::unknown_targets::check_left_out;
 use super::{
-    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, ProcessError, TargetIndices,
-    ViewGroup,
+    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, TargetIndices, ViewGroup,
 };
 use crate::graph::{GraphProblem, Schedule};
 use crate::process::{BufferLayout, DeclaredAttribute, Draws, RenderProcess};
@@ -184,7 +183,7 @@ impl FramePlan {
     ///
     /// # Errors
     /// If a process panics, or its draws do not fit its declaration or its targets.
-    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, ProcessError> {
+    pub fn draws<'a>(&'a self) -> Result<Vec<Draws<'a>>, PlanError> {
         let checked = |(planned, attachments): (&'a PlannedProcess, &'a Attachments)| {
             let draws = planned.draws()?;
             check_blending(planned, &draws, attachments)?;
@@ -223,12 +222,12 @@ impl FramePlan {
     }
 
     /// The columns of objects that the processes read, each once.
-    pub fn columns(&self) -> &[ColumnLayout] {
+    pub(crate) fn columns(&self) -> &[ColumnLayout] {
         &self.shared.columns
     }
 
     /// The material types that the processes read, each once.
-    pub fn material_types(&self) -> &[MaterialLayout] {
+    pub(crate) fn material_types(&self) -> &[MaterialLayout] {
         &self.shared.material_types
     }
 
@@ -238,7 +237,7 @@ impl FramePlan {
     }
 
     /// The buffers that the processes share, each once.
-    pub fn buffers(&self) -> &[BufferLayout] {
+    pub(crate) fn buffers(&self) -> &[BufferLayout] {
         &self.shared.buffers
     }
 
@@ -250,7 +249,7 @@ impl FramePlan {
         draws: &[Draws<'_>],
         scene: &SceneRef<'_>,
         material_types: &[MaterialLayout],
-    ) -> Result<(), ProcessError> {
+    ) -> Result<(), PlanError> {
         check_columns(&self.processes, draws, scene)?;
         check_material_types(&self.processes, draws, material_types)
     }

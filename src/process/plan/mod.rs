@@ -16,7 +16,7 @@ mod test_process;
 mod unknown_targets;
 mod view_arrays;
 
-pub use error::{PlanError, ProcessError};
+pub use error::PlanError;
 pub(crate) use frame_passes::FramePasses;
 pub use frame_passes::{ViewGroup, ViewOrder};
 pub use frame_plan::FramePlan;

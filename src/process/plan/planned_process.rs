@@ -3,7 +3,7 @@
 use std::iter;
 use std::sync::Arc;
 
-use super::{PlanError, ProcessError};
+use super::PlanError;
 #[cfg(feature = "wgpu")]
 use crate::process::RequestLog;
 use crate::process::{Access, BufferAccess, BufferOffset, ClearColor, Declaration, Declare, Draws, RenderProcess};
@@ -78,7 +78,7 @@ impl PlannedProcess {
             catch(|| process.name().to_owned()).map_err(|JobPanic { message, .. }| PlanError::Panicked { message })?;
         let mut declare = Declare::default();
         catch(|| process.declare(&mut declare))
-            .map_err(|panic| ProcessError::Panicked { process: name.clone(), message: panic.message })?;
+            .map_err(|panic| PlanError::ProcessPanicked { process: name.clone(), message: panic.message })?;
         let declaration = declare.finish();
         if declaration.accesses.iter().filter(|(_, access)| access.is_depth()).count() > 1 {
             return Err(PlanError::MultipleDepthTargets { process: name });
@@ -114,9 +114,9 @@ impl PlannedProcess {
     /// # Errors
     /// If the process panics, its draws do not fit its declaration, as only raw passes use targets by their own
     /// commands, or it has a resource of a size that no buffer can have.
-    pub(super) fn draws(&self) -> Result<Draws<'_>, ProcessError> {
+    pub(super) fn draws(&self) -> Result<Draws<'_>, PlanError> {
         let process = || self.name.clone();
-        let panicked = |panic: JobPanic| ProcessError::Panicked { process: process(), message: panic.message };
+        let panicked = |panic: JobPanic| PlanError::ProcessPanicked { process: process(), message: panic.message };
         let draws = catch(|| self.process.draws()).map_err(panicked)?;
         let is_raw = match draws {
             Draws::Commands(_) | Draws::FullScreen(_) | Draws::Lights(_) => false,
@@ -128,21 +128,21 @@ impl PlannedProcess {
         let is_of_both = |access: &Access| matches!(access, Access::SamplePrevious | Access::SampleLayers(_));
         let fits = |access: &Access| access.is_raw() == is_raw || is_of_both(access);
         if let Some((target, _)) = self.declaration.accesses.iter().find(|(_, access)| !fits(access)) {
-            return Err(ProcessError::Misdeclared { process: process(), target: target.clone() });
+            return Err(PlanError::Misdeclared { process: process(), target: target.clone() });
         }
         let attached = |(_, access): &&(String, Access)| access.is_depth() || access.is_color();
         if let (Draws::Compute(_), Some((target, _))) = (&draws, self.declaration.accesses.iter().find(attached)) {
-            return Err(ProcessError::ComputeDraws { process: process(), target: target.clone() });
+            return Err(PlanError::ComputeDraws { process: process(), target: target.clone() });
         }
         if let Some((offset, bytes)) = draws.arguments()
             && let Some(problem) = self.problem_of_arguments(offset, bytes)
         {
-            return Err(ProcessError::Arguments { process: process(), buffer: offset.buffer.name, problem });
+            return Err(PlanError::Arguments { process: process(), buffer: offset.buffer.name, problem });
         }
         for (resource, own) in draws.resources().iter().enumerate() {
             let Some(bytes) = own.bytes().map(<[u8]>::len) else { continue };
             if bytes == 0 || !bytes.is_multiple_of(4) {
-                return Err(ProcessError::ResourceSize { process: process(), resource, bytes });
+                return Err(PlanError::ResourceSize { process: process(), resource, bytes });
             }
         }
         Ok(draws)

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::mip_levels::{check_mip_levels, created_targets, mip_levels_error};
 use super::resource_names::views_of_output;
-use super::{PlanError, PlannedProcess, ProcessError};
+use super::{PlanError, PlannedProcess};
 use crate::process::{
     Access, BlendEquation, Declaration, Draws, Format, ShadowCasters, TargetSize, list_names, previous_name, targets,
 };
@@ -295,7 +295,7 @@ pub(super) fn check_blending(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
     attachments: &Attachments,
-) -> Result<(), ProcessError> {
+) -> Result<(), PlanError> {
     let blends = match draws {
         Draws::FullScreen(full_screen) => full_screen.blend != Blend::None,
         Draws::Procedural(procedural) => procedural.blend != Blend::None,
@@ -305,11 +305,11 @@ pub(super) fn check_blending(
     let process = || planned.name.clone();
     let (equations, targets) = (draws.blend_equations(), attachments.colors);
     if !equations.is_empty() && equations.len() != targets {
-        return Err(ProcessError::BlendEquationCount { process: process(), equations: equations.len(), targets });
+        return Err(PlanError::BlendEquationCount { process: process(), equations: equations.len(), targets });
     }
     for (index, target, format) in &attachments.unblendable {
         if equations.get(*index).map_or(blends, |equation| *equation != BlendEquation::REPLACE) {
-            return Err(ProcessError::CannotBlend { process: process(), target: target.clone(), format: *format });
+            return Err(PlanError::CannotBlend { process: process(), target: target.clone(), format: *format });
         }
     }
     Ok(())
@@ -321,7 +321,7 @@ pub(super) fn check_stencil(
     planned: &PlannedProcess,
     draws: &Draws<'_>,
     attachments: &Attachments,
-) -> Result<(), ProcessError> {
+) -> Result<(), PlanError> {
     let access = planned.declaration.depth().map(|(_, access)| access);
     let declares_test = matches!(access, Some(Access::MarkStencil | Access::TestStencil));
     let problem = match draws.stencil() {
@@ -332,7 +332,7 @@ pub(super) fn check_stencil(
         None if declares_test => "as it declares, but draws without a test of it",
         _ => return Ok(()),
     };
-    Err(ProcessError::Stencil { process: planned.name.clone(), problem })
+    Err(PlanError::Stencil { process: planned.name.clone(), problem })
 }
 
 /// The targets that a process draws into, and the depth that it tests.

@@ -1,7 +1,7 @@
 //! What processes share by its name: the columns, material types, vertex attributes and buffers that a plan's processes
 //! declare.
 
-use super::{PlanError, PlannedProcess, ProcessError};
+use super::{PlanError, PlannedProcess};
 use crate::command::MaterialTypes;
 use crate::process::{BufferAccess, BufferLayout, Declaration, DeclaredAttribute, Draws};
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef};
@@ -122,17 +122,17 @@ pub(super) fn check_columns(
     processes: &[PlannedProcess],
     draws: &[Draws<'_>],
     scene: &SceneRef<'_>,
-) -> Result<(), ProcessError> {
+) -> Result<(), PlanError> {
     let read =
         processes.iter().flat_map(|planned| planned.declaration.columns.iter().map(move |&column| (planned, column)));
     let orders = processes.iter().zip(draws).filter_map(|(planned, draws)| Some((planned, draws.order_column()?)));
     for (planned, declared) in read.chain(orders) {
         let (process, column) = (|| planned.name.clone(), declared.name);
         match scene.columns.iter().find(|values| values.name() == column) {
-            None => return Err(ProcessError::MissingColumn { process: process(), column }),
+            None => return Err(PlanError::MissingColumn { process: process(), column }),
             Some(values) if values.layout().stride != declared.stride => {
                 let (declared, found) = (declared.stride, values.layout().stride);
-                return Err(ProcessError::ColumnSize { process: process(), column, declared, found });
+                return Err(PlanError::ColumnSize { process: process(), column, declared, found });
             }
             Some(_) => {}
         }
@@ -148,7 +148,7 @@ pub(super) fn check_material_types(
     processes: &[PlannedProcess],
     draws: &[Draws<'_>],
     found: &[MaterialLayout],
-) -> Result<(), ProcessError> {
+) -> Result<(), PlanError> {
     for (planned, draws) in processes.iter().zip(draws) {
         let selected = draws.selection().and_then(|selection| match selection.material_types {
             MaterialTypes::Only(selected) => Some(selected),
@@ -159,7 +159,7 @@ pub(super) fn check_material_types(
             if let Some(other) = other {
                 let (process, material_type) = (planned.name.clone(), declared.name);
                 let (declared, found) = (declared.stride, other.stride);
-                return Err(ProcessError::MaterialTypeSize { process, material_type, declared, found });
+                return Err(PlanError::MaterialTypeSize { process, material_type, declared, found });
             }
         }
     }

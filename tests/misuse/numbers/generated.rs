@@ -168,7 +168,7 @@ fn columns() -> Result<(), Failed> {
 
 fn storage() -> Result<(), Failed> {
     let buffer = StorageBuffer::<[u32; 4]>::new("buffer", u32::MAX);
-    same(buffer.layout().bytes, 16 * u64::from(u32::MAX), "its size")?;
+    same(buffer.bytes(), 16 * u64::from(u32::MAX), "its size")?;
     same(buffer.at(u32::MAX).bytes, 16 * u64::from(u32::MAX), "an offset")?;
     // A type of 2⁴⁰ bytes: what it is multiplied by may overflow.
     type Large = [[u32; 1 << 16]; 1 << 22];

@@ -108,7 +108,7 @@ impl AttributeSet {
 
 /// Calls `visit` with the values that a mesh has for an attribute.
 fn with_values<T>(mesh: &Mesh, attribute: &DeclaredAttribute, visit: impl FnOnce(&[u8]) -> T) -> T {
-    match mesh.attribute(attribute.layout) {
+    match mesh.attribute_of(attribute.layout) {
         Some(values) => visit(values),
         None => visit(&attribute.default.repeat(mesh.vertices().len())),
     }
