@@ -24,6 +24,7 @@ mod view_filter;
 mod object_table;
 mod occlusion;
 mod order;
+mod plan;
 mod static_groups;
 #[cfg(feature = "wgpu")]
 mod pipeline_library;

@@ -133,6 +133,28 @@ fn views_of_one_array_have_one_size_and_faces_are_square() {
 }
 
 #[test]
+fn an_array_has_as_many_layers_as_any_process_samples() {
+    for counts in [[1, 2], [2, 1]] {
+        let process = |name: &'static str, layers| {
+            Declaring::new(name, move |declare| {
+                declare.samples_view_layers(ViewKind::Main, "probe", "first", layers);
+                declare.clears_color(name, Format::Rgba8Unorm, ClearColor::Background);
+                declare.keep();
+            })
+        };
+        let builder = Renderer::builder(NullBackend).process(process("first", counts[0]));
+        let builder = builder.process(process("second", counts[1]));
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        let mut scene = scene();
+        scene.cameras.extend(["probe/0", "probe/1"].map(|name| Camera::looking_at(name, DVec3::Z, DVec3::ZERO)));
+        drop(renderer.record(scene.as_scene_ref()).unwrap());
+        scene.cameras[2].size = [16, 17];
+        let message = renderer.record(scene.as_scene_ref()).map(drop).unwrap_err().to_string();
+        assert!(message.contains(r#"views "probe/0" and "probe/1" share the target "first""#), "{message}");
+    }
+}
+
+#[test]
 fn ten_thousand_views_are_an_error_that_says_the_limit() {
     let mut scene = scene();
     scene.cameras[0].size = [1, 1];

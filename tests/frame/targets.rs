@@ -1,16 +1,18 @@
 //! Sizes and histories of targets that no plan can have.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bytemuck::Pod;
 use drawloom::backend::NullBackend;
 use drawloom::command::Selection;
 use drawloom::process::{
-    BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, PlanError, RenderProcess,
-    StorageBuffer, TargetSize,
+    BlendEquation, ClearColor, CommandDraws, Declare, Draws, Format, FullScreen, LightDraws, PlanError,
+    ProceduralDraws, RenderProcess, StorageBuffer, TargetSize,
 };
-use drawloom::scene::{Blend, Material, MaterialType, ViewKind};
+use drawloom::scene::{Blend, LightKind, Material, MaterialType, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::internal::LightClass;
 use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
 
@@ -168,21 +170,27 @@ fn a_process_that_draws_once_a_frame_draws_in_the_first_of_its_views() {
 #[test]
 fn a_process_that_draws_once_a_frame_comes_after_those_of_each_view_that_it_depends_on() {
     const COUNTS: StorageBuffer<u32> = StorageBuffer::new("counts", 4);
+    const OTHERS: StorageBuffer<u32> = StorageBuffer::new("others", 4);
     let each = Declaring::new("each", |declare| {
         clears(declare, "picture");
         declare.changes_buffer(COUNTS);
     });
+    let other = Declaring::new("other", |declare| {
+        clears(declare, "other picture");
+        declare.changes_buffer(OTHERS);
+    });
     let once = Declaring::new("once", |declare| {
         clears(declare, "sum");
         declare.reads_buffer(COUNTS);
+        declare.reads_buffer(OTHERS);
         declare.once_a_frame();
     });
-    let builder = Renderer::builder(NullBackend).process(once).process(each);
+    let builder = Renderer::builder(NullBackend).process(once).process(each).process(other);
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
     let recorded = renderer.record(field(5).as_scene_ref()).unwrap();
     let submission = submitter.submit(recorded).unwrap().submission;
     let passes: Vec<_> = submission.passes.iter().map(|pass| (pass.process.as_str(), pass.view)).collect();
-    assert_eq!(passes, [("each", 0), ("each", 1), ("once", 0)]);
+    assert_eq!(passes, [("each", 0), ("each", 1), ("other", 0), ("other", 1), ("once", 0)]);
 }
 
 #[test]
@@ -228,7 +236,7 @@ fn a_process_that_nothing_needs_is_warned_of() {
 
 #[test]
 fn what_cannot_be_blended_is_named() {
-    struct Sum;
+    struct Sum(fn() -> Draws<'static>);
     impl RenderProcess for Sum {
         fn name(&self) -> &str {
             "sum"
@@ -238,18 +246,33 @@ fn what_cannot_be_blended_is_named() {
             declare.keep();
         }
         fn draws(&self) -> Draws<'_> {
-            Draws::FullScreen(FullScreen { blend: Blend::Additive, ..FullScreen::default() })
+            (self.0)()
         }
     }
-    let builder = Renderer::builder(NullBackend).process(Sum);
-    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
-    let error = renderer.record(field(3).as_scene_ref()).map(drop).unwrap_err();
-    let is_named = matches!(
-        &error,
-        FrameError::Plan(PlanError::CannotBlend { process, target, format: Format::R32Float })
-            if process == "sum" && target == "sum"
-    );
-    assert!(is_named, "{error}");
+    let record = |draws| {
+        let builder = Renderer::builder(NullBackend).process(Sum(draws));
+        let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        renderer.record(field(3).as_scene_ref()).map(drop)
+    };
+    record(|| Draws::FullScreen(FullScreen::default())).unwrap();
+    record(|| Draws::Procedural(ProceduralDraws::default())).unwrap();
+    let blended: [fn() -> Draws<'static>; 3] = [
+        || {
+            let class = LightClass { kind: LightKind::Point, shadowed: false };
+            Draws::Lights(LightDraws { shader: "", class, parameters: Cow::default(), resources: Vec::new() })
+        },
+        || Draws::FullScreen(FullScreen { blend: Blend::Additive, ..FullScreen::default() }),
+        || Draws::Procedural(ProceduralDraws { blend: Blend::Alpha, ..ProceduralDraws::default() }),
+    ];
+    for draws in blended {
+        let error = record(draws).unwrap_err();
+        let is_named = matches!(
+            &error,
+            FrameError::Plan(PlanError::CannotBlend { process, target, format: Format::R32Float })
+                if process == "sum" && target == "sum"
+        );
+        assert!(is_named, "{error}");
+    }
 }
 
 #[test]

@@ -165,3 +165,39 @@ pub(super) fn check_material_types(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::FramePlan;
+    use super::super::test_process::TestProcess;
+    use super::*;
+    use crate::process::{Declare, RenderProcess, StorageBuffer};
+    use crate::scene::{MaterialType, ObjectColumn, VertexAttribute};
+
+    #[test]
+    fn what_processes_read_alike_is_planned_once() {
+        const COLUMN: ObjectColumn<u32> = ObjectColumn::new("number");
+        const METAL: MaterialType<[f32; 4]> = MaterialType::new("metal");
+        const WEIGHT: VertexAttribute<f32> = VertexAttribute::new("weight");
+        const COUNTS: StorageBuffer<u32> = StorageBuffer::new("counts", 16);
+        let process = |name, declare: fn(&mut Declare)| Arc::new(TestProcess(name, declare)) as Arc<dyn RenderProcess>;
+        let reads = |declare: &mut Declare| {
+            declare.reads_column(COLUMN);
+            declare.reads_materials(METAL);
+            declare.reads_attribute(WEIGHT, 1.0);
+            // A buffer may be used in several ways, as long as none changes it.
+            declare.reads_buffer(COUNTS);
+            declare.reads_arguments(COUNTS);
+            declare.keep();
+        };
+        let counts = process("counts", |declare| declare.changes_buffer(COUNTS));
+        let plan = FramePlan::new(vec![counts, process("first", reads), process("second", reads)], &[]).unwrap();
+        assert_eq!(plan.processes().len(), 3);
+        assert_eq!(plan.columns().iter().map(|column| column.name).collect::<Vec<_>>(), ["number"]);
+        assert_eq!(plan.material_types().iter().map(|found| found.name).collect::<Vec<_>>(), ["metal"]);
+        assert_eq!(plan.attributes().iter().map(|found| found.layout.name).collect::<Vec<_>>(), ["weight"]);
+        assert_eq!(plan.buffers().iter().map(|buffer| buffer.name).collect::<Vec<_>>(), ["counts"]);
+    }
+}

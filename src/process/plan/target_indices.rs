@@ -164,4 +164,12 @@ mod tests {
         let (target, processes) = ("shadow: maps".to_owned(), "\"reader\"".to_owned());
         assert_eq!(error, Some(PlanError::UnknownTarget { known: "\"shadow: maps\"".to_owned(), target, processes }));
     }
+
+    #[test]
+    fn a_target_that_no_view_draws_is_that_of_other_views() {
+        let plan = plan();
+        let views =
+            |name| sampled_target(plan.targets(), ViewKind::Shadow, name).map(|index| plan.targets()[index].views);
+        assert_eq!((views("picture"), views("other")), (Some(ViewKind::Main), None));
+    }
 }

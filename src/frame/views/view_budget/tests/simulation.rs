@@ -5,7 +5,7 @@ use std::time::Duration;
 use fastrand::Rng;
 use glam::DVec3;
 
-use crate::frame::view_budget::ViewBudget;
+use crate::frame::views::view_budget::ViewBudget;
 use crate::frame::{BudgetedView, FrameStatistics, QualityLevel, StageTimes, ViewStatistics, ViewVariant};
 use crate::raster::CulledTriangles;
 use crate::scene::{Camera, Redraw, ViewKind};
