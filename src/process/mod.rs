@@ -45,8 +45,8 @@ pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
 pub use cpu_shader::{
     CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
-    ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
-    VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
+    ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS,
+    VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
 };
 use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};

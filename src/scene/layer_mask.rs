@@ -3,7 +3,7 @@
 use std::ops::BitOr;
 
 /// Some of 32 layers, as bits. An object belongs to layers, and a process draws the objects of some: see
-/// [`SceneRef::layers`](super::SceneRef::layers) and [`Selection::layers`](crate::command::Selection::layers).
+/// [`SceneRef::layers`](super::SceneRef::layers) and [`Selection::in_layers`](crate::command::Selection::in_layers).
 ///
 /// ```
 /// use drawloom::scene::LayerMask;

@@ -30,9 +30,9 @@ pub struct SceneRef<'a> {
     pub meshes: &'a [Handle<Mesh>],
     /// The material of each object.
     pub materials: &'a [Handle<Material>],
-    /// The layers of each object, by which processes [select](crate::command::Selection::layers) what they draw. Empty
-    /// if every object belongs to all. A process that does not draw all layers makes its list anew in each frame in
-    /// which an object changes.
+    /// The layers of each object, by which processes [select](crate::command::Selection::in_layers) what they draw.
+    /// Empty if every object belongs to all. A process that does not draw all layers makes its list anew in each frame
+    /// in which an object changes.
     pub layers: &'a [LayerMask],
     /// Data of the engine's own for each object, which shaders of its processes read: see
     /// [`ObjectColumn`](super::ObjectColumn). Columns that no process reads cost nothing.

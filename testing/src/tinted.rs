@@ -39,7 +39,7 @@ impl RenderProcess for Tinted {
 impl<R: Real> ObjectCpuShader<R> for Tinted {
     fn vertex(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexOutput<R> {
         let clip = pass.view.clip_position(object.relative_position(vertex.position));
-        let tint = pass.columns.get(TINT, object.index);
+        let tint = pass.column(TINT, object.index);
         let mut varyings = [R::zero(); VARYINGS];
         for (varying, channel) in varyings.iter_mut().zip(tint) {
             *varying = R::of(f64::from(channel));
@@ -48,7 +48,7 @@ impl<R: Real> ObjectCpuShader<R> for Tinted {
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        let [_, _, _, opacity] = pass.columns.get(TINT, pixel.object);
+        let [_, _, _, opacity] = pass.column(TINT, pixel.object);
         let [red, green, blue, ..] = pixel.varyings;
         targets[0] = Vector([red, green, blue, R::of(f64::from(opacity))]);
         true

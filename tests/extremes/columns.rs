@@ -89,8 +89,8 @@ impl<R: Real> ObjectCpuShader<R> for Numbers {
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        targets[0] = Vector(pass.columns.get(NUMBERS, pixel.object).map(|number| R::of(f64::from(number))));
-        targets[1] = Vector([R::of(f64::from(pass.columns.get(WORDS, pixel.object))); 4]);
+        targets[0] = Vector(pass.column(NUMBERS, pixel.object).map(|number| R::of(f64::from(number))));
+        targets[1] = Vector([R::of(f64::from(pass.column(WORDS, pixel.object))); 4]);
         true
     }
 }

@@ -127,7 +127,7 @@ impl Deformation for Inflate {
 
 impl<R: Real> DeformationCpuShader<R> for Inflate {
     fn deform(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexInput<R> {
-        let factor = R::of(f64::from(pass.columns.get(FACTOR, object.index)));
+        let factor = R::of(f64::from(pass.column(FACTOR, object.index)));
         let quarter = R::of(0.25) * factor;
         let mut moved = *vertex;
         moved.position.0 = moved.position.0.map(|number| number * factor + quarter);

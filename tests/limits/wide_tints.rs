@@ -66,7 +66,7 @@ impl<R: Real> ObjectCpuShader<R> for WideTransparency {
     }
 
     fn fragment(&self, pass: &PassInputs<'_, R>, pixel: &ObjectPixel<R>, targets: &mut [Vector4<R>]) -> bool {
-        let [.., last] = pass.columns.get(TINTS, pixel.object);
+        let [.., last] = pass.column(TINTS, pixel.object);
         targets[0] = Vector(last.map(|channel| R::of(f64::from(channel))));
         true
     }

@@ -96,7 +96,7 @@ struct CpuPush;
 impl<R: Real> DeformationCpuShader<R> for CpuPush {
     fn deform(&self, pass: &PassInputs<'_, R>, object: &ShaderObject<R>, vertex: &VertexInput<R>) -> VertexInput<R> {
         let mut moved = *vertex;
-        let down = R::of(f64::from(pass.columns.get(PUSH, object.index))) * vertex.attributes[0][0];
+        let down = R::of(f64::from(pass.column(PUSH, object.index))) * vertex.attributes[0][0];
         let [x, y, z] = vertex.position.0;
         moved.position = Vector([x + R::of(f64::from(ASIDE)) * down, y - down, z]);
         moved

@@ -24,7 +24,6 @@ use super::view_state::ViewState;
 use crate::backend::subdivision_cache::{SubdividedMeshes, missing_mesh_error, subdivision_of};
 use crate::backend::{BackendError, FrameFence, FrameRequest, PassRequest, ViewQueue};
 use crate::command::Batch;
-use crate::process::ShaderColumns;
 use crate::quality::VertexFormat;
 use crate::scene::{ColumnLayout, GeneratedContents, Mesh};
 use crate::unwind::hold_events;
@@ -108,7 +107,7 @@ impl<R: Precision> TypedFrame<R> {
             view,
             materials: &*self.materials,
             attachments: &pass.attachments,
-            columns: ShaderColumns { columns: &self.columns },
+            columns: &self.columns,
         };
         let outcome = match &pass.draws {
             SoftwareDraws::Objects { shader, face_culling, depth, attributes } => {

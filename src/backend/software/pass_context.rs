@@ -4,7 +4,8 @@ use super::attachments::Attachments;
 use super::executor::Executor;
 use super::precision::Precision;
 use super::view_state::ViewState;
-use crate::process::{Materials, PassInputs, SampledTexture, ShaderColumns};
+use crate::process::{Materials, PassInputs, SampledTexture};
+use crate::scene::ColumnLayout;
 
 /// What drawing a pass needs, whatever it draws.
 pub(super) struct PassContext<'a, R: Precision> {
@@ -12,7 +13,7 @@ pub(super) struct PassContext<'a, R: Precision> {
     pub(super) view: &'a ViewState<R>,
     pub(super) materials: &'a dyn Materials<R>,
     pub(super) attachments: &'a Attachments<R>,
-    pub(super) columns: ShaderColumns<'a>,
+    pub(super) columns: &'a [(ColumnLayout, Box<[u8]>)],
 }
 
 impl<R: Precision> PassContext<'_, R> {

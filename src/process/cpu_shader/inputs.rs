@@ -67,8 +67,8 @@ pub struct PassInputs<'a, R: Real> {
     pub materials: &'a dyn Materials<R>,
     /// The targets that the process samples, in the order declared.
     pub sampled: &'a [&'a dyn SampledTexture<R>],
-    /// The engine's own data of the scene's objects: `@group(3)`.
-    pub columns: ShaderColumns<'a>,
+    /// The columns of objects that the processes of the frame read: see [`column`](Self::column).
+    pub(crate) columns: &'a [(ColumnLayout, Box<[u8]>)],
 }
 
 impl<R: Real> PassInputs<'_, R> {
@@ -79,22 +79,14 @@ impl<R: Real> PassInputs<'_, R> {
         let values = self.materials.values(slot).filter(|values| values.layout() == material.layout());
         values.map_or_else(T::zeroed, |values| bytemuck::pod_read_unaligned(values.bytes()))
     }
-}
 
-/// The columns of objects that the processes of a frame read.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ShaderColumns<'a> {
-    pub(crate) columns: &'a [(ColumnLayout, Box<[u8]>)],
-}
-
-impl ShaderColumns<'_> {
     /// The value that a column has for an object, by its index in the scene: [`ShaderObject::index`] or
-    /// [`ObjectPixel::object`].
+    /// [`ObjectPixel::object`]. It is `@group(3)` of a shader on the device.
     ///
     /// # Panics
     /// If no process of the frame [reads the column](crate::process::Declare::reads_column), or the scene has no such
     /// object. A panic of a CPU shader is an error of the submission.
-    pub fn get<T: Pod>(&self, column: ObjectColumn<T>, object: u32) -> T {
+    pub fn column<T: Pod>(&self, column: ObjectColumn<T>, object: u32) -> T {
         let ColumnLayout { name, stride } = column.layout();
         let values = self.columns.iter().find(|(layout, _)| *layout == column.layout());
         let (_, values) = values.unwrap_or_else(|| panic!("no process declares that it reads the column {name:?}"));

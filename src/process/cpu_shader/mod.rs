@@ -15,8 +15,8 @@ pub(super) mod test_inputs;
 
 pub use deformation::DeformationCpuShader;
 pub use inputs::{
-    FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderColumns, ShaderLight,
-    ShaderMaterial, ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
+    FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial,
+    ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
 pub(crate) use interface::LightCpuShader;
 pub use interface::{CpuShader, FullScreenCpuShader, ObjectCpuShader};

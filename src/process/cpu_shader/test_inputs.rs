@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
 
-use super::{Materials, PassInputs, SampledTexture, ShaderColumns, ShaderLight, ShaderMaterial, ShaderView};
+use super::{Materials, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderView};
 use crate::raster::{Quaternion, Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Blend, Camera, ClipPlane, Light, MaterialValues, Projection, ViewKind};
 use crate::view::{GpuLight, LightClass, RenderView};
@@ -148,6 +148,6 @@ pub(in crate::process) fn pass<'a, R: Real>(
         lights_by_layer: &[],
         materials,
         sampled,
-        columns: ShaderColumns::default(),
+        columns: &[],
     }
 }
