@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::process::{AccessError, list_names};
+use crate::process::AccessError;
 
 /// An error of a backend or its device.
 #[derive(Debug, thiserror::Error)]
@@ -257,7 +257,7 @@ impl BackendError {
     /// That a view has no target of this name, but those that are `known`.
     #[cfg(any(feature = "wgpu", feature = "software"))]
     pub(crate) fn unknown_target<'a>(view: usize, target: &str, known: impl Iterator<Item = &'a str>) -> Self {
-        Self::UnknownTarget { view, target: target.to_owned(), known: list_names(known) }
+        Self::UnknownTarget { view, target: target.to_owned(), known: crate::process::list_names(known) }
     }
 }
 

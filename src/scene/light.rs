@@ -70,16 +70,18 @@ pub enum Light {
     },
 }
 
-/// The position, direction, colour and range of a light, by the kind of reference that `$light` is: what a kind lacks is
-/// `None`.
+/// The position, direction, colour, range and angles of a light, by the kind of reference that `$light` is: what a kind
+/// lacks is `None`.
 macro_rules! fields_of {
     ($light:expr) => {
         match $light {
-            Light::Directional { direction, illuminance, .. } => (None, Some(direction), illuminance, None),
-            Light::Point { position, intensity, range, .. } => (Some(position), None, intensity, Some(range)),
-            Light::Spot { position, direction, intensity, range, .. }
-            | Light::Hemispherical { position, direction, intensity, range, .. } => {
-                (Some(position), Some(direction), intensity, Some(range))
+            Light::Directional { direction, illuminance, .. } => (None, Some(direction), illuminance, None, None),
+            Light::Point { position, intensity, range, .. } => (Some(position), None, intensity, Some(range), None),
+            Light::Spot { position, direction, intensity, range, inner_angle, outer_angle, .. } => {
+                (Some(position), Some(direction), intensity, Some(range), Some([inner_angle, outer_angle]))
+            }
+            Light::Hemispherical { position, direction, intensity, range, .. } => {
+                (Some(position), Some(direction), intensity, Some(range), None)
             }
         }
     };
@@ -91,23 +93,9 @@ impl Light {
         16.0 * intensity.max_element().max(0.0).sqrt()
     }
 
-    /// The kind of light.
-    pub fn kind(&self) -> LightKind {
-        match self {
-            Self::Directional { .. } => LightKind::Directional,
-            Self::Point { .. } => LightKind::Point,
-            Self::Spot { .. } => LightKind::Spot,
-            Self::Hemispherical { .. } => LightKind::Hemispherical,
-        }
-    }
-
-    /// Whether objects cast shadows in this light.
-    pub fn casts_shadow(&self) -> bool {
-        let (Self::Directional { casts_shadow, .. }
-        | Self::Point { casts_shadow, .. }
-        | Self::Spot { casts_shadow, .. }
-        | Self::Hemispherical { casts_shadow, .. }) = self;
-        *casts_shadow
+    /// The intensity or, of a directional light, the illuminance.
+    pub fn color_mut(&mut self) -> &mut Vec3 {
+        self.fields_mut().color
     }
 
     /// The sphere that the light reaches: its centre in the world and its radius, in metres. `None` for a directional
@@ -120,17 +108,13 @@ impl Light {
     /// The light's fields, whatever its kind.
     #[inline]
     pub(crate) fn fields(&self) -> LightFields<'_> {
-        let (position, direction, color, range) = fields_of!(self);
-        let cone = match self {
-            Self::Spot { inner_angle, outer_angle, .. } => Some([*inner_angle, *outer_angle]),
-            Self::Directional { .. } | Self::Point { .. } | Self::Hemispherical { .. } => None,
-        };
-        LightFields { position, direction, color, range, cone }
+        let (position, direction, color, range, cone) = fields_of!(self);
+        LightFields { position, direction, color, range, cone: cone.map(|angles| angles.map(|angle| *angle)) }
     }
 
     /// Those that can be changed whatever the kind.
     pub(crate) fn fields_mut(&mut self) -> LightFieldsMut<'_> {
-        let (position, direction, color, range) = fields_of!(self);
+        let (position, direction, color, range, _) = fields_of!(self);
         LightFieldsMut { position, direction, color, range }
     }
 
@@ -186,38 +170,63 @@ pub(crate) struct LightFieldsMut<'a> {
     pub(crate) range: Option<&'a mut f32>,
 }
 
-/// The kind of a [`Light`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum LightKind {
-    /// [`Light::Directional`].
-    Directional,
-    /// [`Light::Point`].
-    Point,
-    /// [`Light::Spot`].
-    Spot,
-    /// [`Light::Hemispherical`].
-    Hemispherical,
+/// Defines the kinds of lights by the table of their properties: a row for each variant of [`Light`], in the order of
+/// the light classes. A variant without a row does not compile.
+macro_rules! light_kinds {
+    ($($kind:ident: $volume:expr, $maps:expr, $name:literal;)+) => {
+        /// The kind of a [`Light`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
+        pub enum LightKind {
+            $(
+                #[doc = concat!("[`Light::", stringify!($kind), "`].")]
+                $kind,
+            )+
+        }
+
+        impl LightKind {
+            /// All kinds.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$kind),+];
+
+            /// The properties of the kind.
+            pub(crate) const fn rules(self) -> &'static LightRules {
+                match self {
+                    $(Self::$kind => &LightRules { name: $name, volume: $volume, maps: $maps },)+
+                }
+            }
+        }
+
+        impl Light {
+            /// The kind of light.
+            pub fn kind(&self) -> LightKind {
+                match self {
+                    $(Self::$kind { .. } => LightKind::$kind,)+
+                }
+            }
+
+            /// Whether objects cast shadows in this light.
+            pub fn casts_shadow(&self) -> bool {
+                let ($(Self::$kind { casts_shadow, .. })|+) = self;
+                *casts_shadow
+            }
+
+            /// Whether objects cast shadows in this light, to change that whatever its kind.
+            pub fn casts_shadow_mut(&mut self) -> &mut bool {
+                let ($(Self::$kind { casts_shadow, .. })|+) = self;
+                casts_shadow
+            }
+        }
+    };
+}
+
+light_kinds! {
+    Directional: LightVolume::Screen, ShadowProjection::Cascades, "directional";
+    Point: LightVolume::Sphere, ShadowProjection::Cube, "point";
+    Spot: LightVolume::Cone, ShadowProjection::Perspective, "spot";
+    Hemispherical: LightVolume::Cone, ShadowProjection::Paraboloid, "hemispherical";
 }
 
 impl LightKind {
-    /// All kinds.
-    pub const ALL: [Self; 4] = [Self::Directional, Self::Point, Self::Spot, Self::Hemispherical];
-
-    /// The properties of the kind.
-    pub(crate) const fn rules(self) -> &'static LightRules {
-        match self {
-            Self::Directional => {
-                &LightRules { name: "directional", volume: LightVolume::Screen, maps: ShadowProjection::Cascades }
-            }
-            Self::Point => &LightRules { name: "point", volume: LightVolume::Sphere, maps: ShadowProjection::Cube },
-            Self::Spot => &LightRules { name: "spot", volume: LightVolume::Cone, maps: ShadowProjection::Perspective },
-            Self::Hemispherical => {
-                &LightRules { name: "hemispherical", volume: LightVolume::Cone, maps: ShadowProjection::Paraboloid }
-            }
-        }
-    }
-
     /// The lower-case name in reports.
     pub fn name(self) -> &'static str {
         self.rules().name
@@ -227,10 +236,9 @@ impl LightKind {
 /// The properties of a kind of light.
 #[derive(Debug)]
 pub(crate) struct LightRules {
-    /// The lower-case name in reports.
+    /// The lower-case name in reports. Shaders have a constant of that name, in upper case.
     pub(crate) name: &'static str,
     /// What is drawn to light the pixels that it reaches.
-    #[cfg_attr(not(feature = "wgpu"), expect(dead_code))]
     pub(crate) volume: LightVolume,
     /// What shadow maps it has.
     pub(crate) maps: ShadowProjection,

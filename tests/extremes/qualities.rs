@@ -6,7 +6,7 @@ use drawloom::quality::{
     CullingVolume, DepthCurve, DepthPrecision, DiffuseFormat, NormalFormat, Quality, QualityError, RadianceSum,
     ShadowQuality, ToneCurve, TransformPrecision, VertexFormat,
 };
-use drawloom::scene::{Camera, Light, Material, Scene};
+use drawloom::scene::{Camera, Material, Scene};
 use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
 
@@ -25,13 +25,7 @@ fn very_bright() -> Result<Scene, Failed> {
     let mut scene = everything();
     let bright = Vec3::splat(f32::MAX);
     for light in &mut scene.lights {
-        match light {
-            Light::Directional { illuminance: color, .. }
-            | Light::Point { intensity: color, .. }
-            | Light::Spot { intensity: color, .. }
-            | Light::Hemispherical { intensity: color, .. } => *color = Vec3::new(f32::MAX, 0.0, 1.0),
-            _ => {}
-        }
+        *light.color_mut() = Vec3::new(f32::MAX, 0.0, 1.0);
     }
     let materials: Vec<_> = scene.assets().iter::<Material>().map(|(handle, one)| (handle, one.clone())).collect();
     for (handle, material) in materials {

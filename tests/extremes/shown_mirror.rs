@@ -10,7 +10,7 @@ use drawloom::process::{
 };
 use drawloom::quality::Quality;
 use drawloom::raster::{Real, Vector4};
-use drawloom::scene::{LayerMask, Light, Scene, ViewKind};
+use drawloom::scene::{LayerMask, Scene, ViewKind};
 use drawloom_testing::scenes::everything::everything_with_mirror;
 use libtest_mimic::Failed;
 
@@ -84,13 +84,7 @@ impl<R: Real> ObjectCpuShader<R> for Surface {
 fn scene() -> Scene {
     let mut scene = everything_with_mirror(SURFACE);
     for light in &mut scene.lights {
-        match light {
-            Light::Directional { casts_shadow, .. }
-            | Light::Point { casts_shadow, .. }
-            | Light::Spot { casts_shadow, .. }
-            | Light::Hemispherical { casts_shadow, .. } => *casts_shadow = false,
-            _ => {}
-        }
+        *light.casts_shadow_mut() = false;
     }
     scene
 }

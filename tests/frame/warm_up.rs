@@ -83,13 +83,7 @@ fn lights_that_are_dark_or_out_of_sight_are_drawn_too() {
         light
     };
     let invalid = |mut light: Light| {
-        if let Light::Directional { illuminance: color, .. }
-        | Light::Point { intensity: color, .. }
-        | Light::Spot { intensity: color, .. }
-        | Light::Hemispherical { intensity: color, .. } = &mut light
-        {
-            color.x = f32::NAN;
-        }
+        light.color_mut().x = f32::NAN;
         light
     };
     // The first light of each class cannot be drawn at all.

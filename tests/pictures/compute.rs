@@ -71,7 +71,7 @@ fn new_pipeline(
     device: &wgpu::Device,
     [frame, assets]: [&wgpu::BindGroupLayout; 2],
 ) -> (wgpu::ComputePipeline, wgpu::BindGroupLayout) {
-    let source = format!("const ABSOLUTE_TRANSFORMS: bool = false;\n{SHADER_PRELUDE}\n{SHADER}");
+    let source = ["const ABSOLUTE_TRANSFORMS: bool = false;\n", &SHADER_PRELUDE, "\n", SHADER].concat();
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("palette"),
         source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -213,7 +213,7 @@ impl ScissorLights {
         let device = resources.device;
         let shader = [
             ABSOLUTE_TRANSFORMS,
-            SHADER_PRELUDE,
+            &SHADER_PRELUDE,
             &GeometryFormats::default().normal_encoding_wgsl(),
             ILLUMINATION_SHADER,
             include_str!("../../../src/process/deferred/shading/no_shadow.wgsl"),

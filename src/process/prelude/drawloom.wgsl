@@ -33,10 +33,9 @@ struct View {
     // Linear.
     ambient: vec3<f32>,
     far: f32,
-    // Where each of the eight classes of lights ends in `lights`, four a vector. It begins where the one before ends.
-    // The classes are, in this order, directional, point, spot and hemispherical lights, of each kind first those
-    // without a shadow and then those with one.
-    light_ends: array<vec4<u32>, 2>,
+    // Where each class of lights ends in `lights`, four a vector. It begins where the one before ends. The classes are
+    // in the order of the kinds, of each kind first those without a shadow and then those with one.
+    light_ends: array<vec4<u32>, LIGHT_CLASS_VECTORS>,
 }
 
 const PERSPECTIVE: u32 = 0u;
@@ -55,11 +54,6 @@ struct Object {
     scale: vec3<f32>,
     index: u32,
 }
-
-const DIRECTIONAL: u32 = 0u;
-const POINT: u32 = 1u;
-const SPOT: u32 = 2u;
-const HEMISPHERICAL: u32 = 3u;
 
 const NO_SHADOW_MAP: u32 = 0xffffffffu;
 

@@ -2,14 +2,14 @@
 @vertex
 fn light_volume(@location(0) corner: vec3<f32>, @builtin(instance_index) instance: u32) -> LightPixel {
     let light = lights[instance];
-    if light.kind == DIRECTIONAL {
+    if reaches_everything(light.kind) {
         // Infinitely far away.
         return LightPixel(vec4<f32>(corner.xy, 0.0, 1.0), instance);
     }
     // No surface is farther from a camera than this, and a larger range could leave the range of f32.
     let range = min(light.range, 0x1p36);
     var local = corner * range;
-    if light.kind != POINT {
+    if has_cone_volume(light.kind) {
         local = around_axis(light.direction, cone_corner(corner, light.cone_end, range));
     }
     var clip = clip_position(light.position + local);

@@ -50,7 +50,7 @@ impl ShaderOnDevice {
     /// Compiles it for a device.
     pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         use wgpu::{BufferBindingType, ShaderStages};
-        let source = ["const ABSOLUTE_TRANSFORMS: bool = false;\n", SHADER_PRELUDE, COMPUTE_STAGE].concat();
+        let source = ["const ABSOLUTE_TRANSFORMS: bool = false;\n", &SHADER_PRELUDE, COMPUTE_STAGE].concat();
         let source = wgpu::ShaderSource::Wgsl(source.into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("precision"), source });
         let uniform = (BufferBindingType::Uniform, true);

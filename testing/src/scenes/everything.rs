@@ -104,25 +104,13 @@ pub fn class_of(light: &Light) -> LightClass {
 
 /// The same light without a shadow.
 pub fn without_shadow(mut light: Light) -> Light {
-    if let Light::Directional { casts_shadow, .. }
-    | Light::Point { casts_shadow, .. }
-    | Light::Spot { casts_shadow, .. }
-    | Light::Hemispherical { casts_shadow, .. } = &mut light
-    {
-        *casts_shadow = false;
-    }
+    *light.casts_shadow_mut() = false;
     light
 }
 
 /// The same light, but black.
 pub fn dark(mut light: Light) -> Light {
-    if let Light::Directional { illuminance: color, .. }
-    | Light::Point { intensity: color, .. }
-    | Light::Spot { intensity: color, .. }
-    | Light::Hemispherical { intensity: color, .. } = &mut light
-    {
-        *color = Vec3::ZERO;
-    }
+    *light.color_mut() = Vec3::ZERO;
     light
 }
 

@@ -106,7 +106,7 @@ impl Device {
         Ok(Self {
             size,
             index_count: mesh.indices().len() as u32,
-            surface_shader: [ABSOLUTE_TRANSFORMS, SHADER_PRELUDE, SURFACE_SHADER].concat(),
+            surface_shader: [ABSOLUTE_TRANSFORMS, &SHADER_PRELUDE, SURFACE_SHADER].concat(),
             radiance,
             depth,
             picture_view: view_of(&picture),
@@ -374,7 +374,7 @@ fn tone_mapping(
     let resources = vec![parameters.as_entire_binding(), wgpu::BindingResource::TextureView(radiance)];
     let group = group(device, &layout, resources);
     let own = include_str!("../../../../src/process/post/tone_mapping/tone_mapping.wgsl");
-    let shader = [ABSOLUTE_TRANSFORMS, SHADER_PRELUDE, own].concat();
+    let shader = [ABSOLUTE_TRANSFORMS, &SHADER_PRELUDE, own].concat();
     let pipeline =
         new_pipeline(device, &shader, &[None, None, Some(&layout)], "full_screen", &[], None, PICTURE.into());
     (pipeline, group)

@@ -28,7 +28,7 @@ fn fragment(in: FullScreenPixel) -> @location(0) vec4<u32> {
 // Whether a light may reach what is seen between two clip coordinates: whether its sphere is not wholly beyond one of
 // four planes. The margin is a hundred times what rounding makes.
 fn may_reach(light: Light, low: vec2<f32>, high: vec2<f32>) -> bool {
-    if light.kind == DIRECTIONAL {
+    if reaches_everything(light.kind) {
         return true;
     }
     let reach = light.range * 1.001 + length(light.position) * 1e-5;

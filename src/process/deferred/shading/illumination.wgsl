@@ -5,7 +5,7 @@ const MAX_ILLUMINANCE: vec3<f32> = vec3<f32>(1e30);
 
 // The illuminance of a light on a surface, without shadows.
 fn illuminance_from(light: Light, position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
-    if light.kind == DIRECTIONAL {
+    if reaches_everything(light.kind) {
         return min(light.intensity * max(dot(normal, -light.direction), 0.0), MAX_ILLUMINANCE);
     }
     let to_light = light.position - position;

@@ -13,12 +13,12 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
         return 1.0;
     }
     let off_surface = distance_off_surface(position);
-    if light.kind == POINT {
+    if has_cube_map(light.kind) {
         let face = shadow_map_of_layer(light.shadow_layer + cube_face(position - light.position));
         return filtered_visibility(face.shadow_layer, biased_point(face, position, normal, off_surface));
     }
     var map = light;
-    if light.kind == DIRECTIONAL {
+    if has_cascades(light.kind) {
         // The finest cascade in which the filter reads no pixel outside of the map.
         let side = f32(textureDimensions(shadow_maps).x);
         let extent = 1.0 - f32(2 * SHADOW_FILTER + 1) / side;
@@ -58,7 +58,7 @@ fn cube_face(position: vec3<f32>) -> u32 {
 // bias.
 fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>, off_surface: f32) -> ShadowMapPoint {
     var towards = -light.direction;
-    if light.kind != DIRECTIONAL {
+    if !has_cascades(light.kind) {
         towards = normalize(light.position - position);
     }
     // An upper bound of the depth change within the filter.
@@ -92,7 +92,7 @@ fn distance_off_surface(position: vec3<f32>) -> f32 {
 // pixel widths.
 fn shadow_slope(light: Light, normal: vec3<f32>, towards: vec3<f32>) -> f32 {
     let cosine = clamp(dot(normal, towards), 1e-3, 1.0);
-    if light.kind == HEMISPHERICAL {
+    if has_paraboloid_map(light.kind) {
         // A pixel's diagonal, and a little more because pixels differ in size.
         return 1.5 * sqrt(1.0 - cosine * cosine) / cosine;
     }
@@ -110,24 +110,20 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     let side = f32(textureDimensions(shadow_maps).x);
     let local = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
-    switch light.kind {
-        case SPOT, POINT: {
-            let distance = max(-local.z, light.shadow_near);
-            let half = light.shadow_half * distance;
-            return ShadowMapPoint(local.xy / half, light.shadow_near / distance, 2.0 * half / side);
-        }
-        case HEMISPHERICAL: {
-            let distance = max(length(local), 1e-30);
-            let clip = local.xy / (distance * max(1.0 - local.z / distance, 1e-3));
-            // Coarsest in the middle (Brabec et al. 2002).
-            let pixel = 4.0 * distance / (side * (1.0 + dot(clip, clip)));
-            return ShadowMapPoint(clip, (light.range - distance) / reach, pixel);
-        }
-        default: {
-            let half = light.shadow_half;
-            return ShadowMapPoint(local.xy / half, (light.range + local.z) / reach, 2.0 * half / side);
-        }
+    if has_cascades(light.kind) {
+        let half = light.shadow_half;
+        return ShadowMapPoint(local.xy / half, (light.range + local.z) / reach, 2.0 * half / side);
     }
+    if has_paraboloid_map(light.kind) {
+        let distance = max(length(local), 1e-30);
+        let clip = local.xy / (distance * max(1.0 - local.z / distance, 1e-3));
+        // Coarsest in the middle (Brabec et al. 2002).
+        let pixel = 4.0 * distance / (side * (1.0 + dot(clip, clip)));
+        return ShadowMapPoint(clip, (light.range - distance) / reach, pixel);
+    }
+    let distance = max(-local.z, light.shadow_near);
+    let half = light.shadow_half * distance;
+    return ShadowMapPoint(local.xy / half, light.shadow_near / distance, 2.0 * half / side);
 }
 
 // The mean of the depth tests of the map's pixels around a point: a box filter, in which pixels on the edge are
