@@ -4,13 +4,9 @@
 
 mod builder;
 mod nodes;
-#[cfg(feature = "occlusion")]
-mod culling;
 mod encoders;
 mod error;
 mod frame_loop;
-#[cfg(not(feature = "occlusion"))]
-mod no_culling;
 mod plan_cache;
 mod recorded_frame;
 mod renderer;
@@ -21,9 +17,6 @@ mod static_groups;
 mod statistics;
 mod views;
 mod warm_up;
-
-#[cfg(not(feature = "occlusion"))]
-use no_culling as culling;
 
 pub use builder::RendererBuilder;
 pub use error::{BudgetError, BuildError, FrameError, SubmitError};

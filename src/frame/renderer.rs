@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
-use super::culling::CullingOptions;
 use super::encoders::FrameEncoders;
 use super::encoders::{PassRecording, reset_recordings};
 use super::nodes::borrowed_nodes::NodeDeclarations;
@@ -16,6 +15,7 @@ use super::scene_check::ChangeCheck;
 use super::scene_check::SceneCapacity;
 use super::scene_check::check_scene;
 use super::stages::context::FrameContext;
+use super::stages::culling::CullingOptions;
 use super::stages::granularity::{StageClock, StageGroup};
 use super::stages::stage_graph::FrameFeatures;
 use super::stages::stage_graph::StageGraphCache;

@@ -124,6 +124,23 @@ fn access_error(error: &FrameError) -> (AccessError, String) {
 }
 
 #[test]
+fn a_raw_pass_has_the_whole_texture_of_a_small_target() {
+    let asking = Asking::always(
+        "asking",
+        |declare| declare.reads("own"),
+        |resources| {
+            assert_eq!(resources.target("own")?.depth_or_array_layers(), 1);
+            Ok(())
+        },
+    );
+    let (mut renderer, submitter) = with(|builder| builder.process(Clears("own")).process(asking));
+    let mut scene = scene();
+    scene.cameras.iter_mut().for_each(|camera| camera.size = [16, 16]);
+    assert_eq!(scene.cameras.len(), 2);
+    draw(&mut renderer, &submitter, &scene).unwrap();
+}
+
+#[test]
 fn what_a_raw_pass_asks_for_without_declaring_it_fails_the_frame() {
     let process = || "asking".to_owned();
     let undeclared = |target: &str| AccessError::UndeclaredTarget {

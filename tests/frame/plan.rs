@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
-use drawloom::process::{ClearColor, Declare, Deferred, Format, PlanError, StorageBuffer};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, Draws, Format, FramePlan, FullScreen, PlanError, RenderProcess, StorageBuffer,
+};
 use drawloom::scene::{Camera, Scene, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer, RendererBuilder};
@@ -151,6 +153,37 @@ fn views_that_are_submitted_process_by_process_are_named_together_in_errors() {
     assert!(error.contains(r#"view 0 \"main\" and view 1 \"side\", process by process"#), "{error}");
 }
 
+/// A process whose destructor panics.
+struct PanickingDrop;
+
+impl Drop for PanickingDrop {
+    fn drop(&mut self) {
+        panic!("the process is dropped");
+    }
+}
+
+impl RenderProcess for PanickingDrop {
+    fn name(&self) -> &str {
+        "panicking"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        clears(declare, "own");
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::FullScreen(FullScreen::default())
+    }
+}
+
+#[test]
+fn a_plan_contains_the_panics_of_its_processes_destructors() {
+    let plan = FramePlan::new(vec![Arc::new(PanickingDrop)], &[]).unwrap();
+    assert_eq!(plan.processes().len(), 1);
+    drop(plan);
+}
+
 #[test]
 fn raw_passes_write_targets_that_can_be_stored() {
     let renderer = build(builder([
@@ -184,6 +217,34 @@ fn a_target_is_an_output_where_processes_declare_to_draw_it() {
     let outputs = renderer.plan().targets().iter().filter(|target| target.output);
     let outputs: Vec<_> = outputs.map(|target| (target.name.as_str(), target.views)).collect();
     assert_eq!(outputs, [("picture", ViewKind::Main)]);
+}
+
+#[test]
+fn a_target_that_only_other_views_have_is_an_output_there() {
+    let mirror = Declaring::new("mirror", |declare| {
+        declare.views(ViewKind::Reflection);
+        clears(declare, "mirror");
+    });
+    let picture = Declaring::new("picture", |declare| {
+        clears(declare, "picture");
+        declare.keep();
+    });
+    let renderer = build(builder([mirror, picture]).output("mirror"));
+    let outputs = renderer.plan().targets().iter().map(|target| (target.name.as_str(), target.output));
+    assert_eq!(outputs.collect::<Vec<_>>(), [("mirror", true), ("picture", false)]);
+}
+
+#[test]
+fn a_process_may_draw_in_views_of_three_kinds() {
+    let everywhere = Declaring::new("everywhere", |declare| {
+        declare.also_views(ViewKind::Reflection);
+        declare.also_views(ViewKind::Post);
+        clears(declare, "own");
+        declare.keep();
+    });
+    let renderer = build(builder([everywhere]));
+    let kinds: Vec<_> = planned(&renderer).into_iter().map(|(_, kind)| kind).collect();
+    assert_eq!(kinds, [ViewKind::Reflection, ViewKind::Main, ViewKind::Post]);
 }
 
 #[test]

@@ -107,3 +107,16 @@ fn half_the_angle_raises_the_subdivision_level_by_one() {
         assert_eq!((object, fine.saturating_sub(1)), (other, coarse));
     }
 }
+
+#[test]
+fn a_renderer_has_the_quality_that_was_set_and_says_whether_its_pipeline_has_it_too() {
+    let scheduler = Arc::new(Scheduler::new(1).unwrap());
+    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let (mut renderer, _) = builder.build(scheduler).unwrap();
+    assert!(!renderer.pipeline_has_quality());
+    let quality = Quality { depth_pre_pass: true, ..Quality::fast() };
+    renderer.set_quality(quality.clone()).unwrap();
+    assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, true));
+    renderer.set_deferred(Deferred::to_picture()).unwrap();
+    assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, false));
+}

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::Quality;
+use drawloom::quality::{CullingVolume, Quality};
 use drawloom::report::{FrameReport, SchedulerCosts};
 use drawloom::scene::{
-    Blend, Camera, Changes, Light, Material, ObjectSet, RenderObject, Scene, SceneError, SceneRef, StaticGroup,
-    ViewFilter,
+    Blend, Camera, Changes, Light, Material, MaterialPredicate, ObjectSet, RenderObject, Scene, SceneError, SceneRef,
+    StaticGroup, ViewFilter,
 };
 use drawloom::task::Scheduler;
 use drawloom::timeline::Log;
@@ -267,6 +267,10 @@ fn a_view_executes_the_static_groups_that_it_sees_and_that_its_filter_shows_as_a
         rows.scene.cameras[0].filter = filter;
         assert_eq!(views(&mut rows)[0], expected, "{:?}", rows.scene.cameras[0].filter);
     }
+    // What the objects of a static group are made of is asked of each.
+    let materials = Some(MaterialPredicate::new(|material| material.name == "other"));
+    rows.scene.cameras[0].filter = ViewFilter { materials, ..ViewFilter::ALL };
+    assert_eq!(views(&mut rows)[0], (0, 0));
     // All rows lie on both sides of the far plane.
     rows.scene.cameras[0] = Camera { far: 200.0, ..Camera::looking_at("main", DVec3::Z * 200.0, DVec3::X * 60.0) };
     let (static_groups, visible) = views(&mut rows)[0];
@@ -275,6 +279,36 @@ fn a_view_executes_the_static_groups_that_it_sees_and_that_its_filter_shows_as_a
 
 /// The shadow of the sun is drawn by a process for all materials, which may walk the objects in the order of their
 /// bins.
+#[test]
+fn a_view_without_culling_executes_the_static_groups_that_it_does_not_see() {
+    let mut rows = Rows::new();
+    rows.scene.cameras[0] = Camera::looking_at("away", DVec3::Z * 200.0, DVec3::Z * 300.0);
+    for (culling, executed) in [(CullingVolume::Sphere, 0), (CullingVolume::None, ROWS)] {
+        rows.renderer = renderer(Quality { culling, ..Quality::balanced() }, 2).0;
+        rows.frame(Changes::NONE);
+        assert_eq!(rows.frame(Changes::NONE), [ROWS, 0, 0, executed], "{culling:?}");
+    }
+}
+
+#[test]
+fn objects_that_come_later_belong_to_the_static_groups_that_list_them() {
+    let mut rows = Rows::new();
+    let (first, second) = ((ROWS * IN_ROW) as u32, (ROWS * IN_ROW) as u32 + 1);
+    rows.scene.static_groups[1].objects = ObjectSet::new([first]);
+    rows.scene.static_groups[2].objects = ObjectSet::new([second]);
+    rows.scene.static_groups[3].objects = ObjectSet::new([second]);
+    rows.frame(Changes::NONE);
+    assert_eq!(rows.frame(Changes::NONE), [ROWS, 0, 0, ROWS - 3]);
+    let object = rows.scene.object(rows.scene.objects().next().unwrap()).unwrap();
+    rows.scene.add_object(object.clone()).unwrap();
+    assert_eq!(rows.frame(Changes::Objects(&[first])), [ROWS - 1, 0, 1, ROWS - 3]);
+    rows.frame(Changes::NONE);
+    assert_eq!(rows.frame(Changes::Objects(&[first])), [ROWS - 1, 0, 1, ROWS - 3]);
+    rows.scene.add_object(object).unwrap();
+    let error = rows.renderer.record(rows.scene.as_scene_ref()).map(drop).unwrap_err().to_string();
+    assert!(error.contains("object 201 is in the static groups"), "{error}");
+}
+
 #[test]
 fn shares_of_materials_draw_each_object_once_with_static_groups_and_without() {
     const SHARES: u32 = 3;

@@ -204,6 +204,21 @@ fn a_list_is_kept_until_the_filter_or_its_answer_changes() {
 }
 
 #[test]
+fn a_view_whose_list_and_predicate_go_at_once_shows_all_objects() {
+    let (mut renderer, _) = renderer(Quality::balanced(), 1, Granularity::default());
+    let scene = field(500);
+    let mut drawn = |filter: ViewFilter| {
+        let lent = SceneRef { cameras: &filtered(filter), changes: Changes::NONE, ..scene.as_scene_ref() };
+        drop(renderer.record(lent).unwrap());
+        renderer.draw_list("2", 0).unwrap().objects.len()
+    };
+    let all = drawn(ViewFilter::ALL);
+    let filter = ViewFilter::except((0..250).collect()).of_materials(MaterialPredicate::new(|_| false));
+    assert_eq!(drawn(filter), 0);
+    assert_eq!(drawn(ViewFilter::ALL), all);
+}
+
+#[test]
 fn a_predicate_holds_for_objects_that_get_another_material() {
     let (mut renderer, _) = renderer(Quality::balanced(), 1, Granularity::default());
     let scene = field(300);

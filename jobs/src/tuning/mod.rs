@@ -11,7 +11,7 @@
 //! | `ExecutionPolicy` (`graph/execution_policy.rs`) | a serial or a parallel run | each serial run and each measured parallel one: its time | 8 serial or 4/3 measured parallel runs | the other mode is faster by 1.25; a parallel run counts as at least one wake-up |
 //! | `FrameGaps` (`task/frame_gaps.rs`) | whether workers look for jobs between frames | each frame: the time since the one before, at most twice the longest search | 8 frames | searching costs more, or less, than a wake-up |
 //! | [`Tuner`] of recording (`drawloom`'s `backend/wgpu/strategy`) | how a pass is recorded and encoded | each frame: thread time a batch, and the time that other workers wait for it | 8 frames | another way is cheaper by 1.11 |
-//! | [`Tuner`] of occlusion tests (`drawloom`'s `frame/culling.rs`) | whether a view tests for occlusion | each frame: thread time an object | 8 frames | the other way is cheaper by 1.11 |
+//! | [`Tuner`] of occlusion tests (`drawloom`'s `frame/stages/culling.rs`) | whether a view tests for occlusion | each frame: thread time an object | 8 frames | the other way is cheaper by 1.11 |
 //! | `ViewBudget` (`drawloom`'s `frame/views/view_budget.rs`) | the forms in which views are drawn | each frame: thread or device time of a drawn camera, and of the rest | 8 frames | 4 frames in a row are predicted to exceed the budget, or one quality level more is predicted to fit by 1.15 |
 //!
 //! Three of them divide work, each at another scale, and none can replace another. `CostModel` decides how many items

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
+use super::culling::OcclusionControls;
 use super::granularity::{CostModel, Granularity, StageClock};
 use super::tables::{FrameTables, ListInputs, MAX_SEGMENTS, OrderInputs, PassTable};
 use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::{DrawList, Splitters};
-use crate::frame::culling::OcclusionControls;
 use crate::frame::encoders::{FrameEncoders, PassRecording};
 use crate::frame::nodes::borrowed_nodes::BorrowedNodes;
 use crate::view::{DrawFilter, ObjectLevels, VisibleRange};

@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use drawloom_jobs::internal::{Estimate, Filter, Stopwatch, job_size};
 
+use super::culling::OcclusionControls;
 use super::tables::FrameTables;
 use crate::backend::{Backend, CallPanic, GuardedBackend};
 use crate::command::DrawList;
-use crate::frame::culling::OcclusionControls;
 use crate::frame::statistics::StageTimes;
 use crate::graph::ModeChoice;
 use crate::process::{FramePlan, Pass};

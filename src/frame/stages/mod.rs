@@ -1,7 +1,11 @@
 //! The pipeline of a frame: its stages, in order.
 
 pub(super) mod context;
+#[cfg(feature = "occlusion")]
+pub(super) mod culling;
 pub(super) mod granularity;
+#[cfg(not(feature = "occlusion"))]
+pub(super) mod no_culling;
 pub(super) mod stage;
 pub(super) mod stage_graph;
 pub(super) mod tables;
@@ -10,6 +14,8 @@ mod of_culling;
 mod of_passes;
 mod of_views;
 
+#[cfg(not(feature = "occlusion"))]
+pub(super) use no_culling as culling;
 #[cfg(feature = "occlusion")]
 use of_culling::*;
 use of_passes::*;

@@ -5,12 +5,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::context::FrameContext;
+use super::culling::{CullingOptions, OcclusionControls, allows_triangle_culling};
 use super::granularity::{Granularity, StageGroup, StageTuning, TuningLabels};
 use super::stage::{PassMode, Stage, StageNode, StageOwner, orders_by_bin};
 use super::tables::{FrameTables, ViewLevels};
 use crate::backend::Backend;
 use crate::command::Selection;
-use crate::frame::culling::{CullingOptions, OcclusionControls, allows_triangle_culling};
 use crate::frame::nodes::borrowed_nodes::{BorrowedNodes, NodeKeys};
 use crate::frame::static_groups::ListConditions;
 use crate::frame::{CpuNode, FrameError, NodeContext};

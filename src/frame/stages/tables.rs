@@ -2,12 +2,15 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use drawloom_jobs::internal::ChunkedArray;
 use glam::{DVec3, Quat};
 use parking_lot::{Mutex, RwLock};
 
+use super::culling::{CullingTables, PassTriangles};
 use super::granularity::Granularity;
 use super::stage::PassMode;
 use crate::backend::SceneLimits;
@@ -15,10 +18,8 @@ use crate::bit_set::BitWord;
 use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, Partition, RenderCommand, Selection, SortScratch, Splitters, Version,
 };
-use crate::frame::culling::{CullingTables, PassTriangles};
 use crate::frame::scene_check::BlendedTracker;
 use crate::frame::static_groups::{ListConditions, StaticGroupTable};
-use crate::frame::statistics::ViewTimes;
 use crate::frame::views::FrameViews;
 use crate::frame::views::view_visibility::{Retest, ViewVisibility};
 use crate::leaked_guards::unlock;
@@ -344,6 +345,38 @@ impl ViewLevels {
     }
 }
 
+/// Sums up the thread time of each view's stages while jobs run. It keeps its memory from frame to frame.
+#[derive(Debug, Default)]
+pub(in crate::frame) struct ViewTimes {
+    /// By view index.
+    nanoseconds: Vec<AtomicU64>,
+}
+
+impl ViewTimes {
+    /// Begins a frame of this many views.
+    pub(in crate::frame) fn reset(&mut self, views: usize) {
+        self.nanoseconds.clear();
+        self.nanoseconds.resize_with(views, AtomicU64::default);
+    }
+
+    /// Adds the time of a job of one of a view's stages.
+    pub(in crate::frame) fn add(&self, view: usize, took: Duration) {
+        // Relaxed: a sum, read after the run.
+        self.nanoseconds[view].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    /// Takes away a time that the job of one of the view's stages spends on other views. The job's own time is added
+    /// when it ends; until then the sum may be below 0, and wraps.
+    pub(in crate::frame) fn subtract(&self, view: usize, took: Duration) {
+        // Relaxed: a sum, read after the run.
+        self.nanoseconds[view].fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    pub(in crate::frame) fn times(&self) -> impl Iterator<Item = Duration> {
+        self.nanoseconds.iter().map(|view| Duration::from_nanos(view.load(Ordering::Relaxed)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -373,5 +406,17 @@ mod tests {
         // One that is made anew in each frame.
         table.list.get_mut().set_version(Version::default());
         assert_eq!([7, 8].map(|frame| begin(&mut table, frame)), [10, 10]);
+    }
+
+    #[test]
+    fn a_job_gives_time_away_before_its_own_is_known() {
+        let mut times = ViewTimes::default();
+        times.reset(2);
+        let nanoseconds = Duration::from_nanos;
+        times.subtract(0, nanoseconds(700));
+        times.add(0, nanoseconds(300));
+        times.add(1, nanoseconds(400));
+        times.add(0, nanoseconds(1000));
+        assert_eq!(times.times().collect::<Vec<_>>(), [600, 400].map(nanoseconds));
     }
 }

@@ -172,7 +172,6 @@ mod tests {
 
     use super::super::FramePlan;
     use super::super::test_process::TestProcess;
-    use super::*;
     use crate::process::{Declare, RenderProcess, StorageBuffer};
     use crate::scene::{MaterialType, ObjectColumn, VertexAttribute};
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use drawloom_jobs::internal::{CostSample, Tuner};
 use parking_lot::Mutex;
 
-use super::stages::tables::FrameTables;
+use super::tables::FrameTables;
 use crate::command::{Blending, DrawList, Selection};
 use crate::process::{Access, AttachmentExtent, Draws, FramePlan, Pass};
 use crate::quality::{Quality, TransformPrecision};
@@ -20,8 +20,8 @@ use crate::view::{OccluderMeshes, OcclusionCuller, PerView, RenderView, UsedMesh
 
 /// The occlusion test of a view in one frame. It keeps its memory from frame to frame.
 #[derive(Debug, Default)]
-pub(super) struct ViewOcclusion {
-    pub(super) occlusion: OcclusionCuller,
+pub(in crate::frame) struct ViewOcclusion {
+    pub(in crate::frame) occlusion: OcclusionCuller,
     is_on: bool,
     hidden: AtomicUsize,
     /// The thread time of the test, and of drawing what is left.
@@ -30,7 +30,7 @@ pub(super) struct ViewOcclusion {
 
 impl ViewOcclusion {
     /// Starts a frame. `tile` is the side of a tile of the coarse depth buffer in pixels; `None` turns the test off.
-    pub(super) fn reset(&mut self, view: &RenderView, tile: Option<u32>) {
+    pub(in crate::frame) fn reset(&mut self, view: &RenderView, tile: Option<u32>) {
         let tile = tile.filter(|side| has_room(view, *side));
         self.is_on = tile.is_some();
         *self.hidden.get_mut() = 0;
@@ -41,33 +41,33 @@ impl ViewOcclusion {
     }
 
     /// Whether the view tests for occlusion in this frame.
-    pub(super) fn is_on(&self) -> bool {
+    pub(in crate::frame) fn is_on(&self) -> bool {
         self.is_on
     }
 
     /// Counts hidden objects.
-    pub(super) fn add_hidden(&self, objects: usize) {
+    pub(in crate::frame) fn add_hidden(&self, objects: usize) {
         // Relaxed, here and below: sums, read after the run.
         self.hidden.fetch_add(objects, Ordering::Relaxed);
     }
 
     /// The number of hidden objects.
-    pub(super) fn hidden(&self) -> usize {
+    pub(in crate::frame) fn hidden(&self) -> usize {
         self.hidden.load(Ordering::Relaxed)
     }
 
     /// Adds the thread time of a job.
-    pub(super) fn add_time(&self, took: Duration) {
+    pub(in crate::frame) fn add_time(&self, took: Duration) {
         self.nanoseconds.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// Takes away a time that a job spends on other views. It wraps below 0 until the job's own time is added.
-    pub(super) fn subtract_time(&self, took: Duration) {
+    pub(in crate::frame) fn subtract_time(&self, took: Duration) {
         self.nanoseconds.fetch_sub(took.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// The thread time in nanoseconds.
-    pub(super) fn nanoseconds(&self) -> u64 {
+    pub(in crate::frame) fn nanoseconds(&self) -> u64 {
         self.nanoseconds.load(Ordering::Relaxed)
     }
 }
@@ -83,9 +83,9 @@ fn has_room(view: &RenderView, side: u32) -> bool {
 /// without it, and keeps what is cheaper. The measure is the thread time of the test and of drawing what is left,
 /// divided by the number of objects in the frustum. The picture is the same either way.
 #[derive(Clone, Debug)]
-pub(super) struct OcclusionControl {
+pub(in crate::frame) struct OcclusionControl {
     /// The objects that may occlude others; `None` where the view cannot test for occlusion.
-    pub(super) occluders: Option<Vec<Selection>>,
+    pub(in crate::frame) occluders: Option<Vec<Selection>>,
     tuner: Tuner,
     frames: u64,
     /// The alternative of the next frame, and whether it is a trial.
@@ -105,7 +105,7 @@ const MAX_PAUSES: [u64; 2] = [64, 512];
 
 impl OcclusionControl {
     /// The control of a view, by index, in a frame with these passes. `is_enabled` is the quality's setting.
-    pub(super) fn new(
+    pub(in crate::frame) fn new(
         is_enabled: bool,
         plan: &FramePlan,
         draws: &[Draws<'_>],
@@ -121,7 +121,7 @@ impl OcclusionControl {
     }
 
     /// Takes over what was measured of the same view in the frames of another graph.
-    pub(super) fn inherit_measurements(&mut self, before: &Self) {
+    pub(in crate::frame) fn inherit_measurements(&mut self, before: &Self) {
         if self.is_possible() && before.is_possible() {
             // The tables of the other graph may be gone, so the first frame does not count as warm.
             *self = Self { occluders: self.occluders.take(), previous: None, ..before.clone() };
@@ -129,23 +129,23 @@ impl OcclusionControl {
     }
 
     /// The number of frames in which the view had objects.
-    pub(super) fn frames(&self) -> u64 {
+    pub(in crate::frame) fn frames(&self) -> u64 {
         self.frames
     }
 
     /// Whether the view can test for occlusion.
-    pub(super) fn is_possible(&self) -> bool {
+    pub(in crate::frame) fn is_possible(&self) -> bool {
         self.occluders.is_some()
     }
 
     /// Whether the view tests for occlusion in the next frame.
-    pub(super) fn is_on(&self) -> bool {
+    pub(in crate::frame) fn is_on(&self) -> bool {
         self.is_possible() && self.chosen == WITH_TEST
     }
 
     /// The choice for the frame that was recorded, before [`update`](Self::update) chooses for the next one; `None`
     /// where the view cannot test for occlusion, or did not though it was chosen, because its picture is too large.
-    pub(super) fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
+    pub(in crate::frame) fn choice(&self, has_tested: bool, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let alternative = |(name, nanoseconds): (&'static str, _)| TuningAlternative { name: name.into(), nanoseconds };
         (self.is_possible() && has_tested == self.is_on()).then(|| TuningChoice {
             subject: TuningSubject::OcclusionTest,
@@ -158,7 +158,7 @@ impl OcclusionControl {
 
     /// Reports the thread time of the frame, which had `objects` in the view's frustum and tested them or not, and
     /// chooses for the next frame.
-    pub(super) fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
+    pub(in crate::frame) fn update(&mut self, nanoseconds: u64, objects: usize, has_tested: bool, may_try: &mut bool) {
         if objects == 0 {
             return;
         }
@@ -173,14 +173,14 @@ impl OcclusionControl {
 
 /// Which views of a stage graph test for occlusion, by measurement.
 #[derive(Debug)]
-pub(super) struct OcclusionControls {
+pub(in crate::frame) struct OcclusionControls {
     options: CullingOptions,
     of_views: Vec<OcclusionControl>,
 }
 
 impl OcclusionControls {
     /// The controls of views in frames with these passes.
-    pub(super) fn new(
+    pub(in crate::frame) fn new(
         options: CullingOptions,
         plan: &FramePlan,
         draws: &[Draws<'_>],
@@ -196,18 +196,18 @@ impl OcclusionControls {
     }
 
     /// Whether a view can test for occlusion.
-    pub(super) fn is_possible(&self, view: usize) -> bool {
+    pub(in crate::frame) fn is_possible(&self, view: usize) -> bool {
         self.of_views[view].is_possible()
     }
 
     /// The objects that may occlude others in a view.
-    pub(super) fn occluders(&self, view: usize) -> &[Selection] {
+    pub(in crate::frame) fn occluders(&self, view: usize) -> &[Selection] {
         self.of_views[view].occluders.as_deref().unwrap_or_default()
     }
 
     /// Takes over what was measured in the frames of another graph. `kept` has the index of each view there; `None` for
     /// a view that it does not have.
-    pub(super) fn inherit_measurements(&mut self, before: &Self, kept: impl Iterator<Item = Option<usize>>) {
+    pub(in crate::frame) fn inherit_measurements(&mut self, before: &Self, kept: impl Iterator<Item = Option<usize>>) {
         for (control, kept) in self.of_views.iter_mut().zip(kept) {
             if let Some(index) = kept {
                 control.inherit_measurements(&before.of_views[index]);
@@ -216,7 +216,7 @@ impl OcclusionControls {
     }
 
     /// Begins a frame of these views in the tables.
-    pub(super) fn begin_frame(&self, tables: &mut FrameTables, assets: &Assets, views: &[RenderView]) {
+    pub(in crate::frame) fn begin_frame(&self, tables: &mut FrameTables, assets: &Assets, views: &[RenderView]) {
         if self.of_views.iter().any(OcclusionControl::is_possible) {
             tables.culling.occluder_meshes.sync(assets, tables.objects.used_meshes());
         }
@@ -227,7 +227,7 @@ impl OcclusionControls {
     }
 
     /// The choices for a frame that was recorded, of views that have these labels.
-    pub(super) fn choices<'a>(
+    pub(in crate::frame) fn choices<'a>(
         &'a self,
         tables: &'a FrameTables,
         labels: &'a [Arc<Labels>],
@@ -237,7 +237,7 @@ impl OcclusionControls {
     }
 
     /// Updates the control of each view with the times of a frame that was recorded.
-    pub(super) fn update(&mut self, tables: &FrameTables) {
+    pub(in crate::frame) fn update(&mut self, tables: &FrameTables) {
         // Of all views at most one begins a trial in a frame. Another one is first in each frame, so that none waits
         // forever.
         let (count, mut may_try) = (self.of_views.len().max(1), true);
@@ -256,7 +256,7 @@ impl OcclusionControls {
 
 /// The meshes that ask for triangle culling, and that objects use.
 #[derive(Debug, Default)]
-pub(super) struct CullableMeshes {
+pub(in crate::frame) struct CullableMeshes {
     /// The identity and revision of the mesh collection that this was built from, and the revision of the used meshes.
     version: Option<(u64, u64, u64)>,
     /// For each slot, up to the last cullable one.
@@ -265,7 +265,7 @@ pub(super) struct CullableMeshes {
 
 impl CullableMeshes {
     /// Rebuilds the set if the meshes have changed, or others are used.
-    pub(super) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
+    pub(in crate::frame) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
         let version = (assets.meshes.identity(), assets.meshes.revision(), used.revision());
         if self.version == Some(version) {
             return;
@@ -280,64 +280,64 @@ impl CullableMeshes {
     }
 
     /// Whether there are none.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(in crate::frame) fn is_empty(&self) -> bool {
         self.is_cullable.is_empty()
     }
 
     /// Whether the mesh in a slot is one of them.
-    pub(super) fn contains(&self, slot: u32) -> bool {
+    pub(in crate::frame) fn contains(&self, slot: u32) -> bool {
         self.is_cullable.get(slot as usize).is_some_and(|is_cullable| *is_cullable)
     }
 }
 
 /// What culling keeps from frame to frame.
 #[derive(Default)]
-pub(super) struct CullingTables {
-    pub(super) occlusion: PerView<ViewOcclusion>,
+pub(in crate::frame) struct CullingTables {
+    pub(in crate::frame) occlusion: PerView<ViewOcclusion>,
     /// The convex parts of meshes, for views that test for occlusion.
-    pub(super) occluder_meshes: OccluderMeshes,
+    pub(in crate::frame) occluder_meshes: OccluderMeshes,
     /// The meshes whose triangles are culled.
     cullable_meshes: CullableMeshes,
 }
 
 impl CullingTables {
     /// Finds the meshes that ask for triangle culling, and that objects use.
-    pub(super) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
+    pub(in crate::frame) fn update(&mut self, assets: &Assets, used: &UsedMeshes) {
         self.cullable_meshes.update(assets, used);
     }
 
     /// The number of objects that a view leaves out as hidden.
-    pub(super) fn hidden(&self, view: usize) -> usize {
+    pub(in crate::frame) fn hidden(&self, view: usize) -> usize {
         self.occlusion[view].hidden()
     }
 
     /// Begins a frame of these views.
-    pub(super) fn set_views(&mut self, views: &[RenderView]) {
+    pub(in crate::frame) fn set_views(&mut self, views: &[RenderView]) {
         self.occlusion.set_views(views, |_| {});
     }
 
     /// Whether a view tests for occlusion in this frame.
-    pub(super) fn tests_occlusion(&self, view: usize) -> bool {
+    pub(in crate::frame) fn tests_occlusion(&self, view: usize) -> bool {
         self.occlusion[view].is_on()
     }
 
     /// Adds the thread time of a job whose work depends on the occlusion tests of a view.
-    pub(super) fn add_time(&self, view: usize, took: Duration) {
+    pub(in crate::frame) fn add_time(&self, view: usize, took: Duration) {
         self.occlusion[view].add_time(took);
     }
 
     /// Takes away a time that such a job spends on other views.
-    pub(super) fn subtract_time(&self, view: usize, took: Duration) {
+    pub(in crate::frame) fn subtract_time(&self, view: usize, took: Duration) {
         self.occlusion[view].subtract_time(took);
     }
 
     /// Whether objects use a mesh that asks for triangle culling.
-    pub(super) fn has_cullable_meshes(&self) -> bool {
+    pub(in crate::frame) fn has_cullable_meshes(&self) -> bool {
         !self.cullable_meshes.is_empty()
     }
 
     /// Whether the mesh in a slot asks for triangle culling.
-    pub(super) fn is_cullable(&self, mesh: u32) -> bool {
+    pub(in crate::frame) fn is_cullable(&self, mesh: u32) -> bool {
         self.cullable_meshes.contains(mesh)
     }
 }
@@ -351,7 +351,7 @@ impl CullingTables {
 /// - where a pass draws without testing the view's single depth target, or tests its stencil alone;
 /// - where an object is tested before all occluders are drawn, or after the depth is cleared again;
 /// - where occluders are drawn into different colour targets.
-pub(super) fn occluders(
+pub(in crate::frame) fn occluders(
     plan: &FramePlan,
     draws: &[Draws<'_>],
     passes: &[Pass],
@@ -398,28 +398,33 @@ pub(super) fn occluders(
 
 /// What culling a frame does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct CullingOptions {
+pub(in crate::frame) struct CullingOptions {
     /// The side of a tile of the coarse depth buffers in pixels; `None` without occlusion tests.
-    pub(super) occlusion_tile: Option<u32>,
+    pub(in crate::frame) occlusion_tile: Option<u32>,
     culls_triangles: bool,
 }
 
 impl CullingOptions {
     /// The options of a frame whose meshes the tables have.
-    pub(super) fn new(quality: &Quality, tables: &CullingTables) -> Self {
+    pub(in crate::frame) fn new(quality: &Quality, tables: &CullingTables) -> Self {
         // The bounds of triangle culling hold only for camera-relative transforms.
         let is_exact = quality.transforms == TransformPrecision::CameraRelative;
         Self { occlusion_tile: quality.occlusion, culls_triangles: tables.has_cullable_meshes() && is_exact }
     }
 
     /// Whether triangles of meshes with triangle culling are culled.
-    pub(super) fn culls_triangles(self) -> bool {
+    pub(in crate::frame) fn culls_triangles(self) -> bool {
         self.culls_triangles
     }
 }
 
 /// Whether the triangles of meshes with triangle culling may be culled in a pass.
-pub(super) fn allows_triangle_culling(plan: &FramePlan, draws: &[Draws<'_>], view: &RenderView, pass: &Pass) -> bool {
+pub(in crate::frame) fn allows_triangle_culling(
+    plan: &FramePlan,
+    draws: &[Draws<'_>],
+    view: &RenderView,
+    pass: &Pass,
+) -> bool {
     // Triangle culling tests undeformed triangles against the centres of the picture's pixels.
     draws[pass.process_index].allows_triangle_culling()
         && plan.attachment_extent(pass.process_index) == AttachmentExtent::PICTURE
@@ -428,7 +433,7 @@ pub(super) fn allows_triangle_culling(plan: &FramePlan, draws: &[Draws<'_>], vie
 
 /// The triangles of a pass that are tested.
 #[derive(Debug, Default)]
-pub(super) struct PassTriangles {
+pub(in crate::frame) struct PassTriangles {
     items: Vec<Item>,
     /// The indices of the triangles that remain of each item; longer than `items`, to keep memory.
     remaining: Vec<Mutex<Vec<u32>>>,
@@ -451,7 +456,7 @@ const MAX_PASS_TRIANGLES: usize = (1 << 25) / 3;
 
 impl PassTriangles {
     /// Begins a frame. One that culls no triangles gives the memory back.
-    pub(super) fn begin_frame(&mut self, culls_triangles: bool) {
+    pub(in crate::frame) fn begin_frame(&mut self, culls_triangles: bool) {
         if culls_triangles {
             self.clear();
         } else {
@@ -460,7 +465,7 @@ impl PassTriangles {
     }
 
     /// Lists the triangles of cullable meshes in a draw list, in its order, up to [`MAX_PASS_TRIANGLES`].
-    pub(super) fn find(&mut self, list: &DrawList, tables: &CullingTables, assets: &Assets) {
+    pub(in crate::frame) fn find(&mut self, list: &DrawList, tables: &CullingTables, assets: &Assets) {
         self.clear();
         let mut room = MAX_PASS_TRIANGLES;
         let cullable_batches = (0..).zip(&list.batches).filter(|(_, batch)| tables.is_cullable(batch.mesh));
@@ -488,12 +493,12 @@ impl PassTriangles {
     }
 
     /// The number of items.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::frame) fn len(&self) -> usize {
         self.items.len()
     }
 
     /// Culls the triangles of some items.
-    pub(super) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
+    pub(in crate::frame) fn cull(&self, items: Range<usize>, view: &RenderView, scene: &SceneRef<'_>, list: &DrawList) {
         let mut culled = CulledTriangles::default();
         for (item, remaining) in self.items[items.clone()].iter().zip(&self.remaining[items]) {
             let batch = &list.batches[item.batch as usize];
@@ -506,7 +511,7 @@ impl PassTriangles {
     }
 
     /// Makes the draw list draw what remains. A batch that lost no triangle stays whole.
-    pub(super) fn apply(&self, list: &mut DrawList) {
+    pub(in crate::frame) fn apply(&self, list: &mut DrawList) {
         let mut first = 0;
         for items in self.items.chunk_by(|one, next| one.batch == next.batch) {
             let remaining = &self.remaining[first..first + items.len()];
@@ -522,7 +527,7 @@ impl PassTriangles {
     }
 
     /// How many triangles were tested and culled.
-    pub(super) fn culled(&self) -> CulledTriangles {
+    pub(in crate::frame) fn culled(&self) -> CulledTriangles {
         *self.culled.lock()
     }
 }
