@@ -43,7 +43,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     // The picture has the format of the surface, so presenting it is a copy.
     let tone_mapping = ToneMapping { format: Format::Bgra8Srgb, ..ToneMapping::new(1.2) };
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device.clone(), queue)?)
-        .deferred(Deferred::new().post(tone_mapping).replace("transparency", Glow))
+        .pipeline(Deferred::new().post(tone_mapping).replace("transparency", Glow))
         .process(Present { surface: Arc::clone(&surface) })
         .build(Arc::clone(&scheduler))?;
 

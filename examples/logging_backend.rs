@@ -102,7 +102,7 @@ fn main() -> ExitCode {
 fn run() -> Result<(), Box<dyn Error>> {
     let backend = LoggingBackend { inner: NullBackend, calls: Mutex::default() };
     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler)?;
 
     let mut scene = Scene::new();
     let mesh = scene.add(Mesh::cuboid("box", Vec3::ONE)?)?;

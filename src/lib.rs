@@ -36,7 +36,7 @@
 //! | [`scene::Camera`], [`scene::Light`] | each camera is a view: mirrors, shadow maps, tiles |
 //! | [`scene::Mesh`], [`scene::Material`], [`scene::Texture`] | what objects are made of |
 //! | [`scene::Changes`] | which objects differ from the frame before |
-//! | [`process::Deferred`] | the shipped pipeline, with shadows, lights, transparency and tone mapping |
+//! | [`process::Deferred`] | the shipped [pipeline](process::Pipeline), with shadows, lights, transparency and tone mapping |
 //! | [`process::RenderProcess`], [`process::Declare`], [`process::Draws`] | what an engine adds to a frame: its shaders, what they read and write, and what they draw |
 //! | [`CpuNode`] | an engine's own work among the jobs of a frame |
 //! | [`quality::Quality`] | what trades accuracy for speed |

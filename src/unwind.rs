@@ -15,7 +15,7 @@
 //! | `BackendExtras::work_in_background` | `frame/renderer.rs`: in a background job, or with one worker on the calling thread | `FrameError::Panicked` of that frame, or of one after the job |
 //! | `RenderProcess`: `name`, `declare`, `draws`, `cpu_shader` | `process/plan/planned_process.rs`, `backend/software/rasterizer.rs` | `PlanError::ProcessPanicked`, or `PlanError::Panicked` |
 //! | CPU shaders | `backend/software`, in jobs | `BackendError::CpuShaderPanicked` |
-//! | `PostStep`; `Deformation`: `name`, `layers` | `process/deferred`, caught in `frame/plan_cache.rs` | `PlanError::Panicked` |
+//! | `Pipeline`: `requirements`, `build` and others; in that of `Deferred` also `PostStep` and `Deformation`: `name`, `layers` | `frame/plan_cache.rs` | `PlanError::PipelinePanicked` with the call |
 //! | `Deformation`: `declare`, `shader`, `resources`, `cpu_shader` | `process/deferred/deformation.rs`, in calls of the process that deforms | as that of the process |
 //! //! | `CpuNode`: `name`, `declare` | `frame/nodes/borrowed_nodes.rs` | `FrameError::Panicked` with the node |
 //! | `CpuNode`: `width`, `run` and others | in jobs, caught where a graph runs its nodes | `FrameError::Panicked` with the node |
@@ -25,7 +25,8 @@
 //! | what the engine passes to a call, or asks itself, on its own thread: `Parameters::update`, `MaterialPredicate::contains`, `Deferred::names`, `output` and `quality`, `SurfaceFrame::present`, iterators and writers | there | unwinds to the caller; nothing has changed but values of the engine's |
 //! | destructors of any of these, of `Frame`, `Part`, `Commands`, `Submission`, and of the payloads of panics | [`discard`], [`Contained`], in which processes and deformations are wrapped when they are added | nothing |
 
-pub(crate) use drawloom_jobs::internal::{CaughtSpan, Contained, discard, discard_all, emit};
+pub use drawloom_jobs::internal::Contained;
+pub(crate) use drawloom_jobs::internal::{CaughtSpan, discard, discard_all, emit};
 // Only backends that draw send events while they hold locks.
 #[cfg(any(feature = "wgpu", feature = "software"))]
 pub(crate) use drawloom_jobs::internal::{emit_unlocked, hold_events};

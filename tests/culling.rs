@@ -137,7 +137,7 @@ fn frames_draw_objects_whose_volume_is_visible() -> Result<(), Box<dyn Error>> {
     scene.cameras.push(Camera::looking_at("main", DVec3::ZERO, DVec3::NEG_Z));
 
     let scheduler = Arc::new(Scheduler::new(1)?);
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let mut visible = |volume| -> Result<usize, Box<dyn Error>> {
         renderer.set_quality(Quality { culling: volume, ..Quality::balanced() })?;

@@ -45,7 +45,7 @@ fn a_report_counts_what_is_drawn_and_by_kind_what_is_left_out() -> Result<(), Bo
     scene.add_object(RenderObject { position: DVec3::X * 1e30, ..square })?;
     content.count(scene);
 
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1)?))?;
     let statistics = renderer.record(scene.as_scene_ref())?.statistics().clone();
     let [written_text, file_text] = [&written, &file].map(|path| path.to_str().unwrap());

@@ -51,7 +51,7 @@ fn main() -> ExitCode {
 /// Records frames that upload every object anew, half a MiB each, and drops them.
 fn drop_and_measure() -> Result<(), Box<dyn Error>> {
     let (device, queue) = adapter::noop_device()?;
-    let builder = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture());
     let (mut renderer, _submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
     let scene = field(5_000);
     expect_steady_memory(DROPPED_FRAMES_IN_A_PERIOD, |_| {
@@ -65,7 +65,7 @@ fn draw_and_measure() -> Result<(), Box<dyn Error>> {
     let (device, queue) = adapter::device()?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
-        .deferred(Deferred::to_picture().depth_pre_pass(true))
+        .pipeline(Deferred::to_picture().depth_pre_pass(true))
         .build(scheduler)?;
     let mut scene = everything();
     let pixels = (0..64 * 64 * 4).map(|byte| (byte * 37 % 251) as u8).collect();

@@ -42,7 +42,7 @@ use crate::step::AsyncStep;
 ///     .post(post.layer(LayerSettings { strength: 0.3, ..LayerSettings::default() }))
 ///     .post(ToneMapping::default());
 /// let (renderer, submitter) = Renderer::builder(NullBackend)
-///     .deferred(deferred)
+///     .pipeline(deferred)
 ///     .process(post.downsample().expect("bloom is computed from a smaller picture"))
 ///     .output(post.source_target())
 ///     .build(scheduler)?;

@@ -155,7 +155,7 @@ impl Runner {
     fn new(objects: usize) -> Result<Self, Box<dyn Error>> {
         let (device, queue) = adapter::noop_device()?;
         let scheduler = Arc::new(Scheduler::new(2)?);
-        let builder = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture());
         let (renderer, submitter) = builder.build(scheduler)?;
         let mut scene = Scene::new();
         let mesh = scene.add(Mesh::cuboid("box", Vec3::ONE)?)?;

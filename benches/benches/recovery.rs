@@ -181,7 +181,7 @@ impl Engine {
         let (device, queue) = adapter::device()?;
         let builder = Renderer::builder(WgpuBackend::new(device, queue)?);
         let deferred = Deferred::new().post(ToneMapping::default());
-        let (renderer, submitter) = builder.deferred(deferred).build(Arc::new(Scheduler::new(2)?))?;
+        let (renderer, submitter) = builder.pipeline(deferred).build(Arc::new(Scheduler::new(2)?))?;
         Ok(Self { renderer, submitter, scene })
     }
 

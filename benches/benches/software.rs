@@ -82,7 +82,7 @@ impl Runner {
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
         let deferred = Deferred::new().shadow_maps(Some(maps)).post(ToneMapping::default()).post(Fxaa::default());
-        let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+        let (renderer, submitter) = Renderer::builder(backend).pipeline(deferred).build(scheduler)?;
         Ok(Self { renderer, submitter })
     }
 

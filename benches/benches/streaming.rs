@@ -244,7 +244,7 @@ impl World {
             backend = backend.stream_resources(budget)?;
         }
         let scheduler = Arc::new(Scheduler::new(2)?);
-        let (renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+        let (renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler)?;
         let (mut scene, mesh) = (Scene::new(), grid(quads)?);
         let material = scene.add(Material::default())?;
         let shared_mesh = scene.add(mesh.clone())?;

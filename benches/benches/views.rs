@@ -151,7 +151,7 @@ fn memory_of(views: usize) -> Result<f64, Box<dyn Error>> {
 fn print_memory(views: usize) -> Result<(), Box<dyn Error>> {
     let (device, queue) = adapter::noop_device()?;
     let builder = Renderer::builder(WgpuBackend::new(device, queue)?.transient_targets());
-    let (mut renderer, submitter) = builder.deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
+    let (mut renderer, submitter) = builder.pipeline(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?;
     let mut scene = field(500);
     let camera = Camera { size: [8, 8], ..scene.cameras[0].clone() };
     scene.cameras = (0..views).map(|view| Camera { name: format!("view {view}"), ..camera.clone() }).collect();
@@ -251,7 +251,7 @@ impl Runner {
         let (device, queue) = adapter::noop_device()?;
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let builder =
-            Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).process(Mirror);
+            Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).process(Mirror);
         let (renderer, submitter) = builder.build(scheduler)?;
         let main = overhead("main", 70.0, 40);
         let mut cameras = vec![main.clone()];

@@ -114,7 +114,7 @@ impl Engine {
         let fog = Parameters::new(0.02);
         let backend = WgpuBackend::new(graphics.device.clone(), graphics.queue.clone())?;
         let (renderer, submitter) = Renderer::builder(backend)
-            .deferred(Deferred::new().post(ToneMapping { format: surface.picture_format(), ..ToneMapping::default() }))
+            .pipeline(Deferred::new().post(ToneMapping { format: surface.picture_format(), ..ToneMapping::default() }))
             .process(Fog(fog.clone()))
             .quality(Quality::balanced())
             .build(Arc::new(Scheduler::with_available_parallelism()?))?;

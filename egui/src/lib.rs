@@ -15,7 +15,7 @@
 //! # let scheduler = std::sync::Arc::new(Scheduler::new(1)?);
 //! # let mut scene = Scene::new();
 //! # scene.cameras.push(Camera::looking_at("main", DVec3::Z, DVec3::ZERO));
-//! # let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::new()).build(scheduler)?;
+//! # let (mut renderer, submitter) = Renderer::builder(NullBackend).pipeline(Deferred::new()).build(scheduler)?;
 //! # let context = egui::Context::default();
 //! let mut inspector = Inspector::default();
 //! # for _ in 0..3 {

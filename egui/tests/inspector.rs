@@ -41,7 +41,7 @@ impl Engine {
         scene.cameras.push(Camera::looking_at("left eye", DVec3::ZERO, DVec3::NEG_Z));
         scene.lights.push(Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true });
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::new());
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::new());
         let builder = match quality {
             Some(quality) => builder.quality(quality),
             None => builder,

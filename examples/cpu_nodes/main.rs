@@ -74,7 +74,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         BackendName::Noop => adapter::noop_device()?,
     };
     let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
-        .deferred(Deferred::new().post(ToneMapping::new(1.0)))
+        .pipeline(Deferred::new().post(ToneMapping::new(1.0)))
         .process(DrawMirror)
         .process(DrawSparks)
         .build(Arc::clone(&scheduler))?;

@@ -32,7 +32,7 @@ pub fn renderer<B: Backend>(
         .post(ToneMapping::default())
         .post(Fxaa::default());
     let backend = make(&scheduler);
-    Ok(Renderer::builder(backend).deferred(deferred).granularity(arguments.granularity.0).build(scheduler)?)
+    Ok(Renderer::builder(backend).pipeline(deferred).granularity(arguments.granularity.0).build(scheduler)?)
 }
 
 fn has_vertex_colors(scene: &Scene) -> bool {

@@ -80,7 +80,7 @@ impl Engine {
         let mut crowd = Crowd::new(Arc::clone(&characters), size)?;
         crowd.walk_to(2.0);
         let deferred = Deferred::to_picture().post(Fxaa::default()).deformation(Arc::clone(&characters));
-        let builder = self.builder()?.deferred(deferred);
+        let builder = self.builder()?.pipeline(deferred);
         let builder = builder.process(Selected(Arc::clone(&characters))).process(Outline(characters));
         let (mut renderer, submitter) = self.build(builder)?;
         let recorded = renderer.record(crowd.as_scene_ref(&crowd.columns()))?;
@@ -93,7 +93,7 @@ impl Engine {
 
     /// A pipeline with the engine's own material, and with picking.
     fn world(&self, deferred: Deferred) -> Result<RendererBuilder<WgpuBackend>, Box<dyn Error>> {
-        let builder = self.builder()?.deferred(deferred).process(ObjectIndex).output(picking::TARGET);
+        let builder = self.builder()?.pipeline(deferred).process(ObjectIndex).output(picking::TARGET);
         Ok(builder.process(MetalSurfaces::new(&self.device, &self.queue)))
     }
 

@@ -68,7 +68,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let backend = WgpuBackend::new(device, queue)?.stream_resources(budget)?;
     let deferred = Deferred::new().post(ToneMapping::new(1.0));
     let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred(deferred).process(Haze::new(SKY)).build(Arc::clone(&scheduler))?;
+        Renderer::builder(backend).pipeline(deferred).process(Haze::new(SKY)).build(Arc::clone(&scheduler))?;
 
     let flight = Flight::new(arguments.size.0);
     let mut world = World::new(&scheduler, SKY)?;

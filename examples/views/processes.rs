@@ -15,7 +15,7 @@ use crate::surface::Surface;
 pub fn add_to<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
     let shadow_maps = ShadowMaps { side: 512, max_distance: 30.0, cascades: 3, ..ShadowMaps::default() };
     let deferred = Deferred::new().shadow_maps(Some(shadow_maps)).post(ToneMapping::default());
-    let builder = builder.deferred(deferred);
+    let builder = builder.pipeline(deferred);
     let builder = Surface::all().into_iter().fold(builder, RendererBuilder::process);
     let builder = builder.process(Impostor).process(MirrorBall);
     let builder = builder.process(Smoke::new(smoke::DIVISOR)).process(UpsampledSmoke::new(smoke::DIVISOR));

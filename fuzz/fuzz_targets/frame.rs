@@ -50,7 +50,7 @@ fuzz_target!(|input: Input| {
         "occlusion by tiles of {occlusion}"
     );
 
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, submitter) = builder.build(Arc::clone(two)).unwrap();
     match renderer.record(scene) {
         Ok(recorded) => {

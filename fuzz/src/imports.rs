@@ -119,5 +119,5 @@ pub fn check_frame(imported: &Imported, camera: Camera, lights: &[Light]) {
 
 fn null_renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }

@@ -635,7 +635,7 @@ impl Drawer {
         build: impl FnOnce(RendererBuilder<SoftwareBackend>) -> RendererBuilder<SoftwareBackend>,
     ) -> Self {
         let backend = SoftwareBackend::new(Arc::clone(scheduler));
-        let builder = build(Renderer::builder(backend).deferred(Deferred::to_picture()));
+        let builder = build(Renderer::builder(backend).pipeline(Deferred::to_picture()));
         let (renderer, submitter) = builder.build(Arc::clone(scheduler)).unwrap();
         Self { renderer, submitter }
     }

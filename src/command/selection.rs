@@ -59,6 +59,12 @@ impl Selection {
         Self { material_types: MaterialTypes::Shipped, ..self }
     }
 
+    /// Those of these objects whose material is in share `index` of `of` equal shares, counted from 0: several processes
+    /// draw what one would (L 5). No shares count as one.
+    pub const fn of_material_share(self, index: u32, of: u32) -> Self {
+        Self { materials: MaterialShare { index, of }, ..self }
+    }
+
     /// Those of these objects that belong to none of some layers.
     pub const fn not_in_layers(self, layers: LayerMask) -> Self {
         Self { excluded_layers: LayerMask(self.excluded_layers.0 | layers.0), ..self }

@@ -1,25 +1,21 @@
 //! Builds a renderer.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::plan_cache::{PlanCache, with_quality};
+use super::plan_cache::{PlanCache, PlanSources};
 use super::renderer::Renderer;
 use super::{BuildError, Granularity, Submitter};
 use crate::backend::{Backend, GuardedBackend};
-use crate::process::{Deferred, RenderProcess};
+use crate::process::{Contained, DeviceSupport, Pipeline, RenderProcess};
 use crate::quality::Quality;
 use crate::task::Scheduler;
-use crate::unwind::Contained;
 use crate::view::ShadowMaps;
 
 /// Builds a [`Renderer`] from render processes and settings.
 pub struct RendererBuilder<B> {
     backend: GuardedBackend<B>,
-    deferred: Option<Deferred>,
+    sources: PlanSources,
     processes: Vec<Arc<dyn RenderProcess>>,
-    outputs: Vec<String>,
-    shadow_maps: ShadowMaps,
     granularity: Granularity,
     instancing: bool,
     quality: Option<Quality>,
@@ -36,10 +32,8 @@ impl<B: Backend> RendererBuilder<B> {
     fn new(backend: B) -> Self {
         Self {
             backend: GuardedBackend::new(Arc::new(backend)),
-            deferred: None,
+            sources: PlanSources::default(),
             processes: Vec::new(),
-            outputs: Vec::new(),
-            shadow_maps: ShadowMaps::default(),
             granularity: Granularity::default(),
             instancing: true,
             quality: None,
@@ -52,23 +46,24 @@ impl<B: Backend> RendererBuilder<B> {
         self
     }
 
-    /// Adds a deferred pipeline: its output, and in each frame the processes that the scene requires.
-    pub fn deferred(mut self, deferred: Deferred) -> Self {
-        self.deferred = Some(deferred);
+    /// Sets the pipeline, such as [`Deferred`](crate::process::Deferred): its outputs, and in each frame the processes
+    /// that the scene requires.
+    pub fn pipeline(mut self, pipeline: impl Pipeline + 'static) -> Self {
+        self.sources.pipeline = Some(Contained::new(Arc::new(pipeline)));
         self
     }
 
     /// Names an output of the frame. Processes that lead to no output are dropped.
     pub fn output(mut self, target: impl AsRef<str>) -> Self {
-        self.outputs.push(target.as_ref().to_owned());
+        self.sources.add_output(target.as_ref().to_owned());
         self
     }
 
     /// Sets the shadow maps for an engine's own processes that draw in views of
-    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). The settings of a [`Deferred`] pipeline that draws shadow
-    /// maps override these.
+    /// [`ViewKind::Shadow`](crate::scene::ViewKind::Shadow). The settings of a
+    /// [pipeline](Pipeline::shadow_maps) that draws shadow maps override these.
     pub fn shadow_maps(mut self, maps: ShadowMaps) -> Self {
-        self.shadow_maps = maps;
+        self.sources.shadow_maps = maps;
         self
     }
 
@@ -85,8 +80,9 @@ impl<B: Backend> RendererBuilder<B> {
         self
     }
 
-    /// Sets the quality, of the frame and of the [`Deferred`] pipeline: see [`Deferred::quality`]. Without this call
-    /// the pipeline keeps its own settings, and everything else is [`Quality::balanced`].
+    /// Sets the quality, of the frame and of the pipeline: see
+    /// [`Deferred::quality`](crate::process::Deferred::quality) and [`Pipeline::with_quality`]. Without this call the
+    /// pipeline keeps its own settings, and everything else is [`Quality::balanced`].
     pub fn quality(mut self, quality: Quality) -> Self {
         self.quality = Some(quality);
         self
@@ -103,14 +99,12 @@ impl<B: Backend> RendererBuilder<B> {
             return Err(BuildError::EmptyChunk);
         }
         self.quality.unwrap_or_default().check()?;
-        let deferred = match (self.deferred, &self.quality) {
-            (Some(deferred), Some(quality)) => Some(with_quality(deferred, quality)?),
-            (deferred, _) => deferred,
-        };
-        let backend = self.backend;
-        let blends_floats = backend.can_blend_floats();
-        let deferred = deferred.map(|deferred| deferred.with_float_blending(blends_floats));
-        let plans = PlanCache::new(deferred, self.processes, self.outputs, self.shadow_maps, HashMap::new())?;
+        let (backend, mut sources) = (self.backend, self.sources);
+        self.processes.into_iter().try_for_each(|process| sources.add_process(process))?;
+        if let Some(quality) = &self.quality {
+            sources.set_quality(quality)?;
+        }
+        let plans = PlanCache::new(sources, DeviceSupport::new(backend.can_blend_floats()))?;
         let submitter = Submitter::new(backend.clone(), Arc::clone(scheduler.timeline()));
         Ok((Renderer::new(backend, plans, self.granularity, self.instancing, self.quality, scheduler), submitter))
     }

@@ -10,7 +10,7 @@ mod frame_loop;
 mod plan_cache;
 mod recorded_frame;
 mod renderer;
-mod replace_backend;
+mod reconfigure;
 mod scene_check;
 mod stages;
 mod static_groups;

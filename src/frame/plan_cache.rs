@@ -3,89 +3,248 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::process::{Deferred, FramePlan, PlanError, ProcessId, RenderProcess, Requirements};
+use crate::process::{
+    Contained, DeviceSupport, FramePlan, Pipeline, PipelineProcesses, PlanError, ProcessId, RenderProcess,
+    Requirements, SceneContents,
+};
 use crate::quality::Quality;
-use crate::scene::{Camera, Light, ViewKind};
+use crate::scene::ViewKind;
 use crate::task::{JobPanic, catch};
 use crate::view::ShadowMaps;
 
-/// A renderer's processes, and a plan for each set of requirements that scenes have had so far.
-pub(super) struct PlanCache {
-    deferred: Option<Deferred>,
-    /// What every plan has, whatever the scene requires; `None` until the next plan if the backend changed.
-    kept: Option<Requirements>,
-    processes: Vec<Arc<dyn RenderProcess>>,
+/// What the plans of a renderer are made of.
+#[derive(Clone, Default)]
+pub(super) struct PlanSources {
+    pub(super) pipeline: Option<Contained<Arc<dyn Pipeline>>>,
+    processes: Vec<AddedProcess>,
     outputs: Vec<String>,
-    shadow_maps: ShadowMaps,
-    compiled: HashMap<Requirements, Arc<FramePlan>>,
+    /// The engine's settings, for a pipeline without shadow maps.
+    pub(super) shadow_maps: ShadowMaps,
+}
+
+/// A process that the engine added.
+#[derive(Clone)]
+struct AddedProcess {
+    name: String,
+    process: Arc<dyn RenderProcess>,
+    is_enabled: bool,
+}
+
+impl PlanSources {
+    /// Adds a process of the engine's.
+    ///
+    /// # Errors
+    /// If the process panics when it is asked for its name.
+    pub(super) fn add_process(&mut self, process: Arc<dyn RenderProcess>) -> Result<(), PlanError> {
+        let name = catch_panics(|| Ok(process.name().to_owned()))?;
+        self.processes.push(AddedProcess { name, process, is_enabled: true });
+        Ok(())
+    }
+
+    /// # Errors
+    /// If the engine has added no process of this name.
+    pub(super) fn remove_process(&mut self, name: &str) -> Result<(), PlanError> {
+        self.check_added(name)?;
+        self.processes.retain(|added| added.name != name);
+        Ok(())
+    }
+
+    /// # Errors
+    /// If the engine has added no process of this name.
+    pub(super) fn set_process_enabled(&mut self, name: &str, is_enabled: bool) -> Result<(), PlanError> {
+        self.check_added(name)?;
+        self.processes.iter_mut().filter(|added| added.name == name).for_each(|added| added.is_enabled = is_enabled);
+        Ok(())
+    }
+
+    fn check_added(&self, name: &str) -> Result<(), PlanError> {
+        known(name, "process", self.processes.iter().map(|added| added.name.as_str()))
+    }
+
+    /// Adds an output, unless there is one of that name.
+    pub(super) fn add_output(&mut self, target: String) {
+        if !self.outputs.contains(&target) {
+            self.outputs.push(target);
+        }
+    }
+
+    /// # Errors
+    /// If the engine has added no output of this name.
+    pub(super) fn remove_output(&mut self, target: &str) -> Result<(), PlanError> {
+        known(target, "output", self.outputs.iter().map(String::as_str))?;
+        self.outputs.retain(|output| output != target);
+        Ok(())
+    }
+
+    /// Gives the pipeline a quality. Returns whether that makes another one of it.
+    ///
+    /// # Errors
+    /// If the pipeline panics.
+    pub(super) fn set_quality(&mut self, quality: &Quality) -> Result<bool, PlanError> {
+        let Some(pipeline) = &self.pipeline else { return Ok(false) };
+        let other = call("with_quality", || Ok(pipeline.with_quality(quality)))?;
+        let has_other = other.is_some();
+        if let Some(other) = other {
+            self.pipeline = Some(Contained::new(other));
+        }
+        Ok(has_other)
+    }
+
+    fn compile(&self, requirements: &Requirements, device: DeviceSupport) -> Result<FramePlan, PlanError> {
+        let mut built = PipelineProcesses::default();
+        if let Some(pipeline) = &self.pipeline {
+            call("build", || pipeline.build(requirements, device, &mut built))?;
+        }
+        let enabled = self.processes.iter().filter(|added| added.is_enabled);
+        let processes = enabled.map(|added| Arc::clone(&added.process)).collect();
+        catch_panics(|| FramePlan::of_pipeline(built, processes, &self.outputs, |kind| requirements.has_views(kind)))
+    }
+}
+
+/// # Errors
+/// If there is none of this name.
+fn known<'a>(name: &str, what: &'static str, mut all: impl Iterator<Item = &'a str> + Clone) -> Result<(), PlanError> {
+    if all.clone().any(|other| other == name) {
+        return Ok(());
+    }
+    let mut known = all.next().unwrap_or("none").to_owned();
+    all.for_each(|other| known.extend([", ", other]));
+    Err(PlanError::NotAdded { what, name: name.to_owned(), known })
+}
+
+/// A renderer's processes, and a plan for each of the sets of requirements that scenes have had lately.
+pub(super) struct PlanCache {
+    sources: PlanSources,
+    /// How the pipeline draws shadow maps.
+    pipeline_maps: Option<ShadowMaps>,
+    device: DeviceSupport,
+    /// `None` until the next plan if the device changed.
+    of_device: Option<OfDevice>,
+    /// Whether all scenes have the same plan: there is no pipeline, and every scene has the views that processes draw in.
+    has_one_plan: bool,
+    compiled: HashMap<Requirements, CachedPlan>,
+    /// How often a plan was chosen.
+    uses: u64,
     current: Arc<FramePlan>,
     process_ids: ProcessIds,
+}
+
+/// What a pipeline says of a device.
+#[derive(Clone, Copy, Default)]
+struct OfDevice {
+    /// What every plan has, whatever the scene requires.
+    kept: Requirements,
+    lacks_float_blending: bool,
+}
+
+impl OfDevice {
+    /// # Errors
+    /// If the pipeline panics.
+    fn new(sources: &PlanSources, device: DeviceSupport) -> Result<Self, PlanError> {
+        let Some(pipeline) = &sources.pipeline else { return Ok(Self::default()) };
+        Ok(Self {
+            kept: call("kept", || Ok(pipeline.kept(device)))?,
+            lacks_float_blending: call("lacks_float_blending", || Ok(pipeline.lacks_float_blending(device)))?,
+        })
+    }
+}
+
+struct CachedPlan {
+    plan: Arc<FramePlan>,
+    /// [`PlanCache::uses`] when it was chosen last.
+    last_use: u64,
 }
 
 /// The ids of processes, by kind of views and name: those of this cache's plans, and of the cache before.
 type ProcessIds = HashMap<(ViewKind, String), ProcessId>;
 
 impl PlanCache {
-    /// A cache with the plan of an empty scene. Processes that are known have these ids in all plans.
+    /// The most plans in the cache. Of more, that which was used longest ago is dropped.
+    pub(super) const MAX_PLANS: usize = 128;
+
+    /// A cache with the plan of an empty scene.
     ///
     /// # Errors
-    /// If the processes make no frame, either for an empty scene or for one that requires everything, on this backend
+    /// If the processes make no frame, either for an empty scene or for one that requires everything, on this device
     /// or on one that replaces it.
-    pub(super) fn new(
-        deferred: Option<Deferred>,
-        processes: Vec<Arc<dyn RenderProcess>>,
-        outputs: Vec<String>,
-        shadow_maps: ShadowMaps,
-        mut process_ids: ProcessIds,
-    ) -> Result<Self, PlanError> {
-        if let Some(problem) = shadow_maps.problem() {
+    pub(super) fn new(sources: PlanSources, device: DeviceSupport) -> Result<Self, PlanError> {
+        Self::with_ids(sources, device, HashMap::new())
+    }
+
+    /// A cache in which processes that are known have these ids in all plans.
+    fn with_ids(sources: PlanSources, device: DeviceSupport, mut process_ids: ProcessIds) -> Result<Self, PlanError> {
+        let (mut pipeline_maps, mut nothing, mut everything) = (None, Requirements::default(), None);
+        if let Some(pipeline) = &sources.pipeline {
+            call("check", || pipeline.check())?;
+            pipeline_maps = call("shadow_maps", || Ok(pipeline.shadow_maps()))?;
+            nothing = call("requirements", || Ok(pipeline.requirements(&SceneContents::EMPTY)))?;
+            everything = call("to_prepare", || Ok(pipeline.to_prepare()))?.first().copied();
+        }
+        if let Some(problem) = [Some(sources.shadow_maps), pipeline_maps].iter().flatten().find_map(ShadowMaps::problem)
+        {
             return Err(PlanError::ShadowMaps { problem });
         }
-        let all = Requirements::all();
-        if let Some(deferred) = &deferred {
-            catch_panics(|| deferred.check())?;
-            compile(Some(deferred), &processes, &outputs, &all)?.check_left_out()?;
-            let replaced = deferred.clone().with_float_blending(!deferred.blends_floats());
-            compile(Some(&replaced), &processes, &outputs, &all)?;
+        let of_device = OfDevice::new(&sources, device)?;
+        let nothing = nothing.union(of_device.kept);
+        let everything = everything.unwrap_or_else(Requirements::all).union(of_device.kept).with_all_views();
+        if sources.pipeline.is_some() {
+            sources.compile(&everything, device)?.check_left_out()?;
+            sources.compile(&everything, DeviceSupport::new(!device.float_blending))?;
         }
-        let kept = kept_requirements(deferred.as_ref())?;
-        let nothing = Requirements::default().union(kept);
-        let mut current = compile(deferred.as_ref(), &processes, &outputs, &nothing)?;
-        if deferred.is_none() {
+        let mut current = sources.compile(&nothing, device)?;
+        // Without a pipeline, plans differ by kinds of views alone.
+        let has_one_plan = sources.pipeline.is_none() && current.has_all_views();
+        if has_one_plan {
             current.check_left_out()?;
+        } else if sources.pipeline.is_none() {
+            sources.compile(&everything, device)?.check_left_out()?;
         }
         current.share_process_ids(&mut process_ids);
         let current = Arc::new(current);
-        let compiled = HashMap::from([(nothing, Arc::clone(&current))]);
-        Ok(Self { deferred, kept: Some(kept), processes, outputs, shadow_maps, compiled, current, process_ids })
+        let compiled = HashMap::from([(nothing, CachedPlan { plan: Arc::clone(&current), last_use: 0 })]);
+        let of_device = Some(of_device);
+        Ok(Self { sources, pipeline_maps, device, of_device, has_one_plan, compiled, uses: 0, current, process_ids })
     }
 
-    /// A cache with another deferred pipeline.
+    /// A cache with other processes. Those that stay keep their ids.
     ///
     /// # Errors
-    /// As [`PlanCache::new`].
-    pub(super) fn with_deferred(&self, deferred: Deferred) -> Result<Self, PlanError> {
-        let Self { processes, outputs, shadow_maps, compiled, current, .. } = self;
-        let planned = compiled.values().chain([current]).flat_map(|plan| plan.processes());
-        // Those of caches before this one are not needed, and would become ever more.
-        let ids = planned.map(|planned| ((planned.declaration.views, planned.name.clone()), planned.id)).collect();
-        Self::new(Some(deferred), processes.clone(), outputs.clone(), *shadow_maps, ids)
+    /// If `change` fails, or as [`PlanCache::new`].
+    pub(super) fn changed(
+        &self,
+        change: impl FnOnce(&mut PlanSources) -> Result<(), PlanError>,
+    ) -> Result<Self, PlanError> {
+        let mut sources = self.sources.clone();
+        change(&mut sources)?;
+        Self::with_ids(sources, self.device, self.ids_of_plans())
     }
 
-    /// The deferred pipeline, if there is one.
-    pub(super) fn deferred(&self) -> Option<&Deferred> {
-        self.deferred.as_ref()
+    /// A cache whose pipeline has a quality; `None` if it stays as it is.
+    ///
+    /// # Errors
+    /// As [`PlanCache::changed`].
+    pub(super) fn with_quality(&self, quality: &Quality) -> Result<Option<Self>, PlanError> {
+        let mut sources = self.sources.clone();
+        match sources.set_quality(quality)? {
+            true => Self::with_ids(sources, self.device, self.ids_of_plans()).map(Some),
+            false => Ok(None),
+        }
     }
 
-    /// Sets whether the backend can blend floats. If that changes, plans are compiled anew, and what they keep is
-    /// determined anew.
-    pub(super) fn set_float_blending(&mut self, blends_floats: bool) {
-        if let Some(deferred) = self.deferred.take() {
-            if deferred.blends_floats() != blends_floats {
-                self.compiled.clear();
-                self.kept = None;
-            }
-            self.deferred = Some(deferred.with_float_blending(blends_floats));
+    /// The ids of the processes in the plans of this cache. Those of earlier plans are not needed, and would become ever
+    /// more.
+    fn ids_of_plans(&self) -> ProcessIds {
+        let plans = self.compiled.values().map(|cached| &cached.plan).chain([&self.current]);
+        let planned = plans.flat_map(|plan| plan.processes());
+        planned.map(|planned| ((planned.declaration.views, planned.name.clone()), planned.id)).collect()
+    }
+
+    /// Sets what the backend supports. If that changes, plans are compiled anew, and what they keep is determined anew.
+    pub(super) fn set_device(&mut self, device: DeviceSupport) {
+        if self.device != device {
+            self.device = device;
+            self.compiled.clear();
+            self.of_device = None;
         }
     }
 
@@ -99,14 +258,8 @@ impl PlanCache {
     ///
     /// # Errors
     /// If the processes make no frame.
-    pub(super) fn select(
-        &mut self,
-        lights: &[Light],
-        transparency: bool,
-        cameras: &[Camera],
-    ) -> Result<Arc<FramePlan>, PlanError> {
-        let requirements =
-            Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
+    pub(super) fn select(&mut self, scene: &SceneContents<'_>) -> Result<Arc<FramePlan>, PlanError> {
+        let requirements = self.requirements(scene)?;
         self.current = self.plan_for(requirements)?;
         Ok(Arc::clone(&self.current))
     }
@@ -116,17 +269,13 @@ impl PlanCache {
     ///
     /// # Errors
     /// If the processes make no frame.
-    pub(super) fn plans_to_prepare(
-        &mut self,
-        lights: &[Light],
-        transparency: bool,
-        cameras: &[Camera],
-    ) -> Result<Vec<Arc<FramePlan>>, PlanError> {
-        let requirements =
-            Requirements::of(lights, transparency, self.separates_shadowed_lights()).with_cameras(cameras);
-        let all = [requirements].into_iter().chain(Requirements::with_every_shader());
+    pub(super) fn plans_to_prepare(&mut self, scene: &SceneContents<'_>) -> Result<Vec<Arc<FramePlan>>, PlanError> {
+        let others = match &self.sources.pipeline {
+            Some(pipeline) => call("to_prepare", || Ok(pipeline.to_prepare()))?,
+            None => vec![Requirements::all()],
+        };
         let mut plans: Vec<Arc<FramePlan>> = Vec::new();
-        for requirements in all {
+        for requirements in [self.requirements(scene)?].into_iter().chain(others) {
             let plan = self.plan_for(requirements)?;
             if plans.iter().all(|other| other.identity() != plan.identity()) {
                 plans.push(plan);
@@ -135,39 +284,67 @@ impl PlanCache {
         Ok(plans)
     }
 
+    /// What a frame of this scene requires.
+    ///
+    /// # Errors
+    /// If the pipeline panics.
+    fn requirements(&self, scene: &SceneContents<'_>) -> Result<Requirements, PlanError> {
+        let own = match &self.sources.pipeline {
+            Some(pipeline) => call("requirements", || Ok(pipeline.requirements(scene)))?,
+            None => Requirements::default(),
+        };
+        Ok(own.with_cameras(scene.cameras))
+    }
+
     /// The plan for these requirements, compiled if the cache does not have it.
     ///
     /// # Errors
     /// If the processes make no frame.
     fn plan_for(&mut self, requirements: Requirements) -> Result<Arc<FramePlan>, PlanError> {
-        let Some(deferred) = &self.deferred else { return Ok(Arc::clone(&self.current)) };
-        let kept = match self.kept {
-            Some(kept) => kept,
-            None => *self.kept.insert(kept_requirements(Some(deferred))?),
-        };
-        let requirements = requirements.union(kept);
-        if let Some(plan) = self.compiled.get(&requirements) {
-            return Ok(Arc::clone(plan));
+        if self.has_one_plan {
+            return Ok(Arc::clone(&self.current));
         }
-        let mut plan = compile(Some(deferred), &self.processes, &self.outputs, &requirements)?;
+        let of_device = match self.of_device {
+            Some(of_device) => of_device,
+            None => *self.of_device.insert(OfDevice::new(&self.sources, self.device)?),
+        };
+        let requirements = requirements.union(of_device.kept);
+        self.uses += 1;
+        if let Some(cached) = self.compiled.get_mut(&requirements) {
+            cached.last_use = self.uses;
+            return Ok(Arc::clone(&cached.plan));
+        }
+        let mut plan = self.sources.compile(&requirements, self.device)?;
         plan.share_process_ids(&mut self.process_ids);
         let plan = Arc::new(plan);
-        self.compiled.insert(requirements, Arc::clone(&plan));
+        let cached = CachedPlan { plan: Arc::clone(&plan), last_use: self.uses };
+        self.compiled.insert(requirements, cached);
+        if self.compiled.len() > Self::MAX_PLANS {
+            let oldest = self.compiled.iter().min_by_key(|(_, cached)| cached.last_use);
+            let oldest = oldest.map(|(requirements, _)| *requirements);
+            oldest.and_then(|oldest| self.compiled.remove(&oldest));
+            self.process_ids = self.ids_of_plans();
+        }
         Ok(plan)
     }
 
     /// The settings of shadow maps; `None` where the current plan draws none.
     pub(super) fn shadow_maps(&self) -> Option<&ShadowMaps> {
-        let maps = self.deferred.as_ref().and_then(Deferred::maps).unwrap_or(&self.shadow_maps);
+        let maps = self.pipeline_maps.as_ref().unwrap_or(&self.sources.shadow_maps);
         self.current.draws_views(ViewKind::Shadow).then_some(maps)
     }
 
     /// Whether processes of their own draw the lights that cast shadows.
     pub(super) fn separates_shadowed_lights(&self) -> bool {
-        match &self.deferred {
-            Some(deferred) => deferred.maps().is_some(),
+        match &self.sources.pipeline {
+            Some(_) => self.pipeline_maps.is_some(),
             None => self.current.draws_views(ViewKind::Shadow),
         }
+    }
+
+    /// Whether blended objects are drawn in half floats only because the backend cannot blend floats.
+    pub(super) fn lacks_float_blending(&self) -> bool {
+        self.of_device.is_some_and(|of_device| of_device.lacks_float_blending)
     }
 
     /// The number of plans in the cache.
@@ -176,36 +353,12 @@ impl PlanCache {
     }
 }
 
-/// What every plan has, whatever the scene requires.
-fn kept_requirements(deferred: Option<&Deferred>) -> Result<Requirements, PlanError> {
-    catch_panics(|| Ok(deferred.map_or_else(Requirements::default, Deferred::kept_requirements)))
+/// Calls code of the pipeline, and turns its panic into an error.
+fn call<R>(call: &'static str, code: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
+    catch(code).unwrap_or_else(|JobPanic { message, .. }| Err(PlanError::PipelinePanicked { call, message }))
 }
 
-fn compile(
-    deferred: Option<&Deferred>,
-    processes: &[Arc<dyn RenderProcess>],
-    outputs: &[String],
-    requirements: &Requirements,
-) -> Result<FramePlan, PlanError> {
-    catch_panics(|| {
-        let chain = deferred.map_or_else(Vec::new, |deferred| deferred.chain(requirements));
-        let own = deferred.map(|deferred| deferred.output().to_owned());
-        let outputs: Vec<_> = outputs.iter().cloned().chain(own).collect();
-        // Without a pipeline there is one plan for all scenes.
-        let is_present = |kind| deferred.is_none() || requirements.has_views(kind);
-        FramePlan::for_views(chain, processes.to_vec(), &outputs, is_present)
-    })
-}
-
-/// Applies a quality to a pipeline and its steps of post-processing.
-///
-/// # Errors
-/// If a step panics.
-pub(super) fn with_quality(deferred: Deferred, quality: &Quality) -> Result<Deferred, PlanError> {
-    catch_panics(|| Ok(deferred.quality(quality)))
-}
-
-/// Calls code of processes and steps of the engine, and turns its panic into an error.
+/// Calls code of processes of the engine, and turns its panic into an error.
 fn catch_panics<R>(call: impl FnOnce() -> Result<R, PlanError>) -> Result<R, PlanError> {
     catch(call).unwrap_or_else(|JobPanic { message, .. }| Err(PlanError::Panicked { message }))
 }
@@ -217,6 +370,17 @@ mod tests {
     use glam::{DVec3, Vec3};
 
     use super::*;
+    use crate::process::Deferred;
+    use crate::scene::{Camera, Light};
+
+    fn deferred() -> PlanSources {
+        let pipeline = Contained::new(Arc::new(Deferred::to_picture()) as Arc<dyn Pipeline>);
+        PlanSources { pipeline: Some(pipeline), ..PlanSources::default() }
+    }
+
+    fn contents<'a>(lights: &'a [Light], transparency: bool, cameras: &'a [Camera]) -> SceneContents<'a> {
+        SceneContents { lights, transparency, cameras }
+    }
 
     /// The processes of a plan by name and kind of views, each with its id.
     fn ids_of(plan: &FramePlan) -> HashMap<(String, ViewKind), ProcessId> {
@@ -226,9 +390,7 @@ mod tests {
 
     #[test]
     fn a_process_has_the_same_id_in_all_plans() {
-        let mut cache =
-            PlanCache::new(Some(Deferred::to_picture()), Vec::new(), Vec::new(), ShadowMaps::default(), HashMap::new())
-                .unwrap();
+        let mut cache = PlanCache::new(deferred(), DeviceSupport::new(true)).unwrap();
         let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
         let lamp = Light::Point { position: DVec3::ZERO, intensity: Vec3::ONE, range: 1.0, casts_shadow: false };
         let mirror = Camera { kind: ViewKind::Reflection, ..Camera::looking_at("mirror", DVec3::Z, DVec3::ZERO) };
@@ -239,12 +401,17 @@ mod tests {
             }
             assert_eq!(known.values().collect::<HashSet<_>>().len(), known.len(), "{known:?}");
         };
-        check(&cache.select(&[lamp], false, &[]).unwrap());
-        check(&cache.select(&[lamp, sun], true, &[]).unwrap());
-        check(&cache.select(&[sun], true, std::slice::from_ref(&mirror)).unwrap());
-        let mut replaced = cache.with_deferred(Deferred::to_picture()).unwrap();
+        check(&cache.select(&contents(&[lamp], false, &[])).unwrap());
+        check(&cache.select(&contents(&[lamp, sun], true, &[])).unwrap());
+        check(&cache.select(&contents(&[sun], true, std::slice::from_ref(&mirror))).unwrap());
+        let mut replaced = cache
+            .changed(|sources| {
+                sources.pipeline = deferred().pipeline;
+                Ok(())
+            })
+            .unwrap();
         check(replaced.current());
-        check(&replaced.select(&[], false, &[]).unwrap());
-        check(&replaced.select(&[lamp, sun], true, &[mirror]).unwrap());
+        check(&replaced.select(&contents(&[], false, &[])).unwrap());
+        check(&replaced.select(&contents(&[lamp, sun], true, &[mirror])).unwrap());
     }
 }

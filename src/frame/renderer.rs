@@ -7,10 +7,10 @@ use parking_lot::RwLockReadGuard;
 use super::encoders::FrameEncoders;
 use super::encoders::{PassRecording, reset_recordings};
 use super::nodes::borrowed_nodes::NodeDeclarations;
-use super::plan_cache::{PlanCache, with_quality};
+use super::plan_cache::PlanCache;
+use super::reconfigure::BackendMaintenance;
 use super::recorded_frame::view_queues;
 use super::recorded_frame::{FrameFences, RecordedFrame};
-use super::replace_backend::BackendMaintenance;
 use super::scene_check::ChangeCheck;
 use super::scene_check::SceneCapacity;
 use super::scene_check::check_scene;
@@ -22,14 +22,13 @@ use super::stages::stage_graph::StageGraphCache;
 use super::stages::tables::FrameTables;
 use super::statistics::Warnings;
 use super::views::FrameViews;
-use super::views::MapSettings;
-use super::views::ValidLights;
 use super::views::view_cache::ViewCache;
 use super::views::view_visibility::count_unknown_objects;
-use super::{BuildError, CpuNode, FrameError, FrameStatistics, Granularity};
+use super::views::{MapSettings, ValidLights};
+use super::{CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
-use crate::process::{Deferred, Draws, FramePlan, Pass, Requirements};
+use crate::process::{Draws, FramePlan, Pass, Requirements, SceneContents};
 use crate::quality::Quality;
 use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
@@ -50,7 +49,7 @@ use crate::view::{RenderView, ViewRegistry, possible_draw_states};
 /// use drawloom::Renderer;
 ///
 /// let scheduler = Arc::new(Scheduler::new(2)?);
-/// let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// let (mut renderer, submitter) = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler)?;
 ///
 /// let mut scene = Scene::new();
 /// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
@@ -68,32 +67,36 @@ use crate::view::{RenderView, ViewRegistry, possible_draw_states};
 /// ```
 pub struct Renderer<B: Backend> {
     pub(super) backend: GuardedBackend<B>,
-    plans: PlanCache,
+    pub(super) plans: PlanCache,
     granularity: Granularity,
     instancing: bool,
-    quality: Quality,
-    /// Whether the deferred pipeline has that quality; otherwise it has settings of its own.
-    pipeline_has_quality: bool,
+    pub(super) quality: Quality,
+    /// Whether the pipeline has that quality; otherwise it has settings of its own.
+    pub(super) pipeline_has_quality: bool,
     scheduler: Arc<Scheduler>,
     graphs: StageGraphCache<B>,
     view_registry: ViewRegistry,
-    tables: FrameTables,
-    capacity: SceneCapacity,
-    view_cache: ViewCache,
+    pub(super) tables: FrameTables,
+    pub(super) capacity: SceneCapacity,
+    pub(super) view_cache: ViewCache,
     /// One for each pass of the latest frame.
-    recordings: Vec<PassRecording<B>>,
+    pub(super) recordings: Vec<PassRecording<B>>,
     encoders: FrameEncoders,
     /// What the engine chose for the next frame.
     choices: Vec<TuningChoice>,
     node_declarations: NodeDeclarations,
     warnings: Warnings,
     change_check: ChangeCheck,
-    backend_maintenance: BackendMaintenance,
+    pub(super) backend_maintenance: BackendMaintenance,
     /// Whether the histories of the next frame are empty.
     forgets_histories: bool,
 }
 
 impl<B: Backend> Renderer<B> {
+    /// The most plans that are kept. Of more, the one that was used longest ago is dropped, and compiled again when a
+    /// scene requires it.
+    pub const MAX_PLANS: usize = PlanCache::MAX_PLANS;
+
     pub(super) fn new(
         backend: GuardedBackend<B>,
         plans: PlanCache,
@@ -256,7 +259,8 @@ impl<B: Backend> Renderer<B> {
         scene: &SceneRef<'_>,
     ) -> Result<impl FnOnce() -> Result<(), FrameError> + Send + use<B>, FrameError> {
         let transparency = Requirements::any_needs_transparency(scene);
-        let plans = self.plans.plans_to_prepare(scene.lights, transparency, scene.cameras)?;
+        let contents = SceneContents { lights: scene.lights, transparency, cameras: scene.cameras };
+        let plans = self.plans.plans_to_prepare(&contents)?;
         let mut states_of_plans = Vec::new();
         for plan in &plans {
             let states_of = |draws: &Draws<'_>| {
@@ -298,9 +302,10 @@ impl<B: Backend> Renderer<B> {
         count_unknown_objects(scene, self.tables.objects.scene_issues());
         let valid_lights = ValidLights::new(scene, self.tables.objects.scene_issues(), self.quality.light_cut_off);
         let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
-        let plan = self.plans.select(&valid_lights.lights, transparency, scene.cameras)?;
+        let contents = SceneContents { lights: &valid_lights.lights, transparency, cameras: scene.cameras };
+        let plan = self.plans.select(&contents)?;
         self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
-        self.tables.blended_object.count_half_floats(scene, self.plans.deferred(), &self.tables.objects);
+        self.tables.blended_object.count_half_floats(scene, self.plans.lacks_float_blending(), &self.tables.objects);
         let interval = self.quality.shadows.interval;
         let maps = self.plans.shadow_maps().map(|maps| MapSettings { maps, interval, limits });
         let mut requested = FrameViews::new(scene, valid_lights, maps, &plan, self.tables.objects.scene_issues())?;
@@ -413,52 +418,13 @@ impl<B: Backend> Renderer<B> {
         })
     }
 
-    /// Puts a backend in the place of the one before, and drops what belongs to that one.
-    pub(super) fn set_backend(&mut self, backend: GuardedBackend<B>) {
-        self.plans.set_float_blending(backend.can_blend_floats());
-        self.backend = backend;
-        self.capacity.forget_backend();
-        self.recordings.clear();
-        self.backend_maintenance = BackendMaintenance::default();
-        self.view_cache.forget_frames_in_flight();
-    }
-
-    /// Replaces the deferred pipeline from the next frame on. Device pipelines that both have in common are kept.
-    ///
-    /// # Errors
-    /// If the processes make no frame, or one of them panics; then nothing changes.
-    pub fn set_deferred(&mut self, deferred: Deferred) -> Result<(), BuildError> {
-        self.plans = self.plans.with_deferred(deferred.with_float_blending(self.backend.can_blend_floats()))?;
-        self.pipeline_has_quality = false;
-        self.view_cache.invalidate();
-        Ok(())
-    }
-
-    /// Sets the quality from the next frame on, of the deferred pipeline too.
-    ///
-    /// # Errors
-    /// If the quality is invalid, or a step of post-processing panics; then nothing changes.
-    pub fn set_quality(&mut self, quality: Quality) -> Result<(), BuildError> {
-        quality.check()?;
-        if quality == self.quality && self.pipeline_has_quality {
-            return Ok(());
-        }
-        if let Some(deferred) = self.plans.deferred() {
-            self.plans = self.plans.with_deferred(with_quality(deferred.clone(), &quality)?)?;
-        }
-        (self.quality, self.pipeline_has_quality) = (quality, true);
-        self.tables.invalidate();
-        self.view_cache.invalidate();
-        Ok(())
-    }
-
-    /// The quality of frames. Before it is set, a deferred pipeline may have settings of its own that differ.
+    /// The quality of frames. Before it is set, a pipeline may have settings of its own that differ.
     pub fn quality(&self) -> &Quality {
         &self.quality
     }
 
-    /// Whether the deferred pipeline has the settings of the [quality](Self::quality): false until a quality is set,
-    /// and after [`set_deferred`](Self::set_deferred).
+    /// Whether the pipeline has the settings of the [quality](Self::quality): false until a quality is set,
+    /// and after [`set_pipeline`](Self::set_pipeline).
     pub fn pipeline_has_quality(&self) -> bool {
         self.pipeline_has_quality
     }
@@ -478,7 +444,8 @@ impl<B: Backend> Renderer<B> {
         self.plans.current()
     }
 
-    /// The number of plans in the plan cache: one for each set of requirements that scenes have had.
+    /// The number of plans that are kept: one for each set of requirements that scenes have had lately, at most
+    /// [`MAX_PLANS`](Self::MAX_PLANS).
     pub fn plan_count(&self) -> usize {
         self.plans.count()
     }

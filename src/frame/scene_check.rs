@@ -7,7 +7,7 @@ use super::FrameError;
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend, SceneLimits};
 use crate::bit_set::BitWord;
 use crate::handle::Handle;
-use crate::process::{Deferred, Draws, Requirements};
+use crate::process::{Draws, Requirements};
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, ColumnLayout, LayerMask, Material, Mesh, ObjectColumn, SceneError, SceneRef};
 use crate::unwind::emit;
@@ -234,8 +234,8 @@ impl BlendedTracker {
 
     /// Counts an object if the pipeline draws it in half floats because the backend cannot blend floats: the witness,
     /// or another one if that has no room in the table.
-    pub(super) fn count_half_floats(&self, scene: &SceneRef<'_>, deferred: Option<&Deferred>, objects: &ObjectTable) {
-        let witness = self.witness.filter(|_| deferred.is_some_and(Deferred::lacks_float_blending));
+    pub(super) fn count_half_floats(&self, scene: &SceneRef<'_>, lacks_float_blending: bool, objects: &ObjectTable) {
+        let witness = self.witness.filter(|_| lacks_float_blending);
         let drawn = witness.and_then(|Witness { object, .. }| match object < objects.len() {
             true => Some(object),
             false => (0..objects.len()).find(|object| self.materials.contains(scene.materials[*object])),

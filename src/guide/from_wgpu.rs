@@ -24,7 +24,7 @@
 //! // Handles of the engine's own device, or of the one that `WindowDevice::open` opens.
 //! let backend = WgpuBackend::new(device.clone(), queue.clone())?;
 //! let (mut renderer, submitter) =
-//!     Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+//!     Renderer::builder(backend).pipeline(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -71,7 +71,7 @@
 //!
 //! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
 //! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-//! # let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
+//! # let (mut renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).build(scheduler)?;
 //! # let mut assets = Assets::default();
 //! # let vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
 //! # let triangle = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2])?;
@@ -127,7 +127,7 @@
 //! # ) -> Result<(), Box<dyn std::error::Error>> {
 //! // The last step of post-processing decides the picture's format.
 //! let tone_mapping = ToneMapping { format: surface.picture_format(), ..ToneMapping::default() };
-//! let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::new().post(tone_mapping)).build(scheduler)?;
+//! let (mut renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::new().post(tone_mapping)).build(scheduler)?;
 //!
 //! // When the window asks to be drawn. There is no frame while it is minimised.
 //! if let Some(frame) = surface.acquire(window_size)? {
@@ -190,7 +190,7 @@
 //! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
 //! # let backend = WgpuBackend::new(device, queue)?;
 //! let (mut renderer, submitter) =
-//!     Renderer::builder(backend).deferred(Deferred::to_picture()).process(Horizon).build(scheduler)?;
+//!     Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Horizon).build(scheduler)?;
 //! # let mut world = Scene::new();
 //! # world.cameras.push(Camera::looking_at("main", DVec3::Z, DVec3::ZERO));
 //! # submitter.submit(renderer.record(world.as_scene_ref())?)?;
@@ -259,7 +259,7 @@
 //! # });
 //! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
 //! # let backend = WgpuBackend::new(device, queue)?;
-//! # let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Thumbnail(texture)).build(scheduler)?;
+//! # let (mut renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Thumbnail(texture)).build(scheduler)?;
 //! # let mut world = Scene::new();
 //! # world.cameras.push(Camera { size: [320, 200], ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) });
 //! # submitter.submit(renderer.record(world.as_scene_ref())?)?;
@@ -282,7 +282,7 @@
 //! # let (device, queue) = drawloom_testing::adapter::noop_device()?;
 //! # let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
 //! # let (mut renderer, submitter) =
-//! #     Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+//! #     Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
 //! # let mut assets = Assets::default();
 //! # let vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
 //! # let triangle = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2])?;

@@ -301,6 +301,18 @@ impl Declare {
         self.access(target.as_ref(), Access::Read);
     }
 
+    /// Draws over the targets that were declared to be cleared so far: for a process that declares what another one
+    /// does, and goes on where that one ended.
+    pub fn without_clears(&mut self) {
+        for (_, access) in &mut self.declaration.accesses {
+            *access = match *access {
+                Access::ClearColor(..) => Access::DrawOver,
+                Access::ClearDepth(_) | Access::ClearDepthLayer(_) => Access::DrawDepth,
+                other => other,
+            };
+        }
+    }
+
     /// Orders the process after another one, whatever they read and write.
     pub fn after(&mut self, process: &str) {
         self.declaration.after.push(process.to_owned());
@@ -311,7 +323,7 @@ impl Declare {
         self.declaration.before.push(process.to_owned());
     }
 
-    /// Puts the process at a place of the [deferred pipeline](super::Deferred): after all of the pipeline's processes
+    /// Puts the process at a place of the pipeline, such as the [deferred one](super::Deferred): after all of its processes
     /// before it, and before those behind it. Processes at the same place that write the same target still need an
     /// order.
     pub fn at(&mut self, place: InjectionPoint) {
@@ -347,13 +359,6 @@ impl Declare {
     /// Adds a target that has mip levels.
     pub(super) fn add_mipmapped(&mut self, target: &str) {
         self.declaration.mipmapped.push(target.to_owned());
-    }
-
-    /// Changes how the process uses its targets.
-    pub(in crate::process) fn replace_accesses(&mut self, replace: impl Fn(Access) -> Access) {
-        for (_, access) in &mut self.declaration.accesses {
-            *access = replace(*access);
-        }
     }
 
     pub(super) fn access(&mut self, target: &str, access: Access) {

@@ -4,6 +4,7 @@
 //! backend turns it into pipelines, bundles and passes.
 //!
 //! - the interface: [`RenderProcess`], [`Declare`], [`Draws`], and, with the feature `software`, `CpuShader`;
+//! - [`Pipeline`]: the processes of a frame for what its scene requires;
 //! - the plan: [`FramePlan`] orders a frame's processes and lists their targets;
 //! - what comes with the crate: the [`Deferred`] pipeline, a file and a folder for each of its processes, and its
 //!   post-processing.
@@ -20,8 +21,10 @@ mod deferred;
 mod draws;
 mod face_culling;
 mod format;
+mod injection_point;
 mod mip_levels;
 mod parameters;
+mod pipeline;
 mod plan;
 mod post;
 mod prelude;
@@ -31,6 +34,7 @@ mod raw_access;
 #[cfg(feature = "wgpu")]
 mod raw_pass;
 mod render_process;
+mod requirements;
 mod sampled_view;
 mod shader_resource;
 mod stencil;
@@ -52,14 +56,16 @@ use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};
 pub use deferred::{
     COLORED_SURFACE_SHADER, Deferred, Deformation, DepthPrePass, GeometryBuffer, GeometryFormats, ILLUMINATION_SHADER,
-    InjectionPoint, LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency, targets,
+    LightVolumes, SURFACE_SHADER, ShadowCasters, Transparency, targets,
 };
 pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
+pub use injection_point::InjectionPoint;
 pub use parameters::Parameters;
+pub use pipeline::{DeviceSupport, Pipeline, PipelineProcesses};
 pub use plan::PlanError;
-pub(crate) use plan::{ChainSlot, FramePasses, ProcessId, ViewArray};
+pub(crate) use plan::{FramePasses, ProcessId, ViewArray};
 pub use plan::{FramePlan, Pass};
 pub use post::{Exposure, Fxaa, PostStep, ToneMapping};
 pub use prelude::SHADER_PRELUDE;
@@ -67,12 +73,15 @@ pub use procedural_draws::{DrawCount, Primitive, ProceduralDraws};
 #[cfg(feature = "wgpu")]
 pub use raw_pass::{RawPass, RawPassResources};
 pub use render_process::RenderProcess;
+pub use requirements::{Requirements, SceneContents};
 pub use shader_resource::ShaderResource;
 pub use stencil::{Comparison, Stencil, StencilOperation};
 pub use storage_buffer::{BufferOffset, StorageBuffer};
 pub use target::Target;
 pub(crate) use target::list_names;
 pub use target_size::TargetSize;
+
+pub use crate::unwind::Contained;
 
 #[cfg(feature = "software")]
 pub(crate) use cpu_shader::{LightCpuShader, TypedCpuShader};
@@ -88,7 +97,6 @@ pub(crate) use raw_access::{RawAccess, RequestLog};
 pub mod internal {
     pub use super::access::Access;
     pub use super::declaration::{Declaration, DeclaredAttribute};
-    pub use super::deferred::Requirements;
     pub use super::plan::{AttachmentExtent, PlannedProcess, PlannedTarget, SampledViews, ViewGroup, ViewOrder};
     pub use super::sampled_view::{SampledShape, SampledView};
     pub use super::storage_buffer::{BufferAccess, BufferLayout};

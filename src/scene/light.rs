@@ -231,6 +231,11 @@ impl LightKind {
     pub fn name(self) -> &'static str {
         self.rules().name
     }
+
+    /// The shadow maps that lights of the kind have.
+    pub fn shadow_projection(self) -> ShadowProjection {
+        self.rules().maps
+    }
 }
 
 /// The properties of a kind of light.
@@ -253,7 +258,8 @@ impl LightRules {
 
 /// The shadow maps that a light has: how many, and how they project.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ShadowProjection {
+#[non_exhaustive]
+pub enum ShadowProjection {
     /// Orthographic ones around what a main camera sees, one behind the other.
     Cascades,
     /// The six faces of a cube, in perspective.

@@ -40,6 +40,7 @@ pub(crate) use drawn_objects::{
 pub use gpu_view::GpuView;
 pub(crate) use internal::*;
 pub(crate) use levels_of_detail::{LevelSelector, MeshLevels, ObjectLevels};
+pub use light_table::LightClass;
 pub(crate) use map_owners::MapOwners;
 pub(crate) use per_view::PerView;
 pub use render_view::RenderView;
@@ -57,7 +58,7 @@ pub mod internal {
     pub use super::frustum::{BoundingSphere, BoundingSpheres, Frustum};
     pub use super::gpu_light::GpuLight;
     pub use super::gpu_object::GpuObject;
-    pub use super::light_table::{LightClass, LightTable};
+    pub use super::light_table::LightTable;
     pub use super::object_block::ObjectBlock;
     pub use super::object_description::ObjectDraw;
     pub use super::object_table::ObjectTable;

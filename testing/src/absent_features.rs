@@ -11,8 +11,8 @@ use drawloom::process::{
 };
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, ClipPlane, LayerMask, LightKind, Redraw, Scene, ViewKind};
+use drawloom::view::LightClass;
 use drawloom::view::ShadowMaps;
-use drawloom::view::internal::LightClass;
 use drawloom::{BudgetedView, Renderer, RendererBuilder};
 
 use crate::scenes::everything::{class_of, everything, glasses, without_shadow};
@@ -57,7 +57,7 @@ impl Setup {
     pub fn builder<B: Backend>(&self, backend: B) -> RendererBuilder<B> {
         let mut builder = Renderer::builder(backend).shadow_maps(MAPS);
         builder = match &self.deferred {
-            Some(deferred) => builder.deferred(deferred.clone()),
+            Some(deferred) => builder.pipeline(deferred.clone()),
             None => builder.output("picture"),
         };
         if let Some(quality) = self.quality {

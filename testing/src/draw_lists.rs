@@ -18,7 +18,7 @@ use drawloom::task::Scheduler;
 pub fn draw_lists(scene: &Scene) -> Result<Vec<Vec<RenderCommand>>, Box<dyn Error>> {
     let scheduler = Arc::new(Scheduler::new(1)?);
     let (mut renderer, submitter) =
-        Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(Quality::exact()).build(scheduler)?;
+        Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(Quality::exact()).build(scheduler)?;
     let submitted = submitter.submit(renderer.record(scene.as_scene_ref())?)?;
     let passes = submitted.submission.passes.iter();
     let list = |process: &str, view| {

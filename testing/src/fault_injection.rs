@@ -25,7 +25,7 @@ use drawloom_async_post::UploadPicture;
 /// use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
 /// use drawloom_testing::scenes::field;
 ///
-/// let builder = Renderer::builder(FaultyBackend::new(NullBackend)).deferred(Deferred::to_picture());
+/// let builder = Renderer::builder(FaultyBackend::new(NullBackend)).pipeline(Deferred::to_picture());
 /// let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
 /// renderer.backend().inject(CallKind::Finish, 2, Fault::OutOfMemory);
 /// let scene = field(10);

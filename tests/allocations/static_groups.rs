@@ -21,7 +21,7 @@ const COUNTED: usize = 60;
 /// than the frame before.
 fn allocations(static_groups: &[StaticGroup]) -> (usize, usize) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(Quality::balanced());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(Quality::balanced());
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let scene = field(OBJECTS as usize);
     let mut cameras = scene.cameras.clone();

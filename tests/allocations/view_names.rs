@@ -22,7 +22,7 @@ const MAX_GROWTH: usize = 16 * 1024;
 fn growth<B: Backend>(backend: impl Fn(&Arc<Scheduler>) -> B, scene: &Scene) -> usize {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let (mut renderer, submitter) =
-        Renderer::builder(backend(&scheduler)).deferred(Deferred::to_picture()).build(scheduler).unwrap();
+        Renderer::builder(backend(&scheduler)).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
     let mut before = 0;
     for frame in 0..WARM_UP + FRAMES {
         if frame == WARM_UP {

@@ -5,6 +5,7 @@
 //! - `files`: files are short, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files and print lines through `drawloom-output`.
 //! - `pipeline`: `ARCHITECTURE.md` has the table of stages.
+//! - `pipelines`: `Deferred` uses public interfaces alone, and the frame does not know it.
 //! - `subscribers`: the library calls subscribers of `tracing` where their panics are caught.
 //! - `atomics`: the file `ORDERINGS.md` of each crate lists every atomic of the crate.
 
@@ -15,6 +16,7 @@ mod layers;
 mod outputs;
 mod paths;
 mod pipeline;
+mod pipelines;
 mod sources;
 mod subscribers;
 mod tokens;

@@ -44,7 +44,7 @@ fn compute(kind: Kind, index: usize, has_text: bool) -> (Option<&'static str>, V
     scene.cameras.truncate(1);
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let backend = OwnBackend::new(SoftwareBackend::new(Arc::clone(&scheduler)), false);
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(OwnProcess::new());
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(OwnProcess::new());
     let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
     fuse::arm(kind, index, has_text);
     let post = AsyncPost::new(scheduler, OwnStep::new(), StepSource::whole("picture"));

@@ -6,13 +6,15 @@ use std::sync::Arc;
 use drawloom::backend::{NullBackend, SceneLimits, SoftwareBackend};
 use drawloom::glam::Vec3;
 use drawloom::process::{
-    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, Draws, Fxaa, PassInputs, PostStep, RenderProcess,
-    ShaderObject, ShaderResource, ToneMapping, VertexInput,
+    CpuShader, Declare, Deferred, Deformation, DeformationCpuShader, DeviceSupport, Draws, Fxaa, PassInputs, Pipeline,
+    PipelineProcesses, PlanError, PostStep, RenderProcess, Requirements, SceneContents, ShaderObject, ShaderResource,
+    ToneMapping, VertexInput,
 };
 use drawloom::quality::Quality;
 use drawloom::raster::Real;
 use drawloom::scene::{LayerMask, Light, Scene};
 use drawloom::task::Scheduler;
+use drawloom::view::ShadowMaps;
 use drawloom::{BuildError, Granularity, Renderer, RendererBuilder, Submitter};
 use drawloom_testing::limited::LimitedBackend;
 
@@ -134,9 +136,67 @@ pub fn deferred() -> Deferred {
     deferred.deformation(OwnDeformation::new()).keep("transparency")
 }
 
+/// A pipeline of the engine's, with what the deferred one has.
+struct OwnPipeline {
+    inner: Deferred,
+    _dropped: Owned<()>,
+}
+
+fn pipeline() -> OwnPipeline {
+    OwnPipeline { inner: deferred(), _dropped: Owned::new("pipeline", ()) }
+}
+
+impl Pipeline for OwnPipeline {
+    fn requirements(&self, scene: &SceneContents<'_>) -> Requirements {
+        call(Kind::Step, "requirements");
+        self.inner.requirements(scene)
+    }
+
+    fn build(
+        &self,
+        requirements: &Requirements,
+        device: DeviceSupport,
+        processes: &mut PipelineProcesses,
+    ) -> Result<(), PlanError> {
+        call(Kind::Step, "build");
+        self.inner.build(requirements, device, processes)
+    }
+
+    fn check(&self) -> Result<(), PlanError> {
+        call(Kind::Step, "check");
+        self.inner.check()
+    }
+
+    fn kept(&self, device: DeviceSupport) -> Requirements {
+        call(Kind::Step, "kept");
+        self.inner.kept(device)
+    }
+
+    fn shadow_maps(&self) -> Option<ShadowMaps> {
+        call(Kind::Step, "shadow_maps");
+        Pipeline::shadow_maps(&self.inner)
+    }
+
+    fn with_quality(&self, quality: &Quality) -> Option<Arc<dyn Pipeline>> {
+        call(Kind::Step, "pipeline's with_quality");
+        let inner = self.inner.clone().quality(quality);
+        Some(Arc::new(Self { inner, _dropped: Owned::new("pipeline", ()) }))
+    }
+
+    fn to_prepare(&self) -> Vec<Requirements> {
+        call(Kind::Step, "to_prepare");
+        self.inner.to_prepare()
+    }
+
+    fn lacks_float_blending(&self, device: DeviceSupport) -> bool {
+        call(Kind::Step, "lacks_float_blending");
+        self.inner.lacks_float_blending(device)
+    }
+}
+
 fn builder<S: Subject>(scheduler: &Arc<Scheduler>) -> RendererBuilder<OwnBackend<S>> {
     let builder = Renderer::builder(OwnBackend::new(S::open(scheduler), false));
-    builder.deferred(deferred()).process(OwnProcess::new()).quality(Quality::fast())
+    builder.pipeline(pipeline()).process(OwnProcess::new()).quality(Quality::fast())
 }
 
 /// What an engine does once it has its processes.
@@ -187,7 +247,11 @@ fn build_and_change<S: Subject>() -> (Vec<Vec<u8>>, Vec<String>) {
     pictures.push(engine.draw(&scene));
     engine.attempt(|(renderer, _)| renderer.set_quality(Quality::balanced()).map_err(|error| error.to_string()));
     pictures.push(engine.draw(&scene));
-    engine.attempt(|(renderer, _)| renderer.set_deferred(deferred()).map_err(|error| error.to_string()));
+    engine.attempt(|(renderer, _)| renderer.set_pipeline(pipeline()).map_err(|error| error.to_string()));
+    pictures.push(engine.draw(&scene));
+    let remove = |renderer: &mut Renderer<_>| renderer.remove_process("the engine's process");
+    engine.attempt(|(renderer, _)| remove(renderer).map_err(|error| error.to_string()));
+    engine.attempt(|(renderer, _)| renderer.add_process(OwnProcess::new()).map_err(|error| error.to_string()));
     pictures.push(engine.draw(&scene));
     engine.attempt(|(renderer, _)| renderer.prepare_pipelines(scene.as_scene_ref()).map_err(|error| error.to_string()));
     (pictures, engine.errors)
@@ -250,7 +314,7 @@ fn what_is_not_built_is_dropped() {
         let builder = || builder::<NullBackend>(&scheduler);
         let drop_it = || drop(builder());
         let refuse = || {
-            let refused = builder().deferred(deferred().leave_out("nothing")).build(Arc::clone(&scheduler));
+            let refused = builder().pipeline(deferred().leave_out("nothing")).build(Arc::clone(&scheduler));
             assert!(refused.map(drop).unwrap_err().to_string().contains("nothing"));
         };
         let refuse_granularity = || {
@@ -260,7 +324,7 @@ fn what_is_not_built_is_dropped() {
         let set = || {
             let (mut renderer, submitter) = builder().build(Arc::clone(&scheduler)).unwrap();
             assert!(
-                renderer.set_deferred(deferred().leave_out("nothing")).unwrap_err().to_string().contains("nothing")
+                renderer.set_pipeline(deferred().leave_out("nothing")).unwrap_err().to_string().contains("nothing")
             );
             drop((renderer, submitter));
         };
@@ -290,7 +354,7 @@ fn a_panic_of_a_deformation_in_the_first_frame_of_another_backend_is_an_error() 
             OwnBackend::new(if blends_floats { limited } else { limited.without_float_blending() }, false)
         };
         let [scene, _] = worlds();
-        let builder = Renderer::builder(open(true)).deferred(deferred());
+        let builder = Renderer::builder(open(true)).pipeline(deferred());
         let (mut renderer, mut submitter) = builder.build(scheduler).unwrap();
         for has_text in [true, false] {
             for blends_floats in [false, true] {

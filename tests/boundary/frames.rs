@@ -48,7 +48,7 @@ impl<S: Subject> Fixture<S> {
 
     pub fn on(scheduler: Arc<Scheduler>, joins_passes: bool) -> Self {
         let backend = OwnBackend::new(S::open(&scheduler), joins_passes);
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(OwnProcess::new());
+        let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(OwnProcess::new());
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { renderer, submitter, worlds: worlds() }
     }

@@ -22,7 +22,7 @@ type Backend = OwnBackend<NullBackend>;
 
 fn new_loop(buffering: Buffering) -> FrameLoop<Backend> {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).pipeline(Deferred::to_picture());
     let (renderer, submitter) = builder.process(OwnProcess::new()).build(scheduler).unwrap();
     FrameLoop::new(renderer, submitter, buffering).unwrap()
 }

@@ -21,7 +21,7 @@ fn a_panic_of_a_preparation_is_an_error_that_names_it() {
         let [scene, _] = worlds();
         for workers in [1, 2] {
             let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-            let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).deferred(Deferred::to_picture());
+            let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).pipeline(Deferred::to_picture());
             let (mut renderer, submitter) = builder.process(OwnProcess::new()).build(scheduler).unwrap();
             for has_text in [true, false] {
                 let prepare = |renderer: &mut Renderer<_>, in_background: bool| -> Result<(), FrameError> {
@@ -69,7 +69,7 @@ fn preparations_that_nobody_waits_for_are_not_kept() {
             let [scene, _] = worlds();
             let scheduler = Arc::new(Scheduler::new(workers).unwrap());
             let backend = OwnBackend::new(SoftwareBackend::new(Arc::clone(&scheduler)), false);
-            let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+            let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
             let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
             for preparation in 0..300 {
                 drop(renderer.prepare_pipelines_in_background(scene.as_scene_ref()).unwrap());
@@ -97,7 +97,7 @@ fn preparations_that_nobody_waits_for_are_not_kept() {
 fn a_panic_when_a_failed_frame_is_discarded_is_told_with_why_it_failed() {
     within_time(|| {
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
-        let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).pipeline(Deferred::to_picture());
         let (mut renderer, _submitter) = builder.build(scheduler).unwrap();
         let empty = Scene::new();
         fuse::arm(Kind::Backend, 0, true);
@@ -242,7 +242,7 @@ fn a_panic_of_an_upload_is_an_error() {
     within_time(|| {
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
         let post = AsyncPost::new(Arc::clone(&scheduler), Step, StepSource::whole("picture"));
-        let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(OwnBackend::new(NullBackend, false)).pipeline(Deferred::to_picture());
         let (renderer, _submitter) = builder.build(scheduler).unwrap();
         let [scene, _] = worlds();
         fuse::arm(Kind::Backend, 0, true);

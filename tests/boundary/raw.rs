@@ -57,7 +57,7 @@ fn a_panic_of_a_raw_pass_is_an_error_that_names_its_process() {
             let (device, queue) = noop_device().unwrap();
             let backend = WgpuBackend::new(device, queue).unwrap();
             let raw = OwnRawPass { _dropped: Owned::new("raw pass", ()) };
-            let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(raw);
+            let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(raw);
             let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap();
             for index in 0..4 {
                 // The frame has two views.

@@ -18,7 +18,7 @@ const FRAMES: usize = 4;
 fn software(workers: usize) -> (Renderer<SoftwareBackend>, Submitter<SoftwareBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-    Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }
 
 #[test]

@@ -18,7 +18,7 @@ use drawloom::{CpuNode, NodeAccesses, NodeContext, Renderer, Submitter};
 /// The shipped processes on the null backend.
 fn renderer(workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }
 
 type Declare<'a> = Box<dyn Fn(&mut NodeAccesses) + Send + Sync + 'a>;

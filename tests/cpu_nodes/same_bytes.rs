@@ -206,7 +206,7 @@ fn pictures_are_the_same() {
         let new = |workers: usize| {
             let scheduler = Arc::new(Scheduler::new(workers).unwrap());
             let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-            Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality).build(scheduler).unwrap()
+            Renderer::builder(backend).pipeline(Deferred::to_picture()).quality(quality).build(scheduler).unwrap()
         };
         let pictures_of = |workers: usize, by_nodes: bool| {
             let (mut renderer, submitter) = new(workers);

@@ -234,7 +234,7 @@ struct RendererOn<B: Backend> {
 impl<B: Backend<Submission: Pictures>> RendererOn<B> {
     fn open(backend: B, scheduler: Arc<Scheduler>, setup: Setup) -> Result<Box<dyn Runner>, OpenError> {
         let Setup { quality, deferred, process, own_targets } = setup;
-        let builder = Renderer::builder(backend).deferred(deferred).quality(quality);
+        let builder = Renderer::builder(backend).pipeline(deferred).quality(quality);
         let builder = process.into_iter().fold(builder, |builder, process| builder.process(process));
         let builder = own_targets.iter().fold(builder, |builder, target| builder.output(*target));
         let (renderer, submitter) = builder.build(scheduler)?;

@@ -126,7 +126,7 @@ impl Fixture {
         let process = Destroys { target, is_armed: Arc::clone(&is_armed) };
         let balanced = Quality::balanced();
         let shadows = ShadowQuality { side: 24, ..balanced.shadows };
-        let builder = Renderer::builder(shared_backend()?).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(shared_backend()?).pipeline(Deferred::to_picture());
         let builder = builder.process(Clears).process(process).output("own").quality(Quality { shadows, ..balanced });
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         let mut scene = field(20);

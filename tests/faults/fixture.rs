@@ -104,12 +104,12 @@ fn with_deferred<S: Subject>(
 ) -> RendererBuilder<FaultyBackend<S>> {
     let deferred = Deferred::new().post(ToneMapping::default());
     if !setting.is_full {
-        return builder.deferred(deferred.shadow_maps(None));
+        return builder.pipeline(deferred.shadow_maps(None));
     }
     let balanced = Quality::balanced();
     let shadows = ShadowQuality { side: 24, interval: setting.shadow_interval, ..balanced.shadows };
     let occlusion = balanced.occlusion.filter(|_| setting.tests_occlusion);
-    builder.deferred(deferred.post(Fxaa::default())).quality(Quality { shadows, occlusion, ..balanced })
+    builder.pipeline(deferred.post(Fxaa::default())).quality(Quality { shadows, occlusion, ..balanced })
 }
 
 /// Two scenes with all that the pipeline draws, and the objects in which they differ.

@@ -103,7 +103,7 @@ fn lost_in_calls(open_device: &OpenDevice, setting: Setting, is_chosen: &dyn Fn(
 type WgpuRenderer = (Renderer<WgpuBackend>, Submitter<WgpuBackend>);
 
 fn renderer_on(backend: WgpuBackend) -> Result<WgpuRenderer, Failed> {
-    Ok(Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?)
+    Ok(Renderer::builder(backend).pipeline(Deferred::to_picture()).build(Arc::new(Scheduler::new(2)?))?)
 }
 
 fn draw((renderer, submitter): &mut WgpuRenderer, scene: &Scene) -> Result<WgpuSubmission, Failed> {

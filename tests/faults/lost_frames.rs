@@ -136,7 +136,7 @@ impl<S: Subject> Mirrors<S> {
         let backend = FaultyBackend::new(S::open(&scheduler)?);
         let balanced = Quality::balanced();
         let shadows = ShadowQuality { side: 24, interval: 1_000, ..balanced.shadows };
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Shows);
+        let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Shows);
         let (renderer, submitter) = builder.quality(Quality { shadows, ..balanced }).build(scheduler)?;
         Ok(Self { renderer, submitter, read })
     }

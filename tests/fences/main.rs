@@ -29,7 +29,7 @@ impl Fixture {
         let backend = SimulatedDevice::new(NullBackend, frame_time);
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
         let (renderer, submitter) =
-            Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
+            Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
         Self { scene: field(20), renderer, submitter }
     }
 

@@ -7,7 +7,7 @@ use drawloom::ViewBudget;
 use drawloom::backend::{EncodingStrategy, RecordingStrategy, WgpuBackend, WgpuResources};
 use drawloom::scene::{LightKind, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom::wgpu;
 use drawloom_testing::absent_features::{AbsentFeature, Setup, VIEW_ARRAYS, absent_features};
 use drawloom_testing::adapter;

@@ -58,7 +58,7 @@ struct Known {
 fn known<B: Backend>(backend: B, read_pixel: impl Fn(&mut RecordedFrame<B>)) -> (Known, Renderer<B>) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     scheduler.timeline().start();
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
     let scene = field(600);
     renderer.prepare_pipelines(scene.as_scene_ref()).unwrap();

@@ -391,7 +391,7 @@ fn invalid_lights_are_counted_and_left_out() {
 fn invalid_renderers_are_refused() {
     let scheduler = || Arc::new(Scheduler::new(1).unwrap());
     let empty_chunk = Renderer::builder(NullBackend)
-        .deferred(Deferred::to_picture())
+        .pipeline(Deferred::to_picture())
         .granularity(Granularity::Chunk(0))
         .build(scheduler());
     assert!(matches!(empty_chunk.err(), Some(BuildError::EmptyChunk)));
@@ -402,7 +402,7 @@ fn invalid_renderers_are_refused() {
     let unlit = Renderer::builder(NullBackend).process(lights).process(ToneMapping::default()).output("picture");
     let error = unlit.build(scheduler()).err().unwrap().to_string();
     assert!(error.contains("point lights"), "{error}");
-    let deferred = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let deferred = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let twice = deferred.process(GeometryBuffer::new(formats)).build(scheduler());
     assert!(twice.err().unwrap().to_string().contains("geometry buffer"));
 }

@@ -18,7 +18,7 @@ fn build(builder: RendererBuilder<NullBackend>) -> (Renderer<NullBackend>, Submi
 }
 
 fn deferred(deferred: Deferred) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
-    build(Renderer::builder(NullBackend).deferred(deferred))
+    build(Renderer::builder(NullBackend).pipeline(deferred))
 }
 
 fn spot(position: DVec3) -> Light {
@@ -53,7 +53,7 @@ fn a_new_pipeline_takes_effect_in_the_next_frame() {
     assert_eq!(processes(&renderer), ["geometry buffer", "tone mapping"]);
 
     renderer
-        .set_deferred(Deferred::new().depth_pre_pass(true).post(ToneMapping::default()).post(Fxaa::default()))
+        .set_pipeline(Deferred::new().depth_pre_pass(true).post(ToneMapping::default()).post(Fxaa::default()))
         .unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let drawn = submitter.submit(recorded).unwrap().submission.passes.len();
@@ -61,7 +61,7 @@ fn a_new_pipeline_takes_effect_in_the_next_frame() {
     assert_eq!((processes(&renderer).as_slice(), drawn), (&expected[..], expected.len()));
 
     let maps = ShadowMaps { side: 0, ..ShadowMaps::default() };
-    let refused = renderer.set_deferred(Deferred::new().shadow_maps(Some(maps)));
+    let refused = renderer.set_pipeline(Deferred::new().shadow_maps(Some(maps)));
     assert!(matches!(refused, Err(BuildError::Plan(PlanError::ShadowMaps { .. }))));
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     assert_eq!(processes(&renderer), expected);
@@ -144,7 +144,7 @@ impl RenderProcess for Fog {
 #[test]
 fn an_engines_process_may_sample_shadow_maps_even_without_lights() {
     let mut scene = dark_field();
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Fog);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Fog);
     let (mut renderer, _) = build(builder);
     for lights in [vec![], vec![spot(DVec3::Y * 5.0)], vec![]] {
         let drawn = !lights.is_empty();
@@ -202,7 +202,7 @@ impl RenderProcess for OwnMaps {
 fn without_shadow_maps_lights_are_drawn_unshadowed_beside_an_engines_own_maps() {
     let mut scene = dark_field();
     scene.lights = vec![spot(DVec3::Y * 5.0)];
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().shadow_maps(None)).process(OwnMaps);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture().shadow_maps(None)).process(OwnMaps);
     let (mut renderer, submitter) = build(builder);
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let passes = submitter.submit(recorded).unwrap().submission.passes;

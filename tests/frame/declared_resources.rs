@@ -227,7 +227,7 @@ fn what_a_raw_pass_asks_for_without_declaring_it_fails_the_frame() {
         );
         let deferred = Deferred::to_picture();
         let (mut renderer, submitter) =
-            with(|builder| builder.deferred(deferred).process(asking).process(all).process(Clears("other")));
+            with(|builder| builder.pipeline(deferred).process(asking).process(all).process(Clears("other")));
         for frame in 1..=6 {
             let drawn = draw(&mut renderer, &submitter, &scene);
             if frame % 2 == 0 {
@@ -288,7 +288,7 @@ fn a_raw_pass_gets_what_its_process_declares() {
         },
     );
     let (mut renderer, submitter) = with(|builder| {
-        let builder = builder.deferred(Deferred::to_picture()).process(Clears("cleared"));
+        let builder = builder.pipeline(Deferred::to_picture()).process(Clears("cleared"));
         builder.process(everything).process(written).process(shadows)
     });
     let mut scene = scene();
@@ -338,7 +338,7 @@ fn what_a_raw_pass_never_asks_for_is_warned_of_once() {
     let (mut renderer, submitter) = with(|builder| {
         let targets = ["used", "unused", "used late", "used too late", "used twice"];
         let builder = targets.into_iter().fold(builder, |builder, target| builder.process(Clears(target)));
-        builder.deferred(Deferred::to_picture()).process(idle).process(absent)
+        builder.pipeline(Deferred::to_picture()).process(idle).process(absent)
     });
     let mut scene = scene();
     for (frames, expected) in [(59, false), (1, true), (70, false)] {
@@ -397,7 +397,7 @@ fn what_a_shader_has_no_variable_for_is_warned_of() {
     let scene = everything();
     let deferred = || Deferred::to_picture().post(Fxaa::default());
     let text = reported(|| {
-        let (mut renderer, submitter) = with(|builder| builder.deferred(deferred()).process(Sampling));
+        let (mut renderer, submitter) = with(|builder| builder.pipeline(deferred()).process(Sampling));
         (0..2).for_each(|_| draw(&mut renderer, &submitter, &scene).unwrap());
     });
     let warnings: Vec<_> = text.lines().filter(|line| line.contains("no variable")).collect();

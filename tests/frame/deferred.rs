@@ -42,7 +42,7 @@ fn own(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'stati
 }
 
 fn builder(deferred: Deferred) -> RendererBuilder<NullBackend> {
-    Renderer::builder(NullBackend).deferred(deferred)
+    Renderer::builder(NullBackend).pipeline(deferred)
 }
 
 fn build(builder: RendererBuilder<NullBackend>) -> Result<Renderer<NullBackend>, BuildError> {
@@ -318,7 +318,7 @@ fn with_sum(radiance_sum: RadianceSum) -> Quality {
 fn what_is_kept_follows_a_backend_that_is_replaced() {
     let build = |kept: &str, blends_floats| {
         let deferred = Deferred::new().keep(kept);
-        let builder = Renderer::builder(backend(blends_floats)).deferred(deferred);
+        let builder = Renderer::builder(backend(blends_floats)).pipeline(deferred);
         builder.quality(with_sum(RadianceSum::Float)).build(Arc::new(Scheduler::new(1).unwrap())).unwrap()
     };
     for kept in ["tiles of lights", "sum of lights", "sum of blended objects"] {
@@ -338,7 +338,7 @@ fn what_is_kept_follows_a_backend_that_is_replaced() {
 fn tiles_of_lights_are_left_out_only_without_the_sum_that_reads_them() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let build = |deferred: Deferred, sum, blends_floats| {
-        let builder = Renderer::builder(backend(blends_floats)).deferred(deferred).quality(with_sum(sum));
+        let builder = Renderer::builder(backend(blends_floats)).pipeline(deferred).quality(with_sum(sum));
         builder.build(Arc::clone(&scheduler))
     };
     let without_tiles = || Deferred::new().leave_out("tiles of lights");

@@ -87,7 +87,7 @@ fn without_instancing_each_object_is_a_batch_of_its_own() {
     let scene = field(1000);
     let (lists, ..) = drawn(&scene, 2, Granularity::default());
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).instancing(false);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).instancing(false);
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     for (view, list) in lists.iter().enumerate() {

@@ -37,7 +37,7 @@ fn a_panic_is_an_error_that_names_the_process_and_the_next_frame_succeeds() {
     let scheduler = Arc::new(Scheduler::new(3).unwrap());
     let fragile = Fragile { breaks: Arc::clone(&breaks) };
     let (mut renderer, submitter) =
-        Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(fragile).build(scheduler).unwrap();
+        Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(fragile).build(scheduler).unwrap();
     let scene = field(500);
     for frame in 0..20 {
         let broken = frame % 2 == 1;
@@ -96,9 +96,9 @@ impl PostStep for FragileStep {
 #[test]
 fn a_step_or_process_that_panics_while_the_frame_is_planned_is_an_error() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let with_step = |breaks| Renderer::builder(NullBackend).deferred(Deferred::new().post(FragileStep { breaks }));
+    let with_step = |breaks| Renderer::builder(NullBackend).pipeline(Deferred::new().post(FragileStep { breaks }));
     let message = |built: Result<_, BuildError>| match built.map(|_: (Renderer<NullBackend>, _)| ()) {
-        Err(BuildError::Plan(PlanError::Panicked { message })) => message,
+        Err(BuildError::Plan(PlanError::Panicked { message } | PlanError::PipelinePanicked { message, .. })) => message,
         other => panic!("{other:?}"),
     };
     for (breaks, expected) in [("process", "no process"), ("name", "no name")] {
@@ -106,11 +106,13 @@ fn a_step_or_process_that_panics_while_the_frame_is_planned_is_an_error() {
     }
     let with_quality = with_step("quality").quality(Quality::fast());
     assert_eq!(message(with_quality.build(Arc::clone(&scheduler))), "no quality");
-    let nameless = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Nameless);
+    let nameless = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Nameless);
     assert_eq!(message(nameless.build(Arc::clone(&scheduler))), "no name");
 
     let (mut renderer, _submitter) = with_step("quality").build(scheduler).unwrap();
-    assert!(matches!(renderer.set_quality(Quality::fast()), Err(BuildError::Plan(PlanError::Panicked { .. }))));
+    let refused = renderer.set_quality(Quality::fast());
+    let call = "with_quality";
+    assert!(matches!(refused, Err(BuildError::Plan(PlanError::PipelinePanicked { call: named, .. })) if named == call));
     assert_eq!(renderer.quality(), &Quality::balanced());
     assert!(renderer.record(field(10).as_scene_ref()).is_ok());
 }

@@ -30,7 +30,7 @@ fn renderer_of<B: Backend>(
     quality: Quality,
     instancing: bool,
 ) -> (Renderer<B>, Submitter<B>) {
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).quality(quality);
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     builder.granularity(granularity).instancing(instancing).build(scheduler).unwrap()
 }

@@ -41,7 +41,7 @@ fn add(scene: &mut Scene, mesh: Mesh) {
 #[test]
 fn each_mesh_without_room_is_told_once_with_its_name_and_the_limit() {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(LimitedBackend::new(NullBackend, LIMITS)).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(LimitedBackend::new(NullBackend, LIMITS)).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let mut frames = |scene: &Scene| {
         for _ in 0..3 {
@@ -74,7 +74,7 @@ fn each_mesh_without_room_is_told_once_with_its_name_and_the_limit() {
 fn another_backend_is_asked_anew() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let backend = |limits| LimitedBackend::new(NullBackend, limits);
-    let builder = Renderer::builder(backend(LIMITS)).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(backend(LIMITS)).pipeline(Deferred::to_picture());
     let (mut renderer, mut submitter) = builder.build(scheduler).unwrap();
     let mut scene = field(70);
     add(&mut scene, mesh("statue", 129));
@@ -96,7 +96,7 @@ fn another_backend_is_asked_anew() {
 fn an_object_without_room_is_not_counted_as_drawn_in_half_floats() {
     let backend = LimitedBackend::new(NullBackend, LIMITS).without_float_blending();
     let quality = Quality { radiance_sum: RadianceSum::Float, ..Quality::balanced() };
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let mut scene = field(70);
     let stone = scene.as_scene_ref().materials[0];
@@ -152,7 +152,7 @@ const HUGE: StorageBuffer<[f32; 4]> = StorageBuffer::new("huge", 1 << 27);
 fn a_frame_that_a_limit_refuses_does_not_cost_the_meshes_on_the_device() {
     let (device, queue) = adapter::noop_device().unwrap();
     let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap());
-    let builder = builder.deferred(Deferred::to_picture().replace("transparency", TooMuch));
+    let builder = builder.pipeline(Deferred::to_picture().replace("transparency", TooMuch));
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let mut scene = field(50);
     add(&mut scene, mesh("statue", 100_000));

@@ -69,7 +69,7 @@ fn quality(level_of_detail: f32) -> Quality {
 
 fn renderer_of(quality: Quality, workers: usize, granularity: Granularity) -> Renderer<NullBackend> {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     builder.granularity(granularity).build(scheduler).unwrap().0
 }
 

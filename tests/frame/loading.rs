@@ -26,7 +26,7 @@ struct Engine {
 impl Engine {
     fn new(workers: usize) -> Self {
         let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
         let (renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
         let scene = field(20);
         let loader = scene.assets().loader(&scheduler);

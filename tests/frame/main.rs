@@ -7,6 +7,7 @@ mod backend_layers;
 mod backward_reach;
 mod bad_input;
 mod changes;
+mod changing_processes;
 #[cfg(feature = "wgpu")]
 mod declared_resources;
 mod declaring;
@@ -63,7 +64,7 @@ use tracing::subscriber::NoSubscriber;
 /// The shipped processes on the null backend.
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).granularity(granularity).build(scheduler).unwrap()
+    Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).granularity(granularity).build(scheduler).unwrap()
 }
 
 /// What this thread reports through `tracing` during a call, as text.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::Renderer;
 use drawloom::backend::NullBackend;
 use drawloom::process::{ClearColor, Declare, Format, PlanError};
-use drawloom::scene::ViewKind;
+use drawloom::scene::{Camera, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom_testing::mip_levels::{atlas_scene, with_mip_levels};
 
@@ -110,6 +110,10 @@ fn the_null_backend_draws_frames_with_mip_levels() {
     let mut processes: Vec<_> = submitted.submission.passes.into_iter().map(|pass| pass.process).collect();
     processes.truncate(4);
     assert_eq!(processes, ["pyramid", "levels", "overlay", "late levels"]);
+    let mut scene = atlas_scene();
+    let mirror = Camera { kind: ViewKind::Reflection, ..scene.cameras[0].clone() };
+    scene.cameras.push(Camera { name: "mirror".into(), ..mirror });
+    drop(renderer.record(scene.as_scene_ref()).unwrap());
     let mipmapped = renderer.plan().targets().iter().filter(|target| target.mipmapped);
     let names: Vec<_> = mipmapped.map(|target| (target.name.as_str(), target.views)).collect();
     assert!(names.contains(&("pyramid", ViewKind::Main)) && names.contains(&("pyramid", ViewKind::Reflection)));

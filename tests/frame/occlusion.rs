@@ -38,7 +38,7 @@ pub fn wall_and_cubes() -> Scene {
 
 fn with_quality(quality: Quality, workers: usize, granularity: Granularity) -> Renderer<NullBackend> {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     builder.granularity(granularity).build(scheduler).unwrap().0
 }
 
@@ -154,7 +154,7 @@ fn deformed_objects_hide_no_others() {
     let scene = wall_and_cubes();
     let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
     let occluded = |layer_of_wall| {
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture().deformation(Deformed));
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture().deformation(Deformed));
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
         let mut renderer = builder.quality(quality).build(scheduler).unwrap().0;
         let mut layers = vec![LayerMask::layer(1); scene.as_scene_ref().positions.len()];
@@ -213,7 +213,7 @@ fn nothing_is_culled_if_a_process_draws_without_the_depth_test() {
     let occluded = |depth: fn(&mut Declare)| {
         let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
         let builder =
-            Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(OwnProcess(depth)).quality(quality);
+            Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(OwnProcess(depth)).quality(quality);
         let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         renderer.record(scene.as_scene_ref()).unwrap().statistics().views[0].occluded
     };
@@ -314,7 +314,7 @@ fn masked_objects_occlude_nothing_and_are_occluded() {
     let mut scene = wall_and_cubes();
     let occluded = |scene: &Scene, deferred: Deferred| {
         let quality = Quality { occlusion: Some(4), ..Quality::balanced() };
-        let builder = Renderer::builder(NullBackend).deferred(deferred).quality(quality);
+        let builder = Renderer::builder(NullBackend).pipeline(deferred).quality(quality);
         let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         renderer.record(scene.as_scene_ref()).unwrap().statistics().views[0].occluded
     };

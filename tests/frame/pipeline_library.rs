@@ -88,7 +88,7 @@ impl RenderProcess for Nameless {
 type Build = fn(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>;
 
 fn shipped(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
-    builder.deferred(Deferred::to_picture()).process(Fill).process(Show).output("shown")
+    builder.pipeline(Deferred::to_picture()).process(Fill).process(Show).output("shown")
 }
 
 fn renderer(backend: WgpuBackend, build: Build) -> (Renderer<WgpuBackend>, Submitter<WgpuBackend>) {

@@ -54,7 +54,7 @@ fn a_replacement_stays_in_a_pipeline_that_keeps_it_even_if_it_keeps_itself() {
             }
         });
         let deferred = Deferred::to_picture().keep("transparency").replace("transparency", glass);
-        let renderer = build(Renderer::builder(NullBackend).deferred(deferred));
+        let renderer = build(Renderer::builder(NullBackend).pipeline(deferred));
         assert!(planned(&renderer).contains(&("glass", ViewKind::Main)), "{keeps_itself}");
     }
 }
@@ -106,7 +106,7 @@ fn an_order_through_an_absent_process_holds_within_each_kind_of_views() {
         declare.before("transparency");
         declare.after("shadowed hemispherical lights");
     });
-    let builder = builder([rain, fog]).deferred(Deferred::to_picture());
+    let builder = builder([rain, fog]).pipeline(Deferred::to_picture());
     let mut renderer = build(builder);
     let scene = views([("main", ViewKind::Main), ("mirror", ViewKind::Reflection)]);
     drop(renderer.record(scene.as_scene_ref()).unwrap());

@@ -15,7 +15,7 @@ use drawloom_testing::scenes::field;
 /// The draw list of a process in a view of a frame of this quality.
 fn drawn(scene: &Scene, quality: Quality, process: &str, view: usize) -> DrawList {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     drop(renderer.record(scene.as_scene_ref()).unwrap());
     renderer.draw_list(process, view).unwrap().clone()
@@ -111,12 +111,12 @@ fn half_the_angle_raises_the_subdivision_level_by_one() {
 #[test]
 fn a_renderer_has_the_quality_that_was_set_and_says_whether_its_pipeline_has_it_too() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     assert!(!renderer.pipeline_has_quality());
     let quality = Quality { depth_pre_pass: true, ..Quality::fast() };
     renderer.set_quality(quality.clone()).unwrap();
     assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, true));
-    renderer.set_deferred(Deferred::to_picture()).unwrap();
+    renderer.set_pipeline(Deferred::to_picture()).unwrap();
     assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, false));
 }

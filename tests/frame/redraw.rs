@@ -38,7 +38,7 @@ struct Fixture {
 impl Fixture {
     fn new(workers: usize) -> Self {
         let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Screens);
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Screens);
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { renderer, submitter }
     }
@@ -161,7 +161,7 @@ fn all_views_are_drawn_after_a_change_of_the_plan_or_a_lost_frame() {
     assert_eq!(fixture.drawn(&scene), all, "another plan");
     fixture.renderer.set_quality(Quality::fast()).unwrap();
     assert_eq!(fixture.drawn(&scene), all, "another quality");
-    fixture.renderer.set_deferred(Deferred::new().post(ToneMapping::default())).unwrap();
+    fixture.renderer.set_pipeline(Deferred::new().post(ToneMapping::default())).unwrap();
     assert_eq!(fixture.drawn(&scene), all, "another pipeline");
     assert_eq!(fixture.drawn(&scene), main);
     drop(fixture.renderer.record(scene.as_scene_ref()).unwrap());

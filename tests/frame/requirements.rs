@@ -102,7 +102,7 @@ fn glowing(material: Material) -> Material {
 }
 
 fn new_renderer() -> Renderer<NullBackend> {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap().0
 }
 

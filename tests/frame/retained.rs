@@ -19,7 +19,7 @@ use proptest::prelude::*;
 type Contents = (Vec<ViewStatistics>, Vec<SceneIssue>, Vec<(String, usize, Vec<Batch>, Vec<u32>)>);
 
 fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
 }
 

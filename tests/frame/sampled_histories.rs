@@ -45,7 +45,7 @@ impl RenderProcess for Mirror {
 }
 
 fn built(mirror: Mirror) -> Result<(Renderer<NullBackend>, Submitter<NullBackend>), BuildError> {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Declaring::multisampled());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Declaring::multisampled());
     builder.process(mirror).build(Arc::new(Scheduler::new(2).unwrap()))
 }
 
@@ -107,7 +107,7 @@ impl RenderProcess for Lamp {
 #[test]
 fn views_are_ordered_by_what_they_sample_of_the_same_frame_alone() {
     let scene = scene(&["mirror", "mirror/mirror", "lamp"]);
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(LATE).process(Lamp);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(LATE).process(Lamp);
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
     let mut views: Vec<_> = submitted.submission.passes.iter().map(|pass| pass.view).collect();
@@ -179,7 +179,7 @@ fn targets_without_a_history_are_refused_by_name() {
 fn the_name_of_a_history_is_no_target_of_another_view() {
     let named = Mirror { target: "radiance of the frame before", is_previous: false, ..LATE };
     // The lamp has reflections draw what the history would be copied from.
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Lamp).process(named);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Lamp).process(named);
     let error = builder.build(Arc::new(Scheduler::new(1).unwrap())).err();
     let is_named = matches!(
         &error,

@@ -48,7 +48,7 @@ impl RenderProcess for Reader {
 }
 
 fn built(reader: Reader) -> Result<(Renderer<NullBackend>, Submitter<NullBackend>), BuildError> {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(Declaring::multisampled());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(Declaring::multisampled());
     builder.process(reader).output("read").build(Arc::new(Scheduler::new(1).unwrap()))
 }
 

@@ -49,7 +49,7 @@ pub const RADIANCE: Mirror = Mirror { target: "radiance", place: InjectionPoint:
 
 fn renderer(mirror: Mirror) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(mirror);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(mirror);
     builder.build(scheduler).unwrap()
 }
 
@@ -178,7 +178,7 @@ fn a_view_shows_only_the_layers_of_its_camera() {
 fn a_target_that_no_process_writes_is_an_error() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
     let unknown = Mirror { target: "albedo", place: InjectionPoint::AfterLighting };
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(unknown);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(unknown);
     let error = builder.build(scheduler).err().unwrap();
     let named = matches!(
         &error,
@@ -191,7 +191,7 @@ fn a_target_that_no_process_writes_is_an_error() {
 #[test]
 fn a_reflection_that_nothing_samples_is_refused_by_name() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let (mut renderer, _) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
+    let (mut renderer, _) = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
     let mut scene = scene();
     scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
     let error = renderer.record(scene.as_scene_ref()).err().unwrap();
@@ -243,7 +243,7 @@ impl RenderProcess for DrawParticles {
 #[test]
 fn what_is_drawn_once_a_frame_comes_before_all_views_that_use_it() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(RADIANCE);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(RADIANCE);
     let (mut renderer, submitter) = builder.process(Simulate).process(DrawParticles).build(scheduler).unwrap();
     let mut scene = scene();
     scene.cameras.push(scene.cameras[0].reflected("mirror", PLANE));
@@ -323,7 +323,7 @@ fn reflections_have_no_steps_that_nothing_samples_though_these_have_a_history() 
     };
     let build = |mirror: Mirror| {
         let deferred = Deferred::new().post(ToneMapping::default()).post(TemporalFilter);
-        let builder = Renderer::builder(NullBackend).deferred(deferred).process(mirror);
+        let builder = Renderer::builder(NullBackend).pipeline(deferred).process(mirror);
         builder.process(Declaring::new("motion", motion)).build(Arc::new(Scheduler::new(1).unwrap()))
     };
     let (mut renderer, submitter) = build(RADIANCE).unwrap();
@@ -359,7 +359,7 @@ impl RenderProcess for Tint {
 #[test]
 fn a_process_of_reflections_alone_has_no_pass_without_one() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(RADIANCE).process(Tint);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(RADIANCE).process(Tint);
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let mut scene = scene();
     for has_mirror in [false, true, false] {
@@ -415,7 +415,7 @@ impl RenderProcess for OfMain {
 #[test]
 fn a_target_of_another_kind_of_view_is_no_target_of_this_one() {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(OnlyInReflections);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(OnlyInReflections);
     let error = builder.process(RADIANCE).process(OfMain).build(scheduler).err().unwrap();
     let named = matches!(&error, BuildError::Plan(PlanError::UnknownSampledTarget { target, .. }) if target == "own");
     assert!(named, "{error}");
@@ -435,7 +435,7 @@ fn only_objects_of_the_layers_of_shadow_maps_cast_shadows() {
         let maps = ShadowMaps { layers, ..ShadowMaps::default() };
         let deferred = Deferred::to_picture().shadow_maps(Some(maps));
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
-        let (mut renderer, _) = Renderer::builder(NullBackend).deferred(deferred).build(scheduler).unwrap();
+        let (mut renderer, _) = Renderer::builder(NullBackend).pipeline(deferred).build(scheduler).unwrap();
         drop(renderer.record(scene.as_scene_ref()).unwrap());
         renderer.draw_list("shadow casters", 1).unwrap().objects.len()
     };

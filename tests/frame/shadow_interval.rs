@@ -21,7 +21,7 @@ struct Fixture {
 impl Fixture {
     fn new(interval: u32) -> Self {
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality_with(interval));
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality_with(interval));
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { renderer, submitter }
     }
@@ -101,7 +101,7 @@ fn after_frames_that_are_forgotten_maps_are_drawn_as_in_first_frames() {
 fn lights_with_several_maps_have_all_of_them_cached() {
     let maps = ShadowMaps { cascades: 3, ..ShadowMaps::default() };
     let mut fixture = Fixture::new(100);
-    fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
+    fixture.renderer.set_pipeline(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
     let mut scene = two_lights();
     scene.lights.push(Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 9.0, casts_shadow: true });
     let all: Vec<_> = (2..15).collect();
@@ -197,7 +197,7 @@ fn a_change_of_quality_or_pipeline_draws_all_maps_at_once() {
     assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     assert!(fixture.drawn(&scene).is_empty());
     let maps = ShadowMaps { side: 64, ..ShadowMaps::default() };
-    fixture.renderer.set_deferred(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
+    fixture.renderer.set_pipeline(Deferred::to_picture().shadow_maps(Some(maps))).unwrap();
     assert_eq!(fixture.drawn(&scene), [2, 3, 4]);
     assert!(fixture.drawn(&scene).is_empty());
     fixture.renderer.set_quality(quality_with(1)).unwrap();

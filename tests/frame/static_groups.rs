@@ -30,7 +30,7 @@ fn renderer_of(
     quality: Quality,
     workers: usize,
 ) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
-    let builder = Renderer::builder(NullBackend).deferred(deferred).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(deferred).quality(quality);
     builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
 }
 

@@ -42,7 +42,7 @@ impl World {
     fn new(count: usize, budget: StreamingBudget) -> Self {
         let (device, queue) = adapter::noop_device().unwrap();
         let backend = WgpuBackend::new(device, queue).unwrap().stream_resources(budget).unwrap();
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         let mut scene = Scene::new();
         let material = scene.add(Material::default()).unwrap();

@@ -16,7 +16,7 @@ const OWN: Target = Target::new("own");
 const MISSPELT: Target = Target::new("radience");
 
 fn error_of(add: impl FnOnce(RendererBuilder<NullBackend>) -> RendererBuilder<NullBackend>) -> PlanError {
-    let builder = add(Renderer::builder(NullBackend).deferred(Deferred::to_picture()));
+    let builder = add(Renderer::builder(NullBackend).pipeline(Deferred::to_picture()));
     match builder.build(Arc::new(Scheduler::new(1).unwrap())).err() {
         Some(BuildError::Plan(error)) => error,
         other => panic!("no error of a plan, but {other:?}"),
@@ -105,7 +105,7 @@ fn a_process_that_nothing_needs_may_name_whatever_some_frames_write() {
             clears_own(declaration);
             declare(declaration);
         });
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(unneeded);
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(unneeded);
         let (renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
         assert_eq!(renderer.plan().dropped(), ["unneeded"]);
     }
@@ -119,7 +119,7 @@ fn what_is_read_back_and_is_not_there_is_an_error_that_lists_what_is() {
     use drawloom_testing::scenes::field;
 
     let (device, queue) = adapter::noop_device().unwrap();
-    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let scene = field(5);
     let mut recorded = renderer.record(scene.as_scene_ref()).unwrap();

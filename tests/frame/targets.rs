@@ -12,7 +12,7 @@ use drawloom::process::{
 };
 use drawloom::scene::{Blend, LightKind, Material, MaterialType, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom::{BuildError, FrameError, Renderer};
 use drawloom_testing::scenes::field;
 

@@ -121,7 +121,7 @@ fn absolute_transforms_and_paraboloids_cull_no_triangles() {
     let scene = with_meshes(everything(), culled);
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     let absolute = Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() };
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(absolute);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(absolute);
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     assert!(recorded.statistics().views.iter().all(|view| view.culled_triangles.triangles == 0));

@@ -34,7 +34,7 @@ fn record(
 ) -> (Vec<FrameTuning>, Arc<Scheduler>) {
     let scheduler = scheduler(workers, tick);
     let quality = Quality { occlusion: Some(8), ..Quality::balanced() };
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, _submitter) = builder.granularity(granularity).build(Arc::clone(&scheduler)).unwrap();
     let scene = field(3000);
     scheduler.timeline().start();
@@ -82,7 +82,7 @@ fn job_sizes_come_with_the_cost_of_an_item() {
 #[test]
 fn a_frame_that_tests_for_occlusion_says_so() {
     let quality = Quality { occlusion: Some(8), ..Quality::balanced() };
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, _submitter) = builder.build(scheduler(1, TICK)).unwrap();
     let scene = wall_and_cubes();
     let mut chosen = BTreeSet::new();
@@ -145,7 +145,7 @@ fn each_pass_of_commands_has_a_choice_of_recording() {
         let (device, queue) = adapter::noop_device().unwrap();
         let scheduler = Arc::new(Scheduler::new(1).unwrap());
         let builder = Renderer::builder(backend(WgpuBackend::new(device, queue).unwrap()));
-        let (mut renderer, submitter) = builder.deferred(Deferred::to_picture()).build(scheduler).unwrap();
+        let (mut renderer, submitter) = builder.pipeline(Deferred::to_picture()).build(scheduler).unwrap();
         let scene = field(600);
         let draw = |_| submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap().statistics.tuning;
         let tuning: Vec<_> = (0..60).map(draw).collect();

@@ -17,7 +17,7 @@ use drawloom_testing::tinted::TINT;
 fn statistics_and_timeline_report_the_uploaded_bytes() {
     let (device, queue) = adapter::noop_device().unwrap();
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(Arc::clone(&scheduler)).unwrap();
     let scene = field(600);
     scheduler.timeline().start();
@@ -55,7 +55,7 @@ fn objects_of_static_groups_are_uploaded_once() {
     let (device, queue) = adapter::noop_device().unwrap();
     let backend = WgpuBackend::new(device, queue).unwrap();
     let quality = Quality { occlusion: None, ..Quality::balanced() };
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
     let scene = field(600);
     let static_groups = [StaticGroup::new("left", (0..200).collect()), StaticGroup::new("right", (200..600).collect())];
@@ -137,7 +137,7 @@ fn mesh_of(bytes: usize) -> Mesh {
 fn a_mesh_is_uploaded_in_the_first_frame_in_which_an_object_has_it() {
     let new_renderer = || {
         let (device, queue) = adapter::noop_device().unwrap();
-        let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).pipeline(Deferred::to_picture());
         builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap()
     };
     // More than everything else of the scene takes; the second even packed.

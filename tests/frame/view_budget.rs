@@ -50,7 +50,7 @@ fn frame(
 
 fn renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }
 
 fn names(statistics: &FrameStatistics) -> Vec<&str> {

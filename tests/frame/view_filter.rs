@@ -307,7 +307,7 @@ fn a_predicate_that_panics_fails_the_frame_and_names_the_view() {
 fn what_a_view_leaves_out_hides_nothing() {
     let quality = Quality { occlusion: Some(8), ..Quality::balanced() };
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).quality(quality);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).quality(quality);
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     let mut scene = wall_and_cubes();
     let mut first = |scene: &Scene| {

@@ -46,7 +46,7 @@ fn views_are_submitted_whole_shadows_first_each_with_the_processes_of_its_kind()
     let scheduler = Arc::new(Scheduler::new(2).unwrap());
     // The engine's process replaces the shipped shadow casters.
     let deferred = Deferred::to_picture().replace("shadow casters", ShadowDepth);
-    let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(deferred).build(scheduler).unwrap();
+    let (mut renderer, submitter) = Renderer::builder(NullBackend).pipeline(deferred).build(scheduler).unwrap();
     let recorded = renderer.record(scene.as_scene_ref()).unwrap();
     let queues: Vec<_> = recorded.queues().iter().map(|queue| (queue.view, queue.passes.len())).collect();
     assert_eq!(queues, [(0, 4), (1, 4), (2, 1)]);

@@ -8,7 +8,7 @@ use drawloom::process::{Deferred, LightVolumes};
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, Light, LightKind, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom::{Renderer, Submitter, WarmUp};
 use drawloom_testing::scenes::everything::{class_of, dark, everything, everything_with_mirror, glasses};
 use drawloom_testing::scenes::leveled::globe;
@@ -16,7 +16,7 @@ use drawloom_testing::scenes::leveled::globe;
 use crate::sampled_views;
 
 fn new_renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).process(sampled_views::RADIANCE);
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).process(sampled_views::RADIANCE);
     builder.quality(Quality::fast()).build(Arc::new(Scheduler::new(1).unwrap())).unwrap()
 }
 

@@ -20,7 +20,7 @@ const LONG: Duration = Duration::from_secs(60);
 
 fn renderer<B: Backend>(backend: B, workers: usize) -> (Renderer<B>, Submitter<B>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
-    Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }
 
 /// A loop whose device takes a given time for a frame.

@@ -57,7 +57,7 @@ fn changes(frame: usize, moved: &[u32]) -> Changes<'_> {
 fn renderer_of(workers: usize) -> (Renderer<SoftwareBackend>, Submitter<SoftwareBackend>) {
     let scheduler = Arc::new(Scheduler::new(workers).unwrap());
     let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-    Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap()
+    Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap()
 }
 
 /// The pictures of both cameras, one frame after the other.

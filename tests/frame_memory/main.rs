@@ -90,7 +90,7 @@ fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Repor
         .encoding_strategy(EncodingStrategy::PerPass);
     let backend = if workers > 1 { backend.transient_targets() } else { backend };
     let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler).unwrap();
+        Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {
         counting_allocator::count(is_counted);
         let recorded = renderer.record_with_nodes(scene.as_scene_ref(), nodes).unwrap();

@@ -111,7 +111,7 @@ impl Engine {
         let glow = Bloom::default();
         let bloom = AsyncPost::new(Arc::clone(&scheduler), glow.on_cpu(), glow.source());
         let deferred = Deferred::new().post(bloom.layer(LayerSettings::default())).post(ToneMapping::default());
-        let builder = Renderer::builder(open()).deferred(deferred).process(process);
+        let builder = Renderer::builder(open()).pipeline(deferred).process(process);
         let builder = builder.process(bloom.downsample().unwrap()).output(bloom.source_target());
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         let frames = FrameLoop::new(renderer, submitter, Buffering::Double).unwrap();

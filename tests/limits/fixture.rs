@@ -149,7 +149,7 @@ fn boxed<B: Backend>(
     if process == Process::WideTransparency {
         deferred = deferred.replace("transparency", WideTransparency);
     }
-    let mut builder = Renderer::builder(backend).deferred(deferred);
+    let mut builder = Renderer::builder(backend).pipeline(deferred);
     if let Some(quality) = quality {
         builder = builder.quality(quality);
     }

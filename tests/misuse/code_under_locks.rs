@@ -123,7 +123,7 @@ fn async_post() -> Result<(), Failed> {
     scheduler.timeline().start();
     let backend = drawloom::backend::SoftwareBackend::new(Arc::clone(&scheduler));
     let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+        Renderer::builder(backend).pipeline(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
     ASYNC_POST.set(AsyncPost::new(scheduler, Pixel, StepSource::whole("picture"))).map_err(|_| "it is set once")?;
     let post = ASYNC_POST.get().ok_or("it is set")?;
     let scene = scene();
@@ -215,7 +215,7 @@ fn ask() {
 
 /// A fixture whose backend this thread asks.
 fn asked(backend: WgpuBackend, process: Option<Unused>) -> Result<Renderer<WgpuBackend>, Failed> {
-    let mut builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+    let mut builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
     if let Some(process) = process {
         builder = builder.process(process);
     }

@@ -103,7 +103,7 @@ impl Fixture<SoftwareBackend> {
     pub fn software(deferred: Deferred) -> Result<Self, Failed> {
         let scheduler = Arc::new(Scheduler::new(1)?);
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-        let builder = Renderer::builder(backend).deferred(deferred).shadow_maps(small_maps());
+        let builder = Renderer::builder(backend).pipeline(deferred).shadow_maps(small_maps());
         let (renderer, submitter) = builder.build(scheduler)?;
         Ok(Self { renderer, submitter })
     }
@@ -124,7 +124,7 @@ pub fn noop_backend() -> Result<WgpuBackend, Failed> {
 impl<B: Backend> Fixture<B> {
     pub fn new(backend: B, workers: usize, deferred: Deferred) -> Result<Self, Failed> {
         let scheduler = Arc::new(Scheduler::new(workers)?);
-        let (renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+        let (renderer, submitter) = Renderer::builder(backend).pipeline(deferred).build(scheduler)?;
         Ok(Self { renderer, submitter })
     }
 

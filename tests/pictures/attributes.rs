@@ -202,7 +202,7 @@ impl RenderProcess for ColoredTransparency {
 fn read_later() -> Result<(), Failed> {
     let fixture = || {
         Fixture::with(2, |builder| {
-            builder.deferred(Deferred::to_picture().replace("transparency", ColoredTransparency))
+            builder.pipeline(Deferred::to_picture().replace("transparency", ColoredTransparency))
         })
     };
     let mut scene = scene_of(vec![two_colored()?, square(Topology::TriangleList), cube()])?;

@@ -70,7 +70,7 @@ impl<R: Real> FullScreenCpuShader<R> for Columns {
 }
 
 fn build<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
-    let builder = builder.deferred(Deferred::to_picture()).process(Columns).process(Environment);
+    let builder = builder.pipeline(Deferred::to_picture()).process(Columns).process(Environment);
     builder.output("columns").output("environment")
 }
 

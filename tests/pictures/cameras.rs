@@ -78,7 +78,7 @@ fn parallel_tiles() -> Result<(), Failed> {
 /// A camera's picture by the software backend, which computes in f64.
 fn drawn_in_software(scene: &Scene) -> Result<Picture, Failed> {
     let scheduler = Arc::new(Scheduler::new(1)?);
-    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let submission = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission;
     Ok(submission.read(0, "picture")?)

@@ -159,7 +159,7 @@ fn broken_shader() -> Result<(), Failed> {
     let build = |keeps| -> Result<Fixture, Failed> {
         let backend = backend()?;
         let backend = if keeps { backend.keep_working_shaders() } else { backend };
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
         let builder = builder.process(Edited { step: Arc::clone(&step) }).output("paint");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
         Ok(Fixture { renderer, submitter })

@@ -83,7 +83,7 @@ impl RenderProcess for TintedTransparency {
 
 fn read_later() -> Result<(), Failed> {
     let with_transparency = |builder: RendererBuilder<WgpuBackend>| {
-        builder.deferred(Deferred::to_picture().replace("transparency", TintedTransparency))
+        builder.pipeline(Deferred::to_picture().replace("transparency", TintedTransparency))
     };
     let mut scene = squares()?;
     let blended = scene.add(Material { blend: Blend::Alpha, opacity: 0.5, ..Material::default() })?;

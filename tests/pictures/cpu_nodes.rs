@@ -29,7 +29,7 @@ fn same_picture() -> Result<(), Failed> {
     assert!(expected[0].bytes != expected[2].bytes && expected[0].bytes != expected[1].bytes, "nothing moves");
     for workers in [1, 2, 4] {
         let mut fixture =
-            Fixture::with(workers, |builder| builder.deferred(drawloom::process::Deferred::to_picture()))?;
+            Fixture::with(workers, |builder| builder.pipeline(drawloom::process::Deferred::to_picture()))?;
         let made = GeneratedHills::new();
         let scene = hills::scene(made.mesh()?)?;
         for (frame, expected) in expected.iter().enumerate() {

@@ -167,7 +167,7 @@ fn pushes() -> Vec<f32> {
 }
 
 fn picture_of(deferred: Deferred, scene: &Scene, layers: &[LayerMask], pushes: &[f32]) -> Result<Picture, Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     // What is pushed stays within this.
     let [low, high] = [-10.0, 10.0].map(Vec3::splat);
     let bounds = vec![Bounds::around([low, high].into_iter()); layers.len()];
@@ -219,7 +219,7 @@ fn on_software() -> Result<(), Failed> {
     let (scene, layers) = scene(false)?;
     let draw = |deferred: Deferred, scene: &Scene| -> Result<Picture, Failed> {
         let scheduler = Arc::new(Scheduler::new(2)?);
-        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred);
+        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(deferred);
         let (mut renderer, submitter) = builder.build(scheduler)?;
         let pushes = pushes();
         let columns = [PUSH.values(&pushes)];
@@ -261,7 +261,7 @@ impl Deformation for Broken {
 
 fn error_lines() -> Result<(), Failed> {
     let (scene, layers) = scene(false)?;
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().deformation(Broken)))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture().deformation(Broken)))?;
     let broken = SceneRef { layers: &layers, ..scene.as_scene_ref() };
     let error = fixture.renderer.record(broken).err().ok_or("it is drawn")?;
     let found = error.to_string();

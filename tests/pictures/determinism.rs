@@ -49,7 +49,7 @@ fn opaque(mut scene: Scene) -> Result<Scene, Failed> {
 fn with_coarse_edges(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
     let balanced = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { widest_edge: 20.0, ..balanced.shadows }, ..balanced };
-    builder.deferred(Deferred::to_picture()).quality(quality)
+    builder.pipeline(Deferred::to_picture()).quality(quality)
 }
 
 /// Numbers of workers, with ways to split a pass.

@@ -254,7 +254,7 @@ fn no_times() -> Result<(), Failed> {
     let (device, queue) = device_with(wgpu::Features::TIMESTAMP_QUERY)?;
     let backend = WgpuBackend::new(device.clone(), queue)?.time_passes()?;
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
     let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;
     let mut fixture = Fixture { renderer, submitter };
     let recorded = fixture.record(&field(3))?;

@@ -38,7 +38,7 @@ fn noop() -> Result<(), Failed> {
         let backend = WgpuBackend::new(device.clone(), queue.clone())?;
         let scheduler = Arc::new(Scheduler::new(2)?);
         let (mut renderer, submitter) =
-            Renderer::builder(backend).deferred(Deferred::to_picture()).granularity(granularity).build(scheduler)?;
+            Renderer::builder(backend).pipeline(Deferred::to_picture()).granularity(granularity).build(scheduler)?;
         for count in [0, 10, 2000, 500] {
             let recorded = renderer.record(field(count).as_scene_ref())?;
             let submitted = submitter.submit(recorded)?;
@@ -99,7 +99,7 @@ fn large_picture() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(1)?);
     let (mut renderer, _) =
-        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
+        Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).build(scheduler)?;
     let mut scene = field(10);
     scene.cameras[0].size = [5000, 10];
     match renderer.record(scene.as_scene_ref()).err() {
@@ -112,7 +112,7 @@ fn many_objects() -> Result<(), Failed> {
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let (mut renderer, submitter) =
-        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
+        Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).build(scheduler)?;
     let (few, mut many) = (field(1000), field(1000));
     many.duplicate_objects(WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64 / 1000 + 1);
     let capacity = WgpuBackend::REQUIRED_LIMITS.max_storage_buffer_binding_size as usize / 64;
@@ -153,7 +153,7 @@ fn count_shadow_maps<B: Backend>(backend: B, layers: usize) -> Result<(), Failed
     let maps = ShadowMaps { side: 1, cascades: 2, ..ShadowMaps::default() };
     let deferred = Deferred::to_picture().shadow_maps(Some(maps));
     let (mut renderer, submitter) =
-        Renderer::builder(backend).deferred(deferred).build(Arc::new(Scheduler::new(2)?))?;
+        Renderer::builder(backend).pipeline(deferred).build(Arc::new(Scheduler::new(2)?))?;
     let lamp = Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 20.0, casts_shadow: true };
     let unshadowed = Light::Point { position: DVec3::Y, intensity: Vec3::ONE, range: 20.0, casts_shadow: false };
     let sun = Light::Directional { direction: Vec3::NEG_Y, illuminance: Vec3::ONE, casts_shadow: true };
@@ -223,7 +223,7 @@ fn many_shadow_cameras() -> Result<(), Failed> {
     let maps = ShadowMaps { side: 1, ..ShadowMaps::default() };
     let deferred = Deferred::to_picture().shadow_maps(Some(maps));
     let (mut renderer, submitter) =
-        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(deferred).build(Arc::new(Scheduler::new(2)?))?;
+        Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(deferred).build(Arc::new(Scheduler::new(2)?))?;
     for (own, expected) in [(250, 6), (256, 0), (257, 0), (10, 7)] {
         let mut scene = field(3);
         scene.cameras.truncate(1);
@@ -260,7 +260,7 @@ fn many_textures() -> Result<(), Failed> {
     let layers = device.limits().max_texture_array_layers;
     let scheduler = Arc::new(Scheduler::new(1)?);
     let (mut renderer, _) =
-        Renderer::builder(WgpuBackend::new(device, queue)?).deferred(Deferred::to_picture()).build(scheduler)?;
+        Renderer::builder(WgpuBackend::new(device, queue)?).pipeline(Deferred::to_picture()).build(scheduler)?;
     let recorded = renderer.record(textured(layers + 2).0.as_scene_ref())?;
     match recorded.statistics().scene_issues.as_slice() {
         [SceneIssue { reason: IssueReason::TextureLimit, count: 2, .. }] => Ok(()),
@@ -282,7 +282,7 @@ fn lost_device_with(recording: RecordingStrategy, encoding: EncodingStrategy) ->
     let (device, queue) = noop_with(WgpuBackend::REQUIRED_LIMITS)?;
     let scheduler = Arc::new(Scheduler::new(2)?);
     let backend = WgpuBackend::new(device.clone(), queue)?.recording_strategy(recording).encoding_strategy(encoding);
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler)?;
     let scene = field(500);
     submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.wait()?;
     let recorded = renderer.record(scene.as_scene_ref())?;

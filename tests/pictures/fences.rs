@@ -83,7 +83,7 @@ fn read_back_after_fence() -> Result<(), Failed> {
 fn lost_device() -> Result<(), Failed> {
     let (device, queue) = adapter::device().map_err(|error| error.to_string())?;
     let mut fixture =
-        Fixture::on((device.clone(), queue), 2, |builder| builder.deferred(drawloom::process::Deferred::to_picture()))?;
+        Fixture::on((device.clone(), queue), 2, |builder| builder.pipeline(drawloom::process::Deferred::to_picture()))?;
     let scene = scene();
     let mut submitted = fixture.record(&scene)?;
     let in_flight = submitted.fence_at(FencePoint::End)?;
@@ -126,7 +126,7 @@ fn overlapped() -> Result<(), Failed> {
     for workers in [2, 4] {
         for buffering in Buffering::ALL {
             let Fixture { renderer, submitter } =
-                Fixture::with(workers, |builder| builder.deferred(drawloom::process::Deferred::to_picture()))?;
+                Fixture::with(workers, |builder| builder.pipeline(drawloom::process::Deferred::to_picture()))?;
             let mut frames = FrameLoop::new(renderer, submitter, buffering)?;
             let mut moving = scene();
             let mut pictures = Vec::new();

@@ -30,7 +30,7 @@ pub struct Fixture {
 impl Fixture {
     /// The shipped processes on two workers.
     pub fn new() -> Result<Self, Failed> {
-        Self::with(2, |builder| builder.deferred(Deferred::to_picture()))
+        Self::with(2, |builder| builder.pipeline(Deferred::to_picture()))
     }
 
     /// With other render processes or settings.
@@ -96,7 +96,7 @@ pub fn draw_on_processor(
     scene: &Scene,
     target: &str,
 ) -> Result<Picture, Failed> {
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).pipeline(deferred).build(scheduler)?;
     Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, target)?)
 }
 

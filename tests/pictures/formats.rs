@@ -34,7 +34,7 @@ const NORMALS: [NormalFormat; 4] =
     [NormalFormat::Octahedral8, NormalFormat::Octahedral10, NormalFormat::Octahedral16, NormalFormat::HalfFloat];
 
 fn fixture(quality: Quality) -> Result<Fixture, Failed> {
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality))
 }
 
 /// The size of pictures in which each pixel shows one vertex.
@@ -359,7 +359,7 @@ fn background(deferred: Deferred, quality: Option<Quality>, radiance: Vec3) -> R
     scene.background = radiance;
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::Z, DVec3::ZERO), [4, 4])];
     let mut fixture = Fixture::with(1, |builder| {
-        let builder = builder.deferred(deferred);
+        let builder = builder.pipeline(deferred);
         if let Some(quality) = quality { builder.quality(quality) } else { builder }
     })?;
     Ok(pixel(&fixture.draw(&scene)?, 1, 2))

@@ -48,7 +48,7 @@ fn deferred() -> Deferred {
 }
 
 fn drawn(deferred: Deferred, scene: &Scene) -> Result<Vec<Picture>, Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     let recorded = fixture.record(scene)?;
     let submission = fixture.submit(recorded)?;
     let targets = ["picture", "depth", "normal", "diffuse"];
@@ -81,7 +81,7 @@ fn shares() -> Result<(), Failed> {
 
 fn shares_are_processes() -> Result<(), Failed> {
     let scene = small_colonnade()?;
-    let mut whole = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let mut whole = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
     let recorded = whole.record(&scene)?;
     let passes = recorded.queues()[0].passes.len();
     drop(recorded);
@@ -91,7 +91,7 @@ fn shares_are_processes() -> Result<(), Failed> {
     let mut all = drawn_by(&whole, "geometry buffer")?;
     all.sort_unstable();
     for shares in [2, 3, 7] {
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred().geometry_shares(shares)))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred().geometry_shares(shares)))?;
         let recorded = fixture.record(&scene)?;
         if recorded.queues()[0].passes.len() != passes + shares as usize - 1 {
             return Err(format!("{shares} shares: {} passes", recorded.queues()[0].passes.len()).into());
@@ -157,7 +157,7 @@ fn unsuitable() -> Result<(), Failed> {
     ] {
         for &format in unsuitable {
             let deferred = Deferred::to_picture().formats(with(target, format));
-            let error = Fixture::with(1, |builder| builder.deferred(deferred)).err().ok_or("it should be refused")?;
+            let error = Fixture::with(1, |builder| builder.pipeline(deferred)).err().ok_or("it should be refused")?;
             let text = error.message().unwrap_or_default();
             for part in ["geometry buffer", target, &format!("{format:?}")] {
                 if !text.contains(part) {

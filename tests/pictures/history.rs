@@ -32,7 +32,7 @@ pub const CASES: &[Case] = &[
 
 /// Adds 32/255 to the red that its target had in the frame before, and sets green where there was one.
 #[derive(Clone, Copy)]
-struct Accumulate;
+pub struct Accumulate;
 
 const STEP: f64 = 32.0 / 255.0;
 

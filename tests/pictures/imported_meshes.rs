@@ -165,7 +165,7 @@ fn fixture() -> Result<Fixture, Failed> {
 }
 
 fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Colored).output("coloured");
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Colored).output("coloured");
     let (renderer, submitter) = builder.quality(quality()).build(Arc::new(Scheduler::new(2)?))?;
     Ok(Fixture { renderer, submitter })
 }
@@ -575,7 +575,7 @@ fn destroyed() -> Result<(), Failed> {
 
 fn on_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(Deferred::to_picture());
     let (mut renderer, _) = builder.build(scheduler)?;
     let mut scene_issues = |scene: Scene| {
         let recorded = renderer.record(scene.as_scene_ref())?;

@@ -117,7 +117,7 @@ fn srgb() -> Result<(), Failed> {
     let (device, _) = device()?;
     let tone_mapping = ToneMapping { format: Format::Bgra8Srgb, ..ToneMapping::default() };
     let deferred = Deferred::new().post(tone_mapping);
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     let scene = field(60);
     let expected = draw(&mut fixture, &scene)?;
     let surface = texture(&device, scene.cameras[0].size, TextureFormat::Bgra8Unorm, USAGE);
@@ -195,7 +195,7 @@ fn depth_with_stencil() -> Result<(), Failed> {
     let (device, _) = device()?;
     let format = Format::Depth32FloatStencil8;
     let deferred = Deferred::to_picture().formats(GeometryFormats { depth: format, ..GeometryFormats::default() });
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     let scene = field(60);
     let expected = draw(&mut fixture, &scene)?;
     let depth = texture(&device, scene.cameras[0].size, TextureFormat::Depth32FloatStencil8, USAGE);

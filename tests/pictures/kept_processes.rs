@@ -10,8 +10,8 @@ use drawloom::process::{
 use drawloom::raster::{Real, Vector4};
 use drawloom::scene::{Blend, Material, Scene, ViewKind};
 use drawloom::task::Scheduler;
+use drawloom::view::LightClass;
 use drawloom::view::ShadowMaps;
-use drawloom::view::internal::LightClass;
 use drawloom::{RecordedFrame, Renderer, RendererBuilder, Submitter};
 use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror, glasses, without_shadow};
 use libtest_mimic::Failed;
@@ -113,7 +113,7 @@ type NewDrawer<B> = fn(Configure<'_, B>) -> Result<Drawer<B>, Failed>;
 /// requires. The kept processes have passes in each view, which the scene alone does not have.
 fn expect_same<B: Backend>(drawer: &mut Drawer<B>, scene: &Scene, kept: &[String]) -> Result<(), Failed> {
     let mut drawn = |pipeline: Deferred| {
-        drawer.renderer.set_deferred(pipeline)?;
+        drawer.renderer.set_pipeline(pipeline)?;
         let drawn = drawer.draw(scene)?;
         let is_planned =
             |name: &&String| drawer.renderer.plan().processes().iter().any(|planned| planned.name == **name);
@@ -139,7 +139,7 @@ fn expect_same<B: Backend>(drawer: &mut Drawer<B>, scene: &Scene, kept: &[String
 
 /// Compiling pipelines takes most of the time of a new renderer, so one draws all scenes.
 fn with_mirror<B: Backend>(new: NewDrawer<B>) -> Result<Drawer<B>, Failed> {
-    new(&|builder| builder.deferred(deferred()).process(MIRROR))
+    new(&|builder| builder.pipeline(deferred()).process(MIRROR))
 }
 
 fn each<B: Backend>(new: NewDrawer<B>) -> Result<(), Failed> {
@@ -169,7 +169,7 @@ fn on_software() -> Result<(), Failed> {
 /// from the start.
 fn no_new_plans() -> Result<(), Failed> {
     let keeping = names().into_iter().fold(deferred(), Deferred::keep);
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(keeping))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(keeping))?;
     let [empty, mut bare] = scenes_without_all()?;
     fixture.draw(&empty)?;
     let mut kept = Vec::new();
@@ -258,7 +258,7 @@ fn with_overlay<B: Backend>(new: NewDrawer<B>) -> Result<(), Failed> {
         for keep in [false, true] {
             let overlay = Overlay { views, keep };
             let (picture, passes) =
-                new(&|builder| builder.deferred(deferred()).process(MIRROR).process(overlay))?.draw(&scene)?;
+                new(&|builder| builder.pipeline(deferred()).process(MIRROR).process(overlay))?.draw(&scene)?;
             let own: Vec<_> = passes.iter().filter(|(name, _)| name == "overlay").map(|(_, view)| *view).collect();
             if own != if keep { vec![index] } else { Vec::new() } || passes.len() - own.len() != expected.1.len() {
                 return Err(format!("{:?}: {passes:?}", (views, keep)).into());

@@ -120,7 +120,7 @@ fn globes() -> Scene {
 }
 
 fn fixture(level_of_detail: f32) -> Result<Fixture, Failed> {
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality(level_of_detail)))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality(level_of_detail)))
 }
 
 /// The radiance of a scene, and the number of its triangles.

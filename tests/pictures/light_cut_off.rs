@@ -20,7 +20,7 @@ pub const CASES: &[Case] = &[
 
 fn with_cut_off(light_cut_off: f32) -> Result<Fixture, Failed> {
     let quality = Quality { light_cut_off, ..Quality::balanced() };
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality))
 }
 
 fn radiance_of(fixture: &mut Fixture, scene: &Scene) -> Result<Vec<[f64; 3]>, Failed> {
@@ -93,7 +93,7 @@ fn brightening() -> Result<(), Failed> {
     let kept = |light_cut_off| {
         let shadows = ShadowQuality { interval: 1000, ..Quality::balanced().shadows };
         let quality = Quality { light_cut_off, shadows, ..Quality::balanced() };
-        Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+        Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality))
     };
     // 1.125² times the bound of a light that does not change.
     let bound = 1.089 * 1.125 * 1.125 * f64::from(cut_off) / std::f64::consts::PI;

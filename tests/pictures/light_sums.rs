@@ -10,7 +10,7 @@ use drawloom::scene::{
     Blend, Camera, LayerMask, Light, LightKind, Material, Projection, RenderObject, Scene, SceneRef, Topology, ViewKind,
 };
 use drawloom::view::IssueReason;
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom_testing::adapter;
 use drawloom_testing::light_sums::{SUMS, SumScene, blended_scenes, light_scenes, quality};
 use drawloom_testing::scenes::everything::{class_of, everything};
@@ -36,7 +36,7 @@ pub const CASES: &[Case] = &[
 ];
 
 fn fixture(sum: RadianceSum, deferred: Deferred) -> Result<Fixture, Failed> {
-    Fixture::with(2, |builder| builder.deferred(deferred).quality(quality(sum)))
+    Fixture::with(2, |builder| builder.pipeline(deferred).quality(quality(sum)))
 }
 
 fn drawn(fixture: &mut Fixture, scene: &Scene, view: usize) -> Result<Vec<[f64; 3]>, Failed> {
@@ -71,7 +71,7 @@ fn blended_objects() -> Result<(), Failed> {
 }
 
 fn exact() -> Result<(), Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::new()).quality(Quality::exact()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(Deferred::new()).quality(Quality::exact()))?;
     for scene in light_scenes().iter().filter(|scene| !scene.name.contains("shadowed") && scene.lights >= 100) {
         let error = scene.error(&drawn(&mut fixture, &scene.scene, 0)?);
         expect_below(1e-3, error, &scene.name)?;
@@ -82,7 +82,7 @@ fn exact() -> Result<(), Failed> {
 fn without_float_blending() -> Result<(), Failed> {
     for sum in [RadianceSum::Float, RadianceSum::Shader] {
         let device = adapter::device_without(WgpuBackend::BLENDING_FEATURES).map_err(|error| error.to_string())?;
-        let mut fixture = Fixture::on(device, 2, |builder| builder.deferred(Deferred::new()).quality(quality(sum)))?;
+        let mut fixture = Fixture::on(device, 2, |builder| builder.pipeline(Deferred::new()).quality(quality(sum)))?;
         for scene in
             light_scenes().iter().chain(&blended_scenes()).filter(|scene| scene.lights.max(scene.objects) <= 100)
         {
@@ -116,7 +116,7 @@ fn own_without_float_blending() -> Result<(), Failed> {
     ] {
         let device = adapter::device_without(WgpuBackend::BLENDING_FEATURES).map_err(|error| error.to_string())?;
         let build = |builder: drawloom::RendererBuilder<WgpuBackend>| {
-            builder.deferred(deferred).quality(quality(RadianceSum::Float))
+            builder.pipeline(deferred).quality(quality(RadianceSum::Float))
         };
         let recorded = Fixture::on(device, 2, build)?.record(&scene.scene)?;
         let mut scene_issues = recorded.statistics().scene_issues.iter();
@@ -304,7 +304,7 @@ fn mirrored() -> Result<(), Failed> {
         scene.scene.cameras = vec![Camera { size, ..aside }, mirror];
         for sum in SUMS {
             let build = |builder: drawloom::RendererBuilder<WgpuBackend>| {
-                builder.deferred(Deferred::new()).quality(quality(sum)).process(Shown)
+                builder.pipeline(Deferred::new()).quality(quality(sum)).process(Shown)
             };
             let mut fixture = Fixture::with(2, build)?;
             let error = scene.error(&drawn(&mut fixture, &scene.scene, 0)?);

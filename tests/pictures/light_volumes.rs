@@ -303,7 +303,7 @@ fn depth_is_left_alone() -> Result<(), Failed> {
         other => other,
     };
     let lights = [small(point(behind)), spot(behind, DVec3::NEG_Z, 60.0), hemisphere(behind, DVec3::NEG_Z)];
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).output("depth"))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).output("depth"))?;
     let view = camera(DVec3::new(1.0, 0.5, 4.0), DVec3::ZERO, 60.0);
     let mut depths = Vec::new();
     // Behind the wall; on both of its sides; in front of it.

@@ -44,6 +44,7 @@ mod mip_levels;
 mod multisampling;
 mod view_filter;
 mod static_groups;
+mod own_pipelines;
 mod pipeline_state;
 mod placement;
 mod post;
@@ -127,6 +128,7 @@ fn main() {
         (multisampling::CASES, Needs::Adapter),
         (view_filter::CASES, Needs::Adapter),
         (static_groups::CASES, Needs::Adapter),
+        (own_pipelines::CASES, Needs::Adapter),
         (pipeline_state::CASES, Needs::Adapter),
         (placement::CASES, Needs::Adapter),
         (post::CASES, Needs::Adapter),

@@ -114,7 +114,7 @@ fn expect_enough(counts: Counts) -> Result<(), Failed> {
 }
 
 fn shape() -> Result<(), Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(pipeline()).quality(quality()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(pipeline()).quality(quality()))?;
     for light in lights() {
         for lying in [
             UPRIGHT,
@@ -142,7 +142,7 @@ fn on_software() -> Result<(), Failed> {
         scene.cameras.truncate(1);
         let scheduler = Arc::new(Scheduler::new(2)?);
         let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
-        let (mut renderer, submitter) = builder.deferred(pipeline()).quality(quality()).build(scheduler)?;
+        let (mut renderer, submitter) = builder.pipeline(pipeline()).quality(quality()).build(scheduler)?;
         let submission = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission;
         let found = half_floats(&submission.read(0, "radiance")?);
         let counts = expected.expect_radiance(&scene.cameras, |_| Ok(found.clone()));
@@ -157,7 +157,7 @@ fn on_software() -> Result<(), Failed> {
 fn across_the_near_plane() -> Result<(), Failed> {
     for missing in [wgpu::Features::empty(), WgpuBackend::DEPTH_CLIP_FEATURES] {
         let device = adapter::device_without(missing)?;
-        let mut fixture = Fixture::on(device, 2, |builder| builder.deferred(pipeline()).quality(quality()))?;
+        let mut fixture = Fixture::on(device, 2, |builder| builder.pipeline(pipeline()).quality(quality()))?;
         for size in [1.0, 400.0, 1600.0] {
             // It stands to the right of what the camera sees, and its picture's right is in the direction of -Z.
             let center = DVec3::new(2.0, size - 1.0, -0.5 - size / 2.0);
@@ -277,7 +277,7 @@ impl RenderProcess for OwnCasters {
 
 fn by_own_process() -> Result<(), Failed> {
     let mut shipped = fixture_with(MAPS)?;
-    let mut own = Fixture::with(2, |builder| builder.deferred(pipeline()).process(OwnCasters))?;
+    let mut own = Fixture::with(2, |builder| builder.pipeline(pipeline()).process(OwnCasters))?;
     // A paraboloid's process discards what is behind it, too.
     for light in lights().into_iter().filter(|light| light.kind() != LightKind::Hemispherical) {
         let expected = shipped.draw(&under_square(light, |material| material)?)?;

@@ -54,7 +54,7 @@ pub fn mask_material(scene: &mut Scene) -> Result<Material, Failed> {
 
 /// The radiance of the first view on each backend.
 fn on_each_backend(deferred: &Deferred, scene: &Scene) -> Result<[(&'static str, Picture); 3], Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred.clone()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred.clone()))?;
     let recorded = fixture.record(scene)?;
     let by_wgpu = fixture.submit(recorded)?.read(0, "radiance")?;
     let scheduler = || Scheduler::new(2).map(Arc::new);
@@ -224,7 +224,7 @@ fn behind_a_hole() -> Result<(), Failed> {
     }
     let drawn = |scene: &Scene, occlusion: Option<u32>| -> Result<_, Failed> {
         let quality = Quality { occlusion, ..Quality::balanced() };
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality))?;
         let recorded = fixture.record(scene)?;
         let occluded = recorded.statistics().views[0].occluded;
         Ok((fixture.submit(recorded)?.read(0, "picture")?, occluded))

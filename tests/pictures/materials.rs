@@ -252,7 +252,7 @@ fn typed_fixture() -> Result<Fixture, Failed> {
 
 fn typed_fixture_of(deferred: Deferred) -> Result<Fixture, Failed> {
     let [flat, striped] = Colored::of_types();
-    Fixture::with(2, |builder| builder.deferred(deferred).process(flat).process(striped))
+    Fixture::with(2, |builder| builder.pipeline(deferred).process(flat).process(striped))
 }
 
 fn types() -> Result<(), Failed> {
@@ -273,13 +273,13 @@ fn types() -> Result<(), Failed> {
     let deferred = small_maps()
         .replace("geometry buffer", Excluding(GeometryBuffer::new(GeometryFormats::default()), own | other))
         .replace("transparency", Excluding(Transparency::new(None), own | other));
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred).process(flats).process(stripes))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred).process(flats).process(stripes))?;
     let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
     let expected = fixture.submit(recorded)?.read(0, "picture")?;
     expect(found == expected, || "they differ".into())?;
     let after_pre_pass = typed_fixture_of(small_maps().depth_pre_pass(true))?.draw(&typed()?)?;
     expect(after_pre_pass == expected, || "after a depth pre-pass they differ".into())?;
-    expect(found != Fixture::with(2, |builder| builder.deferred(small_maps()))?.draw(&scene)?, || {
+    expect(found != Fixture::with(2, |builder| builder.pipeline(small_maps()))?.draw(&scene)?, || {
         "no type is seen".into()
     })
 }
@@ -341,7 +341,7 @@ fn in_raw_pass() -> Result<(), Failed> {
     let noting: &'static Noting = Box::leak(Box::default());
     let [flat, striped] = Colored::of_types();
     let process = |builder: RendererBuilder<WgpuBackend>| {
-        builder.deferred(small_maps()).process(flat).process(striped).process(noting)
+        builder.pipeline(small_maps()).process(flat).process(striped).process(noting)
     };
     let scene = typed()?;
     Fixture::with(2, process)?.draw(&scene)?;
@@ -385,7 +385,7 @@ fn changing_values() -> Result<(), Failed> {
     let backend = WgpuBackend::new(device, queue)?.recording_strategy(RecordingStrategy::CachedBundles);
     let backend = backend.encoding_strategy(EncodingStrategy::PerPass);
     let [own, _] = Colored::of_types();
-    let builder = Renderer::builder(backend).deferred(small_maps()).process(own);
+    let builder = Renderer::builder(backend).pipeline(small_maps()).process(own);
     let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
     let mut fixture = Fixture { renderer, submitter };
     let mut scene = typed()?;
@@ -419,7 +419,7 @@ fn on_software() -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let [flat, striped] = Colored::of_types();
     let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
-    let (mut renderer, submitter) = builder.deferred(small_maps()).process(flat).process(striped).build(scheduler)?;
+    let (mut renderer, submitter) = builder.pipeline(small_maps()).process(flat).process(striped).build(scheduler)?;
     let recorded = renderer.record(typed()?.as_scene_ref())?;
     let by_software = submitter.submit(recorded)?.submission.read(0, "picture")?;
     let pairs = by_wgpu.bytes.chunks_exact(4).zip(by_software.bytes.chunks_exact(4));

@@ -157,7 +157,7 @@ fn same_bytes() -> Result<(), Failed> {
     for (recording, encoding) in strategies() {
         let backend = backend()?.recording_strategy(recording).encoding_strategy(encoding);
         let builder = Renderer::builder(backend)
-            .deferred(Deferred::to_picture().shadow_maps(None))
+            .pipeline(Deferred::to_picture().shadow_maps(None))
             .granularity(Granularity::Chunk(300));
         let builder = builder.process(Objects).process(Mean("objects")).output("mean").output("objects");
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(2)?))?;
@@ -221,7 +221,7 @@ fn raw() -> Result<(), Failed> {
     scene.cameras.truncate(1);
     let means = ["objects", "copied"].map(|shown| {
         let mut fixture = Fixture::with(2, |builder| {
-            let builder = builder.deferred(Deferred::to_picture().shadow_maps(None));
+            let builder = builder.pipeline(Deferred::to_picture().shadow_maps(None));
             builder.process(Objects).process(Copied).process(Mean(shown)).output("mean")
         })?;
         let recorded = fixture.record(&scene)?;

@@ -371,12 +371,12 @@ fn channels_of_a_surface() -> Result<(), Failed> {
         Deferred::new().post(tone_mapping).post(Fxaa { format, ..Fxaa::default() })
     };
     let by_wgpu = |format| {
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred(format)))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred(format)))?;
         fixture.draw(&scene)
     };
     let by_software = |format| {
         let scheduler = Arc::new(Scheduler::new(2)?);
-        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred(format));
+        let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(deferred(format));
         let (mut renderer, submitter) = builder.build(scheduler)?;
         Ok::<_, Failed>(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)
     };

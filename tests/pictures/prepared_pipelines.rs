@@ -4,7 +4,7 @@ use drawloom::RendererBuilder;
 use drawloom::backend::WgpuBackend;
 use drawloom::process::{ClearColor, Declare, Deferred, Draws, Format, FullScreen, RenderProcess};
 use drawloom::scene::{Blend, LightKind, Material, Scene};
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom_testing::scenes::everything::{class_of, everything, glasses};
 use drawloom_testing::scenes::{cube, field};
 use libtest_mimic::Failed;
@@ -20,7 +20,7 @@ pub const CASES: &[Case] = &[
 ];
 
 fn shipped(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
-    builder.deferred(Deferred::to_picture())
+    builder.pipeline(Deferred::to_picture())
 }
 
 /// The materials of a field and a mask, without mirrored objects, whose pipelines are made when they are first drawn.

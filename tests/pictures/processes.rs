@@ -330,7 +330,7 @@ fn exposure() -> Result<(), Failed> {
         builder.process(GeometryBuffer::new(GeometryFormats::default())).process(tone_mapping).output("picture")
     })?;
     let step = ToneMapping::new(exposure.clone());
-    let mut deferred = Fixture::with(2, |builder| builder.deferred(Deferred::new().post(step)))?;
+    let mut deferred = Fixture::with(2, |builder| builder.pipeline(Deferred::new().post(step)))?;
     for value in [0.5, 1.0, 4.0] {
         exposure.set(value);
         let expected = tone_mapped([0.1 * f64::from(value); 3]);

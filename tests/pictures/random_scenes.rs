@@ -39,9 +39,9 @@ fn random_scenes() -> Result<(), Failed> {
         let quality = Quality { shadows, occlusion, ..preset };
         // One of the presets ignores colours.
         let deferred = Deferred::to_picture().vertex_colors(preset != Quality::fast());
-        let by_wgpu = Fixture::with(2, |builder| builder.deferred(deferred.clone()).quality(quality))?;
+        let by_wgpu = Fixture::with(2, |builder| builder.pipeline(deferred.clone()).quality(quality))?;
         let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-        let builder = Renderer::builder(backend).deferred(deferred).quality(quality);
+        let builder = Renderer::builder(backend).pipeline(deferred).quality(quality);
         fixtures.push((by_wgpu, builder.build(Arc::clone(&scheduler))?));
     }
     let mut worst = Spread::default();

@@ -72,7 +72,7 @@ fn squares() -> Result<Scene, Failed> {
 
 fn picking() -> Result<(), Failed> {
     let mut fixture = Fixture::with(2, |builder| {
-        builder.deferred(Deferred::to_picture()).process(ObjectIndex).output("object index")
+        builder.pipeline(Deferred::to_picture()).process(ObjectIndex).output("object index")
     })?;
     let scene = squares()?;
     for (cursor, expected) in [([26, 16], 1_u32), ([48, 16], 99), ([70, 16], 2), ([95, 31], 99)] {

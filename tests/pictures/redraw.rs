@@ -64,7 +64,7 @@ fn scene(mirrored: f64, direct: f64, redraw: Redraw) -> Result<Scene, Failed> {
 }
 
 fn with_mirror<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
-    builder.deferred(Deferred::to_picture()).process(MIRROR)
+    builder.pipeline(Deferred::to_picture()).process(MIRROR)
 }
 
 fn offset(frame: u32) -> f64 {
@@ -155,7 +155,7 @@ impl RenderProcess for Trail {
 }
 
 fn history() -> Result<(), Failed> {
-    let build = || Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).process(Trail).output("trail"));
+    let build = || Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(Trail).output("trail"));
     let main_alone = |frame: u32, redraw: Redraw| {
         let mut scene = scene(0.0, offset(frame), redraw)?;
         scene.cameras.truncate(1);

@@ -7,8 +7,8 @@ mod needed_processes;
 use drawloom::backend::Picture;
 use drawloom::process::{Deferred, Fxaa, LightVolumes};
 use drawloom::scene::{Changes, LayerMask, Light, LightKind, Mesh, Scene, SceneRef};
+use drawloom::view::LightClass;
 use drawloom::view::ShadowMaps;
-use drawloom::view::internal::LightClass;
 use drawloom_testing::scenes::cube;
 use drawloom_testing::scenes::everything::{SIZE, class_of, dark, everything, glasses, without_shadow};
 use libtest_mimic::Failed;
@@ -187,7 +187,7 @@ fn no_post() -> Result<(), Failed> {
         expect_difference("a step", saved, step)?;
     }
     expect_changed("fxaa", &one_picture, &two_picture)?;
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
     let recorded = fixture.record(&everything())?;
     let radiance = fixture.submit(recorded)?.read(0, "radiance")?;
     if radiance == without.1 { Ok(()) } else { Err("without tone mapping, radiance differs".into()) }
@@ -212,13 +212,13 @@ fn first_use_of_meshes() -> Result<(), Failed> {
         let vertices = cube.vertices().iter().copied().cycle().take(size * 24 * 100).collect();
         *mesh = scene.add(Mesh::new("large cube", cube.topology(), vertices, cube.indices().to_vec())?)?;
     }
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
     let mut meshes = vec![last[0]; last.len()];
     for object in 0..last.len() {
         meshes[object] = last[object];
         let changed = [object as u32];
         let changes = if object == 0 { Changes::Unknown } else { Changes::Objects(&changed) };
-        let mut new = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+        let mut new = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
         let mut pictures = Vec::new();
         for (fixture, changes) in [(&mut fixture, changes), (&mut new, Changes::Unknown)] {
             let recorded = fixture.renderer.record(SceneRef { meshes: &meshes, changes, ..scene.as_scene_ref() })?;

@@ -34,7 +34,7 @@ fn staging_fixture() -> Result<Fixture, Failed> {
 
 /// The shipped processes, and one that reads a column.
 fn with_tints(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
-    builder.deferred(Deferred::to_picture()).process(Tinted).output("tinted")
+    builder.pipeline(Deferred::to_picture()).process(Tinted).output("tinted")
 }
 
 fn changes_make_the_picture_of_a_new_renderer(fixture: fn() -> Result<Fixture, Failed>) -> Result<(), Failed> {

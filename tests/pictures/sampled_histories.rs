@@ -74,8 +74,8 @@ impl RenderProcess for LateMirror {
 }
 
 fn late_mirror() -> Result<(), Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).process(LateMirror))?;
-    let mut ordered = Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).process(MIRROR))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(LateMirror))?;
+    let mut ordered = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(MIRROR))?;
     let mut scene = mirror_scene()?;
     let camera = scene.cameras[0].clone();
     // All objects but the mirror's.

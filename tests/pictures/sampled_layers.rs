@@ -98,7 +98,7 @@ impl<R: Real> FullScreenCpuShader<R> for Strips {
 
 fn fixture() -> Result<Fixture, Failed> {
     Fixture::with(2, |builder| {
-        let builder = builder.deferred(Deferred::to_picture()).process(Environment).process(Strips);
+        let builder = builder.pipeline(Deferred::to_picture()).process(Environment).process(Strips);
         builder.output("radiance").output("environment").output("strips")
     })
 }
@@ -180,7 +180,7 @@ fn cube_map() -> Result<(), Failed> {
 
 fn software(scene: &Scene, target: &str) -> Result<Picture, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(Deferred::to_picture());
     let builder = builder.process(Environment).process(Strips).output("environment").output("strips");
     let (mut renderer, submitter) = builder.build(scheduler)?;
     let submission = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission;
@@ -217,7 +217,7 @@ fn screens() -> Result<Scene, Failed> {
 
 /// The strips that the pictures of the cameras give: zeros for a layer without a camera.
 fn expected_strips(scene: &Scene) -> Result<Vec<f64>, Failed> {
-    let mut fixture = Fixture::with(1, |builder| builder.deferred(Deferred::to_picture()).output("radiance"))?;
+    let mut fixture = Fixture::with(1, |builder| builder.pipeline(Deferred::to_picture()).output("radiance"))?;
     let mut expected = vec![0.0; (SIZE[0] * SIZE[1] * 4) as usize];
     for layer in 0..4 {
         let name = format!("screen/{layer}");
@@ -265,7 +265,7 @@ fn gone() -> Result<(), Failed> {
 
 fn transient() -> Result<(), Failed> {
     let mut fixture = Fixture::with_transient_targets(2, |builder| {
-        builder.deferred(Deferred::to_picture()).process(Strips).output("strips")
+        builder.pipeline(Deferred::to_picture()).process(Strips).output("strips")
     })?;
     for _ in 0..2 {
         assert_strips(&mut fixture, &screens()?)?;

@@ -90,7 +90,7 @@ impl<R: Real> ObjectCpuShader<R> for Surface {
 }
 
 fn fixture(surface: Surface) -> Result<Fixture, Failed> {
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).process(surface))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(surface))
 }
 
 fn submitted(fixture: &mut Fixture, scene: &Scene) -> Result<WgpuSubmission, Failed> {
@@ -227,7 +227,7 @@ fn mirror_in_software() -> Result<(), Failed> {
     let found = submitted(&mut fixture(MIRROR)?, &scene)?.read(0, "picture")?;
     let scheduler = Arc::new(Scheduler::new(1)?);
     let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
-    let (mut renderer, submitter) = builder.deferred(Deferred::to_picture()).process(MIRROR).build(scheduler)?;
+    let (mut renderer, submitter) = builder.pipeline(Deferred::to_picture()).process(MIRROR).build(scheduler)?;
     let submission = submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission;
     assert_alike(&found, &submission.read(0, "picture")?)?;
     // Without the camera the mirror is black, on both.
@@ -350,7 +350,7 @@ fn screens_in_each_other() -> Result<(), Failed> {
     let camera = Camera { name: "other window".to_owned(), ..scene.cameras[1].clone() };
     scene.cameras.push(camera);
     let mut fixture = Fixture::with(2, |builder| {
-        builder.deferred(Deferred::to_picture()).process(WINDOW).process(After { process: other, after: WINDOW.name })
+        builder.pipeline(Deferred::to_picture()).process(WINDOW).process(After { process: other, after: WINDOW.name })
     })?;
     match fixture.renderer.record(scene.as_scene_ref()) {
         Err(error @ FrameError::CircularViews(_))

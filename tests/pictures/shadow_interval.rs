@@ -27,7 +27,7 @@ pub const CASES: &[Case] = &[
 fn fixture_every(interval: u32) -> Result<Fixture, Failed> {
     let quality = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { interval, side: 512, ..quality.shadows }, ..quality };
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality))
 }
 
 fn lights() -> Vec<Light> {

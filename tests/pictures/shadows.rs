@@ -48,7 +48,7 @@ pub const MAPS: ShadowMaps = ShadowMaps {
 
 /// The shipped processes with these shadow maps.
 pub fn fixture_with(maps: ShadowMaps) -> Result<Fixture, Failed> {
-    Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))
+    Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture().shadow_maps(Some(maps))))
 }
 
 pub fn sun(direction: DVec3) -> Light {
@@ -318,7 +318,7 @@ fn across_the_near_plane(near_plane: NearPlane) -> Result<(), Failed> {
         let mut fixture = match near_plane {
             NearPlane::WithoutFeature => {
                 let device = adapter::device_without(wgpu::Features::DEPTH_CLIP_CONTROL)?;
-                Fixture::on(device, 2, |builder| builder.deferred(deferred.clone()))?
+                Fixture::on(device, 2, |builder| builder.pipeline(deferred.clone()))?
             }
             _ => fixture_with(maps)?,
         };

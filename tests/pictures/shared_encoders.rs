@@ -130,7 +130,7 @@ impl RenderProcess for Foot {
 fn refused() -> Result<(), Failed> {
     let backend = backend()?.encoding_strategy(EncodingStrategy::PerPass);
     let builder =
-        Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros).process(Foot);
+        Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Head).process(Ouroboros).process(Foot);
     let (mut renderer, _submitter) = builder.output("foot").build(Arc::new(Scheduler::new(1)?))?;
     let scene = everything();
     // One worker finishes both in the job of the pass after them.

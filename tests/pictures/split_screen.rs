@@ -68,7 +68,7 @@ fn drawing<B: Backend>(
     read: impl Fn(&B::Submission, usize, &str) -> Result<Picture, Failed> + 'static,
 ) -> Result<Draw, Failed> {
     let deferred = Deferred::to_picture().shadow_maps(Some(maps));
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).pipeline(deferred).build(scheduler)?;
     Ok(Box::new(move |scene| {
         let recorded = renderer.record(scene.as_scene_ref())?;
         let maps = recorded.statistics().views.iter().filter(|view| view.kind == ViewKind::Shadow).count();
@@ -213,7 +213,7 @@ fn mirror() -> Result<(), Failed> {
         scene.cameras = cameras.to_vec();
         scene.lights = lights.to_vec();
         let deferred = Deferred::to_picture().shadow_maps(Some(MAPS));
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred).process(MIRROR))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred).process(MIRROR))?;
         let recorded = fixture.record(&scene)?;
         let view = cameras.iter().position(|camera| camera.name == "main").ok_or("there is no main camera")?;
         Ok(fixture.submit(recorded)?.read(view, "picture")?)

@@ -118,7 +118,7 @@ fn on_the_device_with(
     with: impl FnOnce(WgpuBackend) -> Result<WgpuBackend, BackendError>,
     build: impl FnOnce(RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend>,
 ) -> Result<Painter<WgpuBackend>, Failed> {
-    let builder = Renderer::builder(with(backend()?)?).deferred(deferred());
+    let builder = Renderer::builder(with(backend()?)?).pipeline(deferred());
     let (renderer, submitter) = build(builder).build(Arc::new(Scheduler::new(2)?))?;
     Ok(Painter { renderer, submitter, read: |submitted, view| Ok(submitted.submission.read(view, "picture")?) })
 }
@@ -127,7 +127,7 @@ fn in_software_with(
     build: impl FnOnce(RendererBuilder<SoftwareBackend>) -> RendererBuilder<SoftwareBackend>,
 ) -> Result<Painter<SoftwareBackend>, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred());
+    let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(deferred());
     let (renderer, submitter) = build(builder).build(scheduler)?;
     Ok(Painter { renderer, submitter, read: |submitted, view| Ok(submitted.submission.read(view, "picture")?) })
 }
@@ -297,8 +297,8 @@ fn other_renderers() -> Result<(), Failed> {
     executed.push(("a shadow", steady(&mut with, &mut plain, &mut scene, "a shadow")?));
     let formats = GeometryFormats { normal: Format::Rgba32Float, ..GeometryFormats::default() };
     for deferred in [deferred().formats(formats), deferred()] {
-        with.renderer.set_deferred(deferred.clone())?;
-        plain.renderer.set_deferred(deferred)?;
+        with.renderer.set_pipeline(deferred.clone())?;
+        plain.renderer.set_pipeline(deferred)?;
         executed.push(("formats", steady(&mut with, &mut plain, &mut scene, "formats")?));
     }
     with.submitter = with.renderer.replace_backend(backend()?);

@@ -244,7 +244,7 @@ fn in_a_map() -> Result<(), Failed> {
                 let deferred = Deferred::to_picture().shadow_maps(Some(MAPS));
                 let needs_depth = !matches!(test, MapTest::OwnStencil);
                 let builder = if needs_depth { builder.process(MapDepth) } else { builder };
-                builder.deferred(deferred).process(SeenByLight(test)).output("seen")
+                builder.pipeline(deferred).process(SeenByLight(test)).output("seen")
             })?;
             let recorded = fixture.record(&scene)?;
             let maps = recorded.statistics().views.iter().position(|view| view.kind == ViewKind::Shadow);
@@ -270,14 +270,14 @@ fn draw(fixture: &mut Fixture, target: &str) -> Result<Picture, Failed> {
 fn white(mark: Mark, stencil: Stencil) -> Result<Picture, Failed> {
     let white = White { target: mark.target, stencil: Some(stencil) };
     let mut fixture =
-        Fixture::with(2, |builder| builder.deferred(pipeline()).process(mark).process(white).output("white"))?;
+        Fixture::with(2, |builder| builder.pipeline(pipeline()).process(mark).process(white).output("white"))?;
     draw(&mut fixture, "white")
 }
 
 /// The objects that are to be marked, in white: all of them, or where they are visible.
 fn covered(depth: Option<&'static str>) -> Result<Picture, Failed> {
     let mut fixture =
-        Fixture::with(2, |builder| builder.deferred(pipeline()).process(Covered { depth }).output("covered"))?;
+        Fixture::with(2, |builder| builder.pipeline(pipeline()).process(Covered { depth }).output("covered"))?;
     draw(&mut fixture, "covered")
 }
 
@@ -319,7 +319,7 @@ fn every_strategy() -> Result<(), Failed> {
     for (recording, encoding) in strategies() {
         let backend = backend()?.recording_strategy(recording).encoding_strategy(encoding);
         let white = White { target: "depth", stencil: Some(Stencil::test(Comparison::Equal, 3)) };
-        let builder = Renderer::builder(backend).deferred(pipeline()).process(Mark::BESIDE_DEPTH);
+        let builder = Renderer::builder(backend).pipeline(pipeline()).process(Mark::BESIDE_DEPTH);
         let (renderer, submitter) = builder.process(white).output("white").build(Arc::new(Scheduler::new(2)?))?;
         let mut fixture = Fixture { renderer, submitter };
         for frame in 0..2 {
@@ -384,7 +384,7 @@ fn hidden_objects() -> Result<(), Failed> {
         let quality = Quality { occlusion, ..Quality::balanced() };
         let mark = Mark { stencil, ..Mark::BESIDE_DEPTH };
         let mut fixture = Fixture::with(2, |builder| {
-            builder.deferred(pipeline()).process(mark).process(white).output("white").quality(quality)
+            builder.pipeline(pipeline()).process(mark).process(white).output("white").quality(quality)
         })?;
         let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
         Ok(fixture.submit(recorded)?.read(0, "white")?)
@@ -431,7 +431,7 @@ fn through_walls() -> Result<(), Failed> {
     let draw = |occlusion| -> Result<Picture, Failed> {
         let quality = Quality { occlusion, ..Quality::balanced() };
         let mut fixture = Fixture::with(2, |builder| {
-            builder.deferred(pipeline()).process(ThroughWalls).output("white").quality(quality)
+            builder.pipeline(pipeline()).process(ThroughWalls).output("white").quality(quality)
         })?;
         let recorded = fixture.renderer.record(SceneRef { layers: &layers, ..scene.as_scene_ref() })?;
         Ok(fixture.submit(recorded)?.read(0, "white")?)
@@ -503,7 +503,7 @@ fn without() -> Result<(), Failed> {
     let test = Stencil::test(Comparison::Equal, 3);
     let problem = |white: White| -> Result<String, Failed> {
         let process = |builder: RendererBuilder<WgpuBackend>| {
-            builder.deferred(Deferred::to_picture()).process(Mark::ALONE).process(white).output("white")
+            builder.pipeline(Deferred::to_picture()).process(Mark::ALONE).process(white).output("white")
         };
         let mut fixture = match Fixture::with(2, process) {
             Ok(fixture) => fixture,

@@ -59,7 +59,7 @@ pub fn fixture_of(backend: WgpuBackend) -> Result<Fixture, Failed> {
 
 fn fixture_divided(backend: WgpuBackend, granularity: Granularity) -> Result<Fixture, Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
-    let builder = Renderer::builder(backend).deferred(small_maps()).granularity(granularity);
+    let builder = Renderer::builder(backend).pipeline(small_maps()).granularity(granularity);
     let (renderer, submitter) = builder.build(scheduler)?;
     Ok(Fixture { renderer, submitter })
 }
@@ -460,7 +460,7 @@ impl RenderProcess for Head {
 fn refused_at_submission() -> Result<(), Failed> {
     let backend =
         backend()?.recording_strategy(RecordingStrategy::CachedBundles).encoding_strategy(EncodingStrategy::OnSubmit);
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).process(Head).process(Ouroboros);
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).process(Head).process(Ouroboros);
     let (mut renderer, submitter) = builder.output("tail").build(Arc::new(Scheduler::new(2)?))?;
     let scene = everything();
     for _ in 0..2 {

@@ -33,7 +33,7 @@ pub const CASES: &[Case] = &[
 
 /// Draws with the shipped processes.
 fn fixture(backend: WgpuBackend, workers: usize) -> Result<Fixture, Failed> {
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
     let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(workers)?))?;
     Ok(Fixture { renderer, submitter })
 }

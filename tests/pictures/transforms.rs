@@ -39,7 +39,7 @@ fn field_at(shift: DVec3) -> Result<Scene, SceneError> {
 
 fn absolute() -> Result<(), Failed> {
     let of =
-        |transforms| Fixture::with(2, |builder| builder.deferred(Deferred::to_picture()).quality(quality(transforms)));
+        |transforms| Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).quality(quality(transforms)));
     let mut exact = of(TransformPrecision::CameraRelative)?;
     let mut absolute = of(TransformPrecision::Absolute)?;
     for (distance, is_near) in [(0.0, true), (100.0, true), (1e6, false), (1e7, false)] {

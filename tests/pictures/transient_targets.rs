@@ -96,7 +96,7 @@ fn colonnade() -> Result<(), Failed> {
     let quality = Quality::balanced();
     // Some frames draw shadow maps, and the others read those of the frame before.
     let quality = Quality { shadows: ShadowQuality { interval: 2, side: 64, ..quality.shadows }, ..quality };
-    let mut both = Both::new(|builder| builder.deferred(smooth()).quality(quality))?;
+    let mut both = Both::new(|builder| builder.pipeline(smooth()).quality(quality))?;
     let mut scene = small_colonnade()?;
     let (wide, small) = ([96, 54], [40, 40]);
     for (frame, sizes) in [
@@ -123,7 +123,7 @@ fn colonnade() -> Result<(), Failed> {
 
 /// Views come, go and change their order and size, and each frame adds to what its views held before.
 fn small_pictures() -> Result<(), Failed> {
-    let mut both = Both::new(|builder| builder.deferred(Deferred::to_picture()))?;
+    let mut both = Both::new(|builder| builder.pipeline(Deferred::to_picture()))?;
     let mut scene = field(50);
     let camera = scene.cameras[0].clone();
     let mut fewest = usize::MAX;
@@ -150,7 +150,7 @@ fn mirrors() -> Result<(), Failed> {
     let size = scene.cameras[0].size;
     let other = Camera::looking_at("other", DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.1, 0.0, -4.0));
     scene.cameras.push(sized(other, size));
-    let mut both = Both::new(|builder| builder.deferred(Deferred::to_picture()).process(MIRROR))?;
+    let mut both = Both::new(|builder| builder.pipeline(Deferred::to_picture()).process(MIRROR))?;
     // Without mirrored cameras, with those of one camera, of both, and mirrors in mirrors.
     for index in [None, Some(1), Some(0), Some(2), Some(3)] {
         if let Some(index) = index {
@@ -230,7 +230,7 @@ fn history() -> Result<(), Failed> {
     let trail = Mean { accumulates: true, ..Mean::of("trail", "picture", "trail") };
     let shown = Mean::of("shown", "trail", "shown");
     let build = |builder: RendererBuilder<WgpuBackend>| {
-        builder.deferred(Deferred::to_picture()).process(trail.clone()).process(shown.clone()).output("shown")
+        builder.pipeline(Deferred::to_picture()).process(trail.clone()).process(shown.clone()).output("shown")
     };
     let (mut both, mut scene) = (Both::new(build)?, field(40));
     with_cameras(&mut scene, &[[80, 60]; 3]);
@@ -249,7 +249,7 @@ fn history() -> Result<(), Failed> {
 
 fn imports() -> Result<(), Failed> {
     let (device, _) = device()?;
-    let (mut both, mut scene) = (Both::new(|builder| builder.deferred(smooth()))?, field(40));
+    let (mut both, mut scene) = (Both::new(|builder| builder.pipeline(smooth()))?, field(40));
     let size = [80, 60];
     with_cameras(&mut scene, &[size; 3]);
     let pictures = [0, 1, 2].map(|view| (view, "picture"));
@@ -281,7 +281,7 @@ fn imports() -> Result<(), Failed> {
 fn process_by_process() -> Result<(), Failed> {
     let sheet = Mean { once_a_frame: true, ..Mean::of("sheet", "picture", "sheet") };
     let build =
-        |builder: RendererBuilder<WgpuBackend>| builder.deferred(smooth()).process(sheet.clone()).output("sheet");
+        |builder: RendererBuilder<WgpuBackend>| builder.pipeline(smooth()).process(sheet.clone()).output("sheet");
     let (mut both, mut scene) = (Both::new(build)?, field(40));
     with_cameras(&mut scene, &[[80, 60]; 3]);
     let targets = [(0, "picture"), (1, "picture"), (2, "picture"), (0, "sheet")];
@@ -298,7 +298,7 @@ fn process_by_process() -> Result<(), Failed> {
 fn reading() -> Result<(), Failed> {
     let mut scene = field(40);
     with_cameras(&mut scene, &[[80, 60]; 2]);
-    let mut both = Both::new(|builder| builder.deferred(Deferred::to_picture()))?;
+    let mut both = Both::new(|builder| builder.pipeline(Deferred::to_picture()))?;
     let mut recorded = both.record(&scene)?;
     let read_back = recorded[0].read_back(1, "radiance", [0, 0], [1, 1]).map(drop);
     let unknown = recorded[0].read_back(1, "unknown", [0, 0], [1, 1]).map(drop);
@@ -316,7 +316,7 @@ fn reading() -> Result<(), Failed> {
     submissions[1].read(1, "radiance")?;
 
     // An output keeps a texture of its own.
-    let mut both = Both::new(|builder| builder.deferred(Deferred::to_picture()).output("radiance"))?;
+    let mut both = Both::new(|builder| builder.pipeline(Deferred::to_picture()).output("radiance"))?;
     let targets: Vec<_> = (0..2).flat_map(|view| [(view, "picture"), (view, "radiance")]).collect();
     both.draw_same("with another output", &scene, &targets)?;
     both.assert_shared()
@@ -324,7 +324,7 @@ fn reading() -> Result<(), Failed> {
 
 fn statistics() -> Result<(), Failed> {
     let mut scene = field(40);
-    let mut both = Both::new(|builder| builder.deferred(Deferred::to_picture()))?;
+    let mut both = Both::new(|builder| builder.pipeline(Deferred::to_picture()))?;
     let (wide, small) = ([80, 60], [31, 17]);
     for (sizes, repeated) in [
         (&[wide][..], &[][..]),

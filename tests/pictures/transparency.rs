@@ -183,7 +183,7 @@ fn lit_like_opaque() -> Result<(), Failed> {
         })?;
         let position = DVec3::new(0.0, 0.4, 1.0);
         scene.add_object(RenderObject { scale: Vec3::splat(0.3), ..RenderObject::new(block, stone, position) })?;
-        Fixture::with(2, |builder| builder.deferred(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
+        Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture().shadow_maps(Some(maps))))?.draw(&scene)
     };
     let mut before = Vec::new();
     for light in lights() {

@@ -97,7 +97,7 @@ fn other_changes() -> Result<(), Failed> {
     let second = expected(&whole)?;
 
     let mut fixture = fixture_with(RecordingStrategy::CachedBundles, EncodingStrategy::PerPass)?;
-    fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+    fixture.renderer.set_pipeline(small_maps().depth_pre_pass(true))?;
     let mut scene = cullable(everything(), 1);
     for _ in 0..2 {
         let in_flight = fixture.record(&scene)?;
@@ -114,7 +114,7 @@ fn other_changes() -> Result<(), Failed> {
         expect(culled_in(&recorded) == 0, || "triangles with absolute transforms were culled".to_owned())?;
         drop(fixture.submit(recorded)?);
         fixture.renderer.set_quality(Quality::balanced())?;
-        fixture.renderer.set_deferred(small_maps().depth_pre_pass(true))?;
+        fixture.renderer.set_pipeline(small_maps().depth_pre_pass(true))?;
 
         scene = with_meshes(scene, as_list);
         let recorded = fixture.record(&scene)?;

@@ -88,7 +88,7 @@ fn draw_in_software(deferred: Deferred, scene: &Scene, target: &str) -> Result<P
 }
 
 fn draw(deferred: Deferred, scene: &Scene, target: &str) -> Result<Picture, Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     let recorded = fixture.record(scene)?;
     Ok(fixture.submit(recorded)?.read(0, target)?)
 }

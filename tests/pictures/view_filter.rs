@@ -92,7 +92,7 @@ fn check(
 }
 
 fn on_the_device() -> Result<(), Failed> {
-    let of_workers = |workers| Fixture::with(workers, |builder| builder.deferred(Deferred::to_picture()));
+    let of_workers = |workers| Fixture::with(workers, |builder| builder.pipeline(Deferred::to_picture()));
     for workers in [1, 3] {
         let mut fixture = of_workers(workers)?;
         check(|scene| fixture.draw(scene), |scene| of_workers(1)?.draw(scene))?;
@@ -104,7 +104,7 @@ fn in_software() -> Result<(), Failed> {
     let renderer = |workers| {
         let scheduler = Arc::new(Scheduler::new(workers)?);
         let builder = Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler)));
-        Ok::<_, Failed>(builder.deferred(Deferred::to_picture()).build(scheduler)?)
+        Ok::<_, Failed>(builder.pipeline(Deferred::to_picture()).build(scheduler)?)
     };
     let draw = |(renderer, submitter): &mut (Renderer<SoftwareBackend>, Submitter<_>), scene: &Scene| {
         Ok(submitter.submit(renderer.record(scene.as_scene_ref())?)?.submission.read(0, "picture")?)

@@ -7,7 +7,7 @@ use drawloom::process::Deferred;
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Blend, Material};
 use drawloom::task::Scheduler;
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom::{Renderer, RendererBuilder, Submitter, WarmUp};
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::everything::{class_of, everything, everything_with_mirror, glasses};
@@ -28,12 +28,12 @@ pub const CASES: &[Case] = &[
 fn with_memory<B: Backend>(builder: RendererBuilder<B>) -> RendererBuilder<B> {
     let quality = Quality::balanced();
     let quality = Quality { shadows: ShadowQuality { interval: 3, side: 64, ..quality.shadows }, ..quality };
-    accumulates(builder.deferred(Deferred::to_picture()).quality(quality))
+    accumulates(builder.pipeline(Deferred::to_picture()).quality(quality))
 }
 
 /// The shipped processes and a mirror.
 fn with_mirror(builder: RendererBuilder<WgpuBackend>) -> RendererBuilder<WgpuBackend> {
-    builder.deferred(Deferred::to_picture()).process(MIRROR)
+    builder.pipeline(Deferred::to_picture()).process(MIRROR)
 }
 
 fn no_new_pipelines() -> Result<(), Failed> {

@@ -89,14 +89,14 @@ fn each_of_many_views_draws_what_it_draws_alone() {
 #[test]
 fn a_depth_pre_pass_changes_nothing() {
     let scene = everything();
-    let mut with = Fixture::new(2, |builder| builder.deferred(deferred().depth_pre_pass(true)));
+    let mut with = Fixture::new(2, |builder| builder.pipeline(deferred().depth_pre_pass(true)));
     assert!(with.picture(&scene) == Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene));
 }
 
 #[test]
 fn splitting_the_geometry_buffer_changes_nothing() {
     let scene = everything();
-    let mut shared = Fixture::new(2, |builder| builder.deferred(deferred().geometry_shares(3)));
+    let mut shared = Fixture::new(2, |builder| builder.pipeline(deferred().geometry_shares(3)));
     assert!(shared.picture(&scene) == Fixture::with_granularity(2, Granularity::Adaptive).picture(&scene));
 }
 
@@ -139,7 +139,7 @@ fn the_bounds_of_a_light_contain_all_that_it_reaches() {
     scene.add_object(floor).unwrap();
     scene.cameras = vec![sized(Camera::looking_at("main", DVec3::new(0.0, 4.0, 12.0), DVec3::ZERO), [150, 100])];
     let light = |position| Light::Point { position, intensity: Vec3::splat(20.0), range: 3.0, casts_shadow: false };
-    let mut fixture = Fixture::new(2, |builder| builder.deferred(Deferred::to_picture()));
+    let mut fixture = Fixture::new(2, |builder| builder.pipeline(Deferred::to_picture()));
     for position in [[0.0, 0.5, 0.0], [-9.0, 0.5, -6.0], [1.0, 4.0, 12.5], [0.0, 2.0, 9.0], [7.0, 1.0, 4.0]] {
         scene.lights = vec![light(DVec3::from(position))];
         let submission = fixture.draw(&scene);

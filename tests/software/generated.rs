@@ -58,7 +58,7 @@ fn objects_with_a_mesh_that_is_filled_wrongly_are_counted_until_it_is_filled_wel
     for mesh in [other, meshes[1], meshes[0], other, meshes[1]] {
         scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
     }
-    let mut fixture = Fixture::new(2, |builder| builder.deferred(Deferred::to_picture()));
+    let mut fixture = Fixture::new(2, |builder| builder.pipeline(Deferred::to_picture()));
     let (none, [first, second]) = ((0, 0), [(1, 2), (2, 1)]);
     let mut frame = |is_wrong: [bool; 2], (count, first): (usize, usize)| {
         let node = Fill { vertices: &vertices, indices: indices.each_ref(), is_wrong };

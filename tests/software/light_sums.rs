@@ -15,7 +15,7 @@ fn radiance(submission: &SoftwareSubmission) -> Vec<[f64; 3]> {
 /// Draws each scene with each value of the knob.
 fn expect_sums(scenes: &[SumScene]) {
     for sum in SUMS {
-        let mut fixture = Fixture::new(1, |builder| builder.deferred(Deferred::new()).quality(quality(sum)));
+        let mut fixture = Fixture::new(1, |builder| builder.pipeline(Deferred::new()).quality(quality(sum)));
         for scene in scenes {
             let error = scene.error(&radiance(&fixture.draw(&scene.scene)));
             assert!(error <= scene.bound(sum), "{sum:?}: {}: {error}", scene.name);
@@ -37,7 +37,7 @@ fn blended_objects_add_up_within_the_bounds_of_their_sum() {
 /// What the knob is for: in half floats, a sum ends where its terms are less than half a step.
 #[test]
 fn half_floats_lose_the_light_of_ten_thousand_lights() {
-    let mut fixture = Fixture::new(1, |builder| builder.deferred(Deferred::new()));
+    let mut fixture = Fixture::new(1, |builder| builder.pipeline(Deferred::new()));
     let scenes = light_scenes();
     let many = scenes.iter().find(|scene| scene.name == "10000 lights of one brightness").unwrap();
     assert!(many.error(&radiance(&fixture.draw(&many.scene))) > 0.5);

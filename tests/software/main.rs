@@ -37,13 +37,13 @@ impl Fixture {
 
     /// The shipped processes in f32.
     fn with_granularity(workers: usize, granularity: Granularity) -> Self {
-        Self::new(workers, |builder| builder.deferred(deferred()).granularity(granularity))
+        Self::new(workers, |builder| builder.pipeline(deferred()).granularity(granularity))
     }
 
     /// The shipped processes in f64.
     fn reference() -> Self {
         let scheduler = Arc::new(Scheduler::new(2).unwrap());
-        let builder = Renderer::builder(SoftwareBackend::reference()).deferred(deferred());
+        let builder = Renderer::builder(SoftwareBackend::reference()).pipeline(deferred());
         let (renderer, submitter) = builder.build(scheduler).unwrap();
         Self { renderer, submitter }
     }

@@ -128,7 +128,7 @@ impl<R: Real> FullScreenCpuShader<R> for DiscardAll {
 }
 
 fn error_of(process: impl RenderProcess + 'static) -> BackendError {
-    let mut fixture = Fixture::new(2, |builder| builder.deferred(deferred()).process(process));
+    let mut fixture = Fixture::new(2, |builder| builder.pipeline(deferred()).process(process));
     match fixture.renderer.record(field(10).as_scene_ref()) {
         Err(FrameError::Backend(error)) => error,
         other => panic!("{:?}", other.err()),
@@ -157,7 +157,7 @@ fn a_process_that_samples_a_target_that_it_writes_is_refused() {
 
 #[test]
 fn picture_sizes_and_camera_positions_have_limits() {
-    let mut fixture = Fixture::new(2, |builder| builder.deferred(deferred()));
+    let mut fixture = Fixture::new(2, |builder| builder.pipeline(deferred()));
     let expected = fixture.picture(&field(10));
     let mut large = field(10);
     large.cameras[1].size = [16_385, 1];
@@ -178,7 +178,7 @@ fn picture_sizes_and_camera_positions_have_limits() {
 
 #[test]
 fn the_error_names_a_missing_target() {
-    let submission = Fixture::new(2, |builder| builder.deferred(deferred())).draw(&field(10));
+    let submission = Fixture::new(2, |builder| builder.pipeline(deferred())).draw(&field(10));
     for (view, target) in [(0, "pictures"), (2, "picture")] {
         match submission.read(view, target) {
             Err(BackendError::UnknownTarget { view: named, target: name, known }) => {

@@ -90,7 +90,7 @@ fn occlusion_culling_changes_nothing() {
         let quality = Quality { culling: CullingVolume::OrientedBox, shadows, ..balanced };
         let draw = |occlusion| {
             let quality = Quality { occlusion, ..quality };
-            let maps = |builder: RendererBuilder<SoftwareBackend>| builder.deferred(deferred()).quality(quality);
+            let maps = |builder: RendererBuilder<SoftwareBackend>| builder.pipeline(deferred()).quality(quality);
             Fixture::new(2, maps).picture(&scene)
         };
         let whole = draw(None);
@@ -145,7 +145,7 @@ fn levels_of_detail_move_silhouettes_by_no_more_than_the_error() {
     let picture = |level_of_detail: f32| {
         let quality = Quality { level_of_detail, ..Quality::balanced() };
         let deferred = Deferred::new().post(ToneMapping::default());
-        let picture = Fixture::new(2, |builder| builder.deferred(deferred).quality(quality)).picture(&scene);
+        let picture = Fixture::new(2, |builder| builder.pipeline(deferred).quality(quality)).picture(&scene);
         picture.bytes.as_chunks::<4>().0.to_vec()
     };
     let full = picture(0.0);

@@ -25,7 +25,7 @@ use recorder::{Origin, Recorder, scheduler, subscriber};
 fn draw_two_frames(workers: usize, dispatch: &Dispatch) -> (usize, BTreeSet<String>) {
     let scheduler = Arc::new(scheduler(Scheduler::builder().workers(workers), dispatch));
     dispatcher::with_default(dispatch, || {
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
         let (mut renderer, submitter) = builder.granularity(Granularity::Chunk(16)).build(scheduler).unwrap();
         let scene = demo::colonnade().unwrap();
         let timeline = Arc::clone(renderer.scheduler());

@@ -241,7 +241,7 @@ fn smoke() -> Result<(), Failed> {
     let viewer = main_camera()?;
     let draw = |divisor: Option<u32>| -> Result<Picture, Failed> {
         let (mut renderer, submitter) = built(|builder| {
-            let builder = builder.deferred(Deferred::new().post(ToneMapping::default()));
+            let builder = builder.pipeline(Deferred::new().post(ToneMapping::default()));
             match divisor {
                 Some(divisor) => builder.process(Smoke::new(divisor)).process(UpsampledSmoke::new(divisor)),
                 None => builder,

@@ -56,7 +56,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let backend = WgpuBackend::new(device, queue)?;
     print_line!("Rendering on {} with {} workers.", backend.adapter_name(), scheduler.workers());
     let deferred = Deferred::new().post(ToneMapping::default()).post(Fxaa::default());
-    let (mut renderer, submitter) = Renderer::builder(backend).deferred(deferred).build(scheduler)?;
+    let (mut renderer, submitter) = Renderer::builder(backend).pipeline(deferred).build(scheduler)?;
     let scene = demo::colonnade()?;
 
     if !arguments.no_wait {

@@ -54,7 +54,7 @@ fn same_as_on_device<B: DrawingBackend>() -> Result<(), Failed> {
             for process in processes {
                 builder = builder.process(process);
             }
-            builder.deferred(Deferred::new().post(step).post(ToneMapping::default()))
+            builder.pipeline(Deferred::new().post(step).post(ToneMapping::default()))
         })?;
         let frame = on_device.draw(&scene)?;
         let of_device = B::read(&frame.submission, 0, "bloom columns")?;
@@ -83,7 +83,7 @@ fn same_as_on_device<B: DrawingBackend>() -> Result<(), Failed> {
 
 fn with<B: DrawingBackend>(builder: RendererBuilder<B>, post: &AsyncPost) -> RendererBuilder<B> {
     let deferred = Deferred::new().post(post.layer(LayerSettings::default())).post(ToneMapping::default());
-    builder.deferred(deferred).process(post.downsample().expect("it is downsampled"))
+    builder.pipeline(deferred).process(post.downsample().expect("it is downsampled"))
 }
 
 fn source<B: DrawingBackend>() -> Result<(), Failed> {
@@ -92,7 +92,7 @@ fn source<B: DrawingBackend>() -> Result<(), Failed> {
         let bloom = Bloom { divisor: divisor as u32, ..Bloom::default() };
         let mut engine = Engine::<B>::new(bloom.on_cpu(), bloom.source(), |builder, post| {
             let deferred = Deferred::new().post(post.layer(LayerSettings::default()));
-            builder.deferred(deferred).process(post.downsample().expect("it is downsampled")).output("radiance")
+            builder.pipeline(deferred).process(post.downsample().expect("it is downsampled")).output("radiance")
         })?;
         let frame = engine.draw(&scene)?;
         let [radiance, source] = ["radiance", "bloom source"].map(|target| B::read(&frame.submission, 0, target));

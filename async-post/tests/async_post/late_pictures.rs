@@ -55,7 +55,7 @@ fn negative_of(picture: &Picture) -> Vec<u8> {
 fn engine<B: DrawingBackend>() -> Result<Engine<B>, Failed> {
     Engine::new(Negative, StepSource::whole("picture"), |builder: RendererBuilder<B>, post: &AsyncPost| {
         let late = post.late_picture("late picture", Format::Rgba8Srgb);
-        builder.deferred(Deferred::to_picture()).process(late).output("late picture")
+        builder.pipeline(Deferred::to_picture()).process(late).output("late picture")
     })
 }
 
@@ -141,7 +141,7 @@ fn several_views<B: DrawingBackend>() -> Result<(), Failed> {
 
 fn alone<B: DrawingBackend>() -> Result<(), Failed> {
     let mut engine = Engine::<B>::new(Negative, StepSource::whole("picture"), |builder, _| {
-        builder.deferred(Deferred::to_picture())
+        builder.pipeline(Deferred::to_picture())
     })?;
     let scheduler = Arc::clone(engine.renderer.scheduler());
     let late = engine.post.late_picture_alone("late picture", Format::Rgba8Srgb);

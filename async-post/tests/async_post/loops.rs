@@ -44,7 +44,7 @@ impl AsyncStep for Noting {
 fn engine<B: DrawingBackend>(step: &Noting) -> Result<Engine<B>, Failed> {
     Engine::new(step.clone(), StepSource::whole("picture"), |builder: RendererBuilder<B>, post: &AsyncPost| {
         let late = post.late_picture("late picture", Format::Rgba8Unorm);
-        builder.deferred(Deferred::to_picture()).process(late).output("late picture")
+        builder.pipeline(Deferred::to_picture()).process(late).output("late picture")
     })
 }
 

@@ -49,7 +49,7 @@ impl AsyncStep for TextureCoordinates {
 fn engine<B: DrawingBackend>(reprojection: LayerReprojection) -> Result<Engine<B>, Failed> {
     let layer = LayerSettings { reprojection, ..LayerSettings::default() };
     Engine::new(TextureCoordinates, StepSource::whole("depth"), |builder: RendererBuilder<B>, post: &AsyncPost| {
-        builder.deferred(Deferred::new().post(post.layer(layer)))
+        builder.pipeline(Deferred::new().post(post.layer(layer)))
     })
 }
 

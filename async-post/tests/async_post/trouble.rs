@@ -62,7 +62,7 @@ impl<F: Fn(&StepFrame<'_>) + Send + Sync + 'static> AsyncStep for Numbered<F> {
 
 fn build<B: Backend>(builder: RendererBuilder<B>, post: &AsyncPost) -> RendererBuilder<B> {
     let late = post.late_picture("late picture", Format::Rgba8Unorm);
-    builder.deferred(Deferred::to_picture()).process(late).output("late picture")
+    builder.pipeline(Deferred::to_picture()).process(late).output("late picture")
 }
 
 fn engine<B: DrawingBackend>(
@@ -353,7 +353,7 @@ fn nothing_left() -> Result<(), Failed> {
 fn on<B: Backend + UploadPicture>(backend: B, source: &str) -> Result<(Renderer<B>, Submitter<B>, AsyncPost), Failed> {
     let scheduler = Arc::new(Scheduler::new(2)?);
     let post = AsyncPost::new(Arc::clone(&scheduler), Numbered(|_: &StepFrame<'_>| ()), StepSource::whole(source));
-    let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
     let (renderer, submitter) = builder.build(scheduler)?;
     Ok((renderer, submitter, post))
 }

@@ -156,38 +156,38 @@ impl<B: Backend<Submission = WgpuSubmission> + UploadPicture> Contender<B> {
         }];
         let mut post = None;
         let builder = match kind {
-            Kind::Without => builder.deferred(Deferred::to_picture()),
+            Kind::Without => builder.pipeline(Deferred::to_picture()),
             Kind::BloomOnDevice => {
                 let (processes, step) = bloom.on_device(STRENGTH);
-                let builder = builder.deferred(Deferred::new().post(step).post(ToneMapping::default()));
+                let builder = builder.pipeline(Deferred::new().post(step).post(ToneMapping::default()));
                 processes.into_iter().fold(builder, |builder, process| builder.process(process))
             }
             Kind::BloomOnCpuInSameFrame => {
                 // Never begun: only its process and the name of its target are used.
                 let source = AsyncPost::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source());
                 let downsample = source.downsample().ok_or("bloom is computed from a smaller picture")?;
-                builder.deferred(Deferred::new()).process(downsample).output(source.source_target())
+                builder.pipeline(Deferred::new()).process(downsample).output(source.source_target())
             }
             Kind::BloomLayer => {
                 let post = post.insert(AsyncPost::new(Arc::clone(&scheduler), bloom.on_cpu(), bloom.source()));
                 let layer = post.layer(LayerSettings { strength: STRENGTH, ..LayerSettings::default() });
                 let downsample = post.downsample().ok_or("bloom is computed from a smaller picture")?;
                 let deferred = Deferred::new().post(layer).post(ToneMapping::default());
-                builder.deferred(deferred).process(downsample).output(post.source_target())
+                builder.pipeline(deferred).process(downsample).output(post.source_target())
             }
             Kind::GradeOnDevice => {
-                builder.deferred(Deferred::new().post(ToneMapping::default()).post(steps::grade_on_device))
+                builder.pipeline(Deferred::new().post(ToneMapping::default()).post(steps::grade_on_device))
             }
             Kind::LateGrade => {
                 let source = StepSource::whole(targets::PICTURE);
                 let post = post.insert(AsyncPost::new(Arc::clone(&scheduler), Grade, source));
                 let late = post.late_picture("late picture", Format::Rgba8Srgb);
-                builder.deferred(Deferred::to_picture()).process(late).output("late picture")
+                builder.pipeline(Deferred::to_picture()).process(late).output("late picture")
             }
             Kind::LateGradeAlone | Kind::GradeOnCpuInSameFrame => {
                 let source = StepSource::whole(targets::PICTURE);
                 post = Some(AsyncPost::new(Arc::clone(&scheduler), Grade, source));
-                builder.deferred(Deferred::to_picture())
+                builder.pipeline(Deferred::to_picture())
             }
         };
         let (renderer, submitter) = builder.build(Arc::clone(&scheduler))?;

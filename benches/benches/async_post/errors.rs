@@ -169,7 +169,7 @@ impl Engine {
             }
         };
         let mut builder = Renderer::builder(library.backend()?)
-            .deferred(Deferred::new().post(post.layer(layer)).post(ToneMapping::default()))
+            .pipeline(Deferred::new().post(post.layer(layer)).post(ToneMapping::default()))
             .output(post.source_target());
         if let Some(downsample) = post.downsample() {
             builder = builder.process(downsample);

@@ -84,7 +84,7 @@ pub fn measure(
         for &(pipeline, workers) in &pipelines {
             let scene = Rc::clone(&scene);
             match pipeline {
-                Pipeline::Deferred => block.add(scene, workers, |builder| builder.deferred(Deferred::to_picture()))?,
+                Pipeline::Deferred => block.add(scene, workers, |builder| builder.pipeline(Deferred::to_picture()))?,
                 Pipeline::LoopOverLights => block.add(scene, workers, loop_over_lights)?,
                 Pipeline::DrawPerLight => {
                     let contender = PlainForward::new(&backend.open()?, &scene.as_scene_ref(), DrawPerLight::new)?;

@@ -54,7 +54,7 @@ pub fn measure(
         for &workers in workers {
             for depth_pre_pass in [false, true] {
                 let deferred = Deferred::to_picture().depth_pre_pass(depth_pre_pass);
-                block.add(Rc::clone(&scene), workers, |builder| builder.deferred(deferred))?;
+                block.add(Rc::clone(&scene), workers, |builder| builder.pipeline(deferred))?;
                 names.push((name, workers, depth_pre_pass));
             }
         }

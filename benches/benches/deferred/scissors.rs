@@ -15,7 +15,8 @@ use drawloom::process::{
     RenderProcess, SHADER_PRELUDE,
 };
 use drawloom::scene::{LightKind, SceneRef};
-use drawloom::view::internal::{GpuLight, LightClass};
+use drawloom::view::LightClass;
+use drawloom::view::internal::GpuLight;
 use drawloom::view::{GpuView, RenderView};
 use drawloom::wgpu;
 use drawloom_benches::stopwatch::FrameTime;
@@ -92,7 +93,7 @@ pub fn scissors(
         };
         deferred.replace(name, process)
     });
-    builder.deferred(deferred)
+    builder.pipeline(deferred)
 }
 
 /// Draws the lights of one kind.

@@ -43,7 +43,7 @@ pub fn measure(
     for &shadow_maps in extent.shadow_maps {
         let scene = Rc::new(Field { shadow_maps, ..Field::default() }.scene(extent)?);
         for &workers in workers {
-            block.add(Rc::clone(&scene), workers, |builder| builder.deferred(Deferred::to_picture()))?;
+            block.add(Rc::clone(&scene), workers, |builder| builder.pipeline(Deferred::to_picture()))?;
         }
     }
     let settings = block.measure(extent, "shadows")?;

@@ -77,7 +77,7 @@ pub fn measure(extent: &Extent, backend: BackendName, progress: &ProgressBar) ->
             for technique in Technique::ALL {
                 let scene = Rc::clone(&scene);
                 match technique.rejection() {
-                    None => block.add(scene, WORKERS, |builder| builder.deferred(Deferred::to_picture()))?,
+                    None => block.add(scene, WORKERS, |builder| builder.pipeline(Deferred::to_picture()))?,
                     Some(rejection) => {
                         let rectangles = Rectangles::default();
                         let pipeline = block.pipeline(WORKERS, |builder| scissors(builder, &rectangles, rejection))?;

@@ -28,7 +28,7 @@ pub fn measure(quick: bool, progress: &ProgressBar) -> Result<Vec<Row>, Box<dyn 
     let frames = if quick { 20 } else { 20_000 };
     let scheduler = Arc::new(Scheduler::new(1)?);
     let (mut renderer, submitter) =
-        Renderer::builder(BackendName::Noop.open()?).deferred(Deferred::to_picture()).build(scheduler)?;
+        Renderer::builder(BackendName::Noop.open()?).pipeline(Deferred::to_picture()).build(scheduler)?;
     let mut world = Moving::new(city::new(100, [160, 90])?, Motion::Cameras);
     let mut times = PLACES.map(|_| Vec::with_capacity(frames));
     progress.inc_length(frames as u64);

@@ -69,7 +69,7 @@ fn renderer() -> Result<(Renderer<WgpuBackend>, Submitter<WgpuBackend>), Box<dyn
     let backend = backend.recording_strategy(RecordingStrategy::Direct).encoding_strategy(EncodingStrategy::OnSubmit);
     let scheduler = Arc::new(Scheduler::new(1)?);
     // Without instancing each box is a draw, so that there is much to encode.
-    Ok(Renderer::builder(backend).deferred(Deferred::to_picture()).instancing(false).build(scheduler)?)
+    Ok(Renderer::builder(backend).pipeline(Deferred::to_picture()).instancing(false).build(scheduler)?)
 }
 
 /// The medians of an update, of recording and of submitting, on one thread.

@@ -121,7 +121,7 @@ where
     let mut contenders = Vec::new();
     for kind in Kind::ALL {
         let scheduler = Arc::new(Scheduler::new(2)?);
-        let built = Renderer::builder(open()?).deferred(Deferred::to_picture()).build(scheduler)?;
+        let built = Renderer::builder(open()?).pipeline(Deferred::to_picture()).build(scheduler)?;
         let world = Moving::new(city::new(boxes, [160, 90])?, Motion::Cameras);
         contenders.push(Contender::new(kind, built, world)?);
     }

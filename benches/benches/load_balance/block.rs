@@ -113,7 +113,7 @@ impl Block<'_> {
         if mode.translates_on_submit {
             backend = backend.encoding_strategy(EncodingStrategy::OnSubmit);
         }
-        let builder = Renderer::builder(backend).deferred(Deferred::to_picture()).quality(self.case.quality);
+        let builder = Renderer::builder(backend).pipeline(Deferred::to_picture()).quality(self.case.quality);
         let builder = builder.granularity(mode.granularity).instancing(self.case.instancing);
         let (renderer, submitter) = builder.build(Arc::clone(scheduler))?;
         let is_cut_by_cost = mode.granularity == Granularity::Adaptive;

@@ -83,7 +83,7 @@ impl Runner {
         let shadow_maps = Some(ShadowMaps { side: PICTURE, ..ShadowMaps::default() });
         let shares = u32::try_from(geometry_shares)?;
         let deferred = Deferred::to_picture().shadow_maps(shadow_maps).geometry_shares(shares);
-        let builder: RendererBuilder<_> = Renderer::builder(backend).deferred(deferred);
+        let builder: RendererBuilder<_> = Renderer::builder(backend).pipeline(deferred);
         let (renderer, submitter) =
             builder.instancing(instancing).granularity(granularity).build(Arc::clone(scheduler))?;
         Ok(Self { renderer, submitter })

@@ -225,7 +225,7 @@ impl Runner {
         boxes: usize,
         size: [u32; 2],
     ) -> Result<Self, Box<dyn Error>> {
-        let builder = Renderer::builder(backend.open()?).deferred(Deferred::to_picture()).process(Mirror);
+        let builder = Renderer::builder(backend.open()?).pipeline(Deferred::to_picture()).process(Mirror);
         let (mut renderer, submitter) = builder.build(Arc::clone(scheduler))?;
         let mut world = World::new(boxes, size)?;
         let waits = backend == BackendName::Adapter;

@@ -116,7 +116,7 @@ impl Runner {
         if keeps_all {
             deferred = deferred.names().into_iter().fold(deferred, Deferred::keep);
         }
-        let mut builder = Renderer::builder(backend.open()?.transient_targets()).deferred(deferred);
+        let mut builder = Renderer::builder(backend.open()?.transient_targets()).pipeline(deferred);
         if scene.cameras.iter().any(|camera| camera.kind == ViewKind::Reflection) {
             builder = builder.process(Mirror);
         }

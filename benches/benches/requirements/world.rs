@@ -7,7 +7,7 @@ use drawloom::handle::Handle;
 use drawloom::scene::{
     Camera, Changes, ClipPlane, LayerMask, Light, Material, Mesh, ObjectHandle, RenderObject, Scene, SceneRef, ViewKind,
 };
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 use drawloom_benches::mirror;
 use drawloom_testing::scenes::everything::{class_of, everything, glasses};
 

@@ -122,7 +122,7 @@ impl<B: Backend> Runner<B> {
     fn new(backend: B, scheduler: Arc<Scheduler>, subject: &Subject) -> Result<Self, Failure> {
         let name = backend.adapter_name();
         let Configuration { maps, quality, .. } = Configuration::exact();
-        let mut builder = Renderer::builder(backend).deferred(deferred(maps)).quality(quality);
+        let mut builder = Renderer::builder(backend).pipeline(deferred(maps)).quality(quality);
         let mut after = None;
         for (_, (view, surface)) in subject.mirrors.iter().zip(MIRRORS) {
             builder = builder.process(Mirror { view, surface, after });
@@ -150,7 +150,7 @@ where
 
     fn configure(&mut self, configuration: &Configuration) -> Result<(), Failure> {
         if self.maps != configuration.maps {
-            self.renderer.set_deferred(deferred(configuration.maps))?;
+            self.renderer.set_pipeline(deferred(configuration.maps))?;
             self.maps = configuration.maps;
         }
         self.renderer.set_quality(configuration.quality)?;

@@ -39,7 +39,7 @@ impl Graphics {
         let device_name = device.adapter_info().name;
         let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
         let (renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
-            .deferred(Deferred::to_picture())
+            .pipeline(Deferred::to_picture())
             .build(Arc::clone(&scheduler))?;
         let mut assets = Assets::default();
         let mesh = cube();

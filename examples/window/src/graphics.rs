@@ -39,7 +39,7 @@ impl Graphics {
         let picture_format = surface.picture_format();
         let tone_mapping = ToneMapping { format: picture_format, ..ToneMapping::new(1.2) };
         let (renderer, submitter) = Renderer::builder(WgpuBackend::new(wgpu_device, queue)?)
-            .deferred(Deferred::new().post(tone_mapping))
+            .pipeline(Deferred::new().post(tone_mapping))
             // So that the inspector knows the pipeline's settings.
             .quality(Quality::balanced())
             .build(Arc::clone(&scheduler))?;

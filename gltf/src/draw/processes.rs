@@ -41,7 +41,7 @@ pub fn add_world<B: Backend>(
     }
     // The last shipped process that draws shadow maps.
     let last = deferred.names().into_iter().rfind(|name| name.ends_with("shadow casters"));
-    let mut builder = builder.deferred(deferred);
+    let mut builder = builder.pipeline(deferred);
     let (mut previous, mut previous_casters) = (None, last);
     for &(kind, is_deformed) in &world.surfaces {
         let draw = |kind, after| Surfaces::new(kind, is_deformed.then(|| deformation(1)), &textures, after);

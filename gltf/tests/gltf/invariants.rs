@@ -103,5 +103,5 @@ thread_local! {
 
 fn null_renderer() -> (Renderer<NullBackend>, Submitter<NullBackend>) {
     let scheduler = Arc::new(Scheduler::new(1).expect("one worker"));
-    Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler).expect("a null backend")
+    Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler).expect("a null backend")
 }

@@ -41,7 +41,7 @@ use crate::timeline::{Labels, TuningChoice};
 ///
 /// let scheduler = Arc::new(Scheduler::new(2)?);
 /// let backend = SoftwareBackend::new(Arc::clone(&scheduler));
-/// let (mut renderer, submitter) = Renderer::builder(backend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// let (mut renderer, submitter) = Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler)?;
 ///
 /// let mut scene = Scene::new();
 /// let corner = |x, y| Vertex { position: [x, y, 0.0], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };

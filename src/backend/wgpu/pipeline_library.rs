@@ -19,9 +19,9 @@ use crate::backend::BackendError;
 /// # use std::sync::Arc;
 /// # fn open(device: wgpu::Device, queue: wgpu::Queue, scheduler: Arc<Scheduler>) -> Result<(), Box<dyn std::error::Error>> {
 /// let library = PipelineLibrary::new(device, queue);
-/// let game = Renderer::builder(library.backend()?).deferred(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
+/// let game = Renderer::builder(library.backend()?).pipeline(Deferred::to_picture()).build(Arc::clone(&scheduler))?;
 /// // Later: what the game has drawn with needs no compiling.
-/// let preview = Renderer::builder(library.backend()?).deferred(Deferred::to_picture()).build(scheduler)?;
+/// let preview = Renderer::builder(library.backend()?).pipeline(Deferred::to_picture()).build(scheduler)?;
 /// # Ok(())
 /// # }
 /// ```

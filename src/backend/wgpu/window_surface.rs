@@ -48,7 +48,7 @@ pub struct WindowDevice {
 ///     let tone_mapping = ToneMapping { format: surface.picture_format(), ..ToneMapping::default() };
 ///     let backend = WgpuBackend::new(graphics.device.clone(), graphics.queue.clone())?;
 ///     let scheduler = Arc::new(Scheduler::with_available_parallelism()?);
-///     Ok(Renderer::builder(backend).deferred(Deferred::new().post(tone_mapping)).build(scheduler)?)
+///     Ok(Renderer::builder(backend).pipeline(Deferred::new().post(tone_mapping)).build(scheduler)?)
 /// }
 ///
 /// /// When the window asks to be drawn.

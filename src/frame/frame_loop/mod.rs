@@ -38,7 +38,7 @@ use crate::unwind::{Contained, discard, discard_all};
 /// # let scheduler = Arc::new(Scheduler::new(2)?);
 /// # let mut world = Scene::new();
 /// # world.cameras.push(Camera::looking_at("main", DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO));
-/// let (renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// let (renderer, submitter) = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler)?;
 /// let mut frames = FrameLoop::new(renderer, submitter, Buffering::Double)?;
 /// for _ in 0..3 {
 ///     // Waits while two frames are in flight.

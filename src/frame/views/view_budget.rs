@@ -56,7 +56,7 @@ use crate::unwind::emit;
 /// use drawloom::{BudgetedView, Renderer, QualityLevel, ViewBudget, ViewVariant};
 ///
 /// # let scheduler = Arc::new(Scheduler::new(2)?);
-/// # let (mut renderer, submitter) = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).build(scheduler)?;
+/// # let (mut renderer, submitter) = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).build(scheduler)?;
 /// # let scene = Scene::new();
 /// let mut budget = ViewBudget::new(4.0)?;
 /// for _frame in 0..3 {

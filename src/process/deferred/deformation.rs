@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::process::{Access, CommandDraws, Declare, Draws, RenderProcess, ShaderResource};
+use crate::process::{CommandDraws, Contained, Declare, Draws, RenderProcess, ShaderResource};
 use crate::scene::LayerMask;
-use crate::unwind::Contained;
 
 /// Vertex code of the engine's own for some objects: skinning, morph targets, wind. The [deferred
 /// pipeline](super::Deferred) draws these objects as it draws others, with their shadows, in processes of their own:
@@ -233,11 +232,7 @@ impl RenderProcess for Deformed {
 
     fn declare(&self, declare: &mut Declare) {
         self.process.declare(declare);
-        declare.replace_accesses(|access| match access {
-            Access::ClearColor(..) => Access::DrawOver,
-            Access::ClearDepth(_) | Access::ClearDepthLayer(_) => Access::DrawDepth,
-            other => other,
-        });
+        declare.without_clears();
         self.deformation.declare(declare);
     }
 

@@ -5,7 +5,7 @@ mod cpu_shader;
 
 use super::GeometryFormats;
 use super::shading::{COLORED_SURFACE_SHADER, SURFACE_SHADER};
-use crate::command::{MaterialShare, Selection};
+use crate::command::Selection;
 use crate::process::{ClearColor, CommandDraws, Declare, Draws, MaskedEntryPoints, RenderProcess, targets};
 use crate::scene::VERTEX_COLOR;
 
@@ -29,7 +29,8 @@ pub struct GeometryBuffer {
     name: String,
     shader: String,
     formats: GeometryFormats,
-    share: MaterialShare,
+    /// The share of the materials that it draws, and how many shares there are.
+    share: (u32, u32),
     has_depth: bool,
     has_colors: bool,
 }
@@ -37,18 +38,22 @@ pub struct GeometryBuffer {
 impl GeometryBuffer {
     /// Draws every opaque object whose material has no [`MaterialType`](crate::scene::MaterialType).
     pub fn new(formats: GeometryFormats) -> Self {
-        Self::of_share(formats, MaterialShare::ALL)
+        Self::of_share(formats, 0, 1)
     }
 
-    /// Draws the objects of a share of the materials (L 5). The first share clears the targets, the others draw over
-    /// them: all shares are recorded at the same time.
-    pub(crate) fn of_share(formats: GeometryFormats, share: MaterialShare) -> Self {
-        let name = if share.of <= 1 {
-            String::from("geometry buffer")
-        } else {
-            format!("geometry buffer {} of {}", share.index + 1, share.of)
-        };
-        Self { name, shader: shader(SURFACE_SHADER, formats), formats, share, has_depth: false, has_colors: false }
+    /// Draws the objects of share `index` of `of` shares of the materials (L 5). The first share clears the targets, the
+    /// others draw over them: all shares are recorded at the same time.
+    pub(crate) fn of_share(formats: GeometryFormats, index: u32, of: u32) -> Self {
+        let name =
+            if of <= 1 { String::from("geometry buffer") } else { format!("geometry buffer {} of {of}", index + 1) };
+        Self {
+            name,
+            shader: shader(SURFACE_SHADER, formats),
+            formats,
+            share: (index, of),
+            has_depth: false,
+            has_colors: false,
+        }
     }
 
     /// The same with [`VERTEX_COLOR`]: it multiplies diffuse colours by those of the vertices, which are white in
@@ -82,7 +87,7 @@ impl RenderProcess for GeometryBuffer {
             (targets::DIFFUSE, diffuse, zero),
             (targets::RADIANCE, radiance, ClearColor::Background),
         ];
-        let first = self.share.index == 0;
+        let first = self.share.0 == 0;
         for (target, format, clear) in targets {
             if first {
                 declare.clears_color(target, format, clear);
@@ -103,9 +108,10 @@ impl RenderProcess for GeometryBuffer {
     }
 
     fn draws(&self) -> Draws<'_> {
+        let (index, of) = self.share;
         Draws::Commands(CommandDraws {
             shader: &self.shader,
-            selection: Selection { materials: self.share, ..Selection::OPAQUE.of_shipped_materials() },
+            selection: Selection::OPAQUE.of_shipped_materials().of_material_share(index, of),
             writes_depth: !self.has_depth,
             masked: Some(MaskedEntryPoints { vertex: "vertex", fragment: "masked_fragment" }),
             ..CommandDraws::default()

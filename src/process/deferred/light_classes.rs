@@ -17,10 +17,6 @@ impl LightClasses {
         self.0
     }
 
-    pub(super) fn union(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-
     pub(super) fn contains(self, class: LightClass) -> bool {
         self.0 & 1 << class.index() != 0
     }

@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use super::deformation::{Deformation, split_by_deformation, undeformed, undeformed_name};
 use super::{
-    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, InjectionPoint, LightClasses, LightSum, LightTiles,
-    LightVolumes, Requirements, ShadowCasters, Transparency,
+    DepthPrePass, FloatSum, GeometryBuffer, GeometryFormats, LightClasses, LightSum, LightTiles, LightVolumes,
+    ShadowCasters, Transparency,
 };
-use crate::command::MaterialShare;
-use crate::process::{ChainSlot, PlanError, PostStep, RenderProcess, ToneMapping, targets};
+use crate::process::{
+    Contained, DeviceSupport, Format, InjectionPoint, Pipeline, PipelineProcesses, PlanError, PostStep, RenderProcess,
+    Requirements, SceneContents, ToneMapping, targets,
+};
 use crate::quality::{Quality, RadianceSum};
-use crate::unwind::Contained;
+use crate::scene::{ShadowProjection, ViewKind};
 use crate::view::{LightClass, ShadowMaps};
 
 /// The deferred pipeline of L 4: its settings, its post-processing, and the processes that an engine replaces or leaves
@@ -181,28 +183,19 @@ impl Deferred {
         if self.steps().next().is_none() { targets::RADIANCE.name() } else { targets::PICTURE.name() }
     }
 
-    /// Sets whether the backend can [blend floats](crate::backend::BackendExtras::can_blend_floats).
-    pub(crate) fn with_float_blending(self, blends_floats: bool) -> Self {
-        Self { blends_floats, ..self }
-    }
-
-    pub(crate) fn blends_floats(&self) -> bool {
-        self.blends_floats
-    }
-
-    /// Whether blended objects are added in half floats only because the backend cannot blend floats.
-    pub(crate) fn lacks_float_blending(&self) -> bool {
-        !self.blends_floats && self.would_sum_blended_objects()
+    /// The pipeline for this device.
+    fn on(&self, device: DeviceSupport) -> Self {
+        Self { blends_floats: device.float_blending, ..self.clone() }
     }
 
     /// The names of all processes that a frame may have, whatever the scene, in order. Asks steps and deformations,
     /// whose panics unwind to the caller.
     pub fn names(&self) -> Vec<String> {
-        self.build(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
+        self.assemble(&Requirements::all()).iter().flatten().map(|process| process.name().to_owned()).collect()
     }
 
     /// How shadow maps are drawn, if they are drawn.
-    pub(crate) fn maps(&self) -> Option<&ShadowMaps> {
+    fn maps(&self) -> Option<&ShadowMaps> {
         self.shadow_maps.as_ref().filter(|_| !self.left_out.iter().any(|name| name == ShadowCasters::NAME))
     }
 
@@ -217,9 +210,9 @@ impl Deferred {
     }
 
     /// What frames have processes for whatever their scene.
-    pub(crate) fn kept_requirements(&self) -> Requirements {
+    fn kept_requirements(&self) -> Requirements {
         let light_term = self.light_term();
-        Requirements::of_processes(|name| {
+        let is_kept = |name: &str| {
             self.kept.iter().any(|kept| {
                 let deformed =
                     || self.deformations.iter().filter_map(|deformation| undeformed_name(&**deformation, kept));
@@ -232,7 +225,11 @@ impl Deferred {
                 };
                 kept == name || deformed().any(|undeformed| undeformed == name) || has_sum
             })
-        })
+        };
+        let lights = LightClass::all().filter(|class| is_kept(&LightVolumes::name_of(*class)));
+        let kept = lights.fold(Requirements::default(), Requirements::with_lights);
+        let kept = if is_kept(Transparency::NAME) { kept.with_transparency() } else { kept };
+        if is_kept(ShadowCasters::NAME) { kept.with_shadow_maps() } else { kept }
     }
 
     /// The name of a process whose lights are summed, if possible of one without shadow maps; `None` if no lights are.
@@ -243,57 +240,23 @@ impl Deferred {
         term.filter(|_| self.light_sum() != RadianceSum::HalfFloat).map(LightVolumes::name_of)
     }
 
-    /// The processes that draw a scene, each in its slot. Empty slots mark the places for an engine's processes.
-    pub(crate) fn chain(&self, requirements: &Requirements) -> Vec<ChainSlot> {
-        let mut built: Vec<_> = self.build(requirements).into_iter().flatten().collect();
-        let slot = |name: String| {
-            let shipped = built.iter().position(|process| process.name() == name).map(|index| built.swap_remove(index));
-            let replacement =
-                self.replaced.iter().find(|(replaced, _)| *replaced == name).map(|(_, process)| Arc::clone(process));
-            // A replacement of a process that draws deformed objects draws these.
-            let is_deformed =
-                self.deformations.iter().any(|deformation| undeformed_name(&**deformation, &name).is_some());
-            let excluded = if is_deformed { &[][..] } else { &self.deformations };
-            let replacement = replacement.map(|process| undeformed(process, excluded));
-            let process = shipped.map(|shipped| replacement.unwrap_or(shipped));
-            let process = process.filter(|_| !self.left_out.contains(&name) && !self.is_summed_in_shader(&name));
-            ChainSlot { process, keep: self.kept.contains(&name), name }
+    /// The process in the slot of this name, for the one that comes with the crate, if the frame has that.
+    fn process_in_slot(&self, name: &str, shipped: Option<Arc<dyn RenderProcess>>) -> Option<Arc<dyn RenderProcess>> {
+        let shipped = shipped?;
+        if self.left_out.iter().any(|left_out| left_out == name) || self.is_summed_in_shader(name) {
+            return None;
+        }
+        let Some((_, replacement)) = self.replaced.iter().find(|(replaced, _)| replaced == name) else {
+            return Some(shipped);
         };
-        let with_place = |(processes, place): (Vec<Arc<dyn RenderProcess>>, InjectionPoint)| {
-            let names = processes.into_iter().map(|process| process.name().to_owned());
-            names.chain(place.slots().map(str::to_owned)).collect::<Vec<_>>()
-        };
-        self.build(&Requirements::all()).into_iter().zip(InjectionPoint::ALL).flat_map(with_place).map(slot).collect()
-    }
-
-    /// # Errors
-    /// If a setting is invalid, or the pipeline has no process of a name that is to be replaced, left out or kept.
-    pub(crate) fn check(&self) -> Result<(), PlanError> {
-        if let Some((target, format)) = self.formats.first_unsuitable() {
-            let process = String::from("geometry buffer");
-            return Err(PlanError::WrongFormat { process, target: target.to_string(), format });
-        }
-        if let Some(problem) = self.shadow_maps.as_ref().and_then(ShadowMaps::problem) {
-            return Err(PlanError::ShadowMaps { problem });
-        }
-        let complete = Self { left_out: Vec::new(), ..self.clone() };
-        // Which processes sum depends on the quality and the device, and these may change.
-        let with_sum = |radiance_sum| Self { radiance_sum, blends_floats: true, ..complete.clone() }.names();
-        let mut known = complete.names();
-        for name in [RadianceSum::Float, RadianceSum::Shader].into_iter().flat_map(with_sum) {
-            if !known.contains(&name) {
-                known.push(name);
-            }
-        }
-        let mut named = self.replaced.iter().map(|(name, _)| name).chain(self.left_out.iter().chain(&self.kept));
-        match named.find(|name| !known.contains(name)) {
-            Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: known.join(", ") }),
-            None => Ok(()),
-        }
+        // A replacement of a process that draws deformed objects draws these.
+        let is_deformed = self.deformations.iter().any(|deformation| undeformed_name(&**deformation, name).is_some());
+        let excluded = if is_deformed { &[][..] } else { &self.deformations };
+        Some(undeformed(Arc::clone(replacement), excluded))
     }
 
     /// The shipped processes that a scene requires, in order: those before each of [`InjectionPoint::ALL`].
-    fn build(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; InjectionPoint::ALL.len()] {
+    fn assemble(&self, requirements: &Requirements) -> [Vec<Arc<dyn RenderProcess>>; InjectionPoint::ALL.len()] {
         [
             self.shadows(requirements),
             self.geometry(),
@@ -309,7 +272,7 @@ impl Deferred {
     }
 
     fn shadows(&self, requirements: &Requirements) -> Vec<Arc<dyn RenderProcess>> {
-        let hemispheres = requirements.paraboloid_maps();
+        let hemispheres = LightClass::all().any(|class| has_paraboloid_map(&class) && requirements.lights(class));
         let casters = || Arc::new(ShadowCasters { hemispheres }) as Arc<dyn RenderProcess>;
         self.with_deformed(self.required_maps(requirements).map(|_| casters()).into_iter().collect())
     }
@@ -321,7 +284,7 @@ impl Deferred {
         }
         let of = self.geometry_shares.clamp(1, 64);
         for index in 0..of {
-            let mut geometry_buffer = GeometryBuffer::of_share(self.formats, MaterialShare { index, of });
+            let mut geometry_buffer = GeometryBuffer::of_share(self.formats, index, of);
             if self.depth_pre_pass {
                 geometry_buffer = geometry_buffer.after_depth_pre_pass();
             }
@@ -439,6 +402,89 @@ impl Deferred {
         }
         processes
     }
+}
+
+impl Pipeline for Deferred {
+    fn requirements(&self, scene: &SceneContents<'_>) -> Requirements {
+        Requirements::of(scene, self.maps().is_some())
+    }
+
+    /// Each process has its slot in every frame. Empty slots mark the places for an engine's processes.
+    fn build(
+        &self,
+        requirements: &Requirements,
+        device: DeviceSupport,
+        processes: &mut PipelineProcesses,
+    ) -> Result<(), PlanError> {
+        let pipeline = self.on(device);
+        let mut built: Vec<_> = pipeline.assemble(requirements).into_iter().flatten().collect();
+        for (possible, point) in pipeline.assemble(&Requirements::all()).into_iter().zip(InjectionPoint::ALL) {
+            for name in possible.iter().map(|process| process.name()) {
+                let shipped = built.iter().position(|process| process.name() == name);
+                match pipeline.process_in_slot(name, shipped.map(|index| built.swap_remove(index))) {
+                    Some(process) => processes.process_in(name, process),
+                    None => processes.absent(name),
+                }
+            }
+            processes.injection_point(point);
+        }
+        self.kept.iter().for_each(|name| processes.keep(name));
+        if self.maps().is_some() {
+            processes.absent_layers(ViewKind::Shadow, targets::SHADOW_MAP.name(), Format::Depth32Float);
+        }
+        processes.output(self.output());
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), PlanError> {
+        if let Some((target, format)) = self.formats.first_unsuitable() {
+            let process = String::from("geometry buffer");
+            return Err(PlanError::WrongFormat { process, target: target.to_string(), format });
+        }
+        let complete = Self { left_out: Vec::new(), ..self.clone() };
+        // Which processes sum depends on the quality and the device, and these may change.
+        let with_sum = |radiance_sum| Self { radiance_sum, blends_floats: true, ..complete.clone() }.names();
+        let mut known = complete.names();
+        for name in [RadianceSum::Float, RadianceSum::Shader].into_iter().flat_map(with_sum) {
+            if !known.contains(&name) {
+                known.push(name);
+            }
+        }
+        let mut named = self.replaced.iter().map(|(name, _)| name).chain(self.left_out.iter().chain(&self.kept));
+        match named.find(|name| !known.contains(name)) {
+            Some(name) => Err(PlanError::NoSuchProcess { name: name.clone(), known: known.join(", ") }),
+            None => Ok(()),
+        }
+    }
+
+    fn kept(&self, device: DeviceSupport) -> Requirements {
+        self.on(device).kept_requirements()
+    }
+
+    fn shadow_maps(&self) -> Option<ShadowMaps> {
+        self.maps().copied()
+    }
+
+    fn with_quality(&self, quality: &Quality) -> Option<Arc<dyn Pipeline>> {
+        Some(Arc::new(self.clone().quality(quality)))
+    }
+
+    /// Transparency reads shadow maps or does not, and shadow casters are drawn in paraboloid maps too or are not.
+    fn to_prepare(&self) -> Vec<Requirements> {
+        let without = |is_absent: fn(&LightClass) -> bool| {
+            LightClass::all().filter(is_absent).fold(Requirements::all(), Requirements::without_lights)
+        };
+        vec![Requirements::all(), without(has_paraboloid_map), without(|class| class.shadowed)]
+    }
+
+    fn lacks_float_blending(&self, device: DeviceSupport) -> bool {
+        !device.float_blending && self.would_sum_blended_objects()
+    }
+}
+
+/// Whether the lights of a class have paraboloid maps.
+fn has_paraboloid_map(class: &LightClass) -> bool {
+    class.shadowed && class.kind.shadow_projection() == ShadowProjection::Paraboloid
 }
 
 impl Default for Deferred {

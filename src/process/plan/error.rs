@@ -259,6 +259,25 @@ pub enum PlanError {
         /// Those that there may be.
         known: String,
     },
+    /// A renderer has no process or output to remove or switch that the engine added by this name.
+    #[error("the engine has added no {what} {name:?}, only: {known}")]
+    NotAdded {
+        /// `process` or `output`.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// Those that it has added.
+        known: String,
+    },
+    /// A call of the [pipeline](crate::process::Pipeline) panicked, or of what is in it: of the deferred one's steps,
+    /// deformations and replacements.
+    #[error("the pipeline's `{call}` panicked: {message}")]
+    PipelinePanicked {
+        /// The method.
+        call: &'static str,
+        /// The message of the panic.
+        message: String,
+    },
     /// A process panicked in `declare` or `draws`.
     #[error("process {process:?} panicked in `declare` or `draws`: {message}")]
     ProcessPanicked {

@@ -8,19 +8,15 @@ use std::sync::{Arc, OnceLock};
 
 use super::frame_passes::view_groups;
 use super::planned_process::ProcessId;
-use super::planned_target::{
-    Attachments, check_blending, check_stencil, placeholder_shadow_map, reads_shadow_map, targets_of,
-};
+use super::planned_target::{Attachments, absent_layers, check_blending, check_stencil, reads_layers, targets_of};
 use super::process_graph::{compile, node_name};
 use super::resource_names::passed_on_resources;
-use super::sampled_views::check_sampled_views;
+use super::sampled_views::{absent_targets, check_sampled_views};
 use super::shared_declarations::{SharedDeclarations, check_columns, check_material_types};
 use super::unknown_targets::check_left_out;
-use super::{
-    AttachmentExtent, ChainSlot, FramePasses, PlanError, PlannedProcess, PlannedTarget, TargetIndices, ViewGroup,
-};
+use super::{AttachmentExtent, FramePasses, PlanError, PlannedProcess, PlannedTarget, TargetIndices, ViewGroup};
 use crate::graph::{GraphProblem, Schedule};
-use crate::process::{BufferLayout, DeclaredAttribute, Draws, RenderProcess};
+use crate::process::{BufferLayout, DeclaredAttribute, Draws, PipelineProcesses, RenderProcess};
 use crate::scene::{ColumnLayout, MaterialLayout, SceneRef, ViewKind};
 use crate::unwind::{discard_all, emit};
 use crate::view::RenderView;
@@ -42,6 +38,8 @@ pub struct FramePlan {
     left_out: Result<(), PlanError>,
     /// The graph of the processes, whose nodes are the indices of the processes before they were ordered.
     schedule: Schedule<usize>,
+    /// Whether no process is left out because the frame lacks its views.
+    has_all_views: bool,
     /// Written on first use.
     dot: OnceLock<String>,
 }
@@ -53,42 +51,53 @@ impl FramePlan {
     /// # Errors
     /// See [`PlanError`].
     pub fn new(processes: Vec<Arc<dyn RenderProcess>>, outputs: &[String]) -> Result<Self, PlanError> {
-        let plan = Self::for_views(Vec::new(), processes, outputs, |_| true)?;
+        let plan = Self::of_pipeline(PipelineProcesses::default(), processes, outputs, |_| true)?;
         plan.check_left_out()?;
         Ok(plan)
     }
 
-    /// The plan of frames that have the kinds of views that `is_present` tells, with a chain.
+    /// The plan of frames that have the kinds of views that `is_present` tells, with the processes of a pipeline.
     ///
-    /// `chain` lists processes whose order is known: if two of them write one target, the earlier goes first. A slot
-    /// may be empty because the frame needs no such process; other processes may still be ordered before or after it.
-    /// The chain does not order its processes against writers of the same target that are outside of it. They draw in
-    /// reflections what they draw in main views.
+    /// The slots of the pipeline are a chain, whose order is known: if two of their processes write one target, the
+    /// earlier goes first. The chain does not order its processes against writers of the same target that are outside
+    /// of it.
+    ///
+    /// What processes sample of the kinds of views that are not present, they find empty. Orders and outputs that name
+    /// what only those kinds have are ignored.
     ///
     /// # Errors
     /// See [`PlanError`].
-    pub(crate) fn for_views(
-        chain: Vec<ChainSlot>,
+    pub(crate) fn of_pipeline(
+        mut pipeline: PipelineProcesses,
         processes: Vec<Arc<dyn RenderProcess>>,
         outputs: &[String],
         is_present: impl Fn(ViewKind) -> bool,
     ) -> Result<Self, PlanError> {
-        let slot_names: Vec<_> = chain.iter().map(|slot| slot.name.clone()).collect();
+        let slots = std::mem::take(&mut pipeline.slots);
+        let slot_names: Vec<_> = slots.iter().map(|slot| slot.name.clone()).collect();
         let mut added: Vec<(Option<usize>, PlannedProcess)> = Vec::new();
-        for (index, slot) in chain.into_iter().enumerate() {
+        for (index, slot) in slots.into_iter().enumerate() {
             let Some(process) = slot.process else { continue };
-            let mut of_kinds = PlannedProcess::of_each_kind(&process, true, &is_present)?;
+            let mut of_kinds = PlannedProcess::of_each_kind(&process, true)?;
             let own = of_kinds.iter_mut().filter(|planned| planned.is_of_own_kind);
             own.for_each(|planned| planned.declaration.keep |= slot.keep);
             added.extend(of_kinds.into_iter().map(|planned| (Some(index), planned)));
         }
         for process in &processes {
-            let of_kinds = PlannedProcess::of_each_kind(process, false, &is_present)?;
+            let of_kinds = PlannedProcess::of_each_kind(process, false)?;
             added.extend(of_kinds.into_iter().map(|planned| (None, planned)));
         }
+        let is_drawn = |(_, planned): &(_, PlannedProcess)| is_present(planned.declaration.views);
+        let (mut added, absent): (Vec<_>, Vec<_>) = added.into_iter().partition(is_drawn);
+        let absent: Vec<_> = absent.into_iter().map(|(_, planned)| planned).collect();
         added.sort_by_key(|(_, planned)| planned.declaration.views);
-        let placeholder = placeholder_shadow_map(&slot_names, &added);
-        let schedule = compile(&slot_names, &added, placeholder.as_ref(), outputs)?;
+        let is_output = |output: &&String| {
+            let writes = |planned: &PlannedProcess| planned.is_output_writer(output);
+            added.iter().any(|(_, planned)| writes(planned)) || !absent.iter().any(writes)
+        };
+        let outputs: Vec<_> = outputs.iter().chain(&pipeline.outputs).filter(is_output).cloned().collect();
+        let absent_layers = absent_layers(&pipeline, &added, &absent);
+        let schedule = compile(&slot_names, &added, &absent, &absent_layers, &outputs)?;
         let shipped = added.iter().filter(|(_, planned)| slot_names.contains(&planned.name));
         let shipped: Vec<_> = shipped.map(|(_, planned)| node_name(&added, planned)).collect();
         for process in schedule.dropped().iter().filter(|name| !shipped.contains(name)) {
@@ -99,13 +108,15 @@ impl FramePlan {
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
         let mut processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
         let is_left_out = |index| schedule.nodes().all(|(_, kept)| *kept != index);
-        let left_out = check_left_out(&added, is_left_out, placeholder.as_ref());
-        if processes.is_empty() {
+        let left_out = check_left_out(&added, is_left_out, &absent, &absent_layers);
+        if processes.is_empty() && absent.is_empty() {
             return Err(left_out.err().unwrap_or(PlanError::Empty));
         }
         let view_groups = view_groups(&processes, &edges);
-        let mut targets = targets_of(&processes, outputs)?;
-        targets.extend(placeholder.filter(|_| processes.iter().any(reads_shadow_map)));
+        let mut targets = targets_of(&processes, &outputs)?;
+        let is_read = |target: &PlannedTarget| processes.iter().any(|planned| reads_layers(planned, target));
+        targets.extend(absent_layers.into_iter().filter(is_read));
+        targets.extend(absent_targets(&processes, &absent, &targets));
         check_sampled_views(&processes, &targets)?;
         let shared = SharedDeclarations::new(&processes)?;
         let attachments = processes.iter().map(|planned| Attachments::new(planned, &targets)).collect();
@@ -126,6 +137,7 @@ impl FramePlan {
             attachments,
             left_out,
             schedule,
+            has_all_views: absent.is_empty(),
             dot: OnceLock::new(),
         })
     }
@@ -142,6 +154,12 @@ impl FramePlan {
     /// A number that no other plan of this program has.
     pub fn identity(&self) -> u64 {
         self.identity
+    }
+
+    /// Whether no process is left out because the frame lacks its views: then frames with other views have this plan too,
+    /// unless a pipeline's requirements differ.
+    pub(crate) fn has_all_views(&self) -> bool {
+        self.has_all_views
     }
 
     /// Gives the processes the ids that are known of their names and kinds of views, and makes the others known.

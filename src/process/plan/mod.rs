@@ -23,6 +23,5 @@ pub use frame_plan::FramePlan;
 pub use planned_process::{Pass, PlannedProcess};
 pub(crate) use planned_process::{ProcessId, TargetIndices};
 pub use planned_target::{AttachmentExtent, PlannedTarget};
-pub(crate) use process_graph::ChainSlot;
 pub use sampled_views::SampledViews;
 pub(crate) use view_arrays::ViewArray;

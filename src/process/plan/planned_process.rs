@@ -63,17 +63,13 @@ pub(crate) struct ProcessId {
 }
 
 impl PlannedProcess {
-    /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in, if
-    /// `is_present` says that frames have such views; if it `is_chained`, also for the kinds that share the chain of the
-    /// kind that it declares. What draws once a frame does so in the kind that it declares.
+    /// Calls a process's `name` and `declare`, once. Returns the process for each kind of view that it draws in; if it
+    /// `is_chained`, also for the kinds that share the chain of the kind that it declares. What draws once a frame does
+    /// so in the kind that it declares.
     ///
     /// # Errors
     /// If one of them panics, or `declare` declares more than one depth target.
-    pub(super) fn of_each_kind(
-        process: &Arc<dyn RenderProcess>,
-        is_chained: bool,
-        is_present: impl Fn(ViewKind) -> bool,
-    ) -> Result<Vec<Self>, PlanError> {
+    pub(super) fn of_each_kind(process: &Arc<dyn RenderProcess>, is_chained: bool) -> Result<Vec<Self>, PlanError> {
         let name =
             catch(|| process.name().to_owned()).map_err(|JobPanic { message, .. }| PlanError::Panicked { message })?;
         let mut declare = Declare::default();
@@ -87,7 +83,7 @@ impl PlannedProcess {
         let shares_chain = |kind: &ViewKind| is_chained && kind.rules().shares_chain_of == Some(*views);
         let further = also_views.iter().copied().chain(ViewKind::ALL.into_iter().filter(shares_chain));
         let further = further.filter(|_| !declaration.once_a_frame);
-        let mut kinds: Vec<_> = iter::once(*views).chain(further).filter(|kind| is_present(*kind)).collect();
+        let mut kinds: Vec<_> = iter::once(*views).chain(further).collect();
         kinds.sort_unstable();
         kinds.dedup();
         let own_kind = *views;
@@ -107,6 +103,11 @@ impl PlannedProcess {
             }
         };
         Ok(kinds.into_iter().map(of_kind).collect())
+    }
+
+    /// Whether it makes a target an output of this name: it writes it in the kind of views that it declares.
+    pub(super) fn is_output_writer(&self, output: &str) -> bool {
+        self.is_of_own_kind && self.declaration.written().any(|target| target == output)
     }
 
     /// What the process draws in this frame.

@@ -6,7 +6,7 @@ use super::mip_levels::{check_mip_levels, created_targets, mip_levels_error};
 use super::resource_names::views_of_output;
 use super::{PlanError, PlannedProcess};
 use crate::process::{
-    Access, BlendEquation, Declaration, Draws, Format, ShadowCasters, TargetSize, list_names, previous_name, targets,
+    Access, BlendEquation, Declaration, Draws, Format, PipelineProcesses, TargetSize, list_names, previous_name,
 };
 use crate::scene::{Blend, ViewKind};
 
@@ -97,55 +97,36 @@ fn written_targets(processes: &[PlannedProcess]) -> Result<Vec<PlannedTarget>, P
     let mut targets: Vec<PlannedTarget> = Vec::new();
     processes.iter().try_for_each(check_declared_targets)?;
     for (planned, name, access) in accesses(processes) {
-        let Some(format) = access.format() else { continue };
-        let views = planned.declaration.views;
-        let layered = matches!(access, Access::ClearDepthLayer(_));
-        let size = size_of(&planned.declaration, name);
-        let multisampled = planned.declaration.multisampled.contains(name);
-        let mipmapped = planned.declaration.mipmapped.contains(name);
-        match targets.iter().find(|known| known.name == *name && known.views == views) {
-            Some(known) if known.format != format => {
+        let Some(created) = created_target(planned, name, access) else { continue };
+        match targets.iter().find(|known| known.name == created.name && known.views == created.views) {
+            Some(known) if known.format != created.format => {
                 return Err(PlanError::ConflictingFormats {
-                    target: name.clone(),
+                    target: created.name,
                     first: known.format,
-                    second: format,
+                    second: created.format,
                 });
             }
-            Some(known) if known.layered != layered => {
-                return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: name.clone() });
+            Some(known) if known.layered != created.layered => {
+                return Err(PlanError::LayeringMismatch { process: planned.name.clone(), target: created.name });
             }
-            Some(known) if known.multisampled != multisampled => {
+            Some(known) if known.multisampled != created.multisampled => {
                 let problem = "another process creates it with another number of samples";
                 return Err(multisampling_error(planned, name, problem));
             }
-            Some(known) if known.mipmapped != mipmapped => {
-                let problem = if mipmapped {
+            Some(known) if known.mipmapped != created.mipmapped => {
+                let problem = if created.mipmapped {
                     "another process creates it without them"
                 } else {
                     "another process creates it with them"
                 };
                 return Err(mip_levels_error(planned, name, problem));
             }
-            Some(known) if known.size != size => {
-                return Err(PlanError::ConflictingSizes { target: name.clone(), first: known.size, second: size });
+            Some(known) if known.size != created.size => {
+                let (first, second) = (known.size, created.size);
+                return Err(PlanError::ConflictingSizes { target: created.name, first, second });
             }
             Some(_) => {}
-            None => {
-                let (name, copy_of) = (name.clone(), None);
-                let (stored, output) = (false, false);
-                targets.push(PlannedTarget {
-                    name,
-                    views,
-                    format,
-                    stored,
-                    layered,
-                    size,
-                    multisampled,
-                    mipmapped,
-                    output,
-                    copy_of,
-                });
-            }
+            None => targets.push(created),
         }
     }
     Ok(targets)
@@ -157,6 +138,33 @@ pub(super) fn check_declared_targets(planned: &PlannedProcess) -> Result<(), Pla
     check_sizes(planned)?;
     check_multisampling(planned)?;
     check_mip_levels(planned)
+}
+
+/// The target that a process creates by an access; `None` if it only uses it.
+pub(super) fn created_target(planned: &PlannedProcess, name: &str, access: Access) -> Option<PlannedTarget> {
+    Some(PlannedTarget {
+        size: size_of(&planned.declaration, name),
+        layered: matches!(access, Access::ClearDepthLayer(_)),
+        multisampled: planned.declaration.multisampled.iter().any(|target| target == name),
+        mipmapped: planned.declaration.mipmapped.iter().any(|target| target == name),
+        ..unwritten_target(planned.declaration.views, name, access.format()?)
+    })
+}
+
+/// A target of the picture's size that no process writes.
+fn unwritten_target(views: ViewKind, name: &str, format: Format) -> PlannedTarget {
+    PlannedTarget {
+        name: name.to_owned(),
+        views,
+        format,
+        stored: false,
+        layered: false,
+        size: TargetSize::Picture,
+        multisampled: false,
+        mipmapped: false,
+        output: false,
+        copy_of: None,
+    }
 }
 
 fn size_of(declaration: &Declaration, target: &str) -> TargetSize {
@@ -410,40 +418,41 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
     Ok(copies)
 }
 
-/// An empty shadow map, if a process reads one and none draws it because no light casts shadows: there must still be a
-/// texture to bind.
-pub(super) fn placeholder_shadow_map(
-    slot_names: &[String],
+/// The targets in layers that processes sample although none of the frame draws them: those that the pipeline names, and
+/// those of kinds of views that the frame does not have. What samples them finds one layer of zeros.
+pub(super) fn absent_layers(
+    pipeline: &PipelineProcesses,
     added: &[(Option<usize>, PlannedProcess)],
-) -> Option<PlannedTarget> {
-    let is_read = added.iter().any(|(_, other)| reads_shadow_map(other));
-    let is_drawn = added.iter().any(|(_, other)| {
-        other.declaration.views.rules().is_shadow_map
-            && other.declaration.written().any(|target| target == targets::SHADOW_MAP.name())
-    });
-    let may_be_drawn = slot_names.iter().any(|name| name == ShadowCasters::NAME);
-    (is_read && !is_drawn && may_be_drawn).then(|| PlannedTarget {
-        name: targets::SHADOW_MAP.to_string(),
-        views: ViewKind::Shadow,
-        format: Format::Depth32Float,
-        stored: false,
-        layered: true,
-        size: TargetSize::Picture,
-        multisampled: false,
-        mipmapped: false,
-        output: false,
-        copy_of: None,
-    })
+    absent: &[PlannedProcess],
+) -> Vec<PlannedTarget> {
+    let named = pipeline
+        .absent_layers
+        .iter()
+        .map(|named| PlannedTarget { layered: true, ..unwritten_target(named.views, &named.target, named.format) });
+    let created = accesses(absent).filter_map(|(planned, name, access)| created_target(planned, name, access));
+    let mut targets: Vec<PlannedTarget> = Vec::new();
+    for target in named.chain(created.filter(|target| target.layered)) {
+        let is_read = added.iter().any(|(_, other)| reads_layers(other, &target));
+        let is_drawn = added.iter().any(|(_, other)| {
+            other.declaration.views == target.views && other.declaration.written().any(|name| name == target.name)
+        });
+        let is_known = targets.iter().any(|known| (known.views, &known.name) == (target.views, &target.name));
+        if is_read && !is_drawn && !is_known {
+            targets.push(target);
+        }
+    }
+    targets
 }
 
-pub(super) fn reads_shadow_map(planned: &PlannedProcess) -> bool {
-    planned.declaration.accesses.iter().any(|(target, access)| {
+/// Whether a process samples a target in layers, or as those of a view.
+pub(super) fn reads_layers(planned: &PlannedProcess, target: &PlannedTarget) -> bool {
+    planned.declaration.accesses.iter().any(|(name, access)| {
         let (Access::SampleLayers(views) | Access::SampleView(views, _)) = access else { return false };
-        target == targets::SHADOW_MAP.name() && views.rules().is_shadow_map
+        *name == target.name && *views == target.views
     })
 }
 
-fn accesses(processes: &[PlannedProcess]) -> impl Iterator<Item = (&PlannedProcess, &String, Access)> {
+pub(super) fn accesses(processes: &[PlannedProcess]) -> impl Iterator<Item = (&PlannedProcess, &String, Access)> {
     processes
         .iter()
         .flat_map(|planned| planned.declaration.accesses.iter().map(move |(target, access)| (planned, target, *access)))

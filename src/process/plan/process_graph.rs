@@ -1,29 +1,17 @@
 //! From processes to the graph of what they read and write, and the order constraints that reads and writes do not
 //! imply.
 
-use std::sync::Arc;
-
 use super::resource_names::{buffer_name, resource_name, views_of_output};
 use super::unknown_targets::error_of_graph;
 use super::{PlanError, PlannedProcess, PlannedTarget};
 use crate::graph::{CompileError, FrameGraph, NodeId, Schedule};
-use crate::process::{Access, BufferAccess, Declaration, InjectionPoint, RenderProcess, previous_name};
+use crate::process::{Access, BufferAccess, Declaration, InjectionPoint, previous_name};
 use crate::scene::ViewKind;
-
-/// A slot of a chain: a list of processes whose order is known.
-#[derive(Clone)]
-pub(crate) struct ChainSlot {
-    /// The name of the process that comes with the crate for this slot, also if another replaces it.
-    pub name: String,
-    /// The process in the slot; `None` if the frame has none there.
-    pub process: Option<Arc<dyn RenderProcess>>,
-    /// Whether the process stays although no output depends on it.
-    pub keep: bool,
-}
 
 /// Orders the processes by what they read and write, and drops those on which no output depends. `added` are the
 /// processes in descending priority, each with its slot in the chain if it has one. The nodes of the schedule are their
-/// indices.
+/// indices. `absent` are those of views that the frame does not have, and `imported` the targets that are there without
+/// a process that writes them.
 ///
 /// What a process samples of other views is an output of those: which view that is, and the order of views, depends on
 /// the scene. So targets that the remaining processes sample are outputs too, and so are those whose history they read.
@@ -33,10 +21,11 @@ pub(crate) struct ChainSlot {
 pub(super) fn compile(
     slot_names: &[String],
     added: &[(Option<usize>, PlannedProcess)],
-    imported: Option<&PlannedTarget>,
+    absent: &[PlannedProcess],
+    imported: &[PlannedTarget],
     outputs: &[String],
 ) -> Result<Schedule<usize>, PlanError> {
-    let graph = process_graph(slot_names, added, imported, outputs)?;
+    let graph = process_graph(slot_names, added, absent, imported, outputs)?;
     let schedule = graph.compile_with_outputs_of(|index| sampled_resources(added, &added[*index].1));
     schedule.map_err(|CompileError { graph, problem, .. }| {
         // What the outputs themselves lack is named before what the views lack that they sample.
@@ -66,7 +55,8 @@ fn sampled_resources(added: &[(Option<usize>, PlannedProcess)], planned: &Planne
 fn process_graph(
     slot_names: &[String],
     added: &[(Option<usize>, PlannedProcess)],
-    imported: Option<&PlannedTarget>,
+    absent: &[PlannedProcess],
+    imported: &[PlannedTarget],
     outputs: &[String],
 ) -> Result<FrameGraph<usize>, PlanError> {
     let mut graph = FrameGraph::new();
@@ -102,11 +92,20 @@ fn process_graph(
         }
         nodes.push(AddedProcess { chain_slot: *chain_slot, name, id, declaration });
     }
-    if let Some(target) = imported {
+    // Readers of what an absent process changes find what a frame before left.
+    for (buffer, _) in absent
+        .iter()
+        .flat_map(|planned| &planned.declaration.buffers)
+        .filter(|(_, access)| *access == BufferAccess::Change)
+    {
+        let resource = graph.resource(buffer_name(buffer.name));
+        graph.import(resource);
+    }
+    for target in imported {
         let resource = graph.resource(resource_name(target.views, &target.name));
         graph.import(resource);
     }
-    for (before, after) in order_constraints(slot_names, &nodes)? {
+    for (before, after) in order_constraints(slot_names, absent, &nodes)? {
         graph.order(before, after);
     }
     for output in outputs {
@@ -141,11 +140,13 @@ pub(super) struct AddedProcess<'a> {
 }
 
 /// The pairs (before, after) that follow from the chain and from what processes declare with `after` and `before`.
+/// Nothing is ordered by `absent` processes, those of views that the frame does not have.
 ///
 /// # Errors
 /// If a process names one that there is not.
 pub(super) fn order_constraints(
     slot_names: &[String],
+    absent: &[PlannedProcess],
     added: &[AddedProcess<'_>],
 ) -> Result<Vec<(NodeId, NodeId)>, PlanError> {
     let mut orders = Vec::new();
@@ -163,11 +164,11 @@ pub(super) fn order_constraints(
     }
     for own in added {
         for before in &own.declaration.after {
-            let known = find(slot_names, added, (own, before), |empty, filled| filled <= empty);
+            let known = find((slot_names, absent), added, (own, before), |empty, filled| filled <= empty);
             orders.extend(known.map_err(|error| error.in_process(own, before))?.map(|before| (before, own.id)));
         }
         for after in &own.declaration.before {
-            let known = find(slot_names, added, (own, after), |empty, filled| filled >= empty);
+            let known = find((slot_names, absent), added, (own, after), |empty, filled| filled >= empty);
             orders.extend(known.map_err(|error| error.in_process(own, after))?.map(|after| (own.id, after)));
         }
     }
@@ -198,9 +199,9 @@ pub(super) fn order_constraints(
 /// `is_on_side(empty, filled)` holds. Of a process that draws in several kinds of views, the one that [`is_for`] `own`.
 ///
 /// # Errors
-/// If neither a process nor a slot has this name.
+/// If neither a process, drawn or absent, nor a slot has this name.
 fn find(
-    slot_names: &[String],
+    (slot_names, absent): (&[String], &[PlannedProcess]),
     added: &[AddedProcess<'_>],
     (own, name): (&AddedProcess<'_>, &str),
     is_on_side: impl Fn(usize, usize) -> bool,
@@ -209,7 +210,9 @@ fn find(
         let found = added.iter().find(|other| other.name == name && is_for(added, own, other));
         return Ok(found.map(|found| found.id));
     }
-    let empty = slot_names.iter().position(|slot_name| slot_name == name).ok_or(UnknownName)?;
+    let Some(empty) = slot_names.iter().position(|slot_name| slot_name == name) else {
+        return if absent.iter().any(|other| other.name == name) { Ok(None) } else { Err(UnknownName) };
+    };
     let in_chain = added.iter().filter(|other| is_for(added, own, other));
     let in_chain = in_chain.filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
     let nearest = in_chain.filter(|(slot, _)| is_on_side(empty, *slot)).min_by_key(|(slot, _)| slot.abs_diff(empty));

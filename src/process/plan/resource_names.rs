@@ -32,9 +32,7 @@ pub(super) fn passed_on_resources(before: &Declaration, after: &Declaration) -> 
 /// The kinds of views whose target of this name is an output: those in which processes write it that declare to draw
 /// there. In further kinds of views they draw what others sample. Main views if there is none.
 pub(super) fn views_of_output<'a>(processes: impl Iterator<Item = &'a PlannedProcess>, output: &str) -> Vec<ViewKind> {
-    let writers = processes
-        .filter(|planned| planned.is_of_own_kind)
-        .filter(|planned| planned.declaration.written().any(|target| target == output));
+    let writers = processes.filter(|planned| planned.is_output_writer(output));
     let kinds: Vec<_> = writers.map(|planned| planned.declaration.views).collect();
     if kinds.is_empty() { vec![ViewKind::Main] } else { kinds }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::planned_target::{accesses, created_target};
 use super::target_indices::sampled_target;
 use super::{Pass, PlanError, PlannedProcess, PlannedTarget};
 use crate::process::{Access, SampledShape, SampledView, list_names, source_of_previous};
@@ -136,6 +137,35 @@ pub(super) fn check_sampled_views(processes: &[PlannedProcess], targets: &[Plann
         }
     }
     Ok(())
+}
+
+/// The targets that processes sample of kinds of views that the frame does not have, unless a target of the same name
+/// in other views has the same format: what samples them finds a pixel of zeros. `absent` are the processes of those
+/// kinds.
+pub(super) fn absent_targets(
+    processes: &[PlannedProcess],
+    absent: &[PlannedProcess],
+    targets: &[PlannedTarget],
+) -> Vec<PlannedTarget> {
+    let mut added: Vec<PlannedTarget> = Vec::new();
+    for (_, name, access) in accesses(processes) {
+        let (Access::SampleView(views, _) | Access::SampleViewPrevious(views, _)) = access else { continue };
+        let name = source_of_previous(name).filter(|_| access.is_previous()).unwrap_or(name);
+        let mut created =
+            accesses(absent).filter(|(planned, other, _)| planned.declaration.views == views && *other == name);
+        let Some(created) = created.find_map(|(planned, name, access)| created_target(planned, name, access)) else {
+            continue;
+        };
+        let is_alike = |known: &PlannedTarget| {
+            (known.format, known.multisampled, known.layered) == (created.format, created.multisampled, created.layered)
+        };
+        let found = sampled_target(targets, views, name).map(|index| &targets[index]);
+        let is_added = added.iter().any(|known| (known.views, known.name.as_str()) == (views, name));
+        if !is_added && !found.is_some_and(is_alike) {
+            added.push(created);
+        }
+    }
+    added
 }
 
 /// See [`FramePlan::has_raw_access`](super::FramePlan::has_raw_access).

@@ -30,11 +30,13 @@ pub(super) fn error_of_graph(added: &Added, problem: GraphProblem) -> PlanError 
 /// # Errors
 /// If a process of the engine's is left out because no output depends on it, and names a target that no process
 /// creates: the graph only checks what is not left out. The error of a misspelt target is worth more than the warning
-/// that nothing depends on it.
+/// that nothing depends on it. `absent` are the processes of views that the frame does not have, and `imported` the
+/// targets that are there without a process that writes them.
 pub(super) fn check_left_out(
     added: &Added,
     is_left_out: impl Fn(usize) -> bool,
-    imported: Option<&PlannedTarget>,
+    absent: &[PlannedProcess],
+    imported: &[PlannedTarget],
 ) -> Result<(), PlanError> {
     for (index, (slot, planned)) in added.iter().enumerate() {
         if slot.is_some() || !is_left_out(index) {
@@ -42,7 +44,7 @@ pub(super) fn check_left_out(
         }
         check_declared_targets(planned)?;
         for (target, access) in &planned.declaration.accesses {
-            check_access(added, planned, (target, *access), imported)?;
+            check_access(added, planned, (target, *access), absent, imported)?;
         }
     }
     Ok(())
@@ -54,7 +56,8 @@ fn check_access(
     added: &Added,
     planned: &PlannedProcess,
     (declared, access): (&String, Access),
-    imported: Option<&PlannedTarget>,
+    absent: &[PlannedProcess],
+    imported: &[PlannedTarget],
 ) -> Result<(), PlanError> {
     let views = access.views(planned.declaration.views);
     let target = if access.is_previous() { source_of_previous(declared).unwrap_or(declared) } else { declared };
@@ -67,8 +70,9 @@ fn check_access(
     // Where no process draws such views, what is sampled of them is a pixel in the format of the same target elsewhere.
     let is_anywhere = sampled_view.is_some() && added.iter().all(|(_, other)| other.declaration.views != views);
     let is_created = created_targets(added).any(|(of, name)| name == target && (of == views || is_anywhere));
-    let is_imported = imported.is_some_and(|imported| imported.name == *target && imported.views == views);
-    if is_created || is_imported {
+    let is_absent = absent.iter().flat_map(created_by).any(|(of, name)| name == target && of == views);
+    let is_imported = imported.iter().any(|imported| imported.name == *target && imported.views == views);
+    if is_created || is_absent || is_imported {
         return Ok(());
     }
     let (process, known) = (planned.name.clone(), targets_of(added, |of| of == views || is_anywhere));
@@ -84,10 +88,13 @@ fn check_access(
 
 /// The targets that processes create, each with the kind of its views.
 fn created_targets(added: &Added) -> impl Iterator<Item = (ViewKind, &str)> {
-    added.iter().flat_map(|(_, PlannedProcess { declaration, .. })| {
-        let created = declaration.accesses.iter().filter(|(_, access)| access.format().is_some());
-        created.map(|(target, _)| (declaration.views, target.as_str()))
-    })
+    added.iter().flat_map(|(_, planned)| created_by(planned))
+}
+
+/// The targets that a process creates.
+fn created_by(PlannedProcess { declaration, .. }: &PlannedProcess) -> impl Iterator<Item = (ViewKind, &str)> {
+    let created = declaration.accesses.iter().filter(|(_, access)| access.format().is_some());
+    created.map(|(target, _)| (declaration.views, target.as_str()))
 }
 
 /// The names of the targets that processes create in these kinds of views.

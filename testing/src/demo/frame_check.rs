@@ -14,7 +14,7 @@ use drawloom::task::Scheduler;
 /// If the scene has an invalid camera, or a light or object that is left out.
 pub(super) fn draw_whole(scene: SceneRef<'_>) {
     let scheduler = Arc::new(Scheduler::new(1).unwrap());
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let (mut renderer, submitter) = builder.build(scheduler).unwrap();
     let submitted = submitter.submit(renderer.record(scene).unwrap()).unwrap();
     assert!(submitted.statistics.scene_issues.is_empty(), "{:?}", submitted.statistics.scene_issues);

@@ -7,7 +7,7 @@ use drawloom::handle::Handle;
 use drawloom::scene::{
     Blend, Camera, ClipPlane, LayerMask, Light, LightKind, Material, Mesh, RenderObject, Scene, Topology,
 };
-use drawloom::view::internal::LightClass;
+use drawloom::view::LightClass;
 
 use super::{cube, sized, square};
 

@@ -17,7 +17,7 @@ fn clears(declare: &mut Declare, target: &str) {
 
 /// The processes and targets of a frame with a main camera and a mirror.
 fn planned(own: Vec<Declaring>) -> (Vec<String>, Vec<String>) {
-    let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
     let builder = own.into_iter().fold(builder, |builder, own| builder.process(own));
     let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
     let mut scene = Scene::new();

@@ -111,7 +111,7 @@ pub fn new_renderer(pipeline: &Pipeline) -> Renderer<NullBackend> {
     }
     deferred = pipeline.left_out.iter().copied().fold(deferred, Deferred::leave_out);
     deferred = pipeline.kept.iter().copied().fold(deferred, Deferred::keep);
-    let mut builder = Renderer::builder(NullBackend).deferred(deferred);
+    let mut builder = Renderer::builder(NullBackend).pipeline(deferred);
     for own in ordered(&pipeline.own) {
         if own.process.is_output {
             builder = builder.output(own.process.target());

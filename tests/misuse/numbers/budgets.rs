@@ -113,7 +113,7 @@ fn forms() -> Result<(), Failed> {
 fn granularity() -> Result<(), Failed> {
     for workers in [1, 2] {
         for chunk in SIZES {
-            let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture());
+            let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture());
             let built = builder.granularity(Granularity::Chunk(chunk)).build(Arc::new(Scheduler::new(workers)?));
             match built {
                 Err(error) if chunk == 0 => refused(Err::<(), _>(error), "Granularity::Chunk")?,

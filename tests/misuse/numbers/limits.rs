@@ -90,7 +90,7 @@ fn expect_within<B: Backend>(backend: B, limits: SceneLimits, scheduler: &Arc<Sc
     .collect();
     let is_drawn =
         !expected.iter().any(|reason| [IssueReason::ObjectLimit, IssueReason::UndrawableMesh].contains(reason));
-    let builder = Renderer::builder(LimitedBackend::new(backend, limits)).deferred(Deferred::to_picture());
+    let builder = Renderer::builder(LimitedBackend::new(backend, limits)).pipeline(Deferred::to_picture());
     let (renderer, submitter) = builder.shadow_maps(small_maps()).build(Arc::clone(scheduler))?;
     let mut fixture = Fixture { renderer, submitter };
     for _ in 0..2 {

@@ -114,7 +114,7 @@ impl RenderProcess for Process {
 }
 
 fn draw(process: Process) -> Result<(), Failed> {
-    let builder = Renderer::builder(noop_backend()?).deferred(Deferred::to_picture()).process(process);
+    let builder = Renderer::builder(noop_backend()?).pipeline(Deferred::to_picture()).process(process);
     let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1)?))?;
     let mut fixture = Fixture { renderer, submitter };
     fixture.draw(&scene()).map(drop)
@@ -244,9 +244,9 @@ fn expect_drawn(
 ) -> Result<(), Failed> {
     let scheduler = Arc::new(Scheduler::new(1)?);
     let deferred = Deferred::new().post(step).post(ToneMapping::default());
-    let mut noop = Renderer::builder(library()?.backend()?).deferred(deferred.clone());
+    let mut noop = Renderer::builder(library()?.backend()?).pipeline(deferred.clone());
     let mut software =
-        Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).deferred(deferred).shadow_maps(small_maps());
+        Renderer::builder(SoftwareBackend::new(Arc::clone(&scheduler))).pipeline(deferred).shadow_maps(small_maps());
     for process in processes {
         (noop, software) = (noop.process(Arc::clone(process)), software.process(Arc::clone(process)));
     }
@@ -301,7 +301,7 @@ fn shadow_maps() -> Result<(), Failed> {
     all.extend(FLOATS.iter().map(|split_lambda| ShadowMaps { split_lambda: *split_lambda, ..usual }));
     for maps in all {
         let what = format!("{maps:?}");
-        let builder = Renderer::builder(NullBackend).deferred(Deferred::to_picture()).shadow_maps(maps);
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture()).shadow_maps(maps);
         if let Ok((renderer, submitter)) = builder.build(Arc::new(Scheduler::new(1)?)) {
             let drawn = Fixture { renderer, submitter }.draw(&scene());
             ensure(drawn.is_ok(), format_args!("{what}: {drawn:?}", drawn = drawn.map(drop)))?;

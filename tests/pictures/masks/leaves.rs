@@ -247,7 +247,7 @@ pub(super) fn own_pre_pass() -> Result<(), Failed> {
     let mesh = scene.add(cube())?;
     scene.add_object(RenderObject::new(mesh, stone, DVec3::ZERO))?;
     let deferred = || colored().depth_pre_pass(true);
-    let drawn = |deferred: Deferred| Fixture::with(2, |builder| builder.deferred(deferred))?.draw(&scene);
+    let drawn = |deferred: Deferred| Fixture::with(2, |builder| builder.pipeline(deferred))?.draw(&scene);
     let expected = drawn(deferred())?;
     if drawn(deferred().replace("depth pre-pass", OwnPrePass))? != expected {
         return Err("the engine's pre-pass changes the picture".into());
@@ -345,7 +345,7 @@ fn two_leaves([hole, leaf]: [u8; 2], is_red_first: bool) -> Result<Scene, Failed
 pub(super) fn changing() -> Result<(), Failed> {
     let leaves = Leaf::crossing(12);
     let mut scene = leaf_objects(&leaves)?;
-    let mut kept = Fixture::with(2, |builder| builder.deferred(colored()))?;
+    let mut kept = Fixture::with(2, |builder| builder.pipeline(colored()))?;
     let material = scene.assets().iter::<Material>().next().map(|(handle, material)| (handle, material.clone()));
     let (handle, mask) = material.ok_or("there is a material")?;
     let solid = Material { alpha_cutoff: None, ..mask.clone() };
@@ -355,7 +355,7 @@ pub(super) fn changing() -> Result<(), Failed> {
     for material in [&mask, &solid, &glass, &other, &mask, &solid] {
         scene.replace(handle, material.clone())?;
         let found = kept.draw(&scene)?;
-        let expected = Fixture::with(1, |builder| builder.deferred(colored()))?.draw(&scene)?;
+        let expected = Fixture::with(1, |builder| builder.pipeline(colored()))?.draw(&scene)?;
         if found != expected || pictures.last() == Some(&found) {
             return Err(format!("{material:?} is not drawn in the frame in which it changes").into());
         }
@@ -399,7 +399,7 @@ impl<R: Real> DeformationCpuShader<R> for Still {
 pub(super) fn culled_in_static_groups_and_deformed() -> Result<(), Failed> {
     let leaves = Leaf::crossing(30);
     let plain = leaf_objects(&leaves)?;
-    let expected = Fixture::with(2, |builder| builder.deferred(colored()))?.draw(&plain)?;
+    let expected = Fixture::with(2, |builder| builder.pipeline(colored()))?.draw(&plain)?;
     let culled = with_meshes(leaf_objects(&leaves)?, culled);
     let mut in_static_groups = leaf_objects(&leaves)?;
     let objects: Vec<_> = in_static_groups.objects().collect();
@@ -411,7 +411,7 @@ pub(super) fn culled_in_static_groups_and_deformed() -> Result<(), Failed> {
         }
     }
     for (what, scene) in [("triangle culling", culled), ("a static group", in_static_groups)] {
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(colored()).granularity(Granularity::Chunk(7)))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(colored()).granularity(Granularity::Chunk(7)))?;
         for frame in 0..4 {
             if fixture.draw(&scene)? != expected {
                 return Err(format!("{what} changes frame {frame}").into());
@@ -444,7 +444,7 @@ pub(super) fn coarse_levels() -> Result<(), Failed> {
     scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
     for (level_of_detail, triangles) in [(0.0, 160), (10.0, 80)] {
         let quality = Quality { level_of_detail, ..Quality::balanced() };
-        let mut fixture = Fixture::with(2, |builder| builder.deferred(colored()).quality(quality))?;
+        let mut fixture = Fixture::with(2, |builder| builder.pipeline(colored()).quality(quality))?;
         let recorded = fixture.record(&scene)?;
         let drawn = recorded.statistics().views[0].levels_of_detail.map_or(160, |levels| levels.triangles);
         if drawn != triangles {

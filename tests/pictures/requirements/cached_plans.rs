@@ -65,7 +65,7 @@ fn make_opaque(scene: &mut Scene, count: usize) -> Result<(), Failed> {
 }
 
 pub fn cached_plans() -> Result<(), Failed> {
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred()))?;
     let mut scene = everything();
     let mut pictures = Vec::new();
     let mut pipelines = 0;

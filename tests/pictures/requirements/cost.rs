@@ -44,7 +44,7 @@ impl Cost {
 /// A new renderer's picture of a scene, and its costs.
 pub fn drawn(deferred: Deferred, scene: &Scene) -> Result<(Cost, Picture), Failed> {
     let output = deferred.output();
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(deferred))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(deferred))?;
     let recorded = fixture.record(scene)?;
     let views = &recorded.statistics().views;
     let mut cost = Cost {

@@ -29,7 +29,7 @@ fn planned(fixture: &Fixture, is_wanted: impl Fn(ViewKind) -> bool) -> Vec<Strin
 fn without_each(fixture: &mut Fixture, scene: &Scene, names: &[String]) -> Result<Vec<(String, Picture)>, Failed> {
     let (mut pictures, mut needed_by_others) = (Vec::new(), Vec::new());
     for name in names {
-        match fixture.renderer.set_deferred(all().leave_out(name)) {
+        match fixture.renderer.set_pipeline(all().leave_out(name)) {
             Ok(()) => pictures.push((name.clone(), fixture.draw(scene)?)),
             Err(error) => needed_by_others.push((name.as_str(), error.to_string())),
         }
@@ -44,7 +44,7 @@ fn without_each(fixture: &mut Fixture, scene: &Scene, names: &[String]) -> Resul
 
 pub fn every_process_is_needed() -> Result<(), Failed> {
     let scene = everything();
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(all()))?;
     let picture = fixture.draw(&scene)?;
     let names = planned(&fixture, |_| true);
     let without = without_each(&mut fixture, &scene, &names)?;
@@ -62,7 +62,7 @@ pub fn every_process_of_a_mirror_is_needed() -> Result<(), Failed> {
     let scene = everything_with_mirror(SURFACE);
     let mut empty_mirror = everything_with_mirror(SURFACE);
     empty_mirror.cameras.pop();
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(all()).process(MIRROR))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(all()).process(MIRROR))?;
     let unmirrored = fixture.draw(&empty_mirror)?;
     let picture = fixture.draw(&scene)?;
     let shown: Vec<bool> = different_pixels(&picture, &unmirrored).collect();
@@ -84,6 +84,6 @@ pub fn every_process_of_a_mirror_is_needed() -> Result<(), Failed> {
     if steps != ["tone mapping", "fxaa"] {
         return Err(format!("{of_mirror:?} draw in the mirror's view").into());
     }
-    let mut fixture = Fixture::with(2, |builder| builder.deferred(all()))?;
+    let mut fixture = Fixture::with(2, |builder| builder.pipeline(all()))?;
     expect_changed("the mirror's own process", &picture, &fixture.draw(&empty_mirror)?)
 }

@@ -61,7 +61,7 @@ impl Drawloom {
             BackendName::Adapter => adapter::device_without_indirect_validation()?,
         };
         let (renderer, submitter) = Renderer::builder(WgpuBackend::new(device, queue)?)
-            .deferred(Deferred::to_picture().shadow_maps(None))
+            .pipeline(Deferred::to_picture().shadow_maps(None))
             .build(Arc::clone(&scheduler))?;
         let statistics = FrameStatistics::default();
         Ok(Self { world, scheduler, renderer, submitter, statistics, last: None, frame: 0 })

@@ -22,7 +22,7 @@ use crate::unwind::emit;
 /// # fn draw(device: wgpu::Device, queue: wgpu::Queue, scene: Scene) -> Result<(), Box<dyn std::error::Error>> {
 /// # let scheduler = std::sync::Arc::new(Scheduler::new(2)?);
 /// let backend = WgpuBackend::new(device, queue)?.time_passes()?;
-/// # let builder = Renderer::builder(backend).deferred(Deferred::to_picture());
+/// # let builder = Renderer::builder(backend).pipeline(Deferred::to_picture());
 /// # let (mut renderer, submitter) = builder.build(std::sync::Arc::clone(&scheduler))?;
 /// // ...
 /// let (timeline, mut times) = (scheduler.timeline(), Vec::new());

@@ -1,8 +1,9 @@
-//! Places for an engine's processes in a frame of the deferred pipeline.
+//! Places for an engine's processes in a pipeline's frame.
 
 /// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all
-/// of them, whatever the scene requires: see [`Declare::at`](crate::process::Declare::at). What its targets hold is
-/// listed at [`GeometryBuffer`](super::GeometryBuffer).
+/// of them, whatever the scene requires: see [`Declare::at`](super::Declare::at). What its targets hold is
+/// listed at [`GeometryBuffer`](super::GeometryBuffer). A pipeline of the engine's [adds](super::PipelineProcesses) those
+/// that its frames have.
 ///
 /// A process needs a place where what it reads and writes leaves its order open, as that of all that change `radiance`
 /// does.
@@ -30,8 +31,8 @@ pub enum InjectionPoint {
 }
 
 impl InjectionPoint {
-    /// In order.
-    pub(super) const ALL: [Self; 5] = [
+    /// All of them, in order.
+    pub const ALL: [Self; 5] = [
         Self::BeforeGeometry,
         Self::AfterGeometry,
         Self::AfterLighting,
@@ -40,12 +41,12 @@ impl InjectionPoint {
     ];
 
     /// Whether a slot of this name marks a place.
-    pub(in crate::process) fn is_slot(name: &str) -> bool {
+    pub(super) fn is_slot(name: &str) -> bool {
         Self::ALL.into_iter().any(|place| place.slots().contains(&name))
     }
 
     /// The names of the empty slots at the beginning and at the end of the place: what is there comes between them.
-    pub(in crate::process) fn slots(self) -> [&'static str; 2] {
+    pub(super) fn slots(self) -> [&'static str; 2] {
         match self {
             Self::BeforeGeometry => ["the place before geometry", "the end of the place before geometry"],
             Self::AfterGeometry => ["the place after geometry", "the end of the place after geometry"],

@@ -1,0 +1,227 @@
+//! Pipelines of an engine's own, and processes that come and go beside one.
+
+#[path = "../../examples/forward/pipeline.rs"]
+mod forward;
+
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, Draws, Format, FullScreen, InjectionPoint, RenderProcess, ToneMapping,
+};
+use drawloom::scene::{Blend, Camera, Light, Material, RenderObject, Scene, ViewKind};
+use drawloom_testing::scenes::{cube, field, sized};
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::fixture::{Fixture, pixel};
+use crate::history::Accumulate;
+use crate::image_distance::{Distance, as_image, assert_color, tone_mapped};
+use forward::Forward;
+
+pub const CASES: &[Case] = &[
+    ("a_forward_pipeline_draws_what_the_deferred_one_draws", forward_and_deferred),
+    ("a_forward_pipeline_has_the_processes_that_its_lamps_require", forward_processes),
+    ("a_target_of_reflections_is_sampled_with_and_without_a_mirror", own_reflection),
+    ("a_process_that_comes_and_goes_leaves_histories_and_pipelines_of_others", comes_and_goes),
+];
+
+/// Boxes of stone and of glass, with this many lamps.
+fn boxes(lamps: usize) -> Result<Scene, Failed> {
+    let mut scene = Scene::new();
+    let mesh = scene.add(cube())?;
+    let stone = Material { diffuse: Vec3::new(0.7, 0.6, 0.5), emission: Vec3::splat(0.05), ..Material::default() };
+    let glass = Material { diffuse: Vec3::new(0.2, 0.5, 0.9), opacity: 0.5, blend: Blend::Alpha, ..stone.clone() };
+    let (stone, glass) = (scene.add(stone)?, scene.add(glass)?);
+    for index in 0..25 {
+        let (x, z) = (f64::from(index % 5) - 2.0, f64::from(index / 5) - 2.0);
+        let material = if index % 6 == 0 { glass } else { stone };
+        let mut object = RenderObject::new(mesh, material, DVec3::new(x * 1.5, 0.0, z * 1.5));
+        object.scale = Vec3::splat(0.6);
+        scene.add_object(object)?;
+    }
+    scene.ambient = Vec3::splat(0.2);
+    scene.background = Vec3::new(0.1, 0.15, 0.2);
+    scene.cameras.push(sized(Camera::looking_at("main", DVec3::new(0.5, 4.0, 7.0), DVec3::ZERO), [96, 64]));
+    scene.lights = (0..lamps).map(lamp).collect();
+    Ok(scene)
+}
+
+fn lamp(index: usize) -> Light {
+    let angle = index as f64 * 2.4;
+    let position = DVec3::new(3.0 * angle.cos(), 1.5, 3.0 * angle.sin());
+    Light::Point { position, intensity: Vec3::new(2.0, 1.5, 1.0), range: 6.0, casts_shadow: false }
+}
+
+fn forward_and_deferred() -> Result<(), Failed> {
+    let mut forward = Fixture::with(2, |builder| builder.pipeline(Forward))?;
+    let mut deferred = Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()))?;
+    let mut pictures = Vec::new();
+    for lamps in [0, 3, 5, 17, 0] {
+        let scene = boxes(lamps)?;
+        let (one, other) = (as_image(&forward.draw(&scene)?)?, as_image(&deferred.draw(&scene)?)?);
+        let distance = Distance::between(&one, &other)?;
+        if !distance.is_within_bound() {
+            return Err(format!("{lamps} lamps: {distance:?}").into());
+        }
+        pictures.push(one);
+    }
+    // The lamps are seen, and the first picture is that of a scene without them.
+    assert!(!Distance::between(&pictures[0], &pictures[3])?.is_within_bound());
+    assert!(pictures[0] == pictures[4]);
+    Ok(())
+}
+
+fn forward_processes() -> Result<(), Failed> {
+    let mut fixture = Fixture::with(1, |builder| builder.pipeline(Forward))?;
+    let (lit, blended) = ("opaque surfaces", "blended surfaces");
+    for (lamps, expected) in [
+        (0, &[lit, blended, "tone mapping"][..]),
+        (4, &[lit, blended, "tone mapping"]),
+        (5, &["depth pre-pass", lit, blended, "tone mapping"]),
+        (40, &["depth pre-pass", lit, blended, "tone mapping"]),
+    ] {
+        drop(fixture.record(&boxes(lamps)?)?);
+        let plan = fixture.renderer.plan();
+        let found: Vec<_> = plan.processes().iter().map(|planned| planned.name.as_str()).collect();
+        assert_eq!(found, expected, "{lamps} lamps");
+    }
+    // One for each step; none and four lamps have plans of their own, with equal processes.
+    let plans = fixture.renderer.plan_count();
+    for lamps in 0..60 {
+        drop(fixture.record(&boxes(lamps)?)?);
+    }
+    assert_eq!(fixture.renderer.plan_count(), forward::STEPS.len() + 1, "{plans} before");
+    Ok(())
+}
+
+/// Draws numbers in reflections, in a format that no other target has.
+struct Numbers;
+
+impl RenderProcess for Numbers {
+    fn name(&self) -> &str {
+        "numbers"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Reflection);
+        declare.clears_color("numbers", Format::R32Uint, ClearColor::Value([0.0; 4]));
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<u32> {
+                return vec4<u32>(128u, 0u, 0u, 0u);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
+    }
+}
+
+/// Shows the numbers of the view `mirror` in green.
+struct Screen {
+    target: &'static str,
+}
+
+impl RenderProcess for Screen {
+    fn name(&self) -> &str {
+        "screen"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.after("numbers");
+        declare.samples_view(ViewKind::Reflection, "mirror", "numbers");
+        if self.target == "radiance" {
+            declare.at(InjectionPoint::AfterLighting);
+            declare.draws_over(self.target);
+        } else {
+            declare.clears_color(self.target, Format::Rgba16Float, ClearColor::Value([0.0; 4]));
+        }
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @group(2) @binding(1) var numbers: texture_2d<u32>;
+
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                let last = textureDimensions(numbers) - vec2<u32>(1u);
+                let number = textureLoad(numbers, min(vec2<u32>(in.position.xy), last), 0).r;
+                return vec4<f32>(0.0, f32(number) / 256.0, 0.0, 1.0);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, ..FullScreen::default() })
+    }
+}
+
+fn own_reflection() -> Result<(), Failed> {
+    let without = boxes(0)?;
+    let mut with = boxes(0)?;
+    let mirror = Camera { kind: ViewKind::Reflection, ..with.cameras[0].clone() };
+    with.cameras.push(Camera { name: "mirror".into(), ..mirror });
+    let beside = Fixture::with(2, |builder| {
+        builder.pipeline(Deferred::to_picture()).process(Numbers).process(Screen { target: "radiance" })
+    })?;
+    let alone = Fixture::with(2, |builder| {
+        let tone_mapping = drawloom::process::PostStep::process(&ToneMapping::default(), "own", "picture");
+        builder.process(Numbers).process(Screen { target: "own" }).process(tone_mapping).output("picture")
+    })?;
+    for mut fixture in [beside, alone] {
+        for _ in 0..2 {
+            assert_color(pixel(&fixture.draw(&without)?, 40, 30), tone_mapped([0.0; 3]))?;
+            assert_color(pixel(&fixture.draw(&with)?, 40, 30), tone_mapped([0.0, 0.5, 0.0]))?;
+        }
+        fixture.renderer.prepare_pipelines(without.as_scene_ref())?;
+    }
+    Ok(())
+}
+
+/// Darkens the picture.
+struct Shade;
+
+impl RenderProcess for Shade {
+    fn name(&self) -> &str {
+        "shade"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(InjectionPoint::AfterLighting);
+        declare.draws_over("radiance");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        let shader = "
+            @fragment
+            fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {
+                return vec4<f32>(0.0, 0.0, 0.0, 0.5);
+            }
+        ";
+        Draws::FullScreen(FullScreen { shader, blend: Blend::Alpha, ..FullScreen::default() })
+    }
+}
+
+fn comes_and_goes() -> Result<(), Failed> {
+    let mut scene = field(10);
+    scene.cameras.truncate(1);
+    let mut fixture =
+        Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(Accumulate).output("sum"))?;
+    let mut pictures = Vec::new();
+    let mut sum = |fixture: &mut Fixture, frames: u8| -> Result<(), Failed> {
+        let recorded = fixture.record(&scene)?;
+        let submission = fixture.submit(recorded)?;
+        pictures.push(submission.read(0, "picture")?.bytes);
+        assert_color(pixel(&submission.read(0, "sum")?, 5, 5), [32 * frames, if frames > 1 { 255 } else { 0 }, 0])
+    };
+    sum(&mut fixture, 1)?;
+    fixture.renderer.add_process(Shade)?;
+    sum(&mut fixture, 2)?;
+    fixture.renderer.set_process_enabled("shade", false)?;
+    sum(&mut fixture, 3)?;
+    fixture.renderer.set_process_enabled("shade", true)?;
+    sum(&mut fixture, 4)?;
+    fixture.renderer.remove_process("shade")?;
+    sum(&mut fixture, 5)?;
+    let same_as_first: Vec<_> = pictures.iter().map(|picture| *picture == pictures[0]).collect();
+    assert_eq!(same_as_first, [true, false, true, false, true]);
+    assert!(pictures[1] == pictures[3]);
+    Ok(())
+}
