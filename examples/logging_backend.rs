@@ -2,7 +2,8 @@
 //!
 //!     cargo run --release --example logging_backend
 //!
-//! Copy [`LoggingBackend`] to see what a frame asks of a device, or to begin a backend that changes some of these calls.
+//! Copy [`LoggingBackend`] to see what a frame asks of a device, or to begin a backend that changes some of these
+//! calls.
 
 use std::error::Error;
 use std::ops::Range;

@@ -48,7 +48,8 @@ impl Pipeline for Forward {
     }
 
     fn to_prepare(&self) -> Vec<Requirements> {
-        (0..STEPS.len()).rev().map(|step| Requirements::all().with_own(step as u64)).collect()
+        let all = Requirements::default().with_transparency();
+        (0..STEPS.len()).rev().map(|step| all.with_own(step as u64)).collect()
     }
 }
 

@@ -263,7 +263,7 @@ impl BackendExtras for NoExtras {
     }
 }
 
-/// A target as one frame leaves it, on its way to the CPU: see [`Backend::read_back`](super::Backend::read_back).
+/// A target as one frame leaves it, on its way to the CPU: see [`Backend::read_back`].
 pub trait ReadBack: Send {
     /// The pixels, if the device is done with the frame; `None` if it is not, or the frame is not submitted yet. It
     /// does not wait.

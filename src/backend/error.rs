@@ -251,16 +251,16 @@ pub enum BackendError {
     },
 }
 
-/// The error for a broken rule between frame and backend. `rule` states what must hold.
 #[cfg(any(feature = "wgpu", feature = "software"))]
 impl BackendError {
     /// That a view has no target of this name, but those that are `known`.
-    #[cfg(any(feature = "wgpu", feature = "software"))]
     pub(crate) fn unknown_target<'a>(view: usize, target: &str, known: impl Iterator<Item = &'a str>) -> Self {
         Self::UnknownTarget { view, target: target.to_owned(), known: crate::process::list_names(known) }
     }
 }
 
+/// The error for a broken rule between frame and backend. `rule` states what must hold.
+#[cfg(any(feature = "wgpu", feature = "software"))]
 pub(crate) fn broken_rule(rule: &str) -> BackendError {
     BackendError::BrokenRule { rule: rule.to_owned() }
 }

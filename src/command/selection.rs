@@ -59,8 +59,8 @@ impl Selection {
         Self { material_types: MaterialTypes::Shipped, ..self }
     }
 
-    /// Those of these objects whose material is in share `index` of `of` equal shares, counted from 0: several processes
-    /// draw what one would (L 5). No shares count as one.
+    /// Those of these objects whose material is in share `index` of `of` equal shares, counted from 0: several
+    /// processes draw what one would (L 5). No shares count as one.
     pub const fn of_material_share(self, index: u32, of: u32) -> Self {
         Self { materials: MaterialShare { index, of }, ..self }
     }

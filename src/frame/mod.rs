@@ -14,7 +14,6 @@ mod reconfigure;
 mod scene_check;
 mod stages;
 mod static_groups;
-mod statistics;
 mod views;
 mod warm_up;
 
@@ -25,7 +24,8 @@ pub use nodes::{CpuNode, FrameData, NodeAccessError, NodeAccesses, NodeContext, 
 pub use recorded_frame::{FencePoint, RecordedFrame, SubmittedFrame, Submitter};
 pub use renderer::Renderer;
 pub use stages::granularity::Granularity;
-pub use statistics::{FrameStatistics, LevelStatistics, StageTimes, StaticGroupStatistics, ViewStatistics};
+pub use stages::statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};
+pub use static_groups::StaticGroupStatistics;
 pub use views::budgeted_view::{BudgetedView, QualityLevel, ViewVariant};
 pub use views::view_budget::ViewBudget;
 pub use warm_up::WarmUp;

@@ -120,7 +120,8 @@ pub(super) struct PlanCache {
     device: DeviceSupport,
     /// `None` until the next plan if the device changed.
     of_device: Option<OfDevice>,
-    /// Whether all scenes have the same plan: there is no pipeline, and every scene has the views that processes draw in.
+    /// Whether all scenes have the same plan: there is no pipeline, and every scene has the views that processes draw
+    /// in.
     has_one_plan: bool,
     compiled: HashMap<Requirements, CachedPlan>,
     /// How often a plan was chosen.
@@ -231,8 +232,8 @@ impl PlanCache {
         }
     }
 
-    /// The ids of the processes in the plans of this cache. Those of earlier plans are not needed, and would become ever
-    /// more.
+    /// The ids of the processes in the plans of this cache. Those of earlier plans are not needed, and would become
+    /// ever more.
     fn ids_of_plans(&self) -> ProcessIds {
         let plans = self.compiled.values().map(|cached| &cached.plan).chain([&self.current]);
         let planned = plans.flat_map(|plan| plan.processes());
@@ -413,5 +414,41 @@ mod tests {
         check(replaced.current());
         check(&replaced.select(&contents(&[], false, &[])).unwrap());
         check(&replaced.select(&contents(&[lamp, sun], true, &[mirror])).unwrap());
+    }
+
+    #[test]
+    fn without_a_pipeline_a_scene_has_the_same_plan_whatever_the_frames_before_had() {
+        use crate::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderProcess};
+
+        struct Picture;
+
+        impl RenderProcess for Picture {
+            fn name(&self) -> &str {
+                "picture"
+            }
+
+            fn declare(&self, declare: &mut Declare) {
+                declare.also_views(ViewKind::Reflection);
+                declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background);
+                declare.keep();
+            }
+
+            fn draws(&self) -> Draws<'_> {
+                Draws::FullScreen(FullScreen::default())
+            }
+        }
+
+        let mut sources = PlanSources::default();
+        sources.add_process(Arc::new(Picture)).unwrap();
+        let mut cache = PlanCache::new(sources, DeviceSupport::new(true)).unwrap();
+        let main = Camera::looking_at("main", DVec3::Z, DVec3::ZERO);
+        let cameras = [main.clone(), Camera { kind: ViewKind::Reflection, ..main }];
+        let mut kinds = |cameras: &[Camera]| {
+            let plan = cache.select(&contents(&[], false, cameras)).unwrap();
+            plan.processes().iter().map(|planned| planned.declaration.views).collect::<Vec<_>>()
+        };
+        let plans = [&cameras[..1], &cameras[..], &cameras[..1]].map(&mut kinds);
+        assert_eq!(plans[1].len(), 2);
+        assert_eq!([&plans[0], &plans[2]], [&[ViewKind::Main], &[ViewKind::Main]]);
     }
 }

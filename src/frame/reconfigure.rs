@@ -136,8 +136,8 @@ impl<B: Backend> Renderer<B> {
         self.change_plans(|sources| sources.remove_process(name))
     }
 
-    /// Switches the processes of this name that the engine added off, or on again, from the next frame on. Without those
-    /// that are off, frames are as if they had been removed.
+    /// Switches the processes of this name that the engine added off, or on again, from the next frame on. Without
+    /// those that are off, frames are as if they had been removed.
     ///
     /// # Errors
     /// If there is none, or the processes that are on make no frame; then nothing changes.

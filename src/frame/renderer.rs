@@ -4,27 +4,22 @@ use std::sync::Arc;
 
 use parking_lot::RwLockReadGuard;
 
-use super::encoders::FrameEncoders;
-use super::encoders::{PassRecording, reset_recordings};
+use super::encoders::{FrameEncoders, PassRecording, reset_recordings};
 use super::nodes::borrowed_nodes::NodeDeclarations;
 use super::plan_cache::PlanCache;
 use super::reconfigure::BackendMaintenance;
-use super::recorded_frame::view_queues;
-use super::recorded_frame::{FrameFences, RecordedFrame};
-use super::scene_check::ChangeCheck;
-use super::scene_check::SceneCapacity;
-use super::scene_check::check_scene;
+use super::recorded_frame::{FrameFences, RecordedFrame, view_queues};
+use super::scene_check::{ChangeCheck, SceneCapacity, check_scene};
 use super::stages::context::FrameContext;
 use super::stages::culling::CullingOptions;
 use super::stages::granularity::{StageClock, StageGroup};
 use super::stages::stage_graph::FrameFeatures;
 use super::stages::stage_graph::StageGraphCache;
+use super::stages::statistics::Warnings;
 use super::stages::tables::FrameTables;
-use super::statistics::Warnings;
-use super::views::FrameViews;
 use super::views::view_cache::ViewCache;
 use super::views::view_visibility::count_unknown_objects;
-use super::views::{MapSettings, ValidLights};
+use super::views::{FrameViews, MapSettings, ValidLights};
 use super::{CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
@@ -144,6 +139,21 @@ impl<B: Backend> Renderer<B> {
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<RecordedFrame<B>, FrameError> {
         self.record_part(&scene, &[], true)
+    }
+
+    /// Records a frame as [`record`](Self::record) does, with work of the engine's own among its jobs: see [`CpuNode`].
+    /// The nodes are lent as the scene is, until this returns.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record). If the nodes make no graph, because some wait for each other in a circle, one reads
+    /// what nobody writes, two write the same without an order, or two have the same name; if a node fails or panics.
+    /// The error names the node, and the next frame is not affected.
+    pub fn record_with_nodes(
+        &mut self,
+        scene: SceneRef<'_>,
+        nodes: &[&dyn CpuNode],
+    ) -> Result<RecordedFrame<B>, FrameError> {
+        self.record_part(&scene, nodes, true)
     }
 
     /// Records a frame of the scene with these nodes, of its objects that [need

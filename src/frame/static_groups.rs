@@ -17,11 +17,21 @@ use std::ops::Range;
 
 use parking_lot::{MappedRwLockReadGuard, RwLock, RwLockReadGuard};
 
-use super::statistics::StaticGroupStatistics;
 use crate::bit_set::{BitSet, BitWord};
 use crate::command::{Batch, BinnedSegment, DrawList, Selection, Version};
 use crate::scene::{Assets, Changes, SceneError, SceneRef, StaticGroup};
 use crate::view::{Bounds4, DrawFilter, IssueReason, ObjectTable, SceneIssues, bin_objects, recordable_objects};
+
+/// What a frame did with the scene's [static groups](crate::scene::StaticGroup), which is the number of static groups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StaticGroupStatistics {
+    /// That were recorded by earlier frames, so that views may execute them.
+    pub executable: usize,
+    /// That this frame records.
+    pub recorded: usize,
+    /// With an object that is reported as changed.
+    pub changed: usize,
+}
 
 /// The static groups of a scene.
 #[derive(Debug, Default)]

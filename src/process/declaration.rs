@@ -10,8 +10,8 @@ use crate::scene::{
     ViewKind,
 };
 
-/// Collects what a process reads and writes. Targets have names: a [`Target`](super::Target), or a string. Each view of the process's kind has targets of its
-/// own, of the size of its picture unless [`Declare::size`] says otherwise.
+/// Collects what a process reads and writes. Targets have names: a [`Target`](super::Target), or a string. Each view of
+/// the process's kind has targets of its own, of the size of its picture unless [`Declare::size`] says otherwise.
 ///
 /// A process can use only what it declares. What it declares and does not use is warned of through `tracing`: a target,
 /// buffer, column or material type that its shader has no variable for, or that its [raw pass](super::RawPassResources)
@@ -323,9 +323,9 @@ impl Declare {
         self.declaration.before.push(process.to_owned());
     }
 
-    /// Puts the process at a place of the pipeline, such as the [deferred one](super::Deferred): after all of its processes
-    /// before it, and before those behind it. Processes at the same place that write the same target still need an
-    /// order.
+    /// Puts the process at a place of the pipeline, such as the [deferred one](super::Deferred): after all of its
+    /// processes before it, and before those behind it. Processes at the same place that write the same target still
+    /// need an order.
     pub fn at(&mut self, place: InjectionPoint) {
         let [begin, end] = place.slots();
         self.after(begin);

@@ -1,9 +1,9 @@
 //! Places for an engine's processes in a pipeline's frame.
 
 /// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all
-/// of them, whatever the scene requires: see [`Declare::at`](super::Declare::at). What its targets hold is
-/// listed at [`GeometryBuffer`](super::GeometryBuffer). A pipeline of the engine's [adds](super::PipelineProcesses) those
-/// that its frames have.
+/// of them, whatever the scene requires: see [`Declare::at`](super::Declare::at). What its targets hold is listed at
+/// [`GeometryBuffer`](super::GeometryBuffer). A pipeline of the engine's [adds](super::PipelineProcesses) those that
+/// its frames have.
 ///
 /// A process needs a place where what it reads and writes leaves its order open, as that of all that change `radiance`
 /// does.

@@ -48,9 +48,9 @@ pub use blend_equation::{BlendComponent, BlendEquation, BlendFactor};
 pub use compute_dispatch::{ComputeDispatch, Workgroups};
 #[cfg(feature = "software")]
 pub use cpu_shader::{
-    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectCpuShader,
-    ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView, VARYINGS,
-    VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
+    CpuShader, DeformationCpuShader, FullScreenCpuShader, FullScreenPixel, LightCpuShader, MAX_ATTRIBUTES, Materials,
+    ObjectCpuShader, ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial, ShaderObject, ShaderView,
+    VARYINGS, VertexInput, VertexOutput, bounded_uv, direction_from_octahedral, octahedral_from_direction,
 };
 use declaration::source_of_previous;
 pub use declaration::{Declare, previous_name};
@@ -84,7 +84,7 @@ pub use target_size::TargetSize;
 pub use crate::unwind::Contained;
 
 #[cfg(feature = "software")]
-pub(crate) use cpu_shader::{LightCpuShader, TypedCpuShader};
+pub(crate) use cpu_shader::TypedCpuShader;
 pub(crate) use internal::*;
 #[cfg(feature = "wgpu")]
 pub(crate) use prelude::{FIRST_OWN_LOCATION, prelude_with};

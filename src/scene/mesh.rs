@@ -185,7 +185,8 @@ impl Mesh {
         Ok(self)
     }
 
-    /// The bytes of the values of an attribute, one for each vertex; `None` if the mesh does not have it in that format.
+    /// The bytes of the values of an attribute, one for each vertex; `None` if the mesh does not have it in that
+    /// format.
     ///
     /// ```
     /// # use drawloom::scene::{Mesh, Topology, VERTEX_COLOR, Vertex};

@@ -61,10 +61,8 @@ pub(crate) use generated_geometry::{GeneratedGeometry, IndexSource};
 pub(crate) use internal::*;
 pub use layer_mask::LayerMask;
 pub use level_of_detail::LevelOfDetail;
-#[cfg(feature = "wgpu")]
-pub(crate) use light::LightVolume;
 pub use light::{Light, LightKind, ShadowProjection};
-pub(crate) use light::{LightFields, LightFieldsMut, LightRules};
+pub(crate) use light::{LightFields, LightFieldsMut, LightRules, LightVolume};
 pub use material::{Blend, Material, Texture};
 pub use material_predicate::MaterialPredicate;
 pub use material_type::{MaterialType, MaterialValues};

@@ -36,8 +36,8 @@ impl<T: Default> PerView<T> {
     }
 
     /// Makes the values those of these views. Calls `replace` with each value that another view had, or none. Drops the
-    /// values of views that are gone and whose slots no other view has. Returns whether the views are those that it had;
-    /// then it allocates nothing.
+    /// values of views that are gone and whose slots no other view has. Returns whether the views are those that it
+    /// had; then it allocates nothing.
     pub(crate) fn set_views(&mut self, views: &[RenderView], mut replace: impl FnMut(&mut T)) -> bool {
         let ids = || views.iter().map(|view| view.id);
         if self.ids.len() == views.len() && self.ids.iter().copied().eq(ids()) {

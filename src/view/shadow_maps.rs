@@ -291,9 +291,9 @@ mod tests {
     }
 
     proptest! {
-        /// All that a main camera sees within the maximum distance is in the map of its cascade that the sun has for that
-        /// camera, before its far plane, and so far inside that the filter reads no pixel outside. So is what the camera
-        /// sees that draws a tile or is jittered.
+        /// All that a main camera sees within the maximum distance is in the map of its cascade that the sun has for
+        /// that camera, before its far plane, and so far inside that the filter reads no pixel outside. So is what the
+        /// camera sees that draws a tile or is jittered.
         #[test]
         fn a_cascade_covers_what_main_cameras_see_of_its_slice(
             placements in prop::collection::vec((prop::array::uniform3(-1e4..1e4_f64), 1.0..160_f32), 1..3),

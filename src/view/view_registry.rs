@@ -124,7 +124,8 @@ mod tests {
         views.iter().map(|view| view.id).collect()
     }
 
-    /// For each view of `now` the index of the view whose slot it has in the frame `before`, and whether it is the same.
+    /// For each view of `now` the index of the view whose slot it has in the frame `before`, and whether it is the
+    /// same.
     fn found(before: &[Named<'_>], now: &[Named<'_>]) -> Vec<Option<(usize, bool)>> {
         let mut registry = ViewRegistry::default();
         let ids_before = frame(&mut registry, before, false);

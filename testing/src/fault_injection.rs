@@ -55,8 +55,8 @@ pub enum CallKind {
     Record,
     /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish) of one pass.
     Finish,
-    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish) of several passes, which fails in the middle:
-    /// the passes of the first half are finished.
+    /// [`FrameRecorder::finish`](drawloom::backend::FrameRecorder::finish) of several passes, which fails in the
+    /// middle: the passes of the first half are finished.
     FinishTogether,
     /// [`Backend::submit`].
     Submit,

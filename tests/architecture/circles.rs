@@ -1,5 +1,5 @@
-//! The folders of one module do not import each other in circles, so that each can be understood with only those that it
-//! imports. Files of one folder may: they are read together.
+//! The folders of one module do not import each other in circles, so that each can be understood with only those that
+//! it imports. Files of one folder may: they are read together.
 //!
 //! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
 //! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a

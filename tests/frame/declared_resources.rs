@@ -133,7 +133,11 @@ fn a_raw_pass_has_the_whole_texture_of_a_small_target() {
             Ok(())
         },
     );
-    let (mut renderer, submitter) = with(|builder| builder.process(Clears("own")).process(asking));
+    let (device, queue) = noop_device().unwrap();
+    // Small targets share textures beside transient ones, and outputs are not transient.
+    let backend = WgpuBackend::new(device, queue).unwrap().transient_targets();
+    let builder = Renderer::builder(backend).process(Clears("own")).process(asking).output("own");
+    let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
     let mut scene = scene();
     scene.cameras.iter_mut().for_each(|camera| camera.size = [16, 16]);
     assert_eq!(scene.cameras.len(), 2);

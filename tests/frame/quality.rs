@@ -115,7 +115,7 @@ fn a_renderer_has_the_quality_that_was_set_and_says_whether_its_pipeline_has_it_
     let (mut renderer, _) = builder.build(scheduler).unwrap();
     assert!(!renderer.pipeline_has_quality());
     let quality = Quality { depth_pre_pass: true, ..Quality::fast() };
-    renderer.set_quality(quality.clone()).unwrap();
+    renderer.set_quality(quality).unwrap();
     assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, true));
     renderer.set_pipeline(Deferred::to_picture()).unwrap();
     assert_eq!((renderer.quality(), renderer.pipeline_has_quality()), (&quality, false));

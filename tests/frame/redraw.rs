@@ -4,12 +4,16 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::DVec3;
-use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, RenderProcess, ToneMapping};
+use drawloom::process::{
+    ClearColor, CommandDraws, Declare, Deferred, Draws, Format, InjectionPoint, RenderProcess, ToneMapping,
+};
 use drawloom::quality::Quality;
 use drawloom::scene::{Camera, MaterialPredicate, ObjectSet, Redraw, Scene, SceneError, ViewFilter, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer, Submitter};
 use drawloom_testing::scenes::field;
+
+use crate::declaring::Declaring;
 
 /// Samples the view `screen`, so that reflections are drawn.
 struct Screens;
@@ -94,6 +98,47 @@ fn views_of_different_intervals_keep_to_theirs() {
     let count = |view: usize| frames[1..].iter().filter(|frame| frame[view]).count();
     assert_eq!([1, 2, 3, 4, 5, 6].map(count), [6, 4, 12, 6, 0, 12]);
     assert!(frames[1..].iter().all(|frame| frame[1] != frame[4]), "views of interval 2 take turns");
+}
+
+#[test]
+fn a_view_whose_turn_moves_is_drawn_after_its_interval() {
+    let (mut scene, mut fixture) = (scene_with(&[Redraw::Interval(4)]), Fixture::new(1));
+    let frames: Vec<_> = (0..4).map(|_| fixture.drawn(&scene)[1]).collect();
+    assert_eq!(frames, [true, false, false, false]);
+    // The new view takes its turn.
+    scene.cameras.insert(1, Camera { name: "screen 1".to_owned(), ..scene.cameras[1].clone() });
+    assert_eq!(fixture.drawn(&scene), [true, true, true]);
+}
+
+/// A main camera and others of a renderer without a pipeline. They are drawn when they move.
+fn still_views(declares: impl Fn(&mut Declare) + Send + Sync + 'static) -> (Scene, Fixture) {
+    let builder = Renderer::builder(NullBackend).process(Declaring::new("own", declares));
+    let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let mut scene = scene_with(&[Redraw::OnCameraChange; 2]);
+    scene.cameras[1..].iter_mut().for_each(|camera| camera.kind = ViewKind::Main);
+    (scene, Fixture { renderer, submitter })
+}
+
+#[test]
+fn another_quality_draws_all_views() {
+    let (scene, mut fixture) = still_views(|declare| {
+        declare.clears_color("picture", Format::Rgba8Unorm, ClearColor::Background);
+        declare.keep();
+    });
+    assert_eq!([fixture.drawn(&scene), fixture.drawn(&scene)], [[true; 3], [true, false, false]]);
+    fixture.renderer.set_quality(Quality::fast()).unwrap();
+    assert_eq!([fixture.drawn(&scene), fixture.drawn(&scene)], [[true; 3], [true, false, false]]);
+}
+
+#[test]
+fn views_that_get_other_layers_of_a_texture_are_drawn() {
+    let (mut scene, mut fixture) = still_views(|declare| {
+        declare.clears_depth_layer("layers", Format::Depth32Float);
+        declare.keep();
+    });
+    assert_eq!([fixture.drawn(&scene), fixture.drawn(&scene)], [[true; 3], [true, false, false]]);
+    scene.cameras.remove(1);
+    assert_eq!([fixture.drawn(&scene), fixture.drawn(&scene)], [[true; 2], [true, false]]);
 }
 
 #[test]

@@ -300,7 +300,7 @@ fn objects_that_come_later_belong_to_the_static_groups_that_list_them() {
     rows.frame(Changes::NONE);
     assert_eq!(rows.frame(Changes::NONE), [ROWS, 0, 0, ROWS - 3]);
     let object = rows.scene.object(rows.scene.objects().next().unwrap()).unwrap();
-    rows.scene.add_object(object.clone()).unwrap();
+    rows.scene.add_object(object).unwrap();
     assert_eq!(rows.frame(Changes::Objects(&[first])), [ROWS - 1, 0, 1, ROWS - 3]);
     rows.frame(Changes::NONE);
     assert_eq!(rows.frame(Changes::Objects(&[first])), [ROWS - 1, 0, 1, ROWS - 3]);

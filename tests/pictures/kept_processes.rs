@@ -192,8 +192,9 @@ fn no_new_plans() -> Result<(), Failed> {
     fixture.draw(&bare)?;
     counts(&fixture);
     let plans: Vec<_> = kept.iter().map(|(plans, _)| *plans).collect();
-    // Directional lights and those with a range, both without and with shadow maps; tone mapping and anti-aliasing; opaque objects in three draw states; in maps in four, as
-    // subdivision converts one of them; and three of these once more for the sun's map, which clamps depth.
+    // Directional lights and those with a range, both without and with shadow maps; tone mapping and anti-aliasing;
+    // opaque objects in three draw states; in maps in four, as subdivision converts one of them; and three of these
+    // once more for the sun's map, which clamps depth.
     let pipelines: Vec<_> = kept[..4].iter().map(|(_, pipelines)| *pipelines).collect();
     if plans == [1; 5] && pipelines == [6, 9, 9, 16] {
         return Ok(());

@@ -62,7 +62,7 @@ impl<R: Precision> FrameRecording for TypedFrame<R> {
     }
 
     fn read_back(&mut self, view: usize, target: &str) -> Result<SoftwareReadBack, BackendError> {
-        self.targets.named(view, target)?;
+        self.targets.find(view, target)?;
         let (read_back, copy) = new_read_back(view, target);
         self.read_backs.push(copy);
         Ok(read_back)

@@ -64,17 +64,13 @@ impl<R> Default for SoftwareTargets<R> {
 
 impl<R> SoftwareTargets<R> {
     /// A view's target by its name.
-    pub(super) fn find(&self, view: usize, name: &str) -> Option<&SoftwareTarget<R>> {
-        find(self.views.get(view)?, name)
-    }
-
+    ///
     /// # Errors
-    /// As [`Self::find`], if the view has no such target: the error lists those that it has.
-    pub(super) fn named(&self, view: usize, name: &str) -> Result<&SoftwareTarget<R>, BackendError> {
-        self.find(view, name).ok_or_else(|| {
-            let targets = self.views.get(view).into_iter().flatten();
-            BackendError::unknown_target(view, name, targets.map(|(_, target)| target.texture.planned.name.as_str()))
-        })
+    /// If the view has no such target: the error lists those that it has.
+    pub(super) fn find(&self, view: usize, name: &str) -> Result<&SoftwareTarget<R>, BackendError> {
+        let targets = self.views.get(view).map_or(&[][..], |targets| targets);
+        let names = targets.iter().map(|(_, target)| target.texture.planned.name.as_str());
+        find(targets, name).ok_or_else(|| BackendError::unknown_target(view, name, names))
     }
 
     /// A view's target by its index among the plan's; `None` if views of another kind have it.
@@ -348,10 +344,10 @@ fn four_channels<R: Precision>(pixel: &[R]) -> Vector4<R> {
 
 impl<R: Precision> ReadTargets for SoftwareTargets<R> {
     fn picture(&self, view: usize, target: &str) -> Result<Picture, BackendError> {
-        self.named(view, target).map(|target| target.picture())
+        self.find(view, target).map(|target| target.picture())
     }
 
     fn numbers(&self, view: usize, target: &str) -> Result<Vec<[f64; 4]>, BackendError> {
-        self.named(view, target).map(|target| target.numbers())
+        self.find(view, target).map(|target| target.numbers())
     }
 }

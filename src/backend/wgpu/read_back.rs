@@ -176,7 +176,7 @@ pub(crate) fn new_read_back(
     target: &str,
     [origin, size]: [[u32; 2]; 2],
 ) -> Result<(WgpuReadBack, ReadBackCopy), BackendError> {
-    let found = targets.named(view, target)?.clone();
+    let found = targets.find(view, target)?.clone();
     if found.is_transient() {
         return Err(BackendError::TransientTarget { view, target: target.to_owned() });
     }

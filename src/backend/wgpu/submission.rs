@@ -205,7 +205,7 @@ impl WgpuSubmission {
     /// If there is no such target, or it is [transient](super::WgpuBackend::transient_targets).
     pub fn texture(&self, view: usize, target: impl AsRef<str>) -> Result<(&wgpu::Texture, u32), BackendError> {
         let target = target.as_ref();
-        let found = self.targets.named(view, target)?;
+        let found = self.targets.find(view, target)?;
         if found.is_transient() {
             return Err(BackendError::TransientTarget { view, target: target.to_owned() });
         }
@@ -244,7 +244,7 @@ impl WgpuSubmission {
         self.wait()?;
         // The calls below do not report it, and the wait does not if the frame was drawn before.
         check_device(&self.device)?;
-        let found = self.targets.named(view, target)?;
+        let found = self.targets.find(view, target)?;
         let whole = [found.texture.width(), found.texture.height()];
         let (read_back, copy) = new_read_back(&self.device, &self.targets, view, target, [[0, 0], whole])?;
         let index = with_error_scope(&self.device, target, || {

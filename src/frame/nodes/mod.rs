@@ -9,12 +9,11 @@ use bytemuck::Pod;
 use parking_lot::RwLockReadGuard;
 
 use super::stages::tables::FrameTables;
-use super::{FrameError, RecordedFrame, Renderer};
-use crate::backend::{Backend, FrameRequest};
+use crate::backend::FrameRequest;
 use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::command::DrawList;
 use crate::graph::NodeError;
-use crate::scene::{ChunkError, GeneratedBuffer, GeneratedContents, GeneratedSource, SceneRef};
+use crate::scene::{ChunkError, GeneratedBuffer, GeneratedContents, GeneratedSource};
 use crate::task::Worker;
 use crate::view::RenderView;
 
@@ -205,24 +204,7 @@ impl NodeAccesses {
     }
 }
 
-impl<B: Backend> Renderer<B> {
-    /// Records a frame as [`record`](Self::record) does, with work of the engine's own among its jobs: see [`CpuNode`].
-    /// The nodes are lent as the scene is, until this returns.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record). If the nodes make no graph, because some wait for each other in a circle, one reads
-    /// what nobody writes, two write the same without an order, or two have the same name; if a node fails or panics.
-    /// The error names the node, and the next frame is not affected.
-    pub fn record_with_nodes(
-        &mut self,
-        scene: SceneRef<'_>,
-        nodes: &[&dyn CpuNode],
-    ) -> Result<RecordedFrame<B>, FrameError> {
-        self.record_part(&scene, nodes, true)
-    }
-}
-
-/// What a [`CpuNode`](super::CpuNode) sees of the frame while it runs: what it declares to read of it.
+/// What a [`CpuNode`] sees of the frame while it runs: what it declares to read of it.
 #[derive(Clone, Copy)]
 pub struct NodeContext<'a> {
     pub(super) request: &'a FrameRequest<'a>,

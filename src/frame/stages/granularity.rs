@@ -7,10 +7,10 @@ use std::time::Duration;
 use drawloom_jobs::internal::{Estimate, Filter, Stopwatch, job_size};
 
 use super::culling::OcclusionControls;
+use super::statistics::StageTimes;
 use super::tables::FrameTables;
 use crate::backend::{Backend, CallPanic, GuardedBackend};
 use crate::command::DrawList;
-use crate::frame::statistics::StageTimes;
 use crate::graph::ModeChoice;
 use crate::process::{FramePlan, Pass};
 use crate::timeline::{FrameTuning, JobSize, Labels, Timeline, TuningAlternative, TuningChoice, TuningSubject};

@@ -8,6 +8,7 @@ pub(super) mod granularity;
 pub(super) mod no_culling;
 pub(super) mod stage;
 pub(super) mod stage_graph;
+pub(super) mod statistics;
 pub(super) mod tables;
 #[cfg(feature = "occlusion")]
 mod of_culling;
@@ -24,9 +25,9 @@ use of_views::*;
 use self::context::FrameContext;
 use self::granularity::StageGroup::{self, Fill, Instance, Record, Sort, Visibility};
 use self::stage::Chunking::{ByCost, ByDraws, PerBucket, PerItem};
-use self::stage::PassMode as Mode;
 use self::stage::StageOwner::{Frame, Pass, View};
 use self::stage::{Chunking, Stage, StageJob, StageOwner};
+use self::tables::PassMode as Mode;
 use crate::backend::Backend;
 use crate::command::DrawList;
 use crate::graph::NodeError;

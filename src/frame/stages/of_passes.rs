@@ -256,8 +256,8 @@ fn ordered_parts<'a, B: Backend>(
     parts.map_err(|error| FailedPass { pass, failure: PassFailure::Error(error) })
 }
 
-/// The parts of an encoder's passes. When this is dropped, on every path, those that the backend leaves are dropped, and
-/// their memory goes back to the recordings.
+/// The parts of an encoder's passes. When this is dropped, on every path, those that the backend leaves are dropped,
+/// and their memory goes back to the recordings.
 struct TakenParts<'a, B: Backend> {
     parts: [Vec<B::Part>; FrameEncoders::MAX_PASSES],
     recordings: &'a [PassRecording<B>],

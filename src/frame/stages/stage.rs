@@ -1,16 +1,13 @@
-//! What a stage is: one step of the frame's pipeline, and a node of the frame's stage graph; and which passes have it.
+//! What a stage is: one step of the frame's pipeline, and a node of the frame's stage graph.
 
 use std::ops::Range;
 
 use super::context::FrameContext;
 use super::granularity::{Granularity, StageGroup};
+use super::tables::PassMode;
 use crate::backend::Backend;
-use crate::command::{Blending, DrawOrder, Selection};
 use crate::graph::{Node, NodeError};
-use crate::quality::DepthPrecision;
-use crate::scene::Projection;
 use crate::task::Worker;
-use crate::view::RenderView;
 
 /// One step of the frame's pipeline. [`Stage::ALL`] lists all of them.
 pub(in crate::frame) struct Stage<B: Backend> {
@@ -140,71 +137,4 @@ impl<B: Backend> Node<FrameContext<'_, B>> for StageNode<B> {
         }
         result
     }
-}
-
-/// What decides which stages a pass has, and its view: fixed for a stage graph. The frame has a mode of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::frame) struct PassMode {
-    /// Whether it draws objects.
-    pub(in crate::frame) draws_objects: bool,
-    /// Whether it orders its objects by bin, and so makes no commands.
-    pub(in crate::frame) orders_by_bin: bool,
-    /// Whether the scene has static groups.
-    pub(in crate::frame) has_static_groups: bool,
-    /// Whether views choose levels of detail.
-    pub(in crate::frame) chooses_levels: bool,
-    /// Whether the view can test for occlusion.
-    pub(in crate::frame) tests_occlusion: bool,
-    /// Whether the scene has meshes whose triangles are culled.
-    pub(in crate::frame) has_cullable_meshes: bool,
-}
-
-impl PassMode {
-    pub(in crate::frame) fn always(self) -> bool {
-        true
-    }
-
-    pub(in crate::frame) fn draws_objects(self) -> bool {
-        self.draws_objects
-    }
-
-    /// Whether the pass makes commands of its objects, and sorts them.
-    pub(in crate::frame) fn sorts_commands(self) -> bool {
-        self.draws_objects && !self.orders_by_bin
-    }
-
-    pub(in crate::frame) fn orders_by_bin(self) -> bool {
-        self.draws_objects && self.orders_by_bin
-    }
-
-    pub(in crate::frame) fn has_static_groups(self) -> bool {
-        self.has_static_groups
-    }
-
-    /// Whether the pass's draw list has a place for static groups.
-    pub(in crate::frame) fn lists_static_groups(self) -> bool {
-        self.orders_by_bin() && self.has_static_groups
-    }
-
-    pub(in crate::frame) fn chooses_levels(self) -> bool {
-        self.draws_objects && self.chooses_levels
-    }
-
-    #[cfg(feature = "occlusion")]
-    pub(in crate::frame) fn tests_occlusion(self) -> bool {
-        self.draws_objects && self.tests_occlusion
-    }
-
-    #[cfg(feature = "occlusion")]
-    pub(in crate::frame) fn has_cullable_meshes(self) -> bool {
-        self.draws_objects && self.has_cullable_meshes
-    }
-}
-
-/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order,
-/// and the view is not a paraboloid, where the subdivision level gives an object another state.
-pub(in crate::frame) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthPrecision) -> bool {
-    (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
-        && opaque_order.bits == 0
-        && view.camera.projection != Projection::Paraboloid
 }

@@ -1,4 +1,5 @@
-//! The tables that the stages of a frame fill for each other, and what a draw list is made from.
+//! The tables that the stages of a frame fill for each other; which stages a pass has, and what its draw list is made
+//! from.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -12,11 +13,11 @@ use parking_lot::{Mutex, RwLock};
 
 use super::culling::{CullingTables, PassTriangles};
 use super::granularity::Granularity;
-use super::stage::PassMode;
 use crate::backend::SceneLimits;
 use crate::bit_set::BitWord;
 use crate::command::{
-    BinnedSegment, Blending, Bucket, DrawList, Partition, RenderCommand, Selection, SortScratch, Splitters, Version,
+    BinnedSegment, Blending, Bucket, DrawList, DrawOrder, Partition, RenderCommand, Selection, SortScratch, Splitters,
+    Version,
 };
 use crate::frame::scene_check::BlendedTracker;
 use crate::frame::static_groups::{ListConditions, StaticGroupTable};
@@ -24,6 +25,7 @@ use crate::frame::views::FrameViews;
 use crate::frame::views::view_visibility::{Retest, ViewVisibility};
 use crate::leaked_guards::unlock;
 use crate::process::{FramePlan, Pass, ProcessId};
+use crate::quality::DepthPrecision;
 use crate::scene::{Camera, Projection, SceneError, SceneRef};
 use crate::view::{IssueReason, LevelSelector, LightTable, MeshLevels, ObjectLevels, ObjectTable, PerView, RenderView};
 
@@ -375,6 +377,73 @@ impl ViewTimes {
     pub(in crate::frame) fn times(&self) -> impl Iterator<Item = Duration> {
         self.nanoseconds.iter().map(|view| Duration::from_nanos(view.load(Ordering::Relaxed)))
     }
+}
+
+/// What decides which stages a pass has, and its view: fixed for a stage graph. The frame has a mode of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::frame) struct PassMode {
+    /// Whether it draws objects.
+    pub(in crate::frame) draws_objects: bool,
+    /// Whether it orders its objects by bin, and so makes no commands.
+    pub(in crate::frame) orders_by_bin: bool,
+    /// Whether the scene has static groups.
+    pub(in crate::frame) has_static_groups: bool,
+    /// Whether views choose levels of detail.
+    pub(in crate::frame) chooses_levels: bool,
+    /// Whether the view can test for occlusion.
+    pub(in crate::frame) tests_occlusion: bool,
+    /// Whether the scene has meshes whose triangles are culled.
+    pub(in crate::frame) has_cullable_meshes: bool,
+}
+
+impl PassMode {
+    pub(in crate::frame) fn always(self) -> bool {
+        true
+    }
+
+    pub(in crate::frame) fn draws_objects(self) -> bool {
+        self.draws_objects
+    }
+
+    /// Whether the pass makes commands of its objects, and sorts them.
+    pub(in crate::frame) fn sorts_commands(self) -> bool {
+        self.draws_objects && !self.orders_by_bin
+    }
+
+    pub(in crate::frame) fn orders_by_bin(self) -> bool {
+        self.draws_objects && self.orders_by_bin
+    }
+
+    pub(in crate::frame) fn has_static_groups(self) -> bool {
+        self.has_static_groups
+    }
+
+    /// Whether the pass's draw list has a place for static groups.
+    pub(in crate::frame) fn lists_static_groups(self) -> bool {
+        self.orders_by_bin() && self.has_static_groups
+    }
+
+    pub(in crate::frame) fn chooses_levels(self) -> bool {
+        self.draws_objects && self.chooses_levels
+    }
+
+    #[cfg(feature = "occlusion")]
+    pub(in crate::frame) fn tests_occlusion(self) -> bool {
+        self.draws_objects && self.tests_occlusion
+    }
+
+    #[cfg(feature = "occlusion")]
+    pub(in crate::frame) fn has_cullable_meshes(self) -> bool {
+        self.draws_objects && self.has_cullable_meshes
+    }
+}
+
+/// Whether a pass orders its objects by bin, and not by depth: it draws opaque ones alone, nothing asks for an order,
+/// and the view is not a paraboloid, where the subdivision level gives an object another state.
+pub(in crate::frame) fn orders_by_bin(selection: Selection, view: &RenderView, opaque_order: DepthPrecision) -> bool {
+    (selection.order, selection.blending) == (DrawOrder::ByState, Blending::Opaque)
+        && opaque_order.bits == 0
+        && view.camera.projection != Projection::Paraboloid
 }
 
 #[cfg(test)]

@@ -30,8 +30,7 @@ use std::time::Duration;
 
 use drawloom_jobs::internal::{Estimate, Filter, Hysteresis};
 
-use super::budgeted_view::ViewCost;
-use super::budgeted_view::{BudgetedView, QualityLevel};
+use super::budgeted_view::{BudgetedView, QualityLevel, ViewCost};
 #[cfg(feature = "wgpu")]
 use crate::backend::DevicePassTimes;
 use crate::frame::{BudgetError, FrameStatistics};
@@ -199,9 +198,9 @@ impl ViewBudget {
     /// cameras of views that the budget may not reduce may be among them, as views without a quality levels, or be
     /// added by the engine.
     ///
-    /// Give [`Self::choices`] to [`Renderer::add_choices`](crate::frame::Renderer::add_choices) before the frame of these
-    /// cameras is recorded, as the [example](ViewBudget) does. The frame reports its quality levels only then, and
-    /// without them the budget learns no view's cost. It warns of frames that report none.
+    /// Give [`Self::choices`] to [`Renderer::add_choices`](crate::frame::Renderer::add_choices) before the frame of
+    /// these cameras is recorded, as the [example](ViewBudget) does. The frame reports its quality levels only then,
+    /// and without them the budget learns no view's cost. It warns of frames that report none.
     ///
     /// # Errors
     /// If a quality level is invalid or comes after [`QualityLevel::LeftOut`], or if two views or two of their cameras

@@ -1,10 +1,11 @@
-//! The view cache: views that are drawn once for several frames.
+//! The view cache: views that are drawn once for several frames, and what becomes of the frames that draw them.
 
 use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::frame::recorded_frame::FrameOutcome;
+use parking_lot::Mutex;
+
 use crate::frame::views::{FrameViews, covers, have_same_maps, with_brightness_of};
 use crate::process::{FramePlan, ViewArray};
 use crate::scene::{Camera, Redraw, ViewKind};
@@ -246,4 +247,65 @@ fn views_without_their_layers(before: &FrameViews, requested: &FrameViews) -> Ha
     };
     let lost = requested.arrays.iter().filter(|array| !keeps_texture(array));
     lost.flat_map(|array| array.view_indices.iter().flatten().copied()).collect()
+}
+
+/// What becomes of a recorded frame. Later frames that keep a view which it draws share this with it.
+pub(in crate::frame) struct FrameOutcome {
+    state: Mutex<State>,
+}
+
+enum State {
+    /// It is neither submitted nor dropped, and keeps views that these frames draw, or that frames draw which they keep
+    /// views of in turn.
+    InFlight(Vec<Arc<FrameOutcome>>),
+    Submitted,
+    /// It was dropped, or its submission failed.
+    Lost,
+}
+
+impl FrameOutcome {
+    /// Of a frame that keeps views which `earlier` frames draw.
+    pub(in crate::frame) fn in_flight<'a>(earlier: impl Iterator<Item = &'a Arc<Self>>) -> Self {
+        let mut pending: Vec<Arc<Self>> = Vec::new();
+        let mut add = |frame: &Arc<Self>| {
+            if !frame.is_submitted() && !pending.iter().any(|known| Arc::ptr_eq(known, frame)) {
+                pending.push(Arc::clone(frame));
+            }
+        };
+        for frame in earlier {
+            if let State::InFlight(earlier) = &*frame.state.lock() {
+                earlier.iter().for_each(&mut add);
+            }
+            add(frame);
+        }
+        Self { state: Mutex::new(State::InFlight(pending)) }
+    }
+
+    pub(in crate::frame) fn is_submitted(&self) -> bool {
+        matches!(*self.state.lock(), State::Submitted)
+    }
+
+    /// Whether what the frame draws is lost, or will be, because a frame that it relies on is lost.
+    pub(in crate::frame) fn is_lost(&self) -> bool {
+        match &*self.state.lock() {
+            // Each of them is older, so no two wait for each other's lock. Those that these rely on are among them.
+            State::InFlight(earlier) => earlier.iter().any(|frame| matches!(*frame.state.lock(), State::Lost)),
+            State::Submitted => false,
+            State::Lost => true,
+        }
+    }
+
+    pub(in crate::frame) fn submit(&self) {
+        self.end(State::Submitted);
+    }
+
+    pub(in crate::frame) fn lose(&self) {
+        self.end(State::Lost);
+    }
+
+    fn end(&self, state: State) {
+        let before = std::mem::replace(&mut *self.state.lock(), state);
+        // The earlier frames are not needed any more, which keeps the chains of frames short.
+        drop(before);
+    }
 }

@@ -38,7 +38,7 @@ impl CpuShader {
     }
 
     /// For a process that draws the pixels that lights reach: [`Draws::Lights`](crate::process::Draws::Lights).
-    pub(crate) fn lights<S: LightCpuShader<f32> + LightCpuShader<f64> + 'static>(shader: S) -> Self {
+    pub fn lights<S: LightCpuShader<f32> + LightCpuShader<f64> + 'static>(shader: S) -> Self {
         let shader = Arc::new(shader);
         let single = TypedCpuShader::Lights(Contained::new(Arc::clone(&shader) as _));
         Self { single, double: TypedCpuShader::Lights(Contained::new(shader)) }
@@ -76,7 +76,7 @@ pub trait FullScreenCpuShader<R: Real>: Send + Sync {
 ///
 /// It runs for the pixels within conservative bounds of the light whose surface is nearer than the light's far side. No
 /// light geometry is drawn, so the shader discards pixels that the light does not reach.
-pub(crate) trait LightCpuShader<R: Real>: Send + Sync {
+pub trait LightCpuShader<R: Real>: Send + Sync {
     /// The fragment entry point: writes the targets in the order declared; `false` discards the pixel.
     fn fragment(
         &self,

@@ -18,8 +18,7 @@ pub use inputs::{
     FullScreenPixel, MAX_ATTRIBUTES, Materials, ObjectPixel, PassInputs, SampledTexture, ShaderLight, ShaderMaterial,
     ShaderObject, ShaderView, VARYINGS, VertexInput, VertexOutput,
 };
-pub(crate) use interface::LightCpuShader;
-pub use interface::{CpuShader, FullScreenCpuShader, ObjectCpuShader};
+pub use interface::{CpuShader, FullScreenCpuShader, LightCpuShader, ObjectCpuShader};
 pub use prelude::{bounded_uv, direction_from_octahedral, octahedral_from_direction};
 
 pub(crate) use interface::TypedCpuShader;

@@ -41,8 +41,8 @@ impl GeometryBuffer {
         Self::of_share(formats, 0, 1)
     }
 
-    /// Draws the objects of share `index` of `of` shares of the materials (L 5). The first share clears the targets, the
-    /// others draw over them: all shares are recorded at the same time.
+    /// Draws the objects of share `index` of `of` shares of the materials (L 5). The first share clears the targets,
+    /// the others draw over them: all shares are recorded at the same time.
     pub(crate) fn of_share(formats: GeometryFormats, index: u32, of: u32) -> Self {
         let name =
             if of <= 1 { String::from("geometry buffer") } else { format!("geometry buffer {} of {of}", index + 1) };

@@ -156,8 +156,8 @@ impl FramePlan {
         self.identity
     }
 
-    /// Whether no process is left out because the frame lacks its views: then frames with other views have this plan too,
-    /// unless a pipeline's requirements differ.
+    /// Whether no process is left out because the frame lacks its views: then frames with other views have this plan
+    /// too, unless a pipeline's requirements differ.
     pub(crate) fn has_all_views(&self) -> bool {
         self.has_all_views
     }
@@ -240,12 +240,12 @@ impl FramePlan {
     }
 
     /// The columns of objects that the processes read, each once.
-    pub(crate) fn columns(&self) -> &[ColumnLayout] {
+    pub fn columns(&self) -> &[ColumnLayout] {
         &self.shared.columns
     }
 
     /// The material types that the processes read, each once.
-    pub(crate) fn material_types(&self) -> &[MaterialLayout] {
+    pub fn material_types(&self) -> &[MaterialLayout] {
         &self.shared.material_types
     }
 
@@ -255,7 +255,7 @@ impl FramePlan {
     }
 
     /// The buffers that the processes share, each once.
-    pub(crate) fn buffers(&self) -> &[BufferLayout] {
+    pub fn buffers(&self) -> &[BufferLayout] {
         &self.shared.buffers
     }
 

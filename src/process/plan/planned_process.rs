@@ -54,8 +54,8 @@ pub(crate) struct ColorTarget {
     pub(crate) resolved_into: Option<usize>,
 }
 
-/// What a process of a name, for one kind of view, is known by in all plans of a renderer: the first of these plans that
-/// has it, by its identity, and the index of the process there.
+/// What a process of a name, for one kind of view, is known by in all plans of a renderer: the first of these plans
+/// that has it, by its identity, and the index of the process there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct ProcessId {
     pub(super) plan: u64,

@@ -418,8 +418,8 @@ fn copied_targets(processes: &[PlannedProcess], targets: &[PlannedTarget]) -> Re
     Ok(copies)
 }
 
-/// The targets in layers that processes sample although none of the frame draws them: those that the pipeline names, and
-/// those of kinds of views that the frame does not have. What samples them finds one layer of zeros.
+/// The targets in layers that processes sample although none of the frame draws them: those that the pipeline names,
+/// and those of kinds of views that the frame does not have. What samples them finds one layer of zeros.
 pub(super) fn absent_layers(
     pipeline: &PipelineProcesses,
     added: &[(Option<usize>, PlannedProcess)],

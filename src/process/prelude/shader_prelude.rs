@@ -41,8 +41,8 @@ fn compose(vertex_input: &str, deformation: &str, clamps_corners: bool) -> Strin
     [own, &light_kinds(), &clamps_corners, light_volume, "\n", vertex_input, deformation].concat()
 }
 
-/// What shaders know of the kinds of lights, of [`LightKind::ALL`] and [`LightKind::rules`]: a constant for each kind, the
-/// number of vectors that the ends of the light classes are in, and functions that say which kinds have what.
+/// What shaders know of the kinds of lights, of [`LightKind::ALL`] and [`LightKind::rules`]: a constant for each kind,
+/// the number of vectors that the ends of the light classes are in, and functions that say which kinds have what.
 fn light_kinds() -> String {
     let constant = |kind: LightKind| format!("const {}: u32 = {}u;\n", kind.name().to_uppercase(), kind as u32);
     let mut text: String = LightKind::ALL.into_iter().map(constant).collect();

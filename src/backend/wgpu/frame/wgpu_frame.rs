@@ -69,8 +69,8 @@ impl WgpuFrame {
     /// # Errors
     /// See [`new_read_back`].
     pub(crate) fn read_back_whole(&mut self, view: usize, target: &str) -> Result<WgpuReadBack, BackendError> {
-        let whole =
-            self.targets.find(view, target).map_or([0; 2], |found| [found.texture.width(), found.texture.height()]);
+        let texture = &self.targets.find(view, target)?.texture;
+        let whole = [texture.width(), texture.height()];
         self.read_back(view, target, [[0, 0], whole])
     }
 

@@ -97,17 +97,13 @@ impl ViewTarget {
 
 impl WgpuTargets {
     /// The target of one view by its name, for what an engine asks for.
-    pub(crate) fn find(&self, view: usize, name: &str) -> Option<&ViewTarget> {
-        find(self.views.get(view)?, name)
-    }
-
+    ///
     /// # Errors
-    /// As [`Self::find`], if the view has no such target: the error lists those that it has.
-    pub(crate) fn named(&self, view: usize, name: &str) -> Result<&ViewTarget, BackendError> {
-        self.find(view, name).ok_or_else(|| {
-            let targets = self.views.get(view).into_iter().flatten();
-            BackendError::unknown_target(view, name, targets.map(|(_, target)| target.planned.name.as_str()))
-        })
+    /// If the view has no such target: the error lists those that it has.
+    pub(crate) fn find(&self, view: usize, name: &str) -> Result<&ViewTarget, BackendError> {
+        let targets = || self.views.get(view).into_iter().flatten().map(|(_, target)| target);
+        let unknown = || BackendError::unknown_target(view, name, targets().map(|target| &*target.planned.name));
+        targets().find(|target| target.planned.name == name).ok_or_else(unknown)
     }
 
     /// The target of one view by its index among the plan's; `None` if views of another kind have it.
@@ -418,7 +414,7 @@ impl TargetCache {
     /// The current target of this name in the slot of a view, and whether it is the same view's.
     fn kept_target(&self, view: &RenderView, name: &str) -> Option<(&ViewTarget, bool)> {
         let (targets, is_same) = self.current.views.kept(view)?;
-        Some((find(targets, name)?, is_same))
+        targets.iter().find(|(_, target)| target.planned.name == name).map(|(_, target)| (target, is_same))
     }
 
     fn own_target(
@@ -500,9 +496,4 @@ impl TargetCache {
         let (_, array) = new_views(&texture, planned.format, &descriptor);
         Ok(LayeredTarget { planned: Arc::new(planned.clone()), texture, array })
     }
-}
-
-/// The one of a view's targets that has this name.
-fn find<'a>(targets: &'a [(usize, ViewTarget)], name: &str) -> Option<&'a ViewTarget> {
-    targets.iter().map(|(_, target)| target).find(|target| target.planned.name == name)
 }

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use super::stages::tables::{FrameTables, PassTable};
+use super::tables::{FrameTables, PassTable};
 use crate::backend::{FrameRequest, TargetMemory};
 use crate::command::Batch;
+use crate::frame::static_groups::StaticGroupStatistics;
 #[cfg(feature = "wgpu")]
 use crate::process::{Draws, FramePlan, RequestLog};
 use crate::raster::CulledTriangles;
@@ -29,7 +30,7 @@ pub struct FrameStatistics {
     pub static_groups: StaticGroupStatistics,
     /// Bytes that were uploaded to the device.
     pub uploaded: u64,
-    /// Bytes that [CPU nodes](super::CpuNode) have filled, which are uploaded when the frame is submitted.
+    /// Bytes that [CPU nodes](crate::frame::CpuNode) have filled, which are uploaded when the frame is submitted.
     pub generated: u64,
     /// The memory of the frame's targets. The software backend does not tell.
     pub targets: TargetMemory,
@@ -99,7 +100,7 @@ pub struct StageTimes {
     pub instance: Duration,
     /// Other uploads, recording and finishing passes.
     pub record: Duration,
-    /// The engine's own [nodes](super::CpuNode).
+    /// The engine's own [nodes](crate::frame::CpuNode).
     pub nodes: Duration,
     /// Submitting; 0 until the frame is submitted.
     pub submit: Duration,
@@ -114,14 +115,14 @@ impl StageTimes {
 }
 
 impl FrameStatistics {
-    /// The quality level of each view of a [`ViewBudget`](super::ViewBudget), by name: 0 at its best.
+    /// The quality level of each view of a [`ViewBudget`](crate::frame::ViewBudget), by name: 0 at its best.
     pub fn levels(&self) -> impl Iterator<Item = (&str, usize)> {
         let choices = self.tuning.choices.iter().filter(|choice| choice.subject == TuningSubject::QualityLevel);
         choices.filter_map(|choice| Some((choice.labels.view.as_deref()?, choice.chosen)))
     }
 
     /// Tells a timeline what the frame did with static groups, if the scene has any.
-    pub(super) fn count_static_groups(&self, timeline: &Timeline) {
+    pub(in crate::frame) fn count_static_groups(&self, timeline: &Timeline) {
         if self.static_groups != StaticGroupStatistics::default() {
             let executed = self.views.iter().map(|view| view.static_groups).sum::<usize>();
             let objects = self.views.iter().map(|view| view.objects_of_static_groups).sum::<usize>();
@@ -132,7 +133,7 @@ impl FrameStatistics {
     }
 
     /// The statistics of a frame of this many valid lights whose stages have run.
-    pub(super) fn new(
+    pub(in crate::frame) fn new(
         request: &FrameRequest<'_>,
         lights: usize,
         tables: &FrameTables,
@@ -205,20 +206,9 @@ impl LevelStatistics {
     }
 }
 
-/// What a frame did with the scene's [static groups](crate::scene::StaticGroup), which is the number of static groups.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StaticGroupStatistics {
-    /// That were recorded by earlier frames, so that views may execute them.
-    pub executable: usize,
-    /// That this frame records.
-    pub recorded: usize,
-    /// With an object that is reported as changed.
-    pub changed: usize,
-}
-
 /// What warnings were about: each is reported when it changes, not in every frame.
 #[derive(Debug, Default)]
-pub(super) struct Warnings {
+pub(in crate::frame) struct Warnings {
     /// The scene issues of the latest frames.
     reported: Vec<SceneIssue>,
     /// Processes with raw passes, each with something that it declares, from plans whose frames were observed.
@@ -229,7 +219,7 @@ pub(super) struct Warnings {
 impl Warnings {
     /// Warns of the scene issues of a frame that are not reported yet. Some of them only drawing finds, so a frame with
     /// cached views finds a part of these: that many or more were reported.
-    pub(super) fn report(&mut self, scene_issues: &[SceneIssue], has_cached_views: bool) {
+    pub(in crate::frame) fn report(&mut self, scene_issues: &[SceneIssue], has_cached_views: bool) {
         let is_partial = |reason| {
             use IssueReason::{CoarseEdges, LightLimit, UndrawableMesh};
             has_cached_views && matches!(reason, CoarseEdges | LightLimit | UndrawableMesh)
@@ -266,7 +256,7 @@ impl Warnings {
     /// Ends a frame of this plan. Warns of what raw passes have not asked for in the first frames that encoded them,
     /// though their processes declare it. A process is in many plans: what one of them has shown is not observed again.
     #[cfg(feature = "wgpu")]
-    pub(super) fn report_unrequested(&mut self, plan: &FramePlan, draws: &[Draws<'_>]) {
+    pub(in crate::frame) fn report_unrequested(&mut self, plan: &FramePlan, draws: &[Draws<'_>]) {
         for (planned, draws) in plan.processes().iter().zip(draws) {
             let Draws::Raw(_) = draws else { continue };
             for (resource, is_requested) in planned.requests.end_frame(&planned.declaration) {
