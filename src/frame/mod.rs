@@ -1,6 +1,6 @@
 //! The frame: a scene goes in, recorded queues come out, and the device thread submits them.
 //!
-//! [`Renderer::record`] has the steps of a frame in order, and `stages.rs` lists the stages that its jobs run.
+//! [`Renderer::record`] has the steps of a frame in order, and `stages/mod.rs` lists the stages that its jobs run.
 
 mod builder;
 mod nodes;

@@ -57,13 +57,24 @@ impl PlanSources {
         Ok(())
     }
 
+    /// Whether the processes of this name that the engine added are all on, or all off.
+    pub(super) fn are_enabled(&self, name: &str, is_enabled: bool) -> bool {
+        let mut named = self.processes.iter().filter(|added| added.name == name).peekable();
+        named.peek().is_some() && named.all(|added| added.is_enabled == is_enabled)
+    }
+
+    /// Whether the engine has named an output.
+    pub(super) fn has_output(&self, target: &str) -> bool {
+        self.outputs.iter().any(|output| output == target)
+    }
+
     fn check_added(&self, name: &str) -> Result<(), PlanError> {
         known(name, "process", self.processes.iter().map(|added| added.name.as_str()))
     }
 
     /// Adds an output, unless there is one of that name.
     pub(super) fn add_output(&mut self, target: String) {
-        if !self.outputs.contains(&target) {
+        if !self.has_output(&target) {
             self.outputs.push(target);
         }
     }
@@ -207,6 +218,11 @@ impl PlanCache {
         Ok(Self { sources, pipeline_maps, device, of_device, has_one_plan, compiled, uses: 0, current, process_ids })
     }
 
+    /// What the plans are made of.
+    pub(super) fn sources(&self) -> &PlanSources {
+        &self.sources
+    }
+
     /// A cache with other processes. Those that stay keep their ids.
     ///
     /// # Errors
@@ -254,8 +270,7 @@ impl PlanCache {
         &self.current
     }
 
-    /// The plan for a scene with these valid lights, and with objects that need transparency if `transparency` is true,
-    /// compiled if the cache does not have it. It becomes the current plan.
+    /// The plan for a scene with these contents, compiled if the cache does not have it. It becomes the current plan.
     ///
     /// # Errors
     /// If the processes make no frame.
@@ -276,6 +291,7 @@ impl PlanCache {
             None => vec![Requirements::all()],
         };
         let mut plans: Vec<Arc<FramePlan>> = Vec::new();
+        let others = others.into_iter().map(Requirements::with_all_views);
         for requirements in [self.requirements(scene)?].into_iter().chain(others) {
             let plan = self.plan_for(requirements)?;
             if plans.iter().all(|other| other.identity() != plan.identity()) {

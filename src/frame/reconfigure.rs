@@ -79,7 +79,8 @@ impl<B: Backend> Renderer<B> {
         self.view_cache.forget_frames_in_flight();
     }
 
-    /// Replaces the pipeline from the next frame on. Device pipelines that both have in common are kept.
+    /// Replaces the pipeline from the next frame on. Device pipelines of the latest frame that both have in common are kept;
+    /// those that were only prepared are not.
     ///
     /// # Errors
     /// If the processes make no frame, or one of them panics; then nothing changes.
@@ -93,8 +94,8 @@ impl<B: Backend> Renderer<B> {
         Ok(())
     }
 
-    /// Adds a process from the next frame on, behind those that were added before. What the other processes have stays:
-    /// histories, lists, device pipelines. Frames that are recorded already are drawn as they were recorded.
+    /// Adds a process from the next frame on, behind those that were added before. What the other processes have in the
+    /// latest frame stays: histories, lists, device pipelines; pipelines that were only prepared do not. Frames that are recorded already are drawn as they were recorded.
     ///
     /// ```
     /// # use drawloom::process::{Deferred, Declare, Draws, FullScreen, InjectionPoint, RenderProcess};
@@ -142,6 +143,9 @@ impl<B: Backend> Renderer<B> {
     /// # Errors
     /// If there is none, or the processes that are on make no frame; then nothing changes.
     pub fn set_process_enabled(&mut self, name: &str, is_enabled: bool) -> Result<(), BuildError> {
+        if self.plans.sources().are_enabled(name, is_enabled) {
+            return Ok(());
+        }
         self.change_plans(|sources| sources.set_process_enabled(name, is_enabled))
     }
 
@@ -150,6 +154,9 @@ impl<B: Backend> Renderer<B> {
     /// # Errors
     /// If no process writes it; then nothing changes.
     pub fn add_output(&mut self, target: impl AsRef<str>) -> Result<(), BuildError> {
+        if self.plans.sources().has_output(target.as_ref()) {
+            return Ok(());
+        }
         let target = target.as_ref().to_owned();
         self.change_plans(|sources| {
             sources.add_output(target);
@@ -179,7 +186,8 @@ impl<B: Backend> Renderer<B> {
     /// Sets the quality from the next frame on, of the pipeline too.
     ///
     /// # Errors
-    /// If the quality is invalid, or the pipeline panics, as by a step of post-processing; then nothing changes.
+    /// If the quality is invalid, the processes make no frame with it, or the pipeline panics, as by a step of
+    /// post-processing; then nothing changes.
     pub fn set_quality(&mut self, quality: Quality) -> Result<(), BuildError> {
         quality.check()?;
         if quality == self.quality && self.pipeline_has_quality {

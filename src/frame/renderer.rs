@@ -368,7 +368,7 @@ impl<B: Backend> Renderer<B> {
         let shares_encoder = |pass| self.backend.shares_encoder(&frame, pass);
         self.encoders.begin_frame(request.passes.len(), shares_encoder)?;
 
-        // Objects → visibility → fill → sort → instance → record, on all workers: `stages.rs` lists the stages.
+        // Objects → visibility → fill → sort → instance → record, on all workers: `stages/mod.rs` lists them.
         let context = FrameContext {
             request: &request,
             tables: &self.tables,

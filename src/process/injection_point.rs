@@ -1,7 +1,7 @@
 //! Places for an engine's processes in a pipeline's frame.
 
-/// A place for processes of the engine between those of the [deferred pipeline](super::Deferred). Every frame has all
-/// of them, whatever the scene requires: see [`Declare::at`](super::Declare::at). What its targets hold is listed at
+/// A place for processes of the engine between those of the [deferred pipeline](super::Deferred), whose frames
+/// have all of them, whatever the scene requires: see [`Declare::at`](super::Declare::at). What its targets hold is listed at
 /// [`GeometryBuffer`](super::GeometryBuffer). A pipeline of the engine's [adds](super::PipelineProcesses) those that
 /// its frames have.
 ///

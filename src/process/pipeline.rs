@@ -75,8 +75,9 @@ use crate::view::ShadowMaps;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Pipeline: Send + Sync {
-    /// What a frame of this scene requires. Called once a frame, and when pipelines are
-    /// [prepared](crate::Renderer::prepare_pipelines). Kinds of views of the scene's cameras are required in any case.
+    /// What a frame of this scene requires. Called once a frame, when pipelines are
+    /// [prepared](crate::Renderer::prepare_pipelines), and for [an empty scene](SceneContents::EMPTY) whenever the
+    /// renderer's processes, outputs or quality change. Kinds of views of the scene's cameras are required in any case.
     fn requirements(&self, scene: &SceneContents<'_>) -> Requirements {
         Requirements::of(scene, self.shadow_maps().is_some())
     }
@@ -93,19 +94,21 @@ pub trait Pipeline: Send + Sync {
     ) -> Result<(), PlanError>;
 
     /// # Errors
-    /// If a setting of the pipeline is invalid. Called when a renderer gets the pipeline.
+    /// If a setting of the pipeline is invalid. Called when a renderer gets the pipeline, and whenever its processes,
+    /// outputs or quality change.
     fn check(&self) -> Result<(), PlanError> {
         Ok(())
     }
 
-    /// What every frame requires, whatever its scene. Called when a renderer gets the pipeline or another backend.
+    /// What every frame requires, whatever its scene. Called as [`check`](Self::check) is, and for another backend.
     fn kept(&self, device: DeviceSupport) -> Requirements {
         let _ = device;
         Requirements::default()
     }
 
     /// How shadow maps are drawn; `None`, the default, if no light casts shadows. Otherwise lights that cast shadows
-    /// have [classes](crate::view::LightClass) of their own. Called when a renderer gets the pipeline.
+    /// have [classes](crate::view::LightClass) of their own. Called as [`check`](Self::check) is, and in each frame by
+    /// [`requirements`](Self::requirements) unless that is the pipeline's own.
     fn shadow_maps(&self) -> Option<ShadowMaps> {
         None
     }
@@ -124,7 +127,7 @@ pub trait Pipeline: Send + Sync {
     }
 
     /// Whether blended objects are added in half floats only because the device cannot blend floats: then one is
-    /// [counted](crate::view::IssueReason::HalfFloatBlending). Called when a renderer gets the pipeline or another
+    /// [counted](crate::view::IssueReason::HalfFloatBlending). Called as [`check`](Self::check) is, and for another
     /// backend.
     fn lacks_float_blending(&self, device: DeviceSupport) -> bool {
         let _ = device;

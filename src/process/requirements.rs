@@ -85,7 +85,7 @@ impl Requirements {
     /// The same without the lights of a class, and without shadow maps if no other class casts shadows.
     pub fn without_lights(self, class: LightClass) -> Self {
         let without = Self { lights: self.lights & !(1 << class.index()), ..self };
-        Self { shadow_maps: without.shadows(), ..without }
+        Self { shadow_maps: if class.shadowed { without.shadows() } else { self.shadow_maps }, ..without }
     }
 
     /// The same with objects that need transparency.
@@ -109,7 +109,8 @@ impl Requirements {
         Self { optional_views: Self::all().optional_views, ..self }
     }
 
-    /// The same with what only the engine's pipeline knows: each value has plans of its own. A renderer keeps the
+    /// The same with what only the engine's pipeline knows, as bits: each value has plans of its own, and what a pipeline
+    /// [keeps](super::Pipeline::kept) adds its bits. A renderer keeps the
     /// [latest plans](crate::Renderer::MAX_PLANS) only, so that a value that never repeats costs time, but no memory.
     pub fn with_own(self, own: u64) -> Self {
         Self { own, ..self }

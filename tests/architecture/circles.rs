@@ -1,5 +1,5 @@
-//! The folders of one module do not import each other in circles, so that each can be understood with only those that
-//! it imports. Files of one folder may: they are read together.
+//! No circle of imports between the files of one module leaves a folder, so that a folder can be understood with only
+//! what it imports. Files of one folder may import each other in circles: they are read together.
 //!
 //! A file imports the files that define the items it names: in `use` declarations, and in paths that start with
 //! `crate`, `super`, `self` or a module that the file declares. Code for tests does not count, and neither does a
@@ -19,7 +19,7 @@ use crate::tokens::{is, is_for_tests, item, trees_of};
 const MAX_REEXPORTS: usize = 8;
 
 #[test]
-fn folders_do_not_import_each_other_in_circles() {
+fn no_circle_of_imports_leaves_a_folder() {
     let problems = CRATES.map(|folder| circles(&read_all(&[folder]))).concat();
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }

@@ -1,8 +1,8 @@
 //! The structure of the crates, checked on its source:
 //!
 //! - `layers`: the modules that `lib.rs` lists are layers, and each uses only those above it.
-//! - `circles`: the files of one module do not import each other in circles.
-//! - `files`: files are short, and their names say what is inside.
+//! - `circles`: no circle of imports within a module leaves a folder.
+//! - `files`: files have few lines of code, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files and print lines through `drawloom-output`.
 //! - `pipeline`: `ARCHITECTURE.md` has the table of stages.
 //! - `pipelines`: `Deferred` uses public interfaces alone, and the frame does not know it.

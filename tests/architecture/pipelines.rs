@@ -184,12 +184,14 @@ fn the_frame_does_not_know_the_deferred_pipeline() {
     assert!(names.contains("Deferred") && names.contains("ShadowCasters"), "{names:?}");
     let plan = |source: &Source| source.module().starts_with(&["process".to_owned(), "plan".to_owned()]);
     let frame = |source: &Source| source.module().first().is_some_and(|layer| layer == "frame") || plan(source);
-    let mut wrong = Vec::new();
+    let (mut wrong, mut checked) = (Vec::new(), 0);
     for module in modules_without_tests(&all).iter().filter(|module| frame(module.source)) {
+        checked += 1;
         let named = words(&module.trees);
         let shown = module.source.path.display();
         wrong.extend(named.intersection(&names).map(|name| format!("{shown} names {name}")));
     }
+    assert!(checked > 20, "{checked} files found");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

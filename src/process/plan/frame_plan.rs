@@ -58,8 +58,8 @@ impl FramePlan {
 
     /// The plan of frames that have the kinds of views that `is_present` tells, with the processes of a pipeline.
     ///
-    /// The slots of the pipeline are a chain, whose order is known: if two of their processes write one target, the
-    /// earlier goes first. The chain does not order its processes against writers of the same target that are outside
+    /// The slots of the pipeline are a chain, whose order is known: a process that uses a target goes behind those
+    /// before it in the chain that write it. The chain does not order its processes against writers of the same target that are outside
     /// of it.
     ///
     /// What processes sample of the kinds of views that are not present, they find empty. Orders and outputs that name

@@ -1,5 +1,4 @@
-//! What processes share by its name: the columns, material types, vertex attributes and buffers that a plan's processes
-//! declare.
+//! What processes declare by name (columns, material types, vertex attributes and buffers), and whether a scene has it.
 
 use super::{PlanError, PlannedProcess};
 use crate::command::MaterialTypes;
