@@ -1,4 +1,4 @@
-//! The names of targets as constants.
+//! The names of targets as constants, and lists of names for messages.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -22,9 +22,8 @@ use std::fmt::{self, Display, Formatter};
 /// }
 /// ```
 ///
-/// Whatever takes the name of a target takes such a constant, or a string for a name that is made at run time. Two of
-/// one name are the same target. [`targets`](super::targets) has those of the deferred
-/// pipeline.
+/// What takes the name of a target takes a constant, or a string for a name that is made at run time. Two of one name
+/// are the same target. [`targets`](super::targets) has those of the deferred pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Target(&'static str);
 
