@@ -242,8 +242,10 @@ impl OrderKeys<'_> {
 
 impl Fill<'_> {
     /// Writes one command for each visible object whose rank is in `ranks`, at the index that is its rank: its index
-    /// among the visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`].
-    pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) {
+    /// among the visible objects. Objects that the process does not draw become [`RenderCommand::EMPTY`]. Returns whether
+    /// it counted one whose edges are too coarse.
+    pub(crate) fn run(&self, ranks: Range<usize>, commands: &ChunkedArray<RenderCommand>) -> bool {
+        let mut has_coarse_edges = false;
         let camera = &self.view.camera;
         let numbers = match self.selection.order {
             DrawOrder::ByColumn(column) => self.scene.column(column.layout()),
@@ -262,14 +264,21 @@ impl Fill<'_> {
                 let (first, objects) = (word * BITS_PER_WORD, reader.block_of_word(word));
                 let start = rank % ChunkedArray::<RenderCommand>::BLOCK_SIZE;
                 for (slot, bit) in slots[start..].iter_mut().zip(set_bits(bits)) {
-                    *slot = self.command(first + bit, objects, &order);
+                    *slot = self.command(first + bit, objects, &order, &mut has_coarse_edges);
                 }
             });
         }
+        has_coarse_edges
     }
 
     #[inline]
-    fn command(&self, object: usize, objects: &ObjectBlock, order: &OrderKeys<'_>) -> RenderCommand {
+    fn command(
+        &self,
+        object: usize,
+        objects: &ObjectBlock,
+        order: &OrderKeys<'_>,
+        has_coarse_edges: &mut bool,
+    ) -> RenderCommand {
         let entry = object % ObjectTable::BLOCK_SIZE;
         let draw = objects.draws[entry];
         let blend = draw.state.blend();
@@ -286,6 +295,7 @@ impl Fill<'_> {
             state = state.with_subdivision_level(level);
             if level > DrawState::MAX_SUBDIVISION_LEVEL {
                 self.table.scene_issues().count_once(IssueReason::CoarseEdges, object);
+                *has_coarse_edges = true;
             }
         }
         let center = objects.spheres.get(entry).center;

@@ -7,9 +7,9 @@ use drawloom::command::Batch;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, DepthCurve, DepthPrecision, Quality};
-use drawloom::scene::{Camera, Changes, Light, SceneError, SceneRef};
+use drawloom::scene::{Camera, Changes, Light, RenderObject, SceneError, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::view::SceneIssue;
+use drawloom::view::{IssueReason, SceneIssue};
 use drawloom::{FrameError, FrameStatistics, Renderer, Submitter, ViewStatistics};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::scenes::field;
@@ -231,6 +231,39 @@ fn a_change_that_is_not_reported_is_named_and_the_next_frame_is_right() {
     let told_nothing_more = SceneRef { changes: Changes::NONE, ..moved };
     let recorded = renderer.record(told_nothing_more).unwrap();
     assert_eq!(contents(&renderer, recorded.statistics()), of_a_new_renderer(Quality::balanced(), moved));
+}
+
+/// A lamp with a paraboloid map above an object whose edges it sees under few degrees, or under too many.
+#[test]
+fn the_list_of_a_paraboloid_is_kept_unless_edges_are_too_coarse() {
+    for (scale, is_coarse) in [(1.0, false), (1e5, true)] {
+        let mut scene = field(200);
+        let SceneRef { assets, meshes: &[mesh, ..], materials: &[material, ..], .. } = scene.as_scene_ref() else {
+            panic!()
+        };
+        let vertices = assets.get(mesh).unwrap().vertices().iter();
+        let top = vertices.map(|vertex| vertex.position[1]).fold(f32::MIN, f32::max) * scale;
+        let object = RenderObject::new(mesh, material, DVec3::NEG_Y * f64::from(top));
+        scene.add_object(RenderObject { scale: Vec3::splat(scale), ..object }).unwrap();
+        let position = DVec3::Y * 3.0;
+        let (intensity, direction) = (Vec3::splat(900.0), Vec3::NEG_Y);
+        scene.lights = vec![Light::Hemispherical { position, intensity, range: 50.0, direction, casts_shadow: true }];
+        let (mut renderer, submitter) = renderer(Quality::balanced(), 1);
+        let expected = of_a_new_renderer(Quality::balanced(), scene.as_scene_ref());
+        assert_eq!(expected.1.iter().any(|issue| issue.reason == IssueReason::CoarseEdges), is_coarse, "{expected:?}");
+        for frame in 0..4 {
+            renderer.scheduler().timeline().start();
+            let changes = if frame == 0 { Changes::Unknown } else { Changes::NONE };
+            let recorded = renderer.record(SceneRef { changes, ..scene.as_scene_ref() }).unwrap();
+            assert_eq!(difference(&contents(&renderer, recorded.statistics()), &expected), None, "frame {frame}");
+            submitter.submit(recorded).unwrap();
+            let log = renderer.scheduler().timeline().take();
+            let nodes = log.runs[0].graph.nodes.iter().enumerate();
+            let fills = nodes.filter(|(_, node)| node.labels.stage.as_deref() == Some("fill"));
+            let filled: usize = fills.map(|(index, _)| log.runs[0].width(index)).sum();
+            assert_eq!(filled > 0, is_coarse || frame == 0, "frame {frame}: {filled}");
+        }
+    }
 }
 
 #[test]

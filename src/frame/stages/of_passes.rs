@@ -41,7 +41,9 @@ pub(super) fn make_commands<B: Backend>(frame: &FrameContext<'_, B>, job: StageJ
         scene: frame.request.scene,
         quality: frame.request.quality,
     };
-    fill.run(job.items, &table.commands);
+    if fill.run(job.items, &table.commands) {
+        table.has_coarse_edges.get_or_init(|| ());
+    }
     Ok(())
 }
 
@@ -152,7 +154,7 @@ pub(super) fn join<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -
     if table.culls_triangles {
         table.triangles.write().find(&list, &frame.tables.culling, frame.request.scene.assets);
     }
-    if table.can_keep_list {
+    if table.can_keep_list && table.has_coarse_edges.get().is_none() {
         list.set_version(frame.tables.version(job.of));
         *table.list_inputs.write() = Some(frame.list_inputs(job.of));
     }

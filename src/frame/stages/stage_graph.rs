@@ -305,7 +305,7 @@ impl<B: Backend> StageGraph<B> {
             let selection = self.key.draws[pass.process_index].selection.map(|selection| view.selection_of(selection));
             let culls_triangles = culls_triangles && allows_triangle_culling(&self.plan, draws, view, pass);
             let of_pass = (*mode, selection, culls_triangles);
-            table.begin_frame(frame, of_pass, view.camera.projection, tables.objects.len(), granularity);
+            table.begin_frame(frame, of_pass, tables.objects.len(), granularity);
         }
         let conditions = ListConditions { culls_triangles, chooses_levels, has_layers: !scene.layers.is_empty() };
         tables.begin_static_groups(scene, conditions, &self.passes)?;

@@ -202,10 +202,13 @@ pub(in crate::frame) struct PassTable {
     pub(in crate::frame) mode: PassMode,
     /// Whether triangles of meshes with triangle culling are culled.
     pub(in crate::frame) culls_triangles: bool,
-    /// Whether later frames may keep the draw list.
+    /// Whether later frames may keep the draw list, unless it has an object with too coarse edges.
     pub(in crate::frame) can_keep_list: bool,
     /// Whether this frame keeps the one of the frame before; empty until that is known.
     pub(in crate::frame) keeps_list: OnceLock<bool>,
+    /// Set by a frame that finds an object whose edges are too coarse for a paraboloid. Each frame counts such objects,
+    /// and it does so while it makes the list.
+    pub(in crate::frame) has_coarse_edges: OnceLock<()>,
     /// How many objects it put into the list in the frame before; 0 if that kept its list.
     pub(in crate::frame) listed_before: usize,
     /// One command for each visible object, by rank.
@@ -224,13 +227,11 @@ pub(in crate::frame) struct PassTable {
 }
 
 impl PassTable {
-    /// Begins the frame of this number, of `objects` objects, in a view of this projection. The list is kept as that of
-    /// a frame with the same inputs.
+    /// Begins the frame of this number, of `objects` objects. The list is kept as that of a frame with the same inputs.
     pub(in crate::frame) fn begin_frame(
         &mut self,
         frame: u64,
         (mode, selection, culls_triangles): (PassMode, Option<Selection>, bool),
-        projection: Projection,
         objects: usize,
         granularity: Granularity,
     ) {
@@ -241,10 +242,9 @@ impl PassTable {
         let was_made = list.version() == Version::default() || list.version().frame + 1 == frame;
         self.listed_before = if was_made { list.objects.len() } else { 0 };
         (self.mode, self.selection, self.culls_triangles) = (mode, selection, culls_triangles);
-        // Those of paraboloids are made anew, because a frame counts the objects whose edges are too coarse while it
-        // makes them; so are those whose triangles are culled.
-        self.can_keep_list = projection != Projection::Paraboloid && !culls_triangles;
+        self.can_keep_list = !culls_triangles;
         self.keeps_list.take();
+        self.has_coarse_edges.take();
         if selection.is_none() || culls_triangles {
             self.clear_list();
         }
@@ -293,14 +293,15 @@ pub(in crate::frame) struct ListInputs {
 pub(in crate::frame) enum OrderInputs {
     /// By bin: the epoch in which an object was last drawn in another way.
     Bins { draws_changed_in: u64 },
-    /// By depth: the epoch of the object table, and the camera.
-    Depth { epoch: u64, position: DVec3, orientation: Quat, near: f32, far: f32 },
+    /// By depth: the epoch of the object table, and the camera. For a paraboloid, which subdivides meshes, their levels
+    /// depend on the same.
+    Depth { epoch: u64, position: DVec3, orientation: Quat, near: f32, far: f32, subdivides: bool },
 }
 
 impl OrderInputs {
     pub(in crate::frame) fn of_depth(epoch: u64, camera: &Camera) -> Self {
-        let &Camera { position, orientation, near, far, .. } = camera;
-        Self::Depth { epoch, position, orientation, near, far }
+        let &Camera { position, orientation, near, far, projection, .. } = camera;
+        Self::Depth { epoch, position, orientation, near, far, subdivides: projection == Projection::Paraboloid }
     }
 }
 
@@ -466,7 +467,7 @@ mod tests {
         let mut table = PassTable::default();
         let begin = |table: &mut PassTable, frame| {
             let draws = (PassMode::default(), Some(Selection::default()), false);
-            table.begin_frame(frame, draws, Projection::Paraboloid, 10, Granularity::Adaptive);
+            table.begin_frame(frame, draws, 10, Granularity::Adaptive);
             table.listed_before
         };
         table.list.get_mut().objects.extend(0..10);
