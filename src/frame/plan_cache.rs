@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::process::{
     Contained, DeviceSupport, FramePlan, Pipeline, PipelineProcesses, PlanError, ProcessId, RenderProcess,
-    Requirements, SceneContents,
+    Requirements, SceneContents, list_names,
 };
 use crate::quality::Quality;
 use crate::scene::ViewKind;
@@ -69,7 +69,7 @@ impl PlanSources {
     }
 
     fn check_added(&self, name: &str) -> Result<(), PlanError> {
-        known(name, "process", self.processes.iter().map(|added| added.name.as_str()))
+        check_known(name, "process", self.processes.iter().map(|added| added.name.as_str()))
     }
 
     /// Adds an output, unless there is one of that name.
@@ -82,7 +82,7 @@ impl PlanSources {
     /// # Errors
     /// If the engine has added no output of this name.
     pub(super) fn remove_output(&mut self, target: &str) -> Result<(), PlanError> {
-        known(target, "output", self.outputs.iter().map(String::as_str))?;
+        check_known(target, "output", self.outputs.iter().map(String::as_str))?;
         self.outputs.retain(|output| output != target);
         Ok(())
     }
@@ -114,13 +114,15 @@ impl PlanSources {
 
 /// # Errors
 /// If there is none of this name.
-fn known<'a>(name: &str, what: &'static str, mut all: impl Iterator<Item = &'a str> + Clone) -> Result<(), PlanError> {
-    if all.clone().any(|other| other == name) {
-        return Ok(());
+fn check_known<'a>(
+    name: &str,
+    what: &'static str,
+    all: impl Iterator<Item = &'a str> + Clone,
+) -> Result<(), PlanError> {
+    match all.clone().any(|other| other == name) {
+        true => Ok(()),
+        false => Err(PlanError::NotAdded { what, name: name.to_owned(), known: list_names(all) }),
     }
-    let mut known = all.next().unwrap_or("none").to_owned();
-    all.for_each(|other| known.extend([", ", other]));
-    Err(PlanError::NotAdded { what, name: name.to_owned(), known })
 }
 
 /// A renderer's processes, and a plan for each of the sets of requirements that scenes have had lately.

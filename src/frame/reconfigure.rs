@@ -79,8 +79,8 @@ impl<B: Backend> Renderer<B> {
         self.view_cache.forget_frames_in_flight();
     }
 
-    /// Replaces the pipeline from the next frame on. Device pipelines of the latest frame that both have in common are kept;
-    /// those that were only prepared are not.
+    /// Replaces the pipeline from the next frame on. Device pipelines of the latest frame that both have in common are
+    /// kept; those that were only prepared are not.
     ///
     /// # Errors
     /// If the processes make no frame, or one of them panics; then nothing changes.
@@ -95,7 +95,8 @@ impl<B: Backend> Renderer<B> {
     }
 
     /// Adds a process from the next frame on, behind those that were added before. What the other processes have in the
-    /// latest frame stays: histories, lists, device pipelines; pipelines that were only prepared do not. Frames that are recorded already are drawn as they were recorded.
+    /// latest frame stays: histories, lists, device pipelines; pipelines that were only prepared do not. Frames that are
+    /// recorded already are drawn as they were recorded.
     ///
     /// ```
     /// # use drawloom::process::{Deferred, Declare, Draws, FullScreen, InjectionPoint, RenderProcess};
@@ -179,6 +180,7 @@ impl<B: Backend> Renderer<B> {
         change: impl FnOnce(&mut PlanSources) -> Result<(), PlanError>,
     ) -> Result<(), BuildError> {
         self.plans = self.plans.changed(change)?;
+        self.graphs.outdate();
         self.view_cache.invalidate();
         Ok(())
     }
@@ -195,6 +197,7 @@ impl<B: Backend> Renderer<B> {
         }
         if let Some(plans) = self.plans.with_quality(&quality)? {
             self.plans = plans;
+            self.graphs.outdate();
         }
         (self.quality, self.pipeline_has_quality) = (quality, true);
         self.tables.invalidate();

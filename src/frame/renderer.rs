@@ -29,7 +29,7 @@ use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
 use crate::unwind::CaughtSpan;
-use crate::view::{RenderView, ViewRegistry, possible_draw_states};
+use crate::view::{RenderView, SceneIssues, ViewRegistry, possible_draw_states};
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
@@ -69,7 +69,7 @@ pub struct Renderer<B: Backend> {
     /// Whether the pipeline has that quality; otherwise it has settings of its own.
     pub(super) pipeline_has_quality: bool,
     scheduler: Arc<Scheduler>,
-    graphs: StageGraphCache<B>,
+    pub(super) graphs: StageGraphCache<B>,
     view_registry: ViewRegistry,
     pub(super) tables: FrameTables,
     pub(super) capacity: SceneCapacity,
@@ -269,7 +269,9 @@ impl<B: Backend> Renderer<B> {
         scene: &SceneRef<'_>,
     ) -> Result<impl FnOnce() -> Result<(), FrameError> + Send + use<B>, FrameError> {
         let transparency = Requirements::any_needs_transparency(scene);
-        let contents = SceneContents { lights: scene.lights, transparency, cameras: scene.cameras };
+        // The frames of the scene count what is left out.
+        let ValidLights { lights, .. } = ValidLights::new(scene, &SceneIssues::default(), self.quality.light_cut_off);
+        let contents = SceneContents { lights: &lights, transparency, cameras: scene.cameras };
         let plans = self.plans.plans_to_prepare(&contents)?;
         let mut states_of_plans = Vec::new();
         for plan in &plans {

@@ -18,6 +18,12 @@ use crate::view::LightClass;
 /// each class of lights that it has, one light and no other; then no light at all, with everything else, without
 /// transparency, and without reflections. It also uploads the scene's meshes and textures, and makes its targets.
 ///
+/// So it varies the standard facts of [`Requirements`]. It does not vary what only a pipeline of the engine's knows,
+/// [`Requirements::own`]: each frame has what the pipeline says then. An engine whose pipeline has such bits draws a
+/// warm-up for each value that has shaders of its own, and changes what the pipeline says in between.
+/// [`Renderer::prepare_pipelines`] makes the pipelines for other values too, if the pipeline
+/// [names them](crate::process::Pipeline::to_prepare).
+///
 /// The scene holds everything that later frames may have, at the size of the later pictures. Its lights may be out of
 /// sight or dark, as those that are switched off are: a light that is drawn alone stands before a camera, and shines.
 /// Objects that no camera of the scene sees are not drawn, so neither is what only their materials need. Buffers that

@@ -208,18 +208,19 @@ impl PipelineProcesses {
     pub fn process(&mut self, process: impl RenderProcess + 'static) {
         let process = Contained::new(process);
         let name = process.name().to_owned();
-        self.slots.push(Slot { name, process: Some(Arc::new(process)), keep: false });
+        self.slots.push(Slot { process: Some(Arc::new(process)), ..Slot::empty(name) });
     }
 
-    /// Adds a process in a slot of another name: that of the process whose place it takes.
+    /// Adds a process of the engine's in the slot of the process whose place it takes. The targets that it names are
+    /// checked even if no output depends on it.
     pub fn process_in(&mut self, slot: impl Into<String>, process: impl RenderProcess + 'static) {
         let process: Arc<dyn RenderProcess> = Arc::new(Contained::new(process));
-        self.slots.push(Slot { name: slot.into(), process: Some(process), keep: false });
+        self.slots.push(Slot { process: Some(process), is_replacement: true, ..Slot::empty(slot.into()) });
     }
 
     /// Adds an empty slot: the frame has no process of this name, and another frame may have it.
     pub fn absent(&mut self, name: impl Into<String>) {
-        self.slots.push(Slot { name: name.into(), process: None, keep: false });
+        self.slots.push(Slot::empty(name.into()));
     }
 
     /// Adds a place for processes of the engine's, which come after all slots before it and before those behind it.
@@ -252,6 +253,14 @@ pub(in crate::process) struct Slot {
     pub(in crate::process) process: Option<Arc<dyn RenderProcess>>,
     /// Whether the process stays although no output depends on it.
     pub(in crate::process) keep: bool,
+    /// Whether the process takes the place of one of the pipeline's own.
+    pub(in crate::process) is_replacement: bool,
+}
+
+impl Slot {
+    fn empty(name: String) -> Self {
+        Self { name, process: None, keep: false, is_replacement: false }
+    }
 }
 
 /// See [`PipelineProcesses::absent_layers`].

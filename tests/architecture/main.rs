@@ -4,8 +4,8 @@
 //! - `circles`: no circle of imports within a module leaves a folder.
 //! - `files`: files have few lines of code, and their names say what is inside.
 //! - `outputs`: examples and benchmarks write files and print lines through `drawloom-output`.
-//! - `pipeline`: `ARCHITECTURE.md` has the table of stages.
 //! - `pipelines`: `Deferred` uses public interfaces alone, and the frame does not know it.
+//! - `stage_table`: `ARCHITECTURE.md` has the table of stages.
 //! - `subscribers`: the library calls subscribers of `tracing` where their panics are caught.
 //! - `atomics`: the file `ORDERINGS.md` of each crate lists every atomic of the crate.
 
@@ -15,8 +15,8 @@ mod files;
 mod layers;
 mod outputs;
 mod paths;
-mod pipeline;
 mod pipelines;
 mod sources;
+mod stage_table;
 mod subscribers;
 mod tokens;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use drawloom::backend::NullBackend;
 use drawloom::process::{
-    ClearColor, CommandDraws, Declare, Deferred, DeviceSupport, Draws, Format, FullScreen, InjectionPoint, Pipeline,
+    ClearColor, CommandDraws, Declare, Deferred, DeviceSupport, Draws, Format, InjectionPoint, Pipeline,
     PipelineProcesses, PlanError, RenderProcess, Requirements, SceneContents,
 };
 use drawloom::scene::Scene;
@@ -14,39 +14,14 @@ use drawloom::{BuildError, FrameError, Renderer, Submitter};
 use drawloom_testing::scenes::field;
 use parking_lot::Mutex;
 
+use crate::declaring::Declaring;
+
 /// A process over `radiance`.
-struct Over(&'static str);
-
-impl RenderProcess for Over {
-    fn name(&self) -> &str {
-        self.0
-    }
-
-    fn declare(&self, declare: &mut Declare) {
+fn over(name: &'static str) -> Declaring {
+    Declaring::new(name, |declare| {
         declare.at(InjectionPoint::AfterLighting);
         declare.draws_over("radiance");
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen::default())
-    }
-}
-
-/// A process that draws a target of its own, which is no output of the pipeline.
-struct Map;
-
-impl RenderProcess for Map {
-    fn name(&self) -> &str {
-        "map"
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        declare.clears_color("map", Format::Rgba8Unorm, ClearColor::Background);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen::default())
-    }
+    })
 }
 
 type Built = (Renderer<NullBackend>, Submitter<NullBackend>);
@@ -82,7 +57,7 @@ fn processes_are_added_switched_off_and_removed_between_frames() {
     let shipped = ["geometry buffer", "tone mapping"];
     let with_fog = ["geometry buffer", "fog", "tone mapping"];
     assert_eq!(passes(&mut built, &scene), shipped);
-    built.0.add_process(Over("fog")).unwrap();
+    built.0.add_process(over("fog")).unwrap();
     assert_eq!(passes(&mut built, &scene), with_fog);
     built.0.set_process_enabled("fog", false).unwrap();
     assert_eq!(passes(&mut built, &scene), shipped);
@@ -101,7 +76,8 @@ fn processes_are_added_switched_off_and_removed_between_frames() {
 fn outputs_are_added_and_removed_between_frames() {
     let scene = dark_field();
     let mut built = build(Deferred::to_picture().leave_out("transparency")).unwrap();
-    built.0.add_process(Map).unwrap();
+    let map = |declare: &mut Declare| declare.clears_color("map", Format::Rgba8Unorm, ClearColor::Background);
+    built.0.add_process(Declaring::new("map", map)).unwrap();
     assert!(!passes(&mut built, &scene).contains(&"map".to_owned()), "it leads to no output");
     built.0.add_output("map").unwrap();
     assert!(passes(&mut built, &scene).contains(&"map".to_owned()));
@@ -117,15 +93,15 @@ fn outputs_are_added_and_removed_between_frames() {
 fn names_that_the_engine_has_not_added_are_errors_that_list_those_it_has() {
     let scene = dark_field();
     let mut built = build(Deferred::to_picture().leave_out("transparency")).unwrap();
-    built.0.add_process(Over("fog")).unwrap();
+    built.0.add_process(over("fog")).unwrap();
     let message = plan_error(built.0.remove_process("smoke")).to_string();
-    assert_eq!(message, "the engine has added no process \"smoke\", only: fog");
+    assert_eq!(message, "the engine has added no process \"smoke\", only: \"fog\"");
     let message = plan_error(built.0.set_process_enabled("geometry buffer", false)).to_string();
-    assert_eq!(message, "the engine has added no process \"geometry buffer\", only: fog");
+    assert_eq!(message, "the engine has added no process \"geometry buffer\", only: \"fog\"");
     let message = plan_error(built.0.remove_output("picture")).to_string();
     assert_eq!(message, "the engine has added no output \"picture\", only: none");
     assert!(matches!(plan_error(built.0.add_output("nothing")), PlanError::UnknownOutput { .. }));
-    assert!(matches!(plan_error(built.0.add_process(Over("fog"))), PlanError::Graph(_)), "two of one name");
+    assert!(matches!(plan_error(built.0.add_process(over("fog"))), PlanError::Graph(_)), "two of one name");
     assert_eq!(passes(&mut built, &scene), ["geometry buffer", "fog", "tone mapping"]);
 }
 
@@ -133,7 +109,7 @@ fn names_that_the_engine_has_not_added_are_errors_that_list_those_it_has() {
 fn frames_that_are_recorded_keep_a_process_that_is_removed() {
     let scene = dark_field();
     let (mut renderer, submitter) = build(Deferred::to_picture().leave_out("transparency")).unwrap();
-    let fog = Arc::new(Over("fog"));
+    let fog = Arc::new(over("fog"));
     renderer.add_process(Arc::clone(&fog)).unwrap();
     let recorded: Vec<_> = (0..2).map(|_| renderer.record(scene.as_scene_ref()).unwrap()).collect();
     renderer.remove_process("fog").unwrap();
@@ -144,8 +120,6 @@ fn frames_that_are_recorded_keep_a_process_that_is_removed() {
     }
     let drawn = submitter.submit(without).unwrap().submission.passes;
     assert!(drawn.iter().all(|pass| pass.process != "fog"));
-    // Plans of a few frames are kept with their stages.
-    drop((renderer, submitter));
     assert_eq!(Arc::strong_count(&fog), 1);
 }
 
@@ -244,7 +218,7 @@ impl Pipeline for Own {
             processes.process(draw("first", true));
         }
         if self.has("a target that nobody writes") {
-            processes.process(Over("astray"));
+            processes.process(over("astray"));
         }
         processes.output(if self.has("an output that nobody writes") { "nothing" } else { "picture" });
         Ok(())
@@ -327,24 +301,6 @@ fn a_pipeline_that_changes_its_mind_in_every_frame_draws_what_it_says_and_keeps_
 struct Shaders(AtomicU64);
 
 #[cfg(feature = "wgpu")]
-struct Shader(String);
-
-#[cfg(feature = "wgpu")]
-impl RenderProcess for Shader {
-    fn name(&self) -> &str {
-        "shader"
-    }
-
-    fn declare(&self, declare: &mut Declare) {
-        declare.clears_color("picture", Format::Rgba8Srgb, ClearColor::Background);
-    }
-
-    fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen { shader: &self.0, ..FullScreen::default() })
-    }
-}
-
-#[cfg(feature = "wgpu")]
 impl Pipeline for Shaders {
     fn requirements(&self, _: &SceneContents<'_>) -> Requirements {
         Requirements::default().with_own(self.0.load(Ordering::Relaxed))
@@ -357,7 +313,10 @@ impl Pipeline for Shaders {
         processes: &mut PipelineProcesses,
     ) -> Result<(), PlanError> {
         let red = requirements.own();
-        processes.process(Shader(format!(
+        let picture = |declare: &mut Declare| {
+            declare.clears_color("picture", Format::Rgba8Srgb, ClearColor::Background);
+        };
+        processes.process(Declaring::new("shader", picture).with_shader(format!(
             "@fragment fn fragment(in: FullScreenPixel) -> @location(0) vec4<f32> {{ return vec4<f32>({red}.0); }}"
         )));
         processes.output("picture");

@@ -4,11 +4,21 @@ use drawloom::process::{ClearColor, Declare, Draws, Format, FullScreen, RenderPr
 use drawloom::scene::ViewKind;
 
 /// A process with a name, and a function that declares. It draws a triangle over the whole picture.
-pub struct Declaring(&'static str, Box<dyn Fn(&mut Declare) + Send + Sync>);
+pub struct Declaring {
+    name: &'static str,
+    declare: Box<dyn Fn(&mut Declare) + Send + Sync>,
+    shader: String,
+}
 
 impl Declaring {
     pub fn new(name: &'static str, declare: impl Fn(&mut Declare) + Send + Sync + 'static) -> Self {
-        Self(name, Box::new(declare))
+        Self { name, declare: Box::new(declare), shader: String::new() }
+    }
+
+    /// Draws with a fragment shader of this text.
+    #[cfg(feature = "wgpu")]
+    pub fn with_shader(self, shader: String) -> Self {
+        Self { shader, ..self }
     }
 
     /// Draws a multisampled target, in reflections too.
@@ -24,14 +34,14 @@ impl Declaring {
 
 impl RenderProcess for Declaring {
     fn name(&self) -> &str {
-        self.0
+        self.name
     }
 
     fn declare(&self, declare: &mut Declare) {
-        (self.1)(declare);
+        (self.declare)(declare);
     }
 
     fn draws(&self) -> Draws<'_> {
-        Draws::FullScreen(FullScreen::default())
+        Draws::FullScreen(FullScreen { shader: &self.shader, ..FullScreen::default() })
     }
 }

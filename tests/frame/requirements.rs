@@ -1,17 +1,24 @@
-//! The processes of a frame follow from the objects that it draws, and not from the assets that it could draw.
+//! The processes of a frame follow from the objects and lights that it draws, and not from those that it could draw.
 
 use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Quat, Vec3};
 use drawloom::handle::Handle;
-use drawloom::process::Deferred;
-use drawloom::scene::{Assets, Blend, Bounds, Camera, Changes, Material, MaterialType, Mesh, SceneRef};
+use drawloom::process::{
+    ClearColor, Declare, Deferred, DeviceSupport, Format, Pipeline, PipelineProcesses, PlanError, Requirements,
+    SceneContents,
+};
+use drawloom::quality::Quality;
+use drawloom::scene::{Assets, Blend, Bounds, Camera, Changes, Light, Material, MaterialType, Mesh, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::cube;
+use parking_lot::Mutex;
 use proptest::prelude::*;
+
+use crate::declaring::Declaring;
 
 const GLOW: MaterialType<[f32; 4]> = MaterialType::new("glow");
 
@@ -295,6 +302,44 @@ fn a_change_that_is_not_reported_is_not_noticed() {
     let result = renderer.record(world.scene(Changes::NONE)).map(drop);
     assert_eq!(cfg!(debug_assertions), matches!(result, Err(FrameError::Scene(_))));
     assert!(renderer.plan().processes().iter().any(|planned| planned.name == "transparency"));
+}
+
+/// A pipeline that keeps the lights that it was last asked about.
+#[derive(Default)]
+struct Asked(Mutex<Vec<Light>>);
+
+impl Pipeline for Asked {
+    fn requirements(&self, scene: &SceneContents<'_>) -> Requirements {
+        *self.0.lock() = scene.lights.to_vec();
+        Requirements::default()
+    }
+
+    fn build(&self, _: &Requirements, _: DeviceSupport, processes: &mut PipelineProcesses) -> Result<(), PlanError> {
+        let clear = |declare: &mut Declare| declare.clears_color("clear", Format::Rgba8Unorm, ClearColor::Background);
+        processes.process(Declaring::new("clear", clear));
+        processes.output("clear");
+        Ok(())
+    }
+}
+
+#[test]
+fn frames_and_preparations_ask_about_the_same_lights() {
+    let world = World::new(10);
+    let light = |intensity, range| {
+        let position = DVec3::ZERO;
+        Light::Point { position, intensity: Vec3::splat(intensity), range, casts_shadow: false }
+    };
+    let lights = [light(1.0, 100.0), light(0.0, 100.0), light(1.0, f32::NAN), light(4.0, 1.0)];
+    let scene = SceneRef { lights: &lights, ..world.scene(Changes::Unknown) };
+    let asked = Arc::new(Asked::default());
+    let quality = Quality { light_cut_off: 0.25, ..Quality::balanced() };
+    let builder = Renderer::builder(NullBackend).pipeline(Arc::clone(&asked)).quality(quality);
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    drop(renderer.record(scene).unwrap());
+    let of_frame = std::mem::take(&mut *asked.0.lock());
+    assert_eq!(of_frame, [light(1.0, 2.0), light(4.0, 1.0)]);
+    renderer.prepare_pipelines(scene).unwrap();
+    assert_eq!(*asked.0.lock(), of_frame);
 }
 
 /// Changes a world at random, mostly towards few objects that need transparency. Returns the objects that changed.

@@ -264,6 +264,33 @@ fn a_text_goes_with_the_last_process_that_uses_it() {
 }
 
 #[test]
+fn a_broken_shader_is_drawn_as_before_until_its_process_is_removed() {
+    let (instance, device, queue) = device();
+    let text = Arc::new(AtomicUsize::new(0));
+    let broken = GRAY.replace("0.5", "unknown");
+    let edited = Layer { text: Arc::clone(&text), ..Layer::new("edited", Kind::FullScreen) };
+    let edited = Layer { texts: vec![GRAY.to_owned(), broken], ..edited };
+    let backend = WgpuBackend::new(device, queue).unwrap().keep_working_shaders();
+    let mut pair = build(backend, 1, [Layer::new("other", Kind::Objects), edited]);
+    let errors = |pair: &mut Pair| {
+        draw(pair);
+        draw(pair);
+        pair.0.backend().shader_errors().len()
+    };
+    assert_eq!(errors(&mut pair), 0);
+    text.store(1, Ordering::Relaxed);
+    assert_eq!(errors(&mut pair), 1);
+    // It is not removed while it is off.
+    pair.0.set_process_enabled("edited", false).unwrap();
+    draw(&mut pair);
+    pair.0.set_process_enabled("edited", true).unwrap();
+    assert_eq!(errors(&mut pair), 1);
+    pair.0.remove_process("edited").unwrap();
+    assert_eq!(errors(&mut pair), 0);
+    assert_eq!(compiled(&instance), [1; 3]);
+}
+
+#[test]
 fn an_error_of_a_shared_text_names_each_process() {
     type IsNamed = fn(&BackendError, &str) -> bool;
     let wrong = "@fragment fn fragment() -> @location(0) vec4<f32> { return unknown; }";

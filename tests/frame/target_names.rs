@@ -93,6 +93,29 @@ fn the_only_process_is_told_of_its_misspelt_target_and_not_only_that_nothing_nee
 }
 
 #[test]
+fn a_replacement_that_nothing_needs_is_told_of_its_misspelt_target_too() {
+    for name in ["transparency", "of the engine's"] {
+        let build = |target: Target| {
+            let replacement = Declaring::new(name, move |declare| {
+                clears_own(declare);
+                declare.samples(target);
+            });
+            // Reflections lack it. Nothing depends on what the replacement would draw there.
+            let extra = Declaring::new("extra", |declare| {
+                declare.clears_color("extra", Format::Rgba8Unorm, ClearColor::Background);
+            });
+            let pipeline = Deferred::to_picture().replace("transparency", replacement);
+            let builder = Renderer::builder(NullBackend).pipeline(pipeline).process(extra);
+            builder.build(Arc::new(Scheduler::new(1).unwrap())).map(drop)
+        };
+        let error = build(MISSPELT).unwrap_err().to_string();
+        assert!(error.contains(&format!("{name:?}")) && error.contains("radience"), "{error}");
+        build(targets::RADIANCE).unwrap();
+        build(Target::new("extra")).unwrap();
+    }
+}
+
+#[test]
 fn a_process_that_nothing_needs_may_name_whatever_some_frames_write() {
     for declare in [
         (|declare| declare.samples(targets::RADIANCE)) as fn(&mut Declare),

@@ -204,10 +204,11 @@ fn comes_and_goes() -> Result<(), Failed> {
     scene.cameras.truncate(1);
     let mut fixture =
         Fixture::with(2, |builder| builder.pipeline(Deferred::to_picture()).process(Accumulate).output("sum"))?;
-    let mut pictures = Vec::new();
+    let (mut pictures, mut pipelines) = (Vec::new(), Vec::new());
     let mut sum = |fixture: &mut Fixture, frames: u8| -> Result<(), Failed> {
         let recorded = fixture.record(&scene)?;
         let submission = fixture.submit(recorded)?;
+        pipelines.push(fixture.renderer.backend().resources().pipelines);
         pictures.push(submission.read(0, "picture")?.bytes);
         assert_color(pixel(&submission.read(0, "sum")?, 5, 5), [32 * frames, if frames > 1 { 255 } else { 0 }, 0])
     };
@@ -223,5 +224,6 @@ fn comes_and_goes() -> Result<(), Failed> {
     let same_as_first: Vec<_> = pictures.iter().map(|picture| *picture == pictures[0]).collect();
     assert_eq!(same_as_first, [true, false, true, false, true]);
     assert!(pictures[1] == pictures[3]);
+    assert_eq!(pipelines, [0, 1, 0, 1, 0].map(|of_shade| pipelines[0] + of_shade));
     Ok(())
 }

@@ -7,7 +7,7 @@ use parking_lot::Mutex;
 
 use super::error_scope::{check_device, with_error_scope};
 use super::frame::{BufferPool, WgpuPassStatistics, shares_memory};
-use super::pipelines::{PipelineCache, SharedPipelines};
+use super::pipelines::{PipelineCache, SharedPipelines, pipeline_count};
 use super::resources::{
     BindGroupLayouts, CountedQueue, ImportedTarget, LightMeshes, MaterialCache, MeshCache, StorageBuffers,
     SubdividedMesh, TargetCache, texture_format,
@@ -309,12 +309,12 @@ impl WgpuBackend {
 
     /// What the backend keeps on the device from frame to frame.
     pub fn resources(&self) -> WgpuResources {
-        let pipelines = self.pipelines.lock().pipeline_count();
+        let processes = self.pipelines.lock().processes();
         let TargetMemory { textures, bytes, dedicated_bytes } = self.targets.lock().current().memory();
         let mut buffer_sizes = self.buffers.sizes();
         buffer_sizes.extend(self.storage_buffers.lock().sizes());
         WgpuResources {
-            pipelines,
+            pipelines: pipeline_count(&processes),
             targets: textures,
             target_bytes: bytes,
             dedicated_target_bytes: dedicated_bytes,

@@ -470,11 +470,13 @@ impl<B: Backend> GraphBuilder<B> {
 /// graph again.
 pub(in crate::frame) struct StageGraphCache<B: Backend> {
     latest_first: Vec<StageGraph<B>>,
+    /// Whether they are of plans that no later frame has.
+    is_outdated: bool,
 }
 
 impl<B: Backend> Default for StageGraphCache<B> {
     fn default() -> Self {
-        Self { latest_first: Vec::new() }
+        Self { latest_first: Vec::new(), is_outdated: false }
     }
 }
 
@@ -501,13 +503,21 @@ impl<B: Backend> StageGraphCache<B> {
                 if let Some(before) = self.latest_first.first() {
                     graph.inherit_measurements(before);
                 }
-                self.latest_first.truncate(Self::CAPACITY - 1);
+                let kept = if std::mem::take(&mut self.is_outdated) { 0 } else { Self::CAPACITY - 1 };
+                self.latest_first.truncate(kept);
                 self.latest_first.insert(0, graph);
             }
         }
         let graph = &mut self.latest_first[0];
         graph.set_view_ids(views);
         Ok(graph)
+    }
+
+    /// Drops the graphs, because later frames have other plans. The latest one stays until there is another, which
+    /// inherits what was measured.
+    pub(in crate::frame) fn outdate(&mut self) {
+        self.latest_first.truncate(1);
+        self.is_outdated = true;
     }
 
     /// Discards what was measured in a frame that failed.

@@ -421,8 +421,10 @@ impl Pipeline for Deferred {
         for (possible, point) in pipeline.assemble(&Requirements::all()).into_iter().zip(InjectionPoint::ALL) {
             for name in possible.iter().map(|process| process.name()) {
                 let shipped = built.iter().position(|process| process.name() == name);
+                let is_replaced = pipeline.replaced.iter().any(|(replaced, _)| replaced == name);
                 match pipeline.process_in_slot(name, shipped.map(|index| built.swap_remove(index))) {
-                    Some(process) => processes.process_in(name, process),
+                    Some(process) if is_replaced => processes.process_in(name, process),
+                    Some(process) => processes.process(process),
                     None => processes.absent(name),
                 }
             }

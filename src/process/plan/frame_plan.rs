@@ -59,8 +59,8 @@ impl FramePlan {
     /// The plan of frames that have the kinds of views that `is_present` tells, with the processes of a pipeline.
     ///
     /// The slots of the pipeline are a chain, whose order is known: a process that uses a target goes behind those
-    /// before it in the chain that write it. The chain does not order its processes against writers of the same target that are outside
-    /// of it.
+    /// before it in the chain that write it. The chain does not order its processes against writers of the same target
+    /// that are outside of it.
     ///
     /// What processes sample of the kinds of views that are not present, they find empty. Orders and outputs that name
     /// what only those kinds have are ignored.
@@ -75,6 +75,7 @@ impl FramePlan {
     ) -> Result<Self, PlanError> {
         let slots = std::mem::take(&mut pipeline.slots);
         let slot_names: Vec<_> = slots.iter().map(|slot| slot.name.clone()).collect();
+        let are_replacements: Vec<_> = slots.iter().map(|slot| slot.is_replacement).collect();
         let mut added: Vec<(Option<usize>, PlannedProcess)> = Vec::new();
         for (index, slot) in slots.into_iter().enumerate() {
             let Some(process) = slot.process else { continue };
@@ -107,8 +108,13 @@ impl FramePlan {
         let dependencies_of = |after| schedule.dependencies(after).iter().map(move |&before| (before, after));
         let edges: Vec<_> = (0..schedule.len()).flat_map(dependencies_of).collect();
         let mut processes: Vec<_> = schedule.nodes().map(|(_, index)| added[*index].1.clone()).collect();
-        let is_left_out = |index| schedule.nodes().all(|(_, kept)| *kept != index);
-        let left_out = check_left_out(&added, is_left_out, &absent, &absent_layers);
+        // What a pipeline draws in further kinds of views may lack what the engine's own processes draw in one kind.
+        let is_of_engine = |(slot, planned): &(Option<usize>, PlannedProcess)| {
+            slot.is_none_or(|slot| are_replacements[slot] && planned.is_of_own_kind)
+        };
+        let is_left_out = |index: usize| schedule.nodes().all(|(_, kept)| *kept != index);
+        let is_checked = |index: usize| is_of_engine(&added[index]) && is_left_out(index);
+        let left_out = check_left_out(&added, is_checked, &absent, &absent_layers);
         if processes.is_empty() && absent.is_empty() {
             return Err(left_out.err().unwrap_or(PlanError::Empty));
         }

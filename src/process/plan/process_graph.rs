@@ -162,14 +162,15 @@ pub(super) fn order_constraints(
             }
         }
     }
+    let names = ProcessNames { slots: slot_names, absent, added };
     for own in added {
-        for before in &own.declaration.after {
-            let known = find((slot_names, absent), added, (own, before), |empty, filled| filled <= empty);
-            orders.extend(known.map_err(|error| error.in_process(own, before))?.map(|before| (before, own.id)));
+        for name in &own.declaration.after {
+            let before = names.find(own, name, |empty, filled| filled <= empty)?;
+            orders.extend(before.map(|before| (before, own.id)));
         }
-        for after in &own.declaration.before {
-            let known = find((slot_names, absent), added, (own, after), |empty, filled| filled >= empty);
-            orders.extend(known.map_err(|error| error.in_process(own, after))?.map(|after| (own.id, after)));
+        for name in &own.declaration.before {
+            let after = names.find(own, name, |empty, filled| filled >= empty)?;
+            orders.extend(after.map(|after| (own.id, after)));
         }
     }
     // Order is transitive through an empty slot too: what goes before it goes before what comes after it.
@@ -195,28 +196,41 @@ pub(super) fn order_constraints(
     Ok(orders)
 }
 
-/// The process of this name; if it is an empty slot of the chain, the process in the nearest filled slot for which
-/// `is_on_side(empty, filled)` holds. Of a process that draws in several kinds of views, the one that [`is_for`] `own`.
-///
-/// # Errors
-/// If neither a process, drawn or absent, nor a slot has this name.
-fn find(
-    (slot_names, absent): (&[String], &[PlannedProcess]),
-    added: &[AddedProcess<'_>],
-    (own, name): (&AddedProcess<'_>, &str),
-    is_on_side: impl Fn(usize, usize) -> bool,
-) -> Result<Option<NodeId>, UnknownName> {
-    if added.iter().any(|other| other.name == name) {
-        let found = added.iter().find(|other| other.name == name && is_for(added, own, other));
-        return Ok(found.map(|found| found.id));
+/// What a process can name in `after` and `before`.
+struct ProcessNames<'a> {
+    slots: &'a [String],
+    /// Processes of views that the frame does not have.
+    absent: &'a [PlannedProcess],
+    added: &'a [AddedProcess<'a>],
+}
+
+impl ProcessNames<'_> {
+    /// The process of this name; if it is an empty slot of the chain, the process in the nearest filled slot for which
+    /// `is_on_side(empty, filled)` holds. Of a process that draws in several kinds of views, the one that [`is_for`]
+    /// `own`.
+    ///
+    /// # Errors
+    /// If neither a process, drawn or absent, nor a slot has this name.
+    fn find(
+        &self,
+        own: &AddedProcess<'_>,
+        name: &str,
+        is_on_side: impl Fn(usize, usize) -> bool,
+    ) -> Result<Option<NodeId>, PlanError> {
+        let mut named = self.added.iter().filter(|other| other.name == name).peekable();
+        if named.peek().is_some() {
+            return Ok(named.find(|other| is_for(self.added, own, other)).map(|found| found.id));
+        }
+        let Some(empty) = self.slots.iter().position(|slot| slot == name) else {
+            let is_absent = self.absent.iter().any(|other| other.name == name);
+            let unknown = || PlanError::UnknownProcess { process: own.name.to_owned(), other: name.to_owned() };
+            return if is_absent { Ok(None) } else { Err(unknown()) };
+        };
+        let in_chain = self.added.iter().filter(|other| is_for(self.added, own, other));
+        let in_chain = in_chain.filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
+        let on_side = in_chain.filter(|(slot, _)| is_on_side(empty, *slot));
+        Ok(on_side.min_by_key(|(slot, _)| slot.abs_diff(empty)).map(|(_, id)| id))
     }
-    let Some(empty) = slot_names.iter().position(|slot_name| slot_name == name) else {
-        return if absent.iter().any(|other| other.name == name) { Ok(None) } else { Err(UnknownName) };
-    };
-    let in_chain = added.iter().filter(|other| is_for(added, own, other));
-    let in_chain = in_chain.filter_map(|other| other.chain_slot.map(|slot| (slot, other.id)));
-    let nearest = in_chain.filter(|(slot, _)| is_on_side(empty, *slot)).min_by_key(|(slot, _)| slot.abs_diff(empty));
-    Ok(nearest.map(|(_, id)| id))
 }
 
 /// Whether `own` can refer to this process: not if one of the two also draws in the other one's views.
@@ -226,13 +240,4 @@ fn is_for(added: &[AddedProcess<'_>], own: &AddedProcess<'_>, other: &AddedProce
     };
     let (own_views, other_views) = (own.declaration.views, other.declaration.views);
     own_views == other_views || !draws_in_views_of(other, own_views) && !draws_in_views_of(own, other_views)
-}
-
-/// Neither a process nor a slot has a name.
-struct UnknownName;
-
-impl UnknownName {
-    fn in_process(self, process: &AddedProcess<'_>, other: &str) -> PlanError {
-        PlanError::UnknownProcess { process: process.name.to_owned(), other: other.to_owned() }
-    }
 }

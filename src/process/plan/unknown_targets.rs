@@ -27,21 +27,20 @@ pub(super) fn error_of_graph(added: &Added, problem: GraphProblem) -> PlanError 
     }
 }
 
+/// Checks the processes for which `is_checked` holds, by index: those of the engine's that are left out because no
+/// output depends on them. The graph only checks what is not left out, and the error of a misspelt target is worth more
+/// than the warning that nothing depends on the process. `absent` are the processes of views that the frame does not
+/// have, and `imported` the targets that are there without a process that writes them.
+///
 /// # Errors
-/// If a process of the engine's is left out because no output depends on it, and names a target that no process
-/// creates: the graph only checks what is not left out. The error of a misspelt target is worth more than the warning
-/// that nothing depends on it. `absent` are the processes of views that the frame does not have, and `imported` the
-/// targets that are there without a process that writes them.
+/// If one of them names a target that no process creates.
 pub(super) fn check_left_out(
     added: &Added,
-    is_left_out: impl Fn(usize) -> bool,
+    is_checked: impl Fn(usize) -> bool,
     absent: &[PlannedProcess],
     imported: &[PlannedTarget],
 ) -> Result<(), PlanError> {
-    for (index, (slot, planned)) in added.iter().enumerate() {
-        if slot.is_some() || !is_left_out(index) {
-            continue;
-        }
+    for (_, (_, planned)) in added.iter().enumerate().filter(|(index, _)| is_checked(*index)) {
         check_declared_targets(planned)?;
         for (target, access) in &planned.declaration.accesses {
             check_access(added, planned, (target, *access), absent, imported)?;

@@ -55,7 +55,6 @@ fn light_kinds() -> String {
     };
     define("reaches_everything", &|rules| !rules.is_bounded());
     define("has_cone_volume", &|rules| rules.volume == LightVolume::Cone);
-    define("has_cascades", &|rules| rules.maps == ShadowProjection::Cascades);
     define("has_cube_map", &|rules| rules.maps == ShadowProjection::Cube);
     define("has_paraboloid_map", &|rules| rules.maps == ShadowProjection::Paraboloid);
     text

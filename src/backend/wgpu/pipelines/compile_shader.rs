@@ -4,8 +4,7 @@ use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
 use crate::backend::wgpu::error_scope::with_error_scope;
 
-/// Compiles the shader of a process: its own texts of WGSL, each with what it is, behind what the crate puts before
-/// them.
+/// Compiles the [complete text](complete_text) of the shader of a process.
 ///
 /// # Errors
 /// If it does not compile: [`BackendError::Shader`], with the line and column in that of the process's own texts which
@@ -13,13 +12,16 @@ use crate::backend::wgpu::error_scope::with_error_scope;
 pub(super) fn compile_shader(
     device: &wgpu::Device,
     process: &str,
+    complete: &str,
     before: &str,
     own: &[(&'static str, &str)],
 ) -> Result<wgpu::ShaderModule, BackendError> {
-    let source = wgpu::ShaderSource::Wgsl(complete_text(before, own).into());
+    let source = wgpu::ShaderSource::Wgsl(complete.into());
     let mut created = None;
     let outcome = with_error_scope(device, process, || {
-        created = Some(device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(process), source }));
+        // No name of a process: another one with the same text has this module too.
+        let label = Some("shader of one text");
+        created = Some(device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source }));
     });
     let module = created.ok_or_else(|| broken_rule("a shader module is made, right or wrong"))?;
     match outcome {
@@ -101,10 +103,12 @@ mod tests {
     #[test]
     fn errors_are_at_the_lines_of_the_process() {
         let (device, _) = noop_device();
+        let compile_shader =
+            |process, before, own: &[_]| compile_shader(&device, process, &complete_text(before, own), before, own);
         let before = "const A: u32 = 1u;\n// two lines\n";
         let own = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return vec4<f32>(unknown);\n}\n";
-        let error = compile_shader(&device, "wrong", before, &[("deformation", "const B: u32 = A;"), ("shader", own)])
-            .unwrap_err();
+        let error =
+            compile_shader("wrong", before, &[("deformation", "const B: u32 = A;"), ("shader", own)]).unwrap_err();
         let BackendError::Shader { process, line, column, text, .. } = &error else { panic!("{error}") };
         assert_eq!(
             (process.as_str(), *line, *column, text.as_str()),
@@ -113,16 +117,14 @@ mod tests {
         let message = error.to_string();
         assert!(message.contains("`unknown`") && !message.contains("wgsl:"), "{error}");
         let invalid = "@fragment\nfn fragment() -> @location(0) vec4<f32> {\n    return 1u;\n}\n";
-        let invalid = compile_shader(&device, "invalid", before, &[("shader", invalid)]).unwrap_err();
+        let invalid = compile_shader("invalid", before, &[("shader", invalid)]).unwrap_err();
         let reports_error = matches!(&invalid, BackendError::Shader { message, .. } if !message.contains("wgsl:"));
         assert!(reports_error && invalid.to_string().contains("return"), "{invalid}");
-        let syntax = compile_shader(&device, "wrong", before, &[("deformation", "\nfn fragment( {"), ("shader", own)])
-            .unwrap_err();
+        let syntax =
+            compile_shader("wrong", before, &[("deformation", "\nfn fragment( {"), ("shader", own)]).unwrap_err();
         assert!(matches!(syntax, BackendError::Shader { part: "deformation", line: 2, .. }), "{syntax}");
-        let twice = compile_shader(&device, "twice", before, &[("shader", "const A: u32 = 2u;")]).unwrap_err();
+        let twice = compile_shader("twice", before, &[("shader", "const A: u32 = 2u;")]).unwrap_err();
         assert!(matches!(&twice, BackendError::Shader { line: 1, .. }), "{twice}");
-        assert!(
-            compile_shader(&device, "right", before, &[("deformation", ""), ("shader", "const B: u32 = A;")]).is_ok()
-        );
+        assert!(compile_shader("right", before, &[("deformation", ""), ("shader", "const B: u32 = A;")]).is_ok());
     }
 }

@@ -36,7 +36,7 @@ impl CompiledShader {
         let clamps_corners = !(inputs.has_clamped_pipelines() && inputs.clamps_pixels());
         let before = key.prelude(attributes.iter().map(|attribute| attribute.layout), clamps_corners);
         let shaders = key.own_shaders();
-        let compile = || compile_shader(device, name, &before, &shaders);
+        let compile = |complete: &str| compile_shader(device, name, complete, &before, &shaders);
         let module = shared.module(complete_text(&before, &shaders), compile)?;
         warn_of_unused_bindings(name, declaration, &before, &shaders);
         warn_of_undeclared_discards(name, draws, &before, &shaders);

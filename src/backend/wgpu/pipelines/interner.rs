@@ -1,5 +1,6 @@
 //! Values of which there is one for each key.
 
+use std::collections::HashMap;
 use std::hash::{BuildHasher, Hash, RandomState};
 use std::ops::Deref;
 use std::sync::{Arc, Weak};
@@ -15,8 +16,8 @@ pub(super) struct Interner<K, V> {
 }
 
 struct Entries<K, V> {
-    /// Each with the hash of its key.
-    shared: Vec<(u64, Weak<(K, V)>)>,
+    /// By the hash of their keys.
+    shared: HashMap<u64, Vec<Weak<(K, V)>>>,
     kept: Vec<Arc<(K, V)>>,
 }
 
@@ -30,32 +31,37 @@ impl<K: Eq + Hash, V> Interner<K, V> {
 
     /// The value of a key: the one that somebody has, or what `make` makes.
     ///
-    /// No lock is held meanwhile, so two threads may both make it, and get the one that is made first.
+    /// No lock is held while a value is made or dropped. So two threads may both make it, and get the one that is made
+    /// first.
     ///
     /// # Errors
     /// Those of `make`. Nothing is kept of them, so the next to ask gets an error of its own.
     pub(super) fn get_or_make<E>(&self, key: K, make: impl FnOnce(&K) -> Result<V, E>) -> Result<Shared<K, V>, E> {
         let hash = self.hasher.hash_one(&key);
-        if let Some(known) = self.entries.lock().find(hash, &key) {
+        let find = |key: &K, values: &[Arc<(K, V)>]| values.iter().find(|value| value.0 == *key).cloned();
+        let values = self.entries.lock().of_hash(hash);
+        if let Some(known) = find(&key, &values) {
             return Ok(Shared(known));
         }
         let value = make(&key)?;
-        let mut entries = self.entries.lock();
-        if let Some(known) = entries.find(hash, &key) {
-            return Ok(Shared(known));
-        }
         let made = Arc::new((key, value));
-        entries.shared.retain(|(_, value)| value.strong_count() > 0);
-        entries.shared.push((hash, Arc::downgrade(&made)));
-        if self.keeps {
-            entries.kept.push(Arc::clone(&made));
-        }
-        Ok(Shared(made))
+        // The values leave the block, because any of them may be the last of its kind.
+        let (known, _values) = {
+            let mut entries = self.entries.lock();
+            let values = entries.of_hash(hash);
+            let known = find(&made.0, &values);
+            if known.is_none() {
+                entries.add(hash, &made, self.keeps);
+            }
+            (known, values)
+        };
+        Ok(Shared(known.unwrap_or(made)))
     }
 
     /// Makes values anew for those who ask from now on.
     pub(super) fn clear(&self) {
-        *self.entries.lock() = Entries::default();
+        let entries = std::mem::take(&mut *self.entries.lock());
+        drop(entries);
     }
 
     /// The number of values that stay although nobody has them.
@@ -64,17 +70,35 @@ impl<K: Eq + Hash, V> Interner<K, V> {
     }
 }
 
-impl<K: Eq, V> Entries<K, V> {
-    fn find(&self, hash: u64, key: &K) -> Option<Arc<(K, V)>> {
-        let of_hash = self.shared.iter().filter(|(known, _)| *known == hash);
-        of_hash.filter_map(|(_, value)| value.upgrade()).find(|value| value.0 == *key)
+impl<K, V> Entries<K, V> {
+    fn of_hash(&self, hash: u64) -> Vec<Arc<(K, V)>> {
+        self.shared.get(&hash).map_or_else(Vec::new, |values| values.iter().filter_map(Weak::upgrade).collect())
+    }
+
+    /// Adds a value, and removes the entries of those that nobody has any more.
+    fn add(&mut self, hash: u64, made: &Arc<(K, V)>, keeps: bool) {
+        self.shared.retain(|_, values| {
+            values.retain(|value| value.strong_count() > 0);
+            !values.is_empty()
+        });
+        self.shared.entry(hash).or_default().push(Arc::downgrade(made));
+        if keeps {
+            self.kept.push(Arc::clone(made));
+        }
     }
 }
 
 // Derived implementations would require theirs of `K` and `V`.
 impl<K, V> Default for Entries<K, V> {
     fn default() -> Self {
-        Self { shared: Vec::new(), kept: Vec::new() }
+        Self { shared: HashMap::new(), kept: Vec::new() }
+    }
+}
+
+impl<K, V> Shared<K, V> {
+    /// A number that no other value has at the same time.
+    pub(crate) fn identity(&self) -> usize {
+        Arc::as_ptr(&self.0).addr()
     }
 }
 
@@ -144,6 +168,31 @@ mod tests {
         assert_eq!((*get(&interner, 1, 11), interner.kept_count()), (10, 1));
         interner.clear();
         assert_eq!((*get(&interner, 1, 12), interner.kept_count()), (12, 1));
+    }
+
+    /// Checks when it is dropped that its interner is not locked.
+    struct Unlocked(Weak<Interner<u32, Unlocked>>);
+
+    impl Drop for Unlocked {
+        fn drop(&mut self) {
+            let is_locked = self.0.upgrade().is_some_and(|interner| interner.entries.is_locked());
+            assert!(!is_locked, "a value is dropped under the lock");
+        }
+    }
+
+    #[test]
+    fn values_are_dropped_without_the_lock() {
+        let interner = Arc::new(Interner::new(true));
+        let value = || Ok::<_, ()>(Unlocked(Arc::downgrade(&interner)));
+        drop(interner.get_or_make(1, |_| value()));
+        interner.clear();
+        // The second one to make a value drops it.
+        let late = interner.get_or_make(2, |_| {
+            drop(interner.get_or_make(2, |_| value()));
+            value()
+        });
+        drop(late);
+        interner.clear();
     }
 
     #[test]

@@ -15,7 +15,7 @@ mod unused_bindings;
 mod vertex_buffers;
 
 pub(crate) use compile_shader::shader_label;
-pub(crate) use pipeline_cache::PipelineCache;
+pub(crate) use pipeline_cache::{PipelineCache, pipeline_count};
 pub(crate) use pipeline_key::fixed_state;
 pub(crate) use pipeline_variant::PipelineVariant;
 pub(crate) use process_pipelines::ProcessPipelines;

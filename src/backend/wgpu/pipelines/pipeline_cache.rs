@@ -1,16 +1,16 @@
 //! The cache of all pipelines, by plan.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Weak};
 
 use super::compile_shader::shader_label;
 use super::pipeline_key::PipelineKey;
 use super::process_pipelines::ProcessPipelines;
-use super::shared_pipelines::SharedPipelines;
+use super::shared_pipelines::{SharedPipelines, SharedRenderPipeline};
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::with_error_scope;
 use crate::backend::wgpu::resources::BindGroupLayouts;
-use crate::process::{Draws, FramePlan, PlannedProcess};
+use crate::process::{Draws, FramePlan, PlannedProcess, RenderProcess};
 use crate::quality::Quality;
 use crate::unwind::emit_unlocked;
 
@@ -21,8 +21,8 @@ pub(crate) struct PipelineCache {
     plans: HashMap<u64, PlanPipelines>,
     /// Whether a process whose new shader does not compile keeps the pipelines that it had.
     keeps_working_shaders: bool,
-    /// The latest pipelines of each process by its name, if processes keep them.
-    working: HashMap<String, Arc<ProcessPipelines>>,
+    /// The latest pipelines of each process by its name, if processes keep them, and the process that they are of.
+    working: HashMap<String, (Weak<dyn RenderProcess>, Arc<ProcessPipelines>)>,
     /// What was [prepared](Self::add_prepared) and no plan uses yet, each with the plan that it was made for.
     prepared: Vec<(Weak<()>, Arc<ProcessPipelines>)>,
     /// The latest shader of each process that did not compile, and why.
@@ -66,6 +66,7 @@ impl PipelineCache {
         if let Some(cached) = cached.filter(all_fit) {
             let cached = Arc::clone(cached);
             self.failed.retain(|name, _| plan.processes().iter().all(|planned| planned.name != *name));
+            self.forget_removed();
             return Ok(cached);
         }
         let mut processes = cached.map_or_else(Vec::new, |cached| cached.to_vec());
@@ -79,7 +80,7 @@ impl PipelineCache {
                 Some(fitting) => fitting,
                 None => {
                     let label = shader_label(&planned.name);
-                    let working = self.working.get(&planned.name).cloned();
+                    let working = self.working.get(&planned.name).map(|(_, pipelines)| Arc::clone(pipelines));
                     let working = working.filter(|old| old.inputs.differ_in_text_only(plan, planned, draws, quality));
                     let create = || {
                         let created = ProcessPipelines::new(device, (shared, layouts), plan, planned, draws, quality)?;
@@ -118,7 +119,8 @@ impl PipelineCache {
                 }
             };
             if self.keeps_working_shaders {
-                self.working.insert(planned.name.clone(), Arc::clone(&pipelines));
+                let working = (Arc::downgrade(&planned.process), Arc::clone(&pipelines));
+                self.working.insert(planned.name.clone(), working);
             }
             // The loop visits processes in order, so this either replaces an entry or appends one.
             match processes.get_mut(index) {
@@ -134,7 +136,20 @@ impl PipelineCache {
         self.prepared.retain(|(plan, pipelines)| {
             plan.strong_count() > 0 && processes.iter().all(|used| !Arc::ptr_eq(used, pipelines))
         });
+        self.forget_removed();
         Ok(processes)
+    }
+
+    /// Forgets the shaders of processes that there are no more, neither themselves nor others of their names in plans.
+    fn forget_removed(&mut self) {
+        let plans = &self.plans;
+        let is_planned = |name: &str| {
+            let mut alive = plans.values().filter(|cached| cached.plan.strong_count() > 0);
+            alive.any(|cached| cached.processes.iter().any(|pipelines| pipelines.name() == name))
+        };
+        self.working.retain(|name, (process, _)| process.strong_count() > 0 || is_planned(name));
+        let working = &self.working;
+        self.failed.retain(|name, _| working.contains_key(name));
     }
 
     /// Pipelines that a process can use, of whatever plan.
@@ -168,15 +183,9 @@ impl PipelineCache {
         }
     }
 
-    /// The number of render pipelines, each once, however many processes share it.
-    pub(crate) fn pipeline_count(&self) -> usize {
-        let mut distinct = Vec::new();
-        for pipelines in self.all() {
-            distinct.extend(pipelines.variants().values().map(|pipeline| wgpu::RenderPipeline::clone(pipeline)));
-        }
-        distinct.sort_unstable();
-        distinct.dedup();
-        distinct.len()
+    /// The pipelines of all processes, to [count](pipeline_count) them without a lock on the cache.
+    pub(crate) fn processes(&self) -> Vec<Arc<ProcessPipelines>> {
+        self.all().cloned().collect()
     }
 
     /// The pipelines of the processes of all plans, and those that no plan uses yet.
@@ -184,6 +193,15 @@ impl PipelineCache {
         let of_plans = self.plans.values().flat_map(|cached| cached.processes.iter());
         of_plans.chain(self.prepared.iter().map(|(_, pipelines)| pipelines))
     }
+}
+
+/// The number of render pipelines of these processes, each once, however many processes share it.
+pub(crate) fn pipeline_count(processes: &[Arc<ProcessPipelines>]) -> usize {
+    let mut distinct = HashSet::new();
+    for pipelines in processes {
+        distinct.extend(pipelines.variants().values().map(SharedRenderPipeline::identity));
+    }
+    distinct.len()
 }
 
 #[cfg(test)]

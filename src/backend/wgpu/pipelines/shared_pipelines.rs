@@ -111,9 +111,9 @@ impl SharedPipelines {
     pub(super) fn module(
         &self,
         text: String,
-        compile: impl FnOnce() -> Result<wgpu::ShaderModule, BackendError>,
+        compile: impl FnOnce(&str) -> Result<wgpu::ShaderModule, BackendError>,
     ) -> Result<SharedModule, BackendError> {
-        self.0.modules.get_or_make(text, |_| compile())
+        self.0.modules.get_or_make(text, |text| compile(text))
     }
 
     /// # Errors

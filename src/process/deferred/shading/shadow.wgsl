@@ -18,8 +18,8 @@ fn light_visibility(light: Light, position: vec3<f32>, normal: vec3<f32>) -> f32
         return filtered_visibility(face.shadow_layer, biased_point(face, position, normal, off_surface));
     }
     var map = light;
-    if has_cascades(light.kind) {
-        // The finest cascade in which the filter reads no pixel outside of the map.
+    if reaches_everything(light.kind) {
+        // It has cascades. The finest cascade in which the filter reads no pixel outside of the map.
         let side = f32(textureDimensions(shadow_maps).x);
         let extent = 1.0 - f32(2 * SHADOW_FILTER + 1) / side;
         for (var cascade = 1u; cascade < SHADOW_CASCADES; cascade++) {
@@ -58,7 +58,7 @@ fn cube_face(position: vec3<f32>) -> u32 {
 // bias.
 fn biased_point(light: Light, position: vec3<f32>, normal: vec3<f32>, off_surface: f32) -> ShadowMapPoint {
     var towards = -light.direction;
-    if !has_cascades(light.kind) {
+    if !reaches_everything(light.kind) {
         towards = normalize(light.position - position);
     }
     // An upper bound of the depth change within the filter.
@@ -110,7 +110,7 @@ fn shadow_map_point(light: Light, position: vec3<f32>) -> ShadowMapPoint {
     let side = f32(textureDimensions(shadow_maps).x);
     let local = along_map_axes(light, position - light.position);
     let reach = light.range - light.shadow_near;
-    if has_cascades(light.kind) {
+    if reaches_everything(light.kind) {
         let half = light.shadow_half;
         return ShadowMapPoint(local.xy / half, (light.range + local.z) / reach, 2.0 * half / side);
     }
