@@ -320,7 +320,7 @@ impl WgpuBackend {
             dedicated_target_bytes: dedicated_bytes,
             buffers: buffer_sizes.iter().filter(|size| **size > 0).count(),
             buffer_bytes: buffer_sizes.iter().sum(),
-            mesh_bytes: self.meshes.lock().resident_bytes(),
+            mesh_bytes: self.meshes.lock().residents.resident_bytes(),
             texture_bytes: self.materials.lock().textures.resident_bytes(),
         }
     }

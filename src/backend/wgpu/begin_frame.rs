@@ -11,7 +11,7 @@ use super::resources::{
     BindingResource, CachedBindGroup, LightMeshes, StorageBuffers, SubdividedMesh, WgpuTargets, fits_in_buffers,
 };
 use super::strategy::{EncodingStrategy, RecordingStrategy};
-use super::streaming::{FrameUse, Residency, StreamedResources};
+use super::streaming::{FrameAssets, FrameUse, Residency};
 use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
@@ -39,8 +39,7 @@ impl WgpuBackend {
         if self.meshes.lock().require_attributes(plan.attributes()) {
             self.subdivisions.clear();
         }
-        let StreamedResources { meshes, materials, frame_use } =
-            hold_events(|| self.update_resources_in_scope(request))?;
+        let FrameAssets { meshes, materials, frame_use } = hold_events(|| self.update_resources_in_scope(request))?;
         let storage_buffers = self.storage_buffers(plan)?;
         let generated = GeneratedUploads::new(request, &storage_buffers, &meshes.imported_meshes);
         let mut buffers = self.buffers.take(&self.device)?;
@@ -80,7 +79,7 @@ impl WgpuBackend {
     ///
     /// # Errors
     /// If the device has no room.
-    fn update_resources_in_scope(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
+    fn update_resources_in_scope(&self, request: &FrameRequest<'_>) -> Result<FrameAssets, BackendError> {
         let update = || {
             let updated = self.update_resources(request)?;
             // The locks are not held any more.
@@ -95,19 +94,16 @@ impl WgpuBackend {
     ///
     /// # Errors
     /// If the device has no room.
-    fn update_resources(&self, request: &FrameRequest<'_>) -> Result<StreamedResources, BackendError> {
-        let FrameRequest { plan, scene, limits, scene_issues, .. } = *request;
+    fn update_resources(&self, request: &FrameRequest<'_>) -> Result<FrameAssets, BackendError> {
+        let (device, uploads) = (&self.device, &self.uploads);
         let (mut meshes, mut materials) = (self.meshes.lock(), self.materials.lock());
+        let mut residency = Residency { device, uploads, meshes: &mut meshes, materials: &mut materials };
         if let Some(streamer) = &self.streamer {
-            let (device, uploads) = (&self.device, &self.uploads);
-            let on_device = Residency { device, uploads, meshes: &mut meshes, materials: &mut materials };
-            return streamer.begin_frame(on_device, request);
+            return streamer.begin_frame(residency, request);
         }
-        let (used, vertices) = (request.objects.used_meshes(), request.quality.vertices);
-        let meshes = meshes.update(&self.device, &self.uploads, scene.assets, used, vertices)?;
-        let types = plan.material_types();
-        let materials = materials.update(&self.device, &self.uploads, scene.assets, types, (limits, scene_issues))?;
-        Ok(StreamedResources { meshes, materials, frame_use: FrameUse::default() })
+        residency.begin_frame(request, None)?;
+        let (meshes, materials) = residency.snapshots(request, false);
+        Ok(FrameAssets { meshes, materials, frame_use: FrameUse::default() })
     }
 
     /// The buffers that a plan's processes share. If creation fails, existing buffers keep their content, and the next

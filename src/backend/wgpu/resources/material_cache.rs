@@ -1,11 +1,10 @@
 //! The cache of materials and their textures.
 
-use std::convert::Infallible;
 use std::sync::Arc;
 
 use super::buffers::CountedQueue;
 use super::snapshot_lifetimes::SnapshotToken;
-use super::texture_arrays::{TextureArrays, TextureLocation};
+use super::texture_arrays::{ResidentTextures, TextureLocation};
 use crate::backend::mip_generation::reduced_textures;
 use crate::backend::{BackendError, SceneLimits};
 use crate::scene::{Assets, Material, MaterialLayout};
@@ -36,14 +35,15 @@ pub(crate) struct MaterialTextures {
     pub(crate) samplers: [wgpu::Sampler; 2],
 }
 
-/// Keeps materials and textures, and uploads textures that changed since the last frame. Materials are uploaded by the
-/// buffers of a frame.
+/// Keeps materials, and textures on the device. Materials are uploaded by the buffers of a frame.
 #[derive(Default)]
 pub(crate) struct MaterialCache {
-    pub(crate) textures: TextureArrays,
+    pub(crate) textures: ResidentTextures,
     /// By material slot, whether its texture is not on the device.
-    lacks_texture: Arc<[bool]>,
+    pub(crate) lacks_texture: Arc<[bool]>,
     current: Option<Current>,
+    /// The views of the texture arrays, with how often arrays had moved.
+    bound_textures: Option<(u64, Arc<MaterialTextures>)>,
     /// Scene issues that making the snapshot found. Every frame that uses the snapshot reports them.
     rejected_textures: Vec<(IssueReason, usize)>,
     rejected_materials: Vec<(IssueReason, usize)>,
@@ -52,78 +52,61 @@ pub(crate) struct MaterialCache {
 }
 
 struct Current {
-    /// Identity and revision of the snapshot's materials, and of its textures.
+    /// Identity and revision of the snapshot's materials.
     materials: (u64, u64),
-    textures: (u64, u64),
+    /// How often textures, and their arrays, had changed.
+    textures: u64,
     limits: SceneLimits,
-    /// How often texture arrays had moved.
-    moves: u64,
     snapshot: MaterialSnapshot,
 }
 
 impl MaterialCache {
-    /// The snapshot of these materials and textures, with the values of these types: the latest one if nothing changed.
+    /// Begins a frame with the assets' textures. Without streaming, uploads those that are new or changed.
     ///
     /// # Errors
     /// If the device has no room for a texture, or is lost. What is in the cache is undefined then, so drop it.
-    pub(crate) fn update(
+    pub(crate) fn begin_frame(
         &mut self,
         device: &wgpu::Device,
         uploads: &CountedQueue,
         assets: &Assets,
-        types: &[MaterialLayout],
-        (limits, scene_issues): (SceneLimits, &SceneIssues),
-    ) -> Result<MaterialSnapshot, BackendError> {
-        let textures = (assets.textures.identity(), assets.textures.revision());
-        self.update_snapshot(device, assets, types, (limits, scene_issues), textures, |cache| {
-            cache.rejected_textures.clear();
-            cache.textures.update(device, uploads, assets, &mut cache.rejected_textures)
-        })
+        is_streamed: bool,
+    ) -> Result<(), BackendError> {
+        if !self.textures.begin_frame(&assets.textures, (0, |_, _| true), is_streamed) {
+            return Ok(());
+        }
+        // Its layers may be written now, unless a frame in flight has it too.
+        self.current = None;
+        self.rejected_textures.clear();
+        if !is_streamed {
+            self.textures.upload_missing(device, uploads, assets, &mut self.rejected_textures)?;
+        }
+        Ok(())
     }
 
-    /// The same with the textures that are on the device; and by material slot, whether its texture is not.
-    pub(crate) fn update_streamed(
+    /// The snapshot of these materials, with the values of these types, and of the textures on the device: the latest
+    /// one if nothing changed.
+    pub(crate) fn snapshot(
         &mut self,
         device: &wgpu::Device,
         assets: &Assets,
         types: &[MaterialLayout],
         (limits, scene_issues): (SceneLimits, &SceneIssues),
-    ) -> (MaterialSnapshot, Arc<[bool]>) {
-        // Both only grow, so their sum is new when one of them is. A texture may go, or fail to load, before it is on
-        // the device.
-        let textures = (assets.textures.identity(), self.textures.changes() + assets.textures.revision());
-        let Ok(snapshot) =
-            self.update_snapshot(device, assets, types, (limits, scene_issues), textures, |_| Ok::<_, Infallible>(()));
-        (snapshot, Arc::clone(&self.lacks_texture))
-    }
-
-    /// The latest snapshot if nothing changed. If `textures` did, calls `update_textures`.
-    ///
-    /// # Errors
-    /// Returns the error of `update_textures`.
-    fn update_snapshot<E>(
-        &mut self,
-        device: &wgpu::Device,
-        assets: &Assets,
-        types: &[MaterialLayout],
-        (limits, scene_issues): (SceneLimits, &SceneIssues),
-        textures: (u64, u64),
-        update_textures: impl FnOnce(&mut Self) -> Result<(), E>,
-    ) -> Result<MaterialSnapshot, E> {
+    ) -> MaterialSnapshot {
         let materials = (assets.materials.identity(), assets.materials.revision());
-        let mut snapshot = match self.current.take().filter(|current| current.limits == limits) {
-            Some(current) if (current.materials, current.textures) == (materials, textures) => current.snapshot,
-            Some(current) if current.textures == textures => {
+        // Both only grow, so their sum is new when one of them is.
+        let textures = self.textures.changes() + self.textures.memory.moves;
+        let before = self.current.take().filter(|current| (current.limits, current.textures) == (limits, textures));
+        let mut snapshot = match before {
+            Some(current) if current.materials == materials => current.snapshot,
+            Some(current) => {
                 MaterialSnapshot { materials: self.materials(assets, limits), values: Vec::new(), ..current.snapshot }
             }
-            before => {
-                let before = before.map(|current| (current.moves, current.snapshot.textures));
-                update_textures(self)?;
+            None => {
                 self.reduced_textures = reduced_textures(assets).collect();
-                let same_arrays = before.filter(|(moves, _)| *moves == self.textures.moves());
-                let textures = same_arrays.map_or_else(|| self.bound_textures(device), |(_, textures)| textures);
-                let token = self.textures.begin_snapshot();
-                MaterialSnapshot { token, materials: self.materials(assets, limits), textures, values: Vec::new() }
+                let token = self.textures.lifetimes.begin_snapshot();
+                let (materials, textures) = (self.materials(assets, limits), self.bound_textures(device));
+                MaterialSnapshot { token, materials, textures, values: Vec::new() }
             }
         };
         for layout in types {
@@ -131,21 +114,26 @@ impl MaterialCache {
                 snapshot.values.push((*layout, values_of(assets, *layout, limits)));
             }
         }
-        let moves = self.textures.moves();
-        self.current = Some(Current { materials, textures, limits, moves, snapshot: snapshot.clone() });
+        self.current = Some(Current { materials, textures, limits, snapshot: snapshot.clone() });
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             scene_issues.count(reason, index);
         }
         self.reduced_textures.iter().for_each(|slot| scene_issues.count(IssueReason::ReducedTexture, *slot));
-        Ok(snapshot)
+        snapshot
     }
 
-    fn bound_textures(&self, device: &wgpu::Device) -> Arc<MaterialTextures> {
+    fn bound_textures(&mut self, device: &wgpu::Device) -> Arc<MaterialTextures> {
+        let moves = self.textures.memory.moves;
+        if let Some((_, textures)) = self.bound_textures.as_ref().filter(|(of, _)| *of == moves) {
+            return Arc::clone(textures);
+        }
         let samplers = [
             linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
             linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
         ];
-        Arc::new(MaterialTextures { arrays: self.textures.views(device).into(), samplers })
+        let textures = Arc::new(MaterialTextures { arrays: self.textures.views(device).into(), samplers });
+        self.bound_textures = Some((moves, Arc::clone(&textures)));
+        textures
     }
 
     /// A [`GpuMaterial`] for each slot within the limits.

@@ -1,88 +1,49 @@
 //! The cache of meshes on the device.
 
-use std::collections::{BTreeSet, HashSet};
+use std::iter;
 use std::sync::Arc;
 
 use super::buffers::CountedQueue;
 use super::imported_meshes::ImportedMeshes;
-use super::mesh_pages::{MeshBytes, MeshLocation, MeshPages, MeshTarget, PageSizes};
+use super::mesh_pages::{MeshBytes, MeshLocation, MeshTarget, PageSizes, ResidentMeshes};
 use super::mesh_snapshot::{CoarserLevels, MeshPageIndices, MeshRange, MeshSnapshot};
-use super::snapshot_lifetimes::SnapshotLifetimes;
+use super::residents::{EndOfUpload, InFlight, Placed, Unplaced};
 use super::vertex_data::{AttributeBuffers, with_vertex_bytes};
 use crate::backend::BackendError;
+use crate::backend::error::broken_rule;
 use crate::handle::Handle;
 use crate::process::DeclaredAttribute;
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, Mesh};
 use crate::view::UsedMeshes;
 
-/// Keeps the meshes that objects use on the device, and uploads those that changed, or became used, since the last
-/// frame. What lies on the device stays where it is: where there is no room, pages are added.
+/// Keeps the meshes that objects use on the device. What lies on the device stays where it is: where there is no room,
+/// pages are added.
 #[derive(Default)]
 pub(crate) struct MeshCache {
-    pub(super) pages: MeshPages,
-    /// By slot.
-    pub(super) meshes: Vec<Option<ResidentMesh>>,
-    pub(super) resident_count: usize,
-    /// The slots of the meshes on the device that were replaced since. Without streaming there are none.
-    pub(super) outdated: BTreeSet<u32>,
-    /// The slots of the meshes that are to be streamed, and not on their way.
-    pub(super) missing: BTreeSet<u32>,
-    pub(super) coarser_levels: Arc<CoarserLevels>,
-    /// The memory of meshes that are gone.
-    pub(super) lifetimes: SnapshotLifetimes<MeshLocation>,
-    pub(super) imported_meshes: ImportedMeshes,
-    /// What the snapshot is of.
-    pub(super) current: Option<MeshVersion>,
-    /// The latest one, if nothing has changed since.
-    pub(super) snapshot: Option<Arc<MeshSnapshot>>,
-    /// Identifies the pages: another one after they were cleared.
-    pub(super) epoch: Arc<()>,
-    /// The slots of the meshes that jobs are uploading to these pages.
-    pub(super) in_flight: HashSet<u32>,
+    pub(crate) residents: ResidentMeshes,
+    /// A mesh that is gone keeps its entry until another one is in its slot.
+    coarser_levels: Arc<CoarserLevels>,
+    imported_meshes: ImportedMeshes,
+    /// The latest one, with the number of changes at that time.
+    snapshot: Option<(u64, Arc<MeshSnapshot>)>,
 }
 
-/// A mesh on the device.
+/// What meshes that are streamed may take, in bytes.
 #[derive(Clone, Copy)]
-pub(super) struct ResidentMesh {
-    pub(super) handle: Handle<Mesh>,
-    /// In the assets.
-    pub(super) revision: u64,
-    pub(super) location: MeshLocation,
-    /// Of level 0.
-    index_count: u32,
-}
-
-/// What decides which meshes a frame has.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct MeshVersion {
-    /// Of the assets' meshes.
-    identity: u64,
-    revision: u64,
-    /// The revision of the meshes that are used.
-    used: u64,
-}
-
-impl MeshVersion {
-    pub(super) fn new(assets: &Assets, used: &UsedMeshes) -> Self {
-        let (identity, revision) = (assets.meshes.identity(), assets.meshes.revision());
-        Self { identity, revision, used: used.revision() }
-    }
-
-    pub(super) fn has_same_assets(self, other: Self) -> bool {
-        self.identity == other.identity
-    }
+pub(crate) struct MeshBudget {
+    /// Of all pages.
+    pub(crate) pages: u64,
+    /// Of the meshes that a frame itself uploads, because they replace others on the device.
+    pub(crate) at_once: u64,
 }
 
 impl MeshCache {
-    /// Without streaming a scene at rest has few pages, whatever its size.
-    const PAGE_SIZES: PageSizes = PageSizes { min: 1 << 16, max: 8 << 20 };
-
     /// Adds the attributes that a plan's processes read. Returns whether one of them is new.
     pub(crate) fn require_attributes(&mut self, attributes: &[DeclaredAttribute]) -> bool {
-        let Some(changed) = self.pages.attributes.with(attributes) else { return false };
-        self.clear_meshes();
-        self.pages.attributes = Arc::new(changed);
+        let Some(changed) = self.residents.memory.attributes.with(attributes) else { return false };
+        self.residents.clear();
+        self.residents.memory.attributes = Arc::new(changed);
         true
     }
 
@@ -96,101 +57,47 @@ impl MeshCache {
         uploads: &CountedQueue,
         mesh: &Mesh,
     ) -> Result<AttributeBuffers, BackendError> {
-        self.pages.attributes.of_mesh(device, uploads, mesh)
+        self.residents.memory.attributes.of_mesh(device, uploads, mesh)
     }
 
-    /// The snapshot of those of the assets' meshes that are used, with vertices of this format: the latest one if
-    /// nothing changed.
+    /// Begins a frame with those of the assets' meshes that are used, with vertices of this format. Without a budget,
+    /// meshes that changed, or became used, since the last frame are uploaded at once. With one, only those are that
+    /// replace others on the device and have room beside them; the one before stays, and is drawn, until then.
     ///
     /// # Errors
-    /// If the device has no room for them.
-    pub(crate) fn update(
+    /// If the device has no room for them. The next frame uploads all meshes anew.
+    pub(crate) fn begin_frame(
         &mut self,
         device: &wgpu::Device,
         uploads: &CountedQueue,
-        assets: &Assets,
-        used: &UsedMeshes,
+        (assets, used): (&Assets, &UsedMeshes),
         vertices: VertexFormat,
-    ) -> Result<Arc<MeshSnapshot>, BackendError> {
-        self.free_unread();
-        let requested = MeshVersion::new(assets, used);
-        if let Some(snapshot) = &self.snapshot
-            && self.current == Some(requested)
-            && self.pages.format == vertices
-        {
-            return Ok(Arc::clone(snapshot));
-        }
-        if self.pages.format != vertices || self.current.is_none_or(|current| !current.has_same_assets(requested)) {
+        budget: Option<MeshBudget>,
+    ) -> Result<(), BackendError> {
+        if self.residents.memory.format != vertices {
             // All vertices in a page have one size.
-            self.clear_meshes();
-            self.pages.format = vertices;
+            self.residents.clear();
+            self.residents.memory.format = vertices;
         }
-        // No snapshot is current until the new one is complete, so an error leaves no partial one behind.
-        (self.current, self.snapshot) = (None, None);
-        self.retire_changed(assets, used);
-        self.free_unread();
-        self.upload_missing(device, uploads, assets, used)?;
-        let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
-        let meshes = meshes.filter(|(slot, _)| used.can_be_used(*slot));
-        self.imported_meshes = self.imported_meshes.updated(device, meshes)?;
-        let snapshot = Arc::new(self.new_snapshot());
-        self.current = Some(requested);
-        self.snapshot = Some(Arc::clone(&snapshot));
-        Ok(snapshot)
-    }
-
-    /// The size of all pages in bytes.
-    pub(crate) fn resident_bytes(&self) -> u64 {
-        self.pages.page_bytes()
-    }
-
-    /// Moves to new pages. Snapshots keep those that they refer to.
-    pub(super) fn clear_meshes(&mut self) {
-        (self.current, self.snapshot) = (None, None);
-        (self.epoch, self.in_flight) = (Arc::default(), HashSet::new());
-        self.pages.clear();
-        self.meshes.clear();
-        self.resident_count = 0;
-        (self.outdated, self.missing) = (BTreeSet::new(), BTreeSet::new());
-        self.coarser_levels = Arc::default();
-        self.lifetimes = SnapshotLifetimes::following(&self.lifetimes);
-    }
-
-    /// Frees the memory of meshes that are gone, as soon as no frame in flight may read it.
-    pub(super) fn free_unread(&mut self) {
-        for location in self.lifetimes.reclaim() {
-            self.pages.free(location);
+        if !self.residents.begin_frame(&assets.meshes, (used.revision(), lies_in_pages(used)), budget.is_some()) {
+            return Ok(());
         }
-    }
-
-    /// Retires the meshes that changed, or were removed, since they were uploaded.
-    fn retire_changed(&mut self, assets: &Assets, used: &UsedMeshes) {
-        self.meshes.resize(assets.meshes.slot_count().max(self.meshes.len()), None);
-        for slot in 0..self.meshes.len() as u32 {
-            let Some(mesh) = self.meshes[slot as usize] else { continue };
-            let current = assets.meshes.get_with_revision(slot).map(|(revision, _)| revision);
-            if (current != Some(mesh.revision) || !used.contains_slot(slot))
-                && let Some(location) = self.remove_resident(slot)
-            {
-                self.lifetimes.retire(location);
-            }
-        }
-        self.meshes.truncate(assets.meshes.slot_count());
-    }
-
-    /// Forgets the mesh in a slot. Returns where it lay.
-    pub(super) fn remove_resident(&mut self, slot: u32) -> Option<MeshLocation> {
-        let mesh = self.meshes.get_mut(slot as usize).and_then(Option::take)?;
-        self.resident_count -= 1;
-        self.outdated.remove(&slot);
-        if self.coarser_levels.contains_key(&slot) {
-            Arc::make_mut(&mut self.coarser_levels).remove(&slot);
-        }
+        // Its memory may be written now, unless a frame in flight has it too.
         self.snapshot = None;
-        Some(mesh.location)
+        let mut upload = || {
+            match budget {
+                Some(budget) => self.replace_outdated(device, uploads, assets, budget)?,
+                None => self.upload_missing(device, uploads, assets)?,
+            }
+            let meshes = assets.iter::<Mesh>().map(|(handle, mesh)| (handle.index(), mesh));
+            let meshes = meshes.filter(|(slot, _)| used.can_be_used(*slot));
+            self.imported_meshes = self.imported_meshes.updated(device, meshes)?;
+            Ok(())
+        };
+        upload().inspect_err(|_| self.residents.clear())
     }
 
-    /// Uploads the used meshes that are not on the device.
+    /// Uploads the meshes that are missing.
     ///
     /// # Errors
     /// If the device has no room for them.
@@ -199,21 +106,50 @@ impl MeshCache {
         device: &wgpu::Device,
         uploads: &CountedQueue,
         assets: &Assets,
-        used: &UsedMeshes,
     ) -> Result<(), BackendError> {
-        let resident = &self.meshes;
-        let is_missing = |slot: u32| used.contains_slot(slot) && resident[slot as usize].is_none();
-        let meshes = assets.meshes.iter_with_revision();
-        let missing: Vec<_> =
-            meshes.filter(|(handle, _, mesh)| mesh.has_triangles() && is_missing(handle.index())).collect();
-        let mut expected: MeshBytes = missing.iter().map(|(.., mesh)| self.pages.bytes_of(mesh)).sum();
+        self.residents.release_unread(false);
+        let missing: Vec<_> = self.residents.missing(&assets.meshes).collect();
+        let mut expected: MeshBytes = missing.iter().map(|(.., mesh)| self.residents.memory.bytes_of(mesh)).sum();
         for (handle, revision, mesh) in missing {
-            let location = self.pages.allocate(mesh, expected, Self::PAGE_SIZES);
-            let bytes = self.pages.bytes_of(mesh);
+            let pages = &mut self.residents.memory;
+            let sizes = pages.sizes_for(expected);
+            let bytes = pages.bytes_of(mesh);
             expected.vertices -= bytes.vertices;
             expected.indices -= bytes.indices;
-            let target = self.pages.target(location)?;
+            let room = pages.find_room(mesh, (sizes, u64::MAX), iter::empty());
+            let room = room.ok_or_else(|| broken_rule("without a budget there is room"))?;
+            let target = pages.target(room.location)?;
             self.write(device, uploads, (handle, revision, mesh), &target)?;
+        }
+        Ok(())
+    }
+
+    /// Uploads meshes that replace others on the device, where there is room that no frame in flight reads.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn replace_outdated(
+        &mut self,
+        device: &wgpu::Device,
+        uploads: &CountedQueue,
+        assets: &Assets,
+        mut budget: MeshBudget,
+    ) -> Result<(), BackendError> {
+        let outdated = self.residents.outdated.iter().filter_map(|slot| assets.meshes.entry(*slot));
+        for (handle, revision, mesh) in outdated.collect::<Vec<_>>() {
+            let bytes = self.residents.memory.bytes_of(mesh).total();
+            if bytes > budget.at_once {
+                continue;
+            }
+            let placed = self.residents.place(device, mesh, budget.pages, iter::empty(), &mut 0)?;
+            let Ok(Placed { target, last_reader }) = placed else { continue };
+            if self.residents.is_gone(last_reader) {
+                self.residents.take_off(handle.index());
+                self.write(device, uploads, (handle, revision, mesh), &target)?;
+                budget.at_once -= bytes;
+            } else {
+                self.residents.free(target.location);
+            }
         }
         Ok(())
     }
@@ -222,7 +158,7 @@ impl MeshCache {
     ///
     /// # Errors
     /// If the device has no room for its page.
-    pub(super) fn write(
+    fn write(
         &mut self,
         device: &wgpu::Device,
         uploads: &CountedQueue,
@@ -233,19 +169,28 @@ impl MeshCache {
         with_vertex_bytes(mesh, target.format, |vertices| {
             target.for_each_write(mesh, vertices, |buffer, offset, bytes| uploads.write_buffer(buffer, offset, bytes))
         })?;
-        self.add_resident((handle, revision, mesh), target.location);
+        self.residents.add((handle, revision), target.location);
+        self.set_coarser_levels(handle.index(), mesh, target.location);
         Ok(())
     }
 
-    /// Adds a mesh that was written to its location.
-    pub(super) fn add_resident(
+    /// A job has uploaded a mesh, or could not.
+    pub(crate) fn end_upload(
         &mut self,
-        (handle, revision, mesh): (Handle<Mesh>, u64, &Mesh),
+        (upload, mesh): (&InFlight<Mesh>, &Mesh),
         location: MeshLocation,
-    ) {
-        let slot = handle.index();
-        let index_count = mesh.indices().len() as u32;
-        let mut end = location.indices.start + index_count;
+        (assets, used, is_complete): (&Assets, &UsedMeshes, bool),
+    ) -> EndOfUpload {
+        let end = self.residents.end_upload(upload, &assets.meshes, lies_in_pages(used), is_complete);
+        if end == EndOfUpload::Resident {
+            self.set_coarser_levels(upload.handle.index(), mesh, location);
+        }
+        end
+    }
+
+    /// Sets the coarser levels of the mesh in a slot.
+    fn set_coarser_levels(&mut self, slot: u32, mesh: &Mesh, location: MeshLocation) {
+        let mut end = location.indices.start + location.index_count;
         let ranges = mesh.levels().iter().map(|level| {
             let start = end;
             end += level.indices().len() as u32;
@@ -254,39 +199,97 @@ impl MeshCache {
         let ranges: Arc<[_]> = ranges.collect();
         if !ranges.is_empty() {
             Arc::make_mut(&mut self.coarser_levels).insert(slot, ranges);
+        } else if self.coarser_levels.contains_key(&slot) {
+            Arc::make_mut(&mut self.coarser_levels).remove(&slot);
         }
-        self.resident_count += 1;
-        self.meshes[slot as usize] = Some(ResidentMesh { handle, revision, location, index_count });
     }
 
-    pub(super) fn new_snapshot(&mut self) -> MeshSnapshot {
+    /// The snapshot of what is on the device: the latest one if nothing changed.
+    pub(crate) fn snapshot(&mut self, is_streamed: bool) -> Arc<MeshSnapshot> {
+        let changes = self.residents.changes();
+        self.snapshot.take_if(|(of, _)| *of != changes);
+        match &self.snapshot {
+            Some((_, snapshot)) => Arc::clone(snapshot),
+            None => {
+                let snapshot = Arc::new(self.new_snapshot(is_streamed));
+                self.snapshot = Some((changes, Arc::clone(&snapshot)));
+                snapshot
+            }
+        }
+    }
+
+    fn new_snapshot(&mut self, is_streamed: bool) -> MeshSnapshot {
+        let token = self.residents.lifetimes.begin_snapshot();
+        let pages = &self.residents.memory;
         let (mut vertex_pages, mut index_pages) = (Vec::new(), Vec::new());
-        let mut add = |MeshLocation { vertices, indices }: MeshLocation| {
-            add_page(&mut vertex_pages, vertices.page, |page| self.pages.vertex_buffers(page).cloned());
-            add_page(&mut index_pages, indices.page, |page| self.pages.index_buffer(page).cloned());
-        };
-        let mut range = |mesh: ResidentMesh| {
-            let ResidentMesh { location, index_count, .. } = mesh;
-            add(location);
+        let mut range = |MeshLocation { vertices, indices, index_count }: MeshLocation| {
+            add_page(&mut vertex_pages, vertices.page, |page| pages.vertex_buffers(page).cloned());
+            add_page(&mut index_pages, indices.page, |page| pages.index_buffer(page).cloned());
             MeshRange {
-                base_vertex: location.vertices.start as i32,
-                first_index: location.indices.start,
+                base_vertex: vertices.start as i32,
+                first_index: indices.start,
                 index_count,
-                pages: MeshPageIndices { vertices: location.vertices.page, indices: location.indices.page },
+                pages: MeshPageIndices { vertices: vertices.page, indices: indices.page },
             }
         };
-        let meshes = self.meshes.iter().copied().map(|mesh| mesh.map(&mut range)).collect();
+        let meshes = self.residents.slots.iter();
+        let meshes = meshes.map(|mesh| mesh.as_ref().map(|mesh| range(mesh.location))).collect();
         MeshSnapshot {
-            token: self.lifetimes.begin_snapshot(),
+            token,
             vertex_pages,
             index_pages,
             meshes,
             coarser_levels: Arc::clone(&self.coarser_levels),
-            outdated: self.outdated.clone(),
+            outdated: self.residents.outdated.clone(),
             imported_meshes: self.imported_meshes.clone(),
-            is_streamed: false,
+            is_streamed,
         }
     }
+}
+
+impl ResidentMeshes {
+    /// Finds room for a mesh in the pages, or adds pages if the budget allows. Otherwise the candidates make room, the
+    /// first ones first. `evictions` counts them.
+    ///
+    /// # Errors
+    /// If there is no such page. This is a bug in Drawloom.
+    pub(crate) fn place(
+        &mut self,
+        device: &wgpu::Device,
+        mesh: &Mesh,
+        budget: u64,
+        candidates: impl Iterator<Item = u32>,
+        evictions: &mut usize,
+    ) -> Result<Result<Placed<MeshTarget>, Unplaced>, BackendError> {
+        let max_buffer_size = device.limits().max_buffer_size;
+        if let Some(too_large) = self.exceeded_limit(mesh, budget) {
+            return Ok(Err(too_large));
+        }
+        let max = (budget / 16).clamp(1 << 16, (4 << 20).min(max_buffer_size));
+        let sizes = PageSizes { min: 1 << 16, max: MeshBytes { vertices: max, indices: max } };
+        let (meshes, pages) = (&self.slots, &mut self.memory);
+        let candidates = candidates.filter_map(|slot| Some((slot, meshes.get(slot as usize)?.as_ref()?.location)));
+        let Some(room) = pages.find_room(mesh, (sizes, budget), candidates) else { return Ok(Err(Unplaced::Full)) };
+        *evictions += room.evicted.len();
+        // Their memory is the mesh's already.
+        room.evicted.iter().for_each(|slot| self.retire(*slot));
+        let target = self.memory.target(room.location)?;
+        // The memory of pages that were released is free when nothing reads them any more.
+        let is_written = |retired: &MeshLocation| room.releases_pages || retired.overlaps(room.location);
+        let last_reader = self.lifetimes.last_reader(is_written);
+        Ok(Ok(Placed { target, last_reader }))
+    }
+
+    /// A frame uses no mesh that is larger than a buffer of the device, but it may be larger than the budget.
+    fn exceeded_limit(&self, mesh: &Mesh, budget: u64) -> Option<Unplaced> {
+        let bytes = self.memory.bytes_of(mesh).total();
+        (bytes > budget).then_some(Unplaced::TooLarge { bytes, limit: "mesh_bytes", allowed: budget })
+    }
+}
+
+/// Whether a mesh in a slot is used, and not in buffers of its own.
+fn lies_in_pages(used: &UsedMeshes) -> impl Fn(u32, &Mesh) -> bool {
+    |slot, mesh| mesh.has_triangles() && used.contains_slot(slot)
 }
 
 /// Adds the buffers of a page to those by index, if they are not there.
@@ -297,5 +300,20 @@ fn add_page<B>(pages: &mut Vec<Option<B>>, page: u32, buffers: impl FnOnce(u32) 
     }
     if pages[index].is_none() {
         pages[index] = buffers(page);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Topology, Vertex};
+
+    #[test]
+    fn a_mesh_is_too_large_for_the_budget_by_name() {
+        let mesh = Mesh::new("sheet", Topology::TriangleList, vec![Vertex::default(); 100], vec![0; 300]).unwrap();
+        let meshes = ResidentMeshes::default();
+        let too_large = Unplaced::TooLarge { bytes: 4400, limit: "mesh_bytes", allowed: 4399 };
+        assert_eq!(meshes.exceeded_limit(&mesh, 4400), None);
+        assert_eq!(meshes.exceeded_limit(&mesh, 4399), Some(too_large));
     }
 }

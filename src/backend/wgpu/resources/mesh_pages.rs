@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use super::buffers::new_buffer;
 use super::page_set::{PageBuffers, PageRange, PageSet};
+use super::residents::{AssetMemory, Residents};
+use super::snapshot_lifetimes::SnapshotLifetimes;
 use super::vertex_data::{AttributeBuffers, AttributeSet, vertex_stride};
 use crate::backend::BackendError;
 use crate::backend::error::broken_rule;
@@ -23,6 +25,8 @@ pub(crate) struct VertexBuffers {
 pub(crate) struct MeshLocation {
     pub(crate) vertices: PageRange,
     pub(crate) indices: PageRange,
+    /// Of level 0.
+    pub(crate) index_count: u32,
 }
 
 impl MeshLocation {
@@ -34,9 +38,9 @@ impl MeshLocation {
 
 /// How long new pages are, in bytes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PageSizes {
-    pub(crate) min: u64,
-    pub(crate) max: u64,
+pub(super) struct PageSizes {
+    pub(super) min: u64,
+    pub(super) max: MeshBytes,
 }
 
 /// The pages of all meshes.
@@ -49,29 +53,14 @@ pub(crate) struct MeshPages {
 }
 
 impl MeshPages {
-    /// Finds room for a mesh, or adds pages. A new page has room for everything that is about to come, of which this is
-    /// the number of bytes, or for as much as all pages before it, within the page sizes.
-    pub(super) fn allocate(&mut self, mesh: &Mesh, expected: MeshBytes, sizes: PageSizes) -> MeshLocation {
-        let page_bytes = |expected: u64, existing: u64| expected.max(existing).clamp(sizes.min, sizes.max);
-        let stride = self.bytes_per_vertex();
-        let vertices = page_bytes(expected.vertices, self.vertices.length() * stride) / stride;
-        let indices = page_bytes(expected.indices, self.indices.length() * INDEX) / INDEX;
-        MeshLocation {
-            vertices: self.vertices.allocate(mesh.vertices().len() as u32, vertices as u32),
-            indices: self.indices.allocate(index_count(mesh) as u32, indices as u32),
-        }
-    }
-
-    /// Frees the memory of a mesh, and releases pages that are empty then.
-    pub(super) fn free(&mut self, location: MeshLocation) {
-        self.vertices.free(location.vertices);
-        self.indices.free(location.indices);
-    }
-
-    /// Frees the memory of a mesh. Pages that are empty then stay.
-    pub(super) fn vacate(&mut self, location: MeshLocation) {
-        self.vertices.vacate(location.vertices);
-        self.indices.vacate(location.indices);
+    /// The lengths of new pages without a budget: a page has room for everything that is about to come, of which this
+    /// is the number of bytes, or for as much as all pages before it. So a scene at rest has few pages, whatever its
+    /// size.
+    pub(super) fn sizes_for(&self, expected: MeshBytes) -> PageSizes {
+        let (min, max) = (1 << 16, 8 << 20);
+        let vertices = expected.vertices.max(self.vertices.length() * self.bytes_per_vertex());
+        let indices = expected.indices.max(self.indices.length() * INDEX);
+        PageSizes { min, max: MeshBytes { vertices: vertices.clamp(min, max), indices: indices.clamp(min, max) } }
     }
 
     /// Takes memory that was vacated.
@@ -116,18 +105,35 @@ impl MeshPages {
         }
     }
 
-    /// The size of all pages in bytes.
-    pub(super) fn page_bytes(&self) -> u64 {
+    pub(super) fn bytes_per_vertex(&self) -> u64 {
+        vertex_stride(self.format) + self.attributes.bytes_per_vertex()
+    }
+}
+
+/// The meshes on the device.
+pub(crate) type ResidentMeshes = Residents<MeshPages>;
+
+impl AssetMemory for MeshPages {
+    type Asset = Mesh;
+    type Location = MeshLocation;
+
+    fn bytes(&self) -> u64 {
         self.vertices.length() * self.bytes_per_vertex() + self.indices.length() * INDEX
     }
 
-    /// Drops all pages. Those that a snapshot refers to live on with it.
-    pub(super) fn clear(&mut self) {
-        (self.vertices, self.indices) = (PageSet::default(), PageSet::default());
+    fn vacate(&mut self, location: MeshLocation) {
+        self.vertices.vacate(location.vertices);
+        self.indices.vacate(location.indices);
     }
 
-    pub(super) fn bytes_per_vertex(&self) -> u64 {
-        vertex_stride(self.format) + self.attributes.bytes_per_vertex()
+    fn release_empty(&mut self, location: MeshLocation, retired: &SnapshotLifetimes<MeshLocation>) {
+        let (vertices, indices) = (location.vertices.page, location.indices.page);
+        self.vertices.release_if_empty(vertices, || retired.retired().any(|other| other.vertices.page == vertices));
+        self.indices.release_if_empty(indices, || retired.retired().any(|other| other.indices.page == indices));
+    }
+
+    fn clear(&mut self) {
+        (self.vertices, self.indices) = (PageSet::default(), PageSet::default());
     }
 }
 
@@ -177,7 +183,7 @@ pub(crate) struct MeshTarget {
 impl MeshTarget {
     /// What is written to it.
     pub(crate) fn bytes(&self) -> u64 {
-        let MeshLocation { vertices, indices } = self.location;
+        let MeshLocation { vertices, indices, .. } = self.location;
         let stride = vertex_stride(self.format) + self.attributes.bytes_per_vertex();
         u64::from(vertices.length) * stride + u64::from(indices.length) * INDEX
     }

@@ -2,6 +2,7 @@
 
 use super::mesh_pages::{INDEX, MeshBytes, MeshLocation, MeshPages, PageSizes, index_count};
 use super::page_set::PageRange;
+use super::residents::AssetMemory;
 use crate::scene::Mesh;
 
 /// Room that was found.
@@ -63,7 +64,10 @@ impl MeshPages {
 /// A search for room. It takes what it finds at once, so that what is vacated later is not used in vain.
 struct Search {
     vertex_count: u32,
+    /// Of all levels.
     index_count: u32,
+    /// The indices of level 0.
+    first_level: u32,
     vertices: Option<PageRange>,
     indices: Option<PageRange>,
     budget: u64,
@@ -79,7 +83,8 @@ struct Released {
 impl Search {
     fn new(mesh: &Mesh, budget: u64) -> Self {
         let (vertex_count, index_count) = (mesh.vertices().len() as u32, index_count(mesh) as u32);
-        Self { vertex_count, index_count, vertices: None, indices: None, budget }
+        let first_level = mesh.indices().len() as u32;
+        Self { vertex_count, index_count, first_level, vertices: None, indices: None, budget }
     }
 
     /// Looks again. Returns whether there is room for everything, be it in pages that are yet to be added.
@@ -110,46 +115,47 @@ impl Search {
     fn finish(self, pages: &mut MeshPages, sizes: PageSizes) -> (MeshLocation, Released) {
         let (missing, stride) = (self.missing(pages), pages.bytes_per_vertex());
         let mut released = Released::default();
-        while missing.total() > 0 && pages.page_bytes() + missing.total() > self.budget {
+        while missing.total() > 0 && pages.bytes() + missing.total() > self.budget {
             let (vertices, indices) = (pages.vertices.longest_empty_page(), pages.indices.longest_empty_page());
             let bytes = |page: Option<(u32, u32)>, stride| page.map_or(0, |(_, length)| u64::from(length) * stride);
             let is_of_vertices = bytes(vertices, stride) >= bytes(indices, INDEX);
             let Some((page, _)) = (if is_of_vertices { vertices } else { indices }) else { break };
             if is_of_vertices {
-                pages.vertices.release_if_empty(page);
+                pages.vertices.release_if_empty(page, || false);
                 released.vertices.push(page);
             } else {
-                pages.indices.release_if_empty(page);
+                pages.indices.release_if_empty(page, || false);
                 released.indices.push(page);
             }
         }
         // Pages of vertices and pages of indices share what is left of the budget as this mesh does, so that neither
         // takes what the other one will need.
-        let rest = self.budget.saturating_sub(pages.page_bytes());
+        let rest = self.budget.saturating_sub(pages.bytes());
         let whole =
             MeshBytes { vertices: u64::from(self.vertex_count) * stride, indices: u64::from(self.index_count) * INDEX };
-        let page_bytes = |part: u64, other_missing: u64| {
+        let page_bytes = |part: u64, max: u64, other_missing: u64| {
             let share = (u128::from(rest) * u128::from(part) / u128::from(whole.total().max(1))) as u64;
-            share.max(sizes.min).min(sizes.max).min(rest.saturating_sub(other_missing)).max(part)
+            share.max(sizes.min).min(max).min(rest.saturating_sub(other_missing)).max(part)
         };
-        let vertex_page = page_bytes(whole.vertices, missing.indices) / stride;
-        let index_page = page_bytes(whole.indices, missing.vertices) / INDEX;
+        let vertex_page = page_bytes(whole.vertices, sizes.max.vertices, missing.indices) / stride;
+        let index_page = page_bytes(whole.indices, sizes.max.indices, missing.vertices) / INDEX;
         let vertices =
             self.vertices.unwrap_or_else(|| pages.vertices.allocate_in_new_page(self.vertex_count, vertex_page as u32));
-        let rest = self.budget.saturating_sub(pages.page_bytes()) / INDEX;
+        let rest = self.budget.saturating_sub(pages.bytes()) / INDEX;
         let indices = self
             .indices
             .unwrap_or_else(|| pages.indices.allocate_in_new_page(self.index_count, index_page.min(rest) as u32));
-        (MeshLocation { vertices, indices }, released)
+        (MeshLocation { vertices, indices, index_count: self.first_level }, released)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::wgpu::resources::snapshot_lifetimes::SnapshotLifetimes;
     use crate::scene::{Topology, Vertex};
 
-    const SIZES: PageSizes = PageSizes { min: 1 << 12, max: 1 << 13 };
+    const SIZES: PageSizes = PageSizes { min: 1 << 12, max: MeshBytes { vertices: 1 << 13, indices: 1 << 13 } };
     const BUDGET: u64 = 1 << 17;
 
     fn mesh(vertices: usize, triangles: usize) -> Mesh {
@@ -157,6 +163,11 @@ mod tests {
         let vertex =
             |index: usize| Vertex { position: [(index % 2) as f32, (index % 3) as f32, 0.0], ..Vertex::default() };
         Mesh::new("mesh", Topology::TriangleList, (0..vertices).map(vertex).collect(), indices).unwrap()
+    }
+
+    fn free(pages: &mut MeshPages, location: MeshLocation) {
+        pages.vacate(location);
+        pages.release_empty(location, &SnapshotLifetimes::default());
     }
 
     /// Which ranges are taken, in a form that two states can be compared by.
@@ -192,24 +203,24 @@ mod tests {
             let is_in_the_way = |other: &MeshLocation| other.overlaps(room.location);
             assert!(room.releases_pages || evicted.iter().all(is_in_the_way));
             assert!(!live.iter().any(|(_, other)| is_in_the_way(other)));
-            assert!(pages.page_bytes() <= BUDGET);
-            let MeshLocation { vertices: in_vertices, indices: in_indices } = room.location;
+            assert!(pages.bytes() <= BUDGET);
+            let MeshLocation { vertices: in_vertices, indices: in_indices, .. } = room.location;
             assert_eq!((in_vertices.length as usize, in_indices.length as usize), (vertices, triangles * 3));
             pages.target(room.location).unwrap();
             live.push((slot, room.location));
             if random.u8(..4) == 0 {
-                pages.free(live.swap_remove(random.usize(..live.len())).1);
+                free(&mut pages, live.swap_remove(random.usize(..live.len())).1);
             }
         }
         assert!(refused > 100 && evictions > 500, "{refused} refused, {evictions} evictions");
-        live.drain(..).for_each(|(_, location)| pages.free(location));
-        assert_eq!(pages.page_bytes(), 0);
+        live.drain(..).for_each(|(_, location)| free(&mut pages, location));
+        assert_eq!(pages.bytes(), 0);
     }
 
     #[test]
     fn neither_vertices_nor_indices_take_what_the_other_ones_need() {
         // A page of vertices could take all of the budget.
-        let sizes = PageSizes { min: 1 << 10, max: 1 << 20 };
+        let sizes = PageSizes { min: 1 << 10, max: MeshBytes { vertices: 1 << 20, indices: 1 << 20 } };
         let mut pages = MeshPages::default();
         let mesh = mesh(100, 300);
         let bytes = pages.bytes_of(&mesh).total();

@@ -46,13 +46,6 @@ impl<B> Default for PageSet<B> {
 }
 
 impl<B> PageSet<B> {
-    /// A range of this length in the first page that has room. If none has, adds a page of `page_length`, or longer if
-    /// the range is.
-    pub(super) fn allocate(&mut self, length: u32, page_length: u32) -> PageRange {
-        let found = self.allocate_in_pages(length);
-        found.unwrap_or_else(|| self.allocate_in_new_page(length, page_length))
-    }
-
     /// A range of this length in a new page of `page_length`, or longer if the range is.
     pub(super) fn allocate_in_new_page(&mut self, length: u32, page_length: u32) -> PageRange {
         let page_length = page_length.max(length);
@@ -78,12 +71,6 @@ impl<B> PageSet<B> {
         Some(PageRange { page, start, length })
     }
 
-    /// Frees a range, and releases the page if nothing else is in it.
-    pub(super) fn free(&mut self, range: PageRange) {
-        self.vacate(range);
-        self.release_if_empty(range.page);
-    }
-
     /// Frees a range. The page stays if nothing else is in it.
     pub(super) fn vacate(&mut self, range: PageRange) {
         self.change_ranges(range.page, |ranges| ranges.free(range.start, range.length));
@@ -94,10 +81,10 @@ impl<B> PageSet<B> {
         self.change_ranges(range.page, |ranges| ranges.occupy(range.start, range.length));
     }
 
-    /// Releases a page in which nothing is. Returns whether it did.
-    pub(super) fn release_if_empty(&mut self, page: u32) -> bool {
+    /// Releases a page in which nothing is, unless it is still read. Returns whether it did.
+    pub(super) fn release_if_empty(&mut self, page: u32, is_read: impl FnOnce() -> bool) -> bool {
         let Some(entry) = self.pages.get_mut(page as usize) else { return false };
-        let Some(released) = entry.take_if(|page| page.ranges.is_empty()) else { return false };
+        let Some(released) = entry.take_if(|page| page.ranges.is_empty() && !is_read()) else { return false };
         self.length -= u64::from(released.length);
         self.empty_length -= u64::from(released.length);
         while self.pages.last().is_some_and(Option::is_none) {
@@ -141,6 +128,18 @@ impl<B> PageSet<B> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl PageSet<()> {
+        fn allocate(&mut self, length: u32, page_length: u32) -> PageRange {
+            let found = self.allocate_in_pages(length);
+            found.unwrap_or_else(|| self.allocate_in_new_page(length, page_length))
+        }
+
+        fn free(&mut self, range: PageRange) {
+            self.vacate(range);
+            self.release_if_empty(range.page, || false);
+        }
+    }
 
     #[test]
     fn live_ranges_never_overlap_and_empty_pages_are_released() {
@@ -189,7 +188,9 @@ mod tests {
         assert_eq!((pages.allocate_in_pages(30), pages.longest_empty_page()), (Some(first), None));
         pages.vacate(first);
         pages.vacate(second);
-        assert!(pages.release_if_empty(0) && !pages.release_if_empty(0) && !pages.release_if_empty(other.page));
+        assert!(!pages.release_if_empty(0, || true), "something reads it");
+        let mut release = |page| pages.release_if_empty(page, || false);
+        assert!(release(0) && !release(0) && !release(other.page));
         assert_eq!((pages.length(), pages.occupied_length()), (50, 50));
     }
 

@@ -24,7 +24,7 @@ pub(crate) struct LastReader(u64);
 ///
 /// Writes to the device are ordered by submissions. What is written after the last of these frames was submitted does
 /// not reach it, and what is written before it was submitted would.
-pub(super) struct SnapshotLifetimes<T> {
+pub(crate) struct SnapshotLifetimes<T> {
     /// Those that may be alive, the oldest first.
     snapshots: Vec<Weak<SnapshotToken>>,
     latest: u64,

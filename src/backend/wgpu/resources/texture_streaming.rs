@@ -1,15 +1,11 @@
 //! Textures that are streamed: they come to the device by background jobs, and make room for others.
 
-use std::sync::Arc;
-
 use super::buffers::CountedQueue;
-use super::mesh_streaming::{EndOfUpload, Placed, Unplaced};
-use super::snapshot_lifetimes::LastReader;
-use super::texture_arrays::{ResidentTexture, TextureArrays, TextureLocation};
+use super::residents::{Placed, Unplaced};
+use super::texture_arrays::{ResidentTextures, TextureLocation};
 use super::texture_layers::layer_bytes;
 use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
-use crate::handle::Handle;
-use crate::scene::{Assets, Texture};
+use crate::scene::Texture;
 
 /// The device that arrays are on, and what they may take there.
 #[derive(Clone, Copy)]
@@ -54,38 +50,7 @@ impl Copying {
     }
 }
 
-impl TextureArrays {
-    /// Begins a frame with textures that are streamed. One that was replaced stays until the new one arrives.
-    pub(crate) fn begin_streamed_frame(&mut self, assets: &Assets) {
-        for TextureLocation { array, .. } in self.lifetimes.reclaim() {
-            self.release_if_empty(array as usize);
-        }
-        if self.revision == Some(assets.textures.revision()) && self.identity == assets.textures.identity() {
-            return;
-        }
-        self.begin_assets(assets);
-        for slot in 0..self.textures.len() as u32 {
-            if self.textures[slot as usize].is_some_and(|texture| assets.get(texture.handle).is_err()) {
-                self.evict(slot);
-            }
-        }
-        self.missing = (0..assets.textures.slot_count() as u32).filter(|slot| self.is_missing(assets, *slot)).collect();
-        self.revision = Some(assets.textures.revision());
-    }
-
-    /// Whether the texture in a slot is neither on the device, in this revision, nor on its way.
-    fn is_missing(&self, assets: &Assets, slot: u32) -> bool {
-        let Some((handle, revision, _)) = assets.textures.entry(slot) else { return false };
-        let resident = self.textures.get(slot as usize).copied().flatten();
-        let is_resident = resident.is_some_and(|texture| (texture.handle, texture.revision) == (handle, revision));
-        !self.in_flight.contains_key(&slot) && !is_resident
-    }
-
-    /// The textures that are neither on the device, unchanged, nor on their way: with handle and revision.
-    pub(crate) fn missing<'a>(&self, assets: &'a Assets) -> impl Iterator<Item = (Handle<Texture>, u64, &'a Texture)> {
-        self.missing.iter().filter_map(|slot| assets.textures.entry(*slot))
-    }
-
+impl ResidentTextures {
     /// Finds a layer for a texture, or moves an array to a larger one if the budget allows.
     pub(crate) fn place_beside(
         &mut self,
@@ -119,14 +84,14 @@ impl TextureArrays {
             *evictions += self.evict_for(index, budget, Copying::AnyTime, candidates());
             found = self.take_layer(index, budget, Copying::AnyTime);
         }
-        if found == Err(Unplaced::Full) && self.arrays[index].capacity() as u64 == budget.max_layers {
+        if found == Err(Unplaced::Full) && self.memory.arrays[index].capacity() as u64 == budget.max_layers {
             found = Err(Unplaced::LayerLimit);
         }
         self.placed(found?)
     }
 
     fn placed(&self, location: TextureLocation) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
-        let on_device = self.arrays[location.array as usize].texture().cloned().ok_or(Unplaced::Full)?;
+        let on_device = self.memory.arrays[location.array as usize].texture().cloned().ok_or(Unplaced::Full)?;
         let last_reader = self.lifetimes.last_reader(|retired| *retired == location);
         Ok(Placed { target: (location, on_device), last_reader })
     }
@@ -138,17 +103,17 @@ impl TextureArrays {
         budget: ArrayBudget<'_>,
         copying: Copying,
     ) -> Result<TextureLocation, Unplaced> {
-        if self.arrays[index].free_count() == 0 {
+        if self.memory.arrays[index].free_count() == 0 {
             self.grow(index, budget, copying)?;
         }
-        let layer = self.arrays[index].take().ok_or(Unplaced::Full)?;
+        let layer = self.memory.arrays[index].take().ok_or(Unplaced::Full)?;
         Ok(TextureLocation { array: index as u32, layer })
     }
 
     /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what
     /// they do not use.
     fn grow(&mut self, index: usize, budget: ArrayBudget<'_>, copying: Copying) -> Result<(), Unplaced> {
-        let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.arrays[index].capacity() as u64);
+        let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.memory.arrays[index].capacity() as u64);
         let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers);
         let growth = copying.min_growth(capacity).min(wanted - capacity);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
@@ -160,7 +125,7 @@ impl TextureArrays {
             .filter(|other| gives_up && *other != index && self.surplus(*other, copying, 0) > 0)
             .collect();
         // What jobs upload stays where it is.
-        if donors.iter().chain([&index]).any(|array| self.in_flight.values().any(|busy| *busy as usize == *array)) {
+        if donors.iter().chain([&index]).any(|array| self.in_flight().any(|busy| busy.array as usize == *array)) {
             return Err(Unplaced::Awaited);
         }
         for other in donors {
@@ -174,7 +139,7 @@ impl TextureArrays {
 
     /// What an array gives up for another one if `evicted` more of its layers are free.
     fn surplus(&self, array: usize, copying: Copying, evicted: u64) -> u64 {
-        let layers = &self.arrays[array];
+        let layers = &self.memory.arrays[array];
         copying.surplus(layers.capacity() as u64, layers.free_count() as u64 + evicted)
     }
 
@@ -193,7 +158,7 @@ impl TextureArrays {
         copying: Copying,
         candidates: impl Iterator<Item = u32>,
     ) -> usize {
-        let capacity = self.arrays[index].capacity() as u64;
+        let capacity = self.memory.arrays[index].capacity() as u64;
         let may_grow = capacity < budget.max_layers;
         let needed = copying.min_growth(capacity).min(budget.max_layers - capacity) * layer_bytes(ARRAY_SIDES[index]);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
@@ -201,7 +166,7 @@ impl TextureArrays {
         for slot in candidates {
             let Some(location) = self.location(slot) else { continue };
             if location.array as usize == index {
-                self.evict(slot);
+                self.take_off(slot);
                 return 1;
             }
             if !may_grow {
@@ -212,106 +177,11 @@ impl TextureArrays {
             if rest + self.surplus_bytes(index, copying, |array| counts[array]) >= needed {
                 // Those of arrays that give up nothing would make room in vain.
                 chosen.retain(|(_, array)| self.surplus(*array, copying, counts[*array]) > 0);
-                chosen.iter().for_each(|(slot, _)| self.evict(*slot));
+                chosen.iter().for_each(|(slot, _)| self.take_off(*slot));
                 return chosen.len();
             }
         }
         0
-    }
-
-    /// The slots of the textures on the device.
-    pub(crate) fn resident(&self) -> impl Iterator<Item = u32> {
-        (0..).zip(&self.textures).filter(|(_, texture)| texture.is_some()).map(|(slot, _)| slot)
-    }
-
-    /// Whether a texture in a slot is on the device, be it the current one or one that it replaced.
-    pub(crate) fn is_resident(&self, slot: u32) -> bool {
-        self.location(slot).is_some()
-    }
-
-    /// Whether what may be written once this reader is gone may be written now.
-    pub(crate) fn is_gone(&self, last_reader: LastReader) -> bool {
-        self.lifetimes.is_gone(last_reader)
-    }
-
-    /// The number of textures on the device.
-    pub(crate) fn resident_count(&self) -> usize {
-        self.arrays.iter().map(|array| array.capacity() - array.free_count()).sum::<usize>() - self.in_flight.len()
-    }
-
-    /// Takes a texture off the device. Its layer is free for those whose upload waits until nothing reads it.
-    fn evict(&mut self, slot: u32) {
-        if let Some(texture) = self.textures.get_mut(slot as usize).and_then(Option::take) {
-            // One that is being uploaded, in place of this version, is not missing.
-            if !self.in_flight.contains_key(&slot) {
-                self.missing.insert(slot);
-            }
-            self.vacate(texture.location);
-        }
-    }
-
-    fn vacate(&mut self, location: TextureLocation) {
-        self.lifetimes.retire(location);
-        self.arrays[location.array as usize].free(location.layer);
-        self.changes += 1;
-    }
-
-    /// A job is about to upload a texture to a layer of this array.
-    pub(crate) fn begin_upload(&mut self, handle: Handle<Texture>, location: TextureLocation) -> Arc<()> {
-        self.in_flight.insert(handle.index(), location.array);
-        self.missing.remove(&handle.index());
-        Arc::clone(&self.epoch)
-    }
-
-    /// Identifies the arrays.
-    pub(crate) fn epoch(&self) -> &Arc<()> {
-        &self.epoch
-    }
-
-    /// Whether these are the arrays of this cache.
-    pub(crate) fn is_current(&self, epoch: &Arc<()>) -> bool {
-        Arc::ptr_eq(epoch, &self.epoch)
-    }
-
-    /// A job has uploaded a texture, or could not. Nothing is drawn with it if it is gone meanwhile; if it changed, it
-    /// is drawn until the next one arrives.
-    pub(crate) fn end_upload(
-        &mut self,
-        epoch: &Arc<()>,
-        (handle, revision): (Handle<Texture>, u64),
-        location: TextureLocation,
-        (assets, is_complete): (&Assets, bool),
-    ) -> EndOfUpload {
-        if !self.is_current(epoch) {
-            return EndOfUpload::Stale;
-        }
-        let slot = handle.index();
-        self.in_flight.remove(&slot);
-        let is_needed = is_complete && assets.get(handle).is_ok();
-        if is_needed {
-            let new = ResidentTexture { handle, revision, location };
-            if let Some(before) = self.textures[slot as usize].replace(new) {
-                self.vacate(before.location);
-            }
-            self.changes += 1;
-        } else {
-            // No snapshot refers to it.
-            self.free_layer(location);
-        }
-        if self.is_missing(assets, slot) {
-            self.missing.insert(slot);
-        }
-        if is_needed { EndOfUpload::Resident } else { EndOfUpload::Dropped }
-    }
-
-    /// Counts how often what is on the device, or where it is, changed.
-    pub(crate) fn changes(&self) -> u64 {
-        self.changes
-    }
-
-    /// The number of textures on the way.
-    pub(crate) fn in_flight(&self) -> usize {
-        self.in_flight.len()
     }
 }
 
@@ -322,10 +192,12 @@ const MIN_LAYERS: u64 = 8;
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::resources::EndOfUpload;
+    use crate::scene::Assets;
 
     /// Arrays, and the textures in them, those that were used longest ago first.
     struct Arrays {
-        arrays: TextureArrays,
+        arrays: ResidentTextures,
         assets: Assets,
         device: wgpu::Device,
         uploads: CountedQueue,
@@ -339,7 +211,7 @@ mod tests {
     impl Arrays {
         fn new() -> Self {
             let (device, queue) = noop_device();
-            let (arrays, uploads) = (TextureArrays::default(), CountedQueue::new(queue));
+            let (arrays, uploads) = (ResidentTextures::default(), CountedQueue::new(queue));
             Self { arrays, assets: Assets::default(), device, uploads, by_use: Vec::new() }
         }
 
@@ -347,7 +219,7 @@ mod tests {
         fn place(&mut self, side: u32, (layers, max_layers): (u64, u64), candidates: usize) -> Result<usize, Unplaced> {
             let texture = Texture::new("plain", side, side, vec![255; (side * side * 4) as usize]).unwrap();
             let handle = self.assets.add(texture.clone()).unwrap();
-            self.arrays.begin_streamed_frame(&self.assets);
+            self.arrays.begin_frame(&self.assets.textures, (0, |_, _| true), true);
             let (device, uploads) = (&self.device, &self.uploads);
             let budget = ArrayBudget { device, uploads, bytes: layers * LAYER + SLACK, max_layers };
             let (by_use, mut evictions) = (self.by_use[..candidates].to_vec(), 0);
@@ -359,8 +231,8 @@ mod tests {
             let (location, _) = placed.inspect_err(|_| assert_eq!(evictions, 0, "nothing is evicted in vain"))?.target;
             assert!(self.arrays.resident_bytes() <= budget.bytes);
             let (_, revision, _) = self.assets.textures.entry(handle.index()).unwrap();
-            let epoch = self.arrays.begin_upload(handle, location);
-            let end = self.arrays.end_upload(&epoch, (handle, revision), location, (&self.assets, true));
+            let upload = self.arrays.begin_upload((handle, revision), location);
+            let end = self.arrays.end_upload(&upload, &self.assets.textures, |_, _| true, true);
             assert_eq!(end, EndOfUpload::Resident);
             self.by_use.push(handle.index());
             Ok(evictions)
@@ -410,13 +282,13 @@ mod tests {
                 share = random.f64();
             }
             if step == 200 {
-                after_filling = arrays.arrays.moves();
+                after_filling = arrays.arrays.memory.moves;
             }
             let side = if random.f64() < share { 512 } else { 256 };
             placed += usize::from(arrays.place(side, limits, arrays.by_use.len()).is_ok());
         }
         assert_eq!(placed, 1200);
-        let moves = arrays.arrays.moves() - after_filling;
+        let moves = arrays.arrays.memory.moves - after_filling;
         assert!(moves < 150, "{moves} copies of arrays for 1000 textures");
     }
 }

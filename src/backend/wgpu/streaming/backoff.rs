@@ -107,34 +107,27 @@ impl Retries {
 /// What can never be on the device. It is told once.
 #[derive(Default)]
 pub(super) struct TooLarge {
-    /// By slot, with the revision that is too large.
-    meshes: HashMap<u32, u64>,
-    textures: HashMap<u32, u64>,
+    /// By [key](Requested::key), the revision that is too large.
+    told: HashMap<(bool, u32), u64>,
 }
 
 impl TooLarge {
     /// Forgets what is gone, or was replaced.
     pub(super) fn update(&mut self, assets: &Assets) {
-        let is_current = |current: Option<u64>, revision| current == Some(revision);
-        self.meshes.retain(|slot, revision| {
-            is_current(assets.meshes.get_with_revision(*slot).map(|(revision, _)| revision), *revision)
-        });
-        self.textures.retain(|slot, revision| {
-            is_current(assets.textures.get_with_revision(*slot).map(|(revision, _)| revision), *revision)
+        self.told.retain(|(is_mesh, slot), told| {
+            let mesh = || assets.meshes.get_with_revision(*slot).map(|(revision, _)| revision);
+            let texture = || assets.textures.get_with_revision(*slot).map(|(revision, _)| revision);
+            Some(*told) == if *is_mesh { mesh() } else { texture() }
         });
     }
 
     /// Reports, once, that something takes more bytes than the limit of this name allows.
     pub(super) fn tell(&mut self, requested: &Requested<'_>, (bytes, limit, allowed): (u64, &'static str, u64)) {
-        let (told, slot, revision, name, kind) = match *requested {
-            Requested::Mesh(handle, revision, mesh) => {
-                (&mut self.meshes, handle.index(), revision, mesh.name(), "mesh")
-            }
-            Requested::Texture(handle, revision, texture) => {
-                (&mut self.textures, handle.index(), revision, texture.name(), "texture")
-            }
+        let (revision, name, kind) = match *requested {
+            Requested::Mesh(_, revision, mesh) => (revision, mesh.name(), "mesh"),
+            Requested::Texture(_, revision, texture) => (revision, texture.name(), "texture"),
         };
-        if told.insert(slot, revision) != Some(revision) {
+        if self.told.insert(requested.key(), revision) != Some(revision) {
             let name = name.to_owned();
             emit_unlocked(move || {
                 tracing::warn!(target: "drawloom", kind, name, bytes, limit, allowed, "it is too large to be streamed: what it replaces stays, or nothing is drawn");
@@ -144,13 +137,10 @@ impl TooLarge {
 
     /// Something has room: in another format of vertices, for example.
     pub(super) fn remove(&mut self, requested: &Requested<'_>) {
-        match requested {
-            Requested::Mesh(handle, ..) => self.meshes.remove(&handle.index()),
-            Requested::Texture(handle, ..) => self.textures.remove(&handle.index()),
-        };
+        self.told.remove(&requested.key());
     }
 
     pub(super) fn count(&self) -> usize {
-        self.meshes.len() + self.textures.len()
+        self.told.len()
     }
 }

@@ -1,21 +1,14 @@
 //! The upload of a mesh, in portions.
 
-use std::sync::Arc;
-
 use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
-use crate::backend::wgpu::resources::{CountedQueue, MeshTarget};
-use crate::handle::Handle;
+use crate::backend::wgpu::resources::{CountedQueue, InFlight, MeshTarget};
 use crate::quality::VertexFormat;
 use crate::scene::{Mesh, PackedVertex};
 
 /// A mesh on its way to the device.
 pub(crate) struct MeshUpload {
-    /// Which pages its target is in: those of a cache that was not cleared since.
-    pub(crate) epoch: Arc<()>,
-    pub(crate) handle: Handle<Mesh>,
-    /// In the assets.
-    pub(crate) revision: u64,
+    pub(crate) in_flight: InFlight<Mesh>,
     pub(crate) mesh: Mesh,
     pub(crate) target: MeshTarget,
     packed: Vec<PackedVertex>,
@@ -24,8 +17,8 @@ pub(crate) struct MeshUpload {
 }
 
 impl MeshUpload {
-    pub(crate) fn new(epoch: Arc<()>, (handle, revision): (Handle<Mesh>, u64), mesh: Mesh, target: MeshTarget) -> Self {
-        Self { epoch, handle, revision, mesh, target, packed: Vec::new(), written: 0 }
+    pub(crate) fn new(in_flight: InFlight<Mesh>, mesh: Mesh, target: MeshTarget) -> Self {
+        Self { in_flight, mesh, target, packed: Vec::new(), written: 0 }
     }
 
     /// All that it uploads.

@@ -17,6 +17,6 @@ mod eviction_order;
 
 pub use budget::StreamingBudget;
 pub(crate) use frame_use::FrameUse;
-pub(crate) use residency::Residency;
+pub(crate) use residency::{FrameAssets, Residency};
 pub use statistics::StreamingStatistics;
-pub(crate) use streamer::{StreamedResources, Streamer};
+pub(crate) use streamer::Streamer;

@@ -61,15 +61,17 @@ impl<'a, 'b> Placement<'a, 'b> {
         let placed = match request.requested {
             Requested::Mesh(handle, revision, mesh) => self.place_mesh(handle, mesh, importance)?.map(|placed| {
                 let Placed { target, last_reader } = placed;
-                let epoch = self.residency.meshes.begin_upload(handle.index());
-                let upload = Upload::Mesh(MeshUpload::new(epoch, (handle, revision), mesh.clone(), target));
+                let meshes = &mut self.residency.meshes.residents;
+                let in_flight = meshes.begin_upload((handle, revision), target.location);
+                let upload = Upload::Mesh(MeshUpload::new(in_flight, mesh.clone(), target));
                 HeldUpload { upload, last_reader }
             }),
             Requested::Texture(handle, revision, texture) => {
                 self.place_texture(handle, texture, importance).map(|placed| {
                     let Placed { target: (location, array), last_reader } = placed;
-                    let epoch = self.residency.materials.textures.begin_upload(handle, location);
-                    let upload = TextureUpload::new(epoch, (handle, revision), texture.clone(), array, location);
+                    let textures = &mut self.residency.materials.textures;
+                    let in_flight = textures.begin_upload((handle, revision), location);
+                    let upload = TextureUpload::new(in_flight, texture.clone(), array, location);
                     HeldUpload { upload: Upload::Texture(upload), last_reader }
                 })
             }
@@ -85,12 +87,13 @@ impl<'a, 'b> Placement<'a, 'b> {
     ) -> Result<Result<Placed<MeshTarget>, Unplaced>, BackendError> {
         let Self { residency, usage, retries, refused_meshes, .. } = self;
         let (device, budget, slot) = (residency.device, self.budget.mesh_bytes, handle.index());
+        let meshes = &mut residency.meshes.residents;
         // A mesh that replaces one may take the place of that.
-        let replaces = residency.meshes.is_resident(slot);
+        let replaces = meshes.is_resident(slot);
         if refused_meshes.covers(mesh) && !replaces {
             return Ok(Err(Unplaced::Full));
         }
-        let beside = residency.meshes.place(device, mesh, budget, iter::empty(), &mut 0)?;
+        let beside = meshes.place(device, mesh, budget, iter::empty(), &mut 0)?;
         if !matches!(beside, Err(Unplaced::Full)) {
             return Ok(beside);
         }
@@ -98,10 +101,10 @@ impl<'a, 'b> Placement<'a, 'b> {
             refused_meshes.add(mesh, 0);
             return Ok(beside);
         }
-        let eviction_order = self.mesh_evictions.get_or_insert_with(|| usage.mesh_evictions(residency.meshes));
+        let eviction_order = self.mesh_evictions.get_or_insert_with(|| usage.mesh_evictions(meshes));
         let tried = Cell::new(0);
         let candidates = eviction_order.candidates(importance, slot).inspect(|_| tried.set(tried.get() + 1));
-        let placed = residency.meshes.place(device, mesh, budget, candidates, &mut self.evictions)?;
+        let placed = meshes.place(device, mesh, budget, candidates, &mut self.evictions)?;
         if placed.is_err() {
             refused_meshes.add(mesh, tried.get());
             retries.add(slot, tried.get());

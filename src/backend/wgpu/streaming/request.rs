@@ -19,14 +19,21 @@ pub(super) enum Requested<'a> {
     Texture(Handle<Texture>, u64, &'a Texture),
 }
 
+impl Requested<'_> {
+    /// Whether it is a mesh, and its slot.
+    pub(super) fn key(&self) -> (bool, u32) {
+        match self {
+            Self::Mesh(handle, ..) => (true, handle.index()),
+            Self::Texture(handle, ..) => (false, handle.index()),
+        }
+    }
+}
+
 impl Request<'_> {
     /// Meshes come before textures: without a texture something is drawn nevertheless. The rest is there so that any
     /// two differ.
     fn rank(&self) -> (bool, i32, bool, Reverse<u32>) {
-        let (is_mesh, slot) = match self.requested {
-            Requested::Mesh(handle, ..) => (true, handle.index()),
-            Requested::Texture(handle, ..) => (false, handle.index()),
-        };
+        let (is_mesh, slot) = self.requested.key();
         (self.is_wanted, self.priority, is_mesh, Reverse(slot))
     }
 }

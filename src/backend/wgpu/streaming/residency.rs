@@ -1,10 +1,13 @@
-//! What a frame finds on the device, and changes there.
+//! What a frame finds on the device, changes there, and draws with.
 
 use std::sync::Arc;
 
 use super::budget::StreamingBudget;
+use super::frame_use::FrameUse;
 use super::upload_jobs::Upload;
-use crate::backend::wgpu::resources::{CountedQueue, LastReader, MaterialCache, MeshCache};
+use crate::backend::wgpu::resources::{
+    CountedQueue, LastReader, MaterialCache, MaterialSnapshot, MeshBudget, MeshCache, MeshSnapshot,
+};
 use crate::backend::{BackendError, FrameRequest};
 
 /// The device, and what is on it.
@@ -15,6 +18,13 @@ pub(crate) struct Residency<'a> {
     pub(crate) materials: &'a mut MaterialCache,
 }
 
+/// What a frame draws with.
+pub(crate) struct FrameAssets {
+    pub(crate) meshes: Arc<MeshSnapshot>,
+    pub(crate) materials: MaterialSnapshot,
+    pub(crate) frame_use: FrameUse,
+}
+
 /// An upload whose memory is still read by a frame in flight.
 pub(super) struct HeldUpload {
     pub(super) upload: Upload,
@@ -22,51 +32,48 @@ pub(super) struct HeldUpload {
     pub(super) last_reader: LastReader,
 }
 
-/// Which pages and arrays there are: others after the caches were cleared.
-#[derive(Default)]
-pub(super) struct Epochs {
-    meshes: Arc<()>,
-    textures: Arc<()>,
-}
-
 impl Residency<'_> {
-    /// Drops what is gone.
+    /// Drops what is gone. Without a budget, uploads all that is missing; with one, only what replaces others.
     ///
     /// # Errors
-    /// If the device has no room for what was replaced.
-    pub(super) fn begin_frame(
+    /// If the device has no room for what is uploaded.
+    pub(crate) fn begin_frame(
         &mut self,
         request: &FrameRequest<'_>,
-        budget: &StreamingBudget,
+        budget: Option<&StreamingBudget>,
     ) -> Result<(), BackendError> {
         let (assets, used, vertices) = (request.scene.assets, request.objects.used_meshes(), request.quality.vertices);
-        let budget = (budget.mesh_bytes, budget.upload_bytes_per_frame);
-        self.meshes.begin_streamed_frame(self.device, self.uploads, (assets, used), vertices, budget)?;
-        self.materials.textures.begin_streamed_frame(assets);
-        Ok(())
+        let of_meshes =
+            budget.map(|budget| MeshBudget { pages: budget.mesh_bytes, at_once: budget.upload_bytes_per_frame });
+        self.meshes.begin_frame(self.device, self.uploads, (assets, used), vertices, of_meshes)?;
+        self.materials.begin_frame(self.device, self.uploads, assets, budget.is_some())
+    }
+
+    /// The snapshots of what is on the device. The caches have forgotten the ones before then.
+    pub(crate) fn snapshots(
+        &mut self,
+        request: &FrameRequest<'_>,
+        is_streamed: bool,
+    ) -> (Arc<MeshSnapshot>, MaterialSnapshot) {
+        let FrameRequest { plan, scene, limits, scene_issues, .. } = *request;
+        let types = plan.material_types();
+        let materials = self.materials.snapshot(self.device, scene.assets, types, (limits, scene_issues));
+        (self.meshes.snapshot(is_streamed), materials)
     }
 
     /// Whether an upload is to the pages and arrays that there are.
     pub(super) fn is_current(&self, upload: &Upload) -> bool {
         match upload {
-            Upload::Mesh(mesh) => self.meshes.is_current(&mesh.epoch),
-            Upload::Texture(texture) => self.materials.textures.is_current(&texture.epoch),
+            Upload::Mesh(mesh) => self.meshes.residents.is_current(&mesh.in_flight),
+            Upload::Texture(texture) => self.materials.textures.is_current(&texture.in_flight),
         }
     }
 
     /// Whether the memory of an upload may be written.
     pub(super) fn may_begin(&self, held: &HeldUpload) -> bool {
         match held.upload {
-            Upload::Mesh(_) => self.meshes.is_gone(held.last_reader),
+            Upload::Mesh(_) => self.meshes.residents.is_gone(held.last_reader),
             Upload::Texture(_) => self.materials.textures.is_gone(held.last_reader),
         }
-    }
-
-    /// Brings the epochs up to date. Returns whether one is another.
-    pub(super) fn update_epochs(&self, epochs: &mut Epochs) -> bool {
-        let (meshes, textures) = (self.meshes.epoch(), self.materials.textures.epoch());
-        let is_same = Arc::ptr_eq(&epochs.meshes, meshes) && Arc::ptr_eq(&epochs.textures, textures);
-        *epochs = Epochs { meshes: Arc::clone(meshes), textures: Arc::clone(textures) };
-        !is_same
     }
 }

@@ -11,14 +11,12 @@ use super::frame_use::FrameUse;
 use super::mesh_upload::MeshUpload;
 use super::placement::Placement;
 use super::request::Requested;
-use super::residency::{Epochs, HeldUpload, Residency};
+use super::residency::{FrameAssets, HeldUpload, Residency};
 use super::statistics::StreamingStatistics;
 use super::texture_upload::TextureUpload;
 use super::upload_jobs::{Upload, UploadJobs};
 use super::usage::{TextureUsers, Usage};
-use crate::backend::wgpu::resources::{
-    CountedQueue, EndOfUpload, MaterialCache, MaterialSnapshot, MeshSnapshot, Unplaced,
-};
+use crate::backend::wgpu::resources::{CountedQueue, EndOfUpload, Unplaced};
 use crate::backend::{BackendError, FrameRequest};
 use crate::scene::Assets;
 use crate::unwind::emit_unlocked;
@@ -43,17 +41,9 @@ struct Latest {
     texture_users: TextureUsers,
     /// What has room, and waits until no frame in flight reads there. The most important first.
     held: Vec<HeldUpload>,
-    epochs: Epochs,
     retries: Retries,
     too_large: TooLarge,
     warning: BudgetWarning,
-}
-
-/// What a frame begins with.
-pub(crate) struct StreamedResources {
-    pub(crate) meshes: Arc<MeshSnapshot>,
-    pub(crate) materials: MaterialSnapshot,
-    pub(crate) frame_use: FrameUse,
 }
 
 impl Streamer {
@@ -75,38 +65,31 @@ impl Streamer {
         &self,
         mut residency: Residency<'_>,
         request: &FrameRequest<'_>,
-    ) -> Result<StreamedResources, BackendError> {
+    ) -> Result<FrameAssets, BackendError> {
         let assets = request.scene.assets;
         let mut latest = self.latest.lock();
         let latest = &mut *latest;
         latest.frame_use.frame += 1;
         latest.frame_use.meshes.reserve(assets.meshes.slot_count());
         latest.frame_use.materials.reserve(assets.materials.slot_count());
-        residency.begin_frame(request, &self.budget)?;
-        if residency.update_epochs(&mut latest.epochs) {
-            latest.held.retain(|held| residency.is_current(&held.upload));
-            self.jobs.drop_stale(|upload| residency.is_current(upload));
-        }
+        residency.begin_frame(request, Some(&self.budget))?;
+        latest.held.retain(|held| residency.is_current(&held.upload));
+        self.jobs.drop_stale(|upload| residency.is_current(upload));
         self.take_over(&mut residency, (assets, request.objects.used_meshes()), &latest.frame_use)?;
         self.place(&mut residency, (assets, request.scene_issues), latest)?;
         let Latest { frame_use, statistics, held, .. } = latest;
         latest.warning.update(statistics.over_budget);
-        let (materials, lacks_texture) = residency.materials.update_streamed(
-            residency.device,
-            assets,
-            request.plan.material_types(),
-            (request.limits, request.scene_issues),
-        );
-        frame_use.lacks_texture = lacks_texture;
+        let (meshes, materials) = residency.snapshots(request, true);
+        frame_use.lacks_texture = Arc::clone(&residency.materials.lacks_texture);
         // The caches have forgotten the snapshots before. So what made room may be written now, unless a frame is in
         // flight.
         self.begin_uploads(&residency, held);
-        let Residency { meshes, materials: MaterialCache { textures, .. }, .. } = residency;
-        statistics.mesh_bytes = meshes.resident_bytes();
+        let (residents, textures) = (&residency.meshes.residents, &residency.materials.textures);
+        statistics.mesh_bytes = residents.resident_bytes();
         statistics.texture_bytes = textures.resident_bytes();
-        (statistics.meshes, statistics.textures) = (meshes.resident_count(), textures.resident_count());
-        statistics.in_flight = meshes.in_flight() + textures.in_flight();
-        Ok(StreamedResources { meshes: meshes.streamed_snapshot(), materials, frame_use: frame_use.clone() })
+        (statistics.meshes, statistics.textures) = (residents.resident_count(), textures.resident_count());
+        statistics.in_flight = residents.in_flight().len() + textures.in_flight().len();
+        Ok(FrameAssets { meshes, materials, frame_use: frame_use.clone() })
     }
 
     /// Whether something waits for a background job.
@@ -142,18 +125,18 @@ impl Streamer {
         for (upload, result) in finished {
             let is_complete = result.is_ok();
             let end = match upload {
-                Upload::Mesh(MeshUpload { epoch, handle, revision, mesh, target, .. }) => {
+                Upload::Mesh(MeshUpload { in_flight, mesh, target, .. }) => {
                     let arrived = (assets, used, is_complete);
-                    let end = residency.meshes.end_upload(&epoch, (handle, revision, &mesh), &target, arrived);
+                    let end = residency.meshes.end_upload((&in_flight, &mesh), target.location, arrived);
                     if end == EndOfUpload::Resident {
                         // As if it had been drawn, so that what was used before makes room first.
-                        frame_use.mark_arrival(handle.index(), Self::FRAMES_IN_SIGHT);
+                        frame_use.mark_arrival(in_flight.handle.index(), Self::FRAMES_IN_SIGHT);
                     }
                     end
                 }
-                Upload::Texture(TextureUpload { epoch, handle, revision, location, .. }) => {
+                Upload::Texture(TextureUpload { in_flight, .. }) => {
                     let textures = &mut residency.materials.textures;
-                    textures.end_upload(&epoch, (handle, revision), location, (assets, is_complete))
+                    textures.end_upload(&in_flight, &assets.textures, |_, _| true, is_complete)
                 }
             };
             if end != EndOfUpload::Stale {
@@ -178,7 +161,7 @@ impl Streamer {
         retries.begin_frame(frame_use.frame);
         too_large.update(assets);
         let usage = Usage::new(assets, (frame_use, texture_users), Self::FRAMES_IN_SIGHT);
-        let mut requests = usage.requests(residency.meshes, &residency.materials.textures);
+        let mut requests = usage.requests(&residency.meshes.residents, &residency.materials.textures);
         statistics.requested = requests.len();
         statistics.wanted = requests.iter().filter(|request| request.is_wanted).count();
         statistics.over_budget = 0;
@@ -255,7 +238,7 @@ mod tests {
 
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
-    use crate::backend::wgpu::resources::MeshCache;
+    use crate::backend::wgpu::resources::{MaterialCache, MeshCache};
     use crate::scene::{Mesh, Topology, Vertex};
 
     #[test]
@@ -267,8 +250,10 @@ mod tests {
         let handle = assets.add(mesh.clone()).unwrap();
         for was_cleared in [true, false] {
             let (mut meshes, mut materials) = (MeshCache::default(), MaterialCache::default());
-            let placed = meshes.place(&device, &mesh, 1 << 20, iter::empty(), &mut 0).unwrap().ok().unwrap();
-            let upload = MeshUpload::new(meshes.begin_upload(0), (handle, 1), mesh.clone(), placed.target);
+            let residents = &mut meshes.residents;
+            let placed = residents.place(&device, &mesh, 1 << 20, iter::empty(), &mut 0).unwrap().ok().unwrap();
+            let in_flight = residents.begin_upload((handle, 1), placed.target.location);
+            let upload = MeshUpload::new(in_flight, mesh.clone(), placed.target);
             let error = BackendError::OutOfMemory { label: "a leaf".to_owned() };
             streamer.jobs.end(Upload::Mesh(upload), Err(error));
             if was_cleared {

@@ -1,21 +1,14 @@
 //! The upload of a texture, in portions.
 
-use std::sync::Arc;
-
 use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
-use crate::backend::wgpu::resources::{CountedQueue, TextureLocation, copy_rows, layer_bytes};
-use crate::handle::Handle;
+use crate::backend::wgpu::resources::{CountedQueue, InFlight, TextureLocation, copy_rows, layer_bytes};
 use crate::scene::Texture;
 
 /// A texture on its way to the device.
 pub(crate) struct TextureUpload {
-    /// Which arrays its location is in: those of a cache that was not cleared since.
-    pub(crate) epoch: Arc<()>,
-    pub(crate) handle: Handle<Texture>,
-    /// In the assets.
-    pub(crate) revision: u64,
+    pub(crate) in_flight: InFlight<Texture>,
     pub(crate) texture: Texture,
     pub(crate) array: wgpu::Texture,
     pub(crate) location: TextureLocation,
@@ -26,13 +19,12 @@ pub(crate) struct TextureUpload {
 
 impl TextureUpload {
     pub(crate) fn new(
-        epoch: Arc<()>,
-        (handle, revision): (Handle<Texture>, u64),
+        in_flight: InFlight<Texture>,
         texture: Texture,
         array: wgpu::Texture,
         location: TextureLocation,
     ) -> Self {
-        Self { epoch, handle, revision, texture, array, location, levels: Vec::new(), rows: 0 }
+        Self { in_flight, texture, array, location, levels: Vec::new(), rows: 0 }
     }
 
     /// All that it uploads.

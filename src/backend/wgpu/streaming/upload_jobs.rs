@@ -65,6 +65,9 @@ impl UploadJobs {
     pub(super) fn drop_stale(&self, is_current: impl Fn(&Upload) -> bool) {
         let stale: VecDeque<_> = {
             let mut state = self.state.lock();
+            if state.waiting.iter().all(&is_current) {
+                return;
+            }
             let (current, stale) = mem::take(&mut state.waiting).into_iter().partition(is_current);
             state.waiting = current;
             stale

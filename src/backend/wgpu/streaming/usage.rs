@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 use super::eviction_order::{EvictionCandidate, EvictionOrder};
 use super::frame_use::FrameUse;
 use super::request::{Request, Requested};
-use crate::backend::wgpu::resources::{MeshCache, TextureArrays};
+use crate::backend::wgpu::resources::{ResidentMeshes, ResidentTextures};
 use crate::handle::Handle;
 use crate::scene::{Assets, Material, Mesh, Texture};
 
@@ -60,13 +60,13 @@ impl<'a> Usage<'a> {
     }
 
     /// What is used, but neither on the device nor on its way.
-    pub(super) fn requests(&self, meshes: &MeshCache, textures: &TextureArrays) -> BinaryHeap<Request<'a>> {
-        let meshes = meshes.missing(self.assets).map(|(handle, revision, mesh)| Request {
+    pub(super) fn requests(&self, meshes: &ResidentMeshes, textures: &ResidentTextures) -> BinaryHeap<Request<'a>> {
+        let meshes = meshes.missing(&self.assets.meshes).map(|(handle, revision, mesh)| Request {
             is_wanted: self.is_in_sight(self.frame_use.meshes.latest_use(handle.index())),
             priority: self.assets.priority_of_slot::<Mesh>(handle.index()),
             requested: Requested::Mesh(handle, revision, mesh),
         });
-        let textures = textures.missing(self.assets).filter_map(|(handle, revision, texture)| {
+        let textures = textures.missing(&self.assets.textures).filter_map(|(handle, revision, texture)| {
             Some(Request {
                 is_wanted: self.is_in_sight(self.latest_use_of(handle)?),
                 priority: self.assets.priority_of_slot::<Texture>(handle.index()),
@@ -76,13 +76,13 @@ impl<'a> Usage<'a> {
         meshes.chain(textures).collect()
     }
 
-    pub(super) fn mesh_evictions(&self, meshes: &MeshCache) -> EvictionOrder {
+    pub(super) fn mesh_evictions(&self, meshes: &ResidentMeshes) -> EvictionOrder {
         EvictionOrder::new(meshes.resident().map(|slot| {
             self.candidate(slot, self.frame_use.meshes.latest_use(slot), self.assets.priority_of_slot::<Mesh>(slot))
         }))
     }
 
-    pub(super) fn texture_evictions(&self, textures: &TextureArrays) -> EvictionOrder {
+    pub(super) fn texture_evictions(&self, textures: &ResidentTextures) -> EvictionOrder {
         EvictionOrder::new(textures.resident().map(|slot| {
             let entry = self.assets.textures.entry(slot);
             let latest_use = entry.and_then(|(texture, ..)| self.latest_use_of(texture)).unwrap_or(0);
