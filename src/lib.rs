@@ -122,9 +122,10 @@ pub use drawloom_jobs::report;
 pub use drawloom_jobs::{fence, graph, task, text, timeline};
 pub use frame::{
     BudgetError, BudgetedView, Buffering, BuildError, CpuNode, FencePoint, FinishedFrame, FrameData, FrameError,
-    FrameLoop, FrameLoopError, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics, NodeAccessError,
-    NodeAccesses, NodeContext, NodeResource, QualityLevel, RecordedFrame, Renderer, RendererBuilder, StageTimes,
-    StaticGroupStatistics, SubmitError, SubmittedFrame, Submitter, ViewBudget, ViewStatistics, ViewVariant, WarmUp,
+    FrameInputs, FrameLoop, FrameLoopError, FrameSlot, FrameStatistics, FrameTimes, Granularity, LevelStatistics,
+    NodeAccessError, NodeAccesses, NodeContext, NodeResource, QualityLevel, RecordedFrame, Renderer, RendererBuilder,
+    StageTimes, StaticGroupStatistics, SubmitError, SubmittedFrame, Submitter, ViewBudget, ViewStatistics, ViewVariant,
+    WarmUp,
 };
 pub use glam;
 #[cfg(feature = "wgpu")]

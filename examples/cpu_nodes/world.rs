@@ -6,7 +6,7 @@ use drawloom::scene::{
     Camera, Changes, GeneratedBuffer, Light, Material, Mesh, NodeColumn, RenderObject, Scene, SceneError, SceneRef,
     WrittenColumns,
 };
-use drawloom::{FrameError, RecordedFrame, Renderer};
+use drawloom::{FrameError, FrameInputs, RecordedFrame, Renderer};
 
 use crate::creature::{self, Creature};
 use crate::mirror::{self, BuildBvh, Reflected, TraceMirror};
@@ -106,9 +106,9 @@ impl World {
         };
         let cameras = [camera];
         let scene = SceneRef { written, cameras: &cameras, changes: Changes::Unknown, ..self.scene.as_scene_ref() };
-        renderer.record_with_nodes(
-            scene,
-            &[&walkers, &self.terrain, creature, &self.sparks, &self.sound, &build_bvh, &trace_mirror],
-        )
+        renderer.record_with(FrameInputs {
+            nodes: &[&walkers, &self.terrain, creature, &self.sparks, &self.sound, &build_bvh, &trace_mirror],
+            ..FrameInputs::new(scene)
+        })
     }
 }

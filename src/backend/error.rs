@@ -150,6 +150,43 @@ pub enum BackendError {
     /// A raw pass reported an error.
     #[error("the raw pass failed: {0}")]
     RawPass(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// The engine's code that records items reported an error.
+    #[error("items {first}..{end} of the {count} that the view sees, in draw order, cannot be recorded: {source}")]
+    Items {
+        /// The first of them, by its index among those that the view sees.
+        first: usize,
+        /// The end of the range.
+        end: usize,
+        /// The number of items that the view sees.
+        count: usize,
+        /// The error.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The engine's code that records items panicked.
+    #[error("recording items {first}..{end} of the {count} that the view sees, in draw order, panicked: {message}")]
+    ItemsPanicked {
+        /// The first of them, by its index among those that the view sees.
+        first: usize,
+        /// The end of the range.
+        end: usize,
+        /// The number of items that the view sees.
+        count: usize,
+        /// The panic's message.
+        message: String,
+    },
+    /// Items have the versions that they had in an earlier frame, but are recorded to other commands. Only builds with
+    /// debug assertions look for that.
+    #[error(
+        "items {first}..{end} of the {count} that the view sees, in draw order, are recorded to other commands than in an earlier frame with the same versions"
+    )]
+    ItemVersions {
+        /// The first of them, by its index among those that the view sees.
+        first: usize,
+        /// The end of the range.
+        end: usize,
+        /// The number of items that the view sees.
+        count: usize,
+    },
     /// A raw pass asked for a resource that it may not use.
     #[error(transparent)]
     Access(AccessError),

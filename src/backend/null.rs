@@ -9,8 +9,8 @@ use parking_lot::Mutex;
 use super::backend_trait::{Backend, BackendExtras, FrameRecorder, ReadBack};
 use super::error::BackendError;
 use super::requests::{FrameFence, FrameRequest, PassRequest, SceneLimits, TargetMemory, ViewQueue};
-use crate::command::{DrawList, DrawState};
-use crate::process::{Draws, FramePlan, Pass};
+use crate::command::{DrawList, DrawState, ItemList};
+use crate::process::{Draws, FramePlan, ItemOrder, Pass};
 use crate::quality::{Quality, VertexFormat};
 use crate::scene::{Assets, Mesh};
 use crate::timeline::{Labels, TuningChoice};
@@ -25,7 +25,9 @@ use crate::timeline::{Labels, TuningChoice};
 ///   static groups, without gaps;
 /// - a partial batch draws one object, and fewer triangles than its mesh has;
 /// - each pass is finished once, with its bundles in order, when all objects it was prepared with are recorded;
-/// - a pass without commands has neither batches nor bundles;
+/// - a pass of items has those that are lent, each once at most, in order of their keys if its process says so; its
+///   bundles are not empty;
+/// - a pass without commands and items has neither batches nor bundles;
 /// - the camera of a view is replaced only if it may be;
 /// - passes are submitted in the planned order;
 /// - fences have places within the frame, in order.
@@ -48,6 +50,8 @@ pub struct NullPass {
     pub view: usize,
     /// The number of bundles.
     pub bundles: usize,
+    /// The number of items of the engine's own in all bundles.
+    pub items: usize,
     /// The number of batches in all bundles.
     pub batches: usize,
     /// The number of objects.
@@ -73,6 +77,7 @@ pub struct NullFrame {
 /// A recorded bundle.
 #[derive(Debug)]
 pub struct NullBundle {
+    items: usize,
     batches: usize,
     first_object: usize,
     objects: usize,
@@ -194,13 +199,11 @@ impl FrameRecorder for NullBackend {
         Ok(())
     }
 
-    fn prepare(
-        &self,
-        frame: &NullFrame,
-        &PassRequest { pass, list, .. }: &PassRequest<'_>,
-    ) -> Result<(), BackendError> {
+    fn prepare(&self, frame: &NullFrame, request: &PassRequest<'_>) -> Result<(), BackendError> {
+        let PassRequest { pass, list, .. } = *request;
+        check_items(request)?;
         ensure(frame.passes.contains(&pass), || format!("prepared passes belong to the frame, but {pass:?} does not"))?;
-        let before = frame.prepared.lock().insert(pass, list.drawn_count());
+        let before = frame.prepared.lock().insert(pass, list.drawn_count() + list.items.items().len());
         ensure(before.is_none(), || format!("each pass is prepared once, but {pass:?} is prepared again"))?;
         let commands = list.commands().count();
         ensure(commands == 0 || commands == list.objects.len(), || "a list has one object per command".to_owned())?;
@@ -227,7 +230,10 @@ impl FrameRecorder for NullBackend {
             ensure(first_time, || {
                 format!("each bundle is recorded once, but bundle {bundle} of {pass:?} is recorded again")
             })?;
-            emit(record_bundle(request.scene.assets, list, bundle)?);
+            emit(match request.draws[pass.process_index] {
+                Draws::Items(_) => record_items(list, bundle)?,
+                _ => record_bundle(request.scene.assets, list, bundle)?,
+            });
         }
         Ok(())
     }
@@ -256,20 +262,27 @@ fn finish_pass(
         format!("each pass is finished once, but {pass:?} is finished again")
     })?;
     let process = &request.plan.processes()[pass.process_index].name;
-    if !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
-        let has_none = bundles.is_empty() && list.batches.is_empty();
+    let draws_items = matches!(request.draws[pass.process_index], Draws::Items(_));
+    if !draws_items && !matches!(request.draws[pass.process_index], Draws::Commands(_)) {
+        let has_none = bundles.is_empty() && list.draw_count() == 0;
         ensure(has_none, || format!("a pass without commands has no bundles, but one of {process:?} has"))?;
     }
-    let first_objects = (0..list.bundle_count()).map(|bundle| list.bundle(bundle)[0].first as usize);
+    let first_objects = (0..list.bundle_count()).map(|bundle| match draws_items {
+        true => list.items.bundle_range(bundle).start,
+        false => list.bundle(bundle)[0].first as usize,
+    });
     let in_order = bundles.iter().zip(first_objects).all(|(bundle, first)| bundle.first_object == first);
     ensure(in_order, || "bundles are finished in order".to_owned())?;
     let objects = bundles.iter().map(|bundle| bundle.objects).sum();
+    let items = bundles.iter().map(|bundle| bundle.items).sum();
     let prepared = frame.prepared.lock().get(&pass).copied().unwrap_or(0);
-    ensure(objects == prepared, || format!("all prepared objects are recorded, but {objects} of {prepared} are"))?;
+    let recorded: usize = objects + items;
+    ensure(recorded == prepared, || format!("all prepared objects are recorded, but {recorded} of {prepared} are"))?;
     Ok(NullPass {
         process: process.clone(),
         view: pass.view_index,
         bundles: bundles.len(),
+        items,
         batches: bundles.iter().map(|bundle| bundle.batches).sum(),
         objects,
         triangles: bundles.iter().map(|bundle| bundle.triangles).sum(),
@@ -278,6 +291,28 @@ fn finish_pass(
             _ => 0,
         },
     })
+}
+
+/// # Errors
+/// If a pass has items that it cannot draw, or in another order than its process asks for.
+fn check_items(request: &PassRequest<'_>) -> Result<(), BackendError> {
+    let items = request.list.items.items();
+    let Some(lent) = request.items() else {
+        return ensure(items.is_empty(), || "only a pass whose process draws items has any".to_owned());
+    };
+    let in_range = items.iter().all(|item| (*item as usize) < lent.keys.len());
+    ensure(in_range, || format!("items are among the {} of {:?} that are lent", lent.keys.len(), lent.process))?;
+    let sorts = matches!(&request.frame.draws[request.pass.process_index], Draws::Items(draws) if draws.order == ItemOrder::ByKey);
+    let rank = |item: &u32| (if sorts { lent.keys[*item as usize] } else { 0 }, *item);
+    let in_order = items.is_sorted_by(|one, next| rank(one) < rank(next));
+    ensure(in_order, || format!("items of {:?} are drawn in order, and each once", lent.process))
+}
+
+fn record_items(list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
+    let range = list.items.bundle_range(bundle);
+    let within = (1..=ItemList::ITEMS_PER_BUNDLE).contains(&range.len());
+    ensure(within, || format!("a bundle has 1 to {} items, but one has {}", ItemList::ITEMS_PER_BUNDLE, range.len()))?;
+    Ok(NullBundle { items: range.len(), batches: 0, first_object: range.start, objects: 0, triangles: 0 })
 }
 
 fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<NullBundle, BackendError> {
@@ -314,7 +349,7 @@ fn record_bundle(assets: &Assets, list: &DrawList, bundle: usize) -> Result<Null
         end = batch.first + batch.count;
         objects += batch.count as usize;
     }
-    Ok(NullBundle { batches: batches.len(), first_object, objects, triangles })
+    Ok(NullBundle { items: 0, batches: batches.len(), first_object, objects, triangles })
 }
 
 fn ensure(holds: bool, rule: impl FnOnce() -> String) -> Result<(), BackendError> {

@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::BackendError;
 use crate::command::DrawList;
 use crate::fence::FenceSetter;
-use crate::process::{Draws, FramePlan, Pass, SampledViews};
+use crate::process::{Draws, FramePlan, Items, Pass, SampledViews};
 use crate::quality::Quality;
 use crate::scene::{GeneratedContents, Light, SceneRef};
 use crate::view::{GpuLight, GpuObject, GpuView, LightTable, ObjectTable, RenderView, SceneIssues};
@@ -34,6 +34,10 @@ pub struct FrameRequest<'a> {
     pub sampled_views: &'a SampledViews,
     /// The scene.
     pub scene: &'a SceneRef<'a>,
+    /// The items that the engine lends.
+    pub items: &'a [Items<'a>],
+    /// The items of each process, by index; `None` for one that draws no items.
+    pub items_of_process: &'a [Option<usize>],
     /// What all views need to know about the scene's objects. Blocks are complete when they are uploaded.
     pub objects: &'a ObjectTable,
     /// The most objects that a draw list has: all of the scene, and once more those of its static groups.
@@ -55,7 +59,12 @@ pub struct FrameRequest<'a> {
     pub scene_issues: &'a SceneIssues,
 }
 
-impl FrameRequest<'_> {
+impl<'a> FrameRequest<'a> {
+    /// All items that the engine lends for a process, by index; `None` if it draws none.
+    pub fn items_of(&self, process: usize) -> Option<&'a Items<'a>> {
+        self.items_of_process.get(process).copied().flatten().map(|index| &self.items[index])
+    }
+
     /// One of the views, by index.
     pub fn view(&self, index: usize) -> ViewRequest<'_> {
         ViewRequest {
@@ -119,19 +128,24 @@ pub struct PassRequest<'a> {
     pub index: usize,
     /// The render process and the view.
     pub pass: Pass,
-    /// Its batches; empty for a pass without commands.
+    /// Its batches, or its items; empty for a pass that draws neither.
     pub list: &'a DrawList,
 }
 
-impl PassRequest<'_> {
+impl<'a> PassRequest<'a> {
+    /// All items that the engine lends for the process; `None` if it draws none.
+    pub fn items(&self) -> Option<&'a Items<'a>> {
+        self.frame.items_of(self.pass.process_index)
+    }
+
     /// Divides a time that was spent on passes together among them, by what each costs relative to the others: a share
     /// for each, in order.
-    pub(crate) fn divide_time<'a>(
-        passes: &'a [PassRequest<'_>],
+    pub(crate) fn divide_time<'b>(
+        passes: &'b [PassRequest<'_>],
         time: Duration,
-    ) -> impl Iterator<Item = Duration> + 'a {
+    ) -> impl Iterator<Item = Duration> + 'b {
         // A pass costs something without batches too.
-        divide_by_costs(time, passes.iter().map(|pass| 1 + pass.list.batches.len() as u64))
+        divide_by_costs(time, passes.iter().map(|pass| 1 + pass.list.draw_count() as u64))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::{DerefMut, Range};
 
-use super::{Batch, Bin, BinnedSegment, Bins, Bucket, RenderCommand};
+use super::{Batch, Bin, BinnedSegment, Bins, Bucket, ItemList, RenderCommand};
 
 /// The version of something that is kept from frame to frame: equal versions have equal contents, so what is derived
 /// from one need not be derived again.
@@ -32,6 +32,8 @@ pub struct DrawList {
     remaining_indices: Vec<u32>,
     /// The indices of partial batches, ascending, each with its range of `remaining_indices`.
     partial_batches: Vec<(u32, Range<u32>)>,
+    /// What a pass of [items](crate::process::Draws::Items) draws, which has no commands and batches.
+    pub items: ItemList,
     /// The version of batches and objects, without the objects of static groups.
     version: Version,
     /// The number of batches in a bundle, if it is less than [`DrawList::BATCHES_PER_BUNDLE`].
@@ -86,6 +88,12 @@ impl DrawList {
         self.objects.truncate(self.static_groups.object_count());
         self.remaining_indices.clear();
         self.partial_batches.clear();
+        self.items.clear();
+    }
+
+    /// The number of its batches and items.
+    pub(crate) fn draw_count(&self) -> usize {
+        self.batches.len() + self.items.items().len()
     }
 
     /// Appends a bucket. The list takes the bucket's vectors and leaves its own in exchange, so neither allocates.
@@ -271,10 +279,10 @@ impl DrawList {
         self.bundle_size.unwrap_or(Self::BATCHES_PER_BUNDLE)
     }
 
-    /// The number of bundles that the batches fill. No bundle has batches of static groups and of other objects.
+    /// The number of bundles that the batches or items fill. No bundle has batches of static groups and of other objects.
     pub fn bundle_count(&self) -> usize {
         let own = self.batches.len() - self.static_groups.batch_count();
-        self.static_groups.bundle_count() + own.div_ceil(self.batches_per_bundle())
+        self.static_groups.bundle_count() + own.div_ceil(self.batches_per_bundle()) + self.items.bundle_count()
     }
 
     /// The batches of one bundle.

@@ -6,6 +6,7 @@ mod binned_segment;
 mod bucket;
 mod draw_list;
 mod draw_state;
+mod item_list;
 mod key_packer;
 mod partition;
 mod radix_sort;
@@ -19,6 +20,7 @@ pub use bucket::{Batch, RenderCommand};
 pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use internal::*;
+pub(crate) use item_list::BlockBits;
 pub(crate) use partition::Partition;
 pub(crate) use selection::{Blending, MaterialShare, MaterialTypes};
 pub use selection::{DrawOrder, Selection};
@@ -32,5 +34,6 @@ pub mod internal {
     pub use super::binned_segment::{Bin, BinnedSegment, Bins};
     pub use super::bucket::Bucket;
     pub use super::draw_list::{DrawListStaticGroups, Version};
+    pub use super::item_list::ItemList;
     pub use super::splitters::Splitters;
 }

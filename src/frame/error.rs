@@ -92,6 +92,44 @@ pub enum FrameError {
     /// The scene cannot be drawn.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A process draws items, and the engine lends none for it. A frame without items lends empty slices.
+    #[error("process {process:?} draws items, and none are lent for it")]
+    MissingItems {
+        /// The process.
+        process: String,
+    },
+    /// Items are lent for a process that does not draw items.
+    #[error("items are lent for process {process:?}, which does not draw items")]
+    UnexpectedItems {
+        /// The process.
+        process: String,
+    },
+    /// Two sets of items are lent for one process.
+    #[error("two sets of items are lent for process {process:?}")]
+    RepeatedItems {
+        /// The process.
+        process: String,
+    },
+    /// Slices of [`Items`](crate::process::Items) whose lengths differ.
+    #[error("the items of process {process:?} have {keys} keys but {count} {slice}")]
+    UnequalItems {
+        /// The process.
+        process: String,
+        /// The name of the slice.
+        slice: &'static str,
+        /// Its length.
+        count: usize,
+        /// The length of `keys`.
+        keys: usize,
+    },
+    /// Items are more than can be numbered by 32 bits.
+    #[error("{count} items are lent for process {process:?}, and at most {} can be drawn", u32::MAX)]
+    TooManyItems {
+        /// The process.
+        process: String,
+        /// Their number.
+        count: usize,
+    },
     /// The backend could not begin the frame, or a pass was not finished.
     #[error("the backend refused the frame: {0}")]
     Backend(#[from] BackendError),

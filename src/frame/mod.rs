@@ -22,7 +22,7 @@ pub use error::{BudgetError, BuildError, FrameError, SubmitError};
 pub use frame_loop::{Buffering, FinishedFrame, FrameLoop, FrameLoopError, FrameSlot, FrameTimes};
 pub use nodes::{CpuNode, FrameData, NodeAccessError, NodeAccesses, NodeContext, NodeResource};
 pub use recorded_frame::{FencePoint, RecordedFrame, SubmittedFrame, Submitter};
-pub use renderer::Renderer;
+pub use renderer::{FrameInputs, Renderer};
 pub use stages::granularity::Granularity;
 pub use stages::statistics::{FrameStatistics, LevelStatistics, StageTimes, ViewStatistics};
 pub use static_groups::StaticGroupStatistics;

@@ -9,7 +9,7 @@ use super::nodes::borrowed_nodes::NodeDeclarations;
 use super::plan_cache::PlanCache;
 use super::reconfigure::BackendMaintenance;
 use super::recorded_frame::{FrameFences, RecordedFrame, view_queues};
-use super::scene_check::{ChangeCheck, SceneCapacity, check_scene};
+use super::scene_check::{ChangeCheck, SceneCapacity, check_scene, find_items};
 use super::stages::context::FrameContext;
 use super::stages::culling::CullingOptions;
 use super::stages::granularity::{StageClock, StageGroup};
@@ -23,13 +23,44 @@ use super::views::{FrameViews, MapSettings, ValidLights};
 use super::{CpuNode, FrameError, FrameStatistics, Granularity};
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend};
 use crate::command::DrawList;
-use crate::process::{Draws, FramePlan, Pass, Requirements, SceneContents};
+use crate::process::{Draws, FramePlan, Items, Pass, Requirements, SceneContents};
 use crate::quality::Quality;
 use crate::scene::SceneRef;
 use crate::task::{BackgroundJob, JobPanic, Scheduler, catch};
 use crate::timeline::TuningChoice;
 use crate::unwind::CaughtSpan;
 use crate::view::{RenderView, SceneIssues, ViewRegistry, possible_draw_states};
+
+/// What an engine lends for one frame: see [`Renderer::record_with`].
+#[derive(Clone, Copy)]
+pub struct FrameInputs<'a> {
+    /// The scene.
+    pub scene: SceneRef<'a>,
+    /// Work of the engine's own among the jobs of the frame.
+    pub nodes: &'a [&'a dyn CpuNode],
+    /// Draws of the engine's own: the items of each process that [draws items](Draws::Items), in any order.
+    pub items: &'a [Items<'a>],
+}
+
+impl<'a> FrameInputs<'a> {
+    /// A scene, and nothing else.
+    pub fn new(scene: SceneRef<'a>) -> Self {
+        Self { scene, nodes: &[], items: &[] }
+    }
+}
+
+/// What a frame draws of its inputs.
+#[derive(Clone, Copy)]
+pub(super) struct FrameScope {
+    /// Whether objects that [need transparency](Requirements::needs_transparency) are drawn.
+    pub(super) transparency: bool,
+    /// Whether a process whose items are not lent draws none.
+    pub(super) lacks_items: bool,
+}
+
+impl FrameScope {
+    const WHOLE: Self = Self { transparency: true, lacks_items: false };
+}
 
 /// Produces frames: records a scene on all workers. The scene is borrowed until recording is complete.
 ///
@@ -138,40 +169,34 @@ impl<B: Backend> Renderer<B> {
     /// ambient light or background; if the processes make no frame of it; if the device refuses
     /// something; if a process fails or panics: see [`FrameError`]. The next frame is not affected.
     pub fn record(&mut self, scene: SceneRef<'_>) -> Result<RecordedFrame<B>, FrameError> {
-        self.record_part(&scene, &[], true)
+        self.record_part(&FrameInputs::new(scene), FrameScope::WHOLE)
     }
 
-    /// Records a frame as [`record`](Self::record) does, with work of the engine's own among its jobs: see [`CpuNode`].
-    /// The nodes are lent as the scene is, until this returns.
+    /// Records a frame as [`record`](Self::record) does, with work and draws of the engine's own.
     ///
     /// # Errors
     /// As [`record`](Self::record). If the nodes make no graph, because some wait for each other in a circle, one reads
     /// what nobody writes, two write the same without an order, or two have the same name; if a node fails or panics.
-    /// The error names the node, and the next frame is not affected.
-    pub fn record_with_nodes(
-        &mut self,
-        scene: SceneRef<'_>,
-        nodes: &[&dyn CpuNode],
-    ) -> Result<RecordedFrame<B>, FrameError> {
-        self.record_part(&scene, nodes, true)
+    /// If the items do not fit the processes that draw them, or code that records them fails or panics. The error names
+    /// the node or the process, and the next frame is not affected.
+    pub fn record_with(&mut self, inputs: FrameInputs<'_>) -> Result<RecordedFrame<B>, FrameError> {
+        self.record_part(&inputs, FrameScope::WHOLE)
     }
 
-    /// Records a frame of the scene with these nodes, of its objects that [need
-    /// transparency](Requirements::needs_transparency) only if `transparency` is true.
+    /// Records a frame of these inputs, or what a warm-up draws of it.
     ///
     /// # Errors
-    /// As [`record_with_nodes`](Self::record_with_nodes).
+    /// As [`record_with`](Self::record_with).
     pub(super) fn record_part(
         &mut self,
-        scene: &SceneRef<'_>,
-        nodes: &[&dyn CpuNode],
-        transparency: bool,
+        inputs: &FrameInputs<'_>,
+        scope: FrameScope,
     ) -> Result<RecordedFrame<B>, FrameError> {
         let choices = std::mem::take(&mut self.choices);
         // Calls of the engine's code have errors that name them. Should one have been forgotten, the frame is abandoned
         // all the same.
         let recorded = catch(|| {
-            let recorded = self.record_frame(scene, nodes, choices, transparency)?;
+            let recorded = self.record_frame(inputs, choices, scope)?;
             self.backend_maintenance.start(&self.backend, &self.scheduler)?;
             Ok(recorded)
         });
@@ -292,10 +317,9 @@ impl<B: Backend> Renderer<B> {
 
     fn record_frame(
         &mut self,
-        scene: &SceneRef<'_>,
-        nodes: &[&dyn CpuNode],
+        &FrameInputs { ref scene, nodes, items }: &FrameInputs<'_>,
         mut choices: Vec<TuningChoice>,
-        transparency: bool,
+        scope: FrameScope,
     ) -> Result<RecordedFrame<B>, FrameError> {
         let frame_number = self.scheduler.timeline().begin_frame();
         let _timeline_span = self.scheduler.timeline().span_of(frame_number, "record");
@@ -313,7 +337,7 @@ impl<B: Backend> Renderer<B> {
         self.capacity.begin_frame(&self.backend, limits, scene, &mut self.tables.objects, self.quality.vertices)?;
         count_unknown_objects(scene, self.tables.objects.scene_issues());
         let valid_lights = ValidLights::new(scene, self.tables.objects.scene_issues(), self.quality.light_cut_off);
-        let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && transparency;
+        let transparency = self.tables.blended_object.update(scene, &self.tables.objects) && scope.transparency;
         let contents = SceneContents { lights: &valid_lights.lights, transparency, cameras: scene.cameras };
         let plan = self.plans.select(&contents)?;
         self.capacity.set_columns(plan.columns(), scene, &mut self.tables.objects);
@@ -328,6 +352,7 @@ impl<B: Backend> Renderer<B> {
 
         // Views → the job graph of their stages, and what all its jobs share.
         let draws = plan.draws()?;
+        find_items((items, scope.lacks_items), &plan, &draws, &mut self.tables.items_of_process)?;
         plan.check_scene(&draws, scene, self.tables.objects.material_types())?;
         self.tables.culling.update(scene.assets, self.tables.objects.used_meshes());
         self.tables.mesh_levels.update(scene.assets, self.tables.objects.used_meshes());
@@ -342,6 +367,7 @@ impl<B: Backend> Renderer<B> {
         let graph = self.graphs.get(&plan, &draws, views, features, nodes)?;
         let workers = self.scheduler.workers();
         graph.begin_frame(&mut self.tables, scene, (views, &draws), &self.quality, workers, self.granularity)?;
+        self.tables.begin_items(items, &draws, &graph.passes);
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);
@@ -355,6 +381,8 @@ impl<B: Backend> Renderer<B> {
             passes: &graph.passes,
             sampled_views: &graph.sampled_views,
             scene,
+            items,
+            items_of_process: &self.tables.items_of_process,
             objects: &self.tables.objects,
             list_capacity: self.tables.objects.len() + self.tables.static_groups.listed_objects(),
             generated: &nodes.declarations.generated,
@@ -442,13 +470,13 @@ impl<B: Backend> Renderer<B> {
     }
 
     /// What one process drew in one view, by index, in the latest frame that had stages; empty if one of them failed.
-    /// `None` where the process draws no commands in that view, or the view was [cached](crate::scene::Redraw).
+    /// `None` where the process draws neither commands nor items in that view, or the view was [cached](crate::scene::Redraw).
     pub fn draw_list(&self, process: &str, view: usize) -> Option<RwLockReadGuard<'_, DrawList>> {
         let graph = self.graphs.latest()?;
         let name = |pass: &Pass| graph.plan.processes()[pass.process_index].name.as_str();
         let is_wanted = |pass: &Pass| pass.view_index == view && name(pass) == process;
         let table = self.tables.passes.get(graph.passes.iter().position(is_wanted)?)?;
-        table.selection.map(|_| table.list.read())
+        table.mode.has_list().then(|| table.list.read())
     }
 
     /// The plan of the latest frame; before the first one, that of an empty scene.

@@ -7,7 +7,7 @@ use super::FrameError;
 use crate::backend::{Backend, CallPanic, FrameRequest, GuardedBackend, SceneLimits};
 use crate::bit_set::BitWord;
 use crate::handle::Handle;
-use crate::process::{Draws, Requirements};
+use crate::process::{Draws, FramePlan, Items, Requirements};
 use crate::quality::VertexFormat;
 use crate::scene::{Assets, ColumnLayout, LayerMask, Material, Mesh, ObjectColumn, SceneError, SceneRef};
 use crate::unwind::emit;
@@ -33,6 +33,45 @@ pub(super) fn check_scene(scene: &SceneRef<'_>) -> Result<(), FrameError> {
         }
     }
     Ok(())
+}
+
+/// Finds the items of each process, by index among those that are lent. Items for a process that the plan does not have
+/// are left alone; `may_lack_items` says whether a process may have none.
+///
+/// # Errors
+/// If the items do not fit the processes, or a set of them is invalid as a whole.
+pub(super) fn find_items(
+    (items, may_lack_items): (&[Items<'_>], bool),
+    plan: &FramePlan,
+    draws: &[Draws<'_>],
+    found: &mut Vec<Option<usize>>,
+) -> Result<(), FrameError> {
+    found.clear();
+    for (planned, draws) in plan.processes().iter().zip(draws) {
+        let mut lent = items.iter().zip(0..).filter(|(lent, _)| lent.process == planned.name);
+        let (first, process) = (lent.next(), || planned.name.clone());
+        match (draws, first) {
+            (Draws::Items(_), None) if !may_lack_items => return Err(FrameError::MissingItems { process: process() }),
+            (Draws::Items(_), Some((first, _))) if lent.next().is_none() => check_items(first)?,
+            (Draws::Items(_), Some(_)) => return Err(FrameError::RepeatedItems { process: process() }),
+            (_, Some(_)) => return Err(FrameError::UnexpectedItems { process: process() }),
+            (_, None) => {}
+        }
+        found.push(first.map(|(_, index)| index));
+    }
+    Ok(())
+}
+
+fn check_items(items: &Items<'_>) -> Result<(), FrameError> {
+    let (process, keys) = (|| items.process.to_owned(), items.keys.len());
+    if u32::try_from(keys).is_err() {
+        return Err(FrameError::TooManyItems { process: process(), count: keys });
+    }
+    let slices = [("bounds", items.bounds.len()), ("layers", items.layers.len()), ("versions", items.versions.len())];
+    match slices.into_iter().find(|(_, count)| *count != 0 && *count != keys) {
+        Some((slice, count)) => Err(FrameError::UnequalItems { process: process(), slice, count, keys }),
+        None => Ok(()),
+    }
 }
 
 /// What a frame can hold of its scene, as the object table asks for it.

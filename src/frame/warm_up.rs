@@ -4,7 +4,8 @@ use std::vec;
 
 use glam::Vec3;
 
-use super::{FrameError, RecordedFrame, Renderer};
+use super::renderer::FrameScope;
+use super::{FrameError, FrameInputs, RecordedFrame, Renderer};
 use crate::backend::Backend;
 use crate::process::Requirements;
 use crate::scene::{Camera, Changes, Light, LightFieldsMut, SceneRef};
@@ -99,7 +100,7 @@ impl<'a> WarmUp<'a> {
         let is_drawn = |camera: &&Camera| optional_views || !camera.kind.rules().is_optional;
         let cameras: Vec<_> = self.scene.cameras.iter().filter(is_drawn).cloned().collect();
         let scene = SceneRef { lights: &lights, cameras: &cameras, changes: Changes::Unknown, ..self.scene };
-        let recorded = renderer.record_part(&scene, &[], transparency);
+        let recorded = renderer.record_part(&FrameInputs::new(scene), FrameScope { transparency, lacks_items: true });
         renderer.forget_previous_frames();
         recorded.map(Some)
     }

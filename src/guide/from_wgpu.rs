@@ -206,7 +206,23 @@
 //! A process passes values to its shader as a uniform. [`Parameters`] is one that changes between frames, with an
 //! example.
 //!
-//! # 6. Keep a pass of your own
+//! # 6. Keep your draws
+//!
+//! Pipelines, bind groups and draw calls that you have need no new shader and no [`Scene`]. They become
+//! [items](crate::process::Items): for each a bounding sphere, a key to sort by, and a version; and the code that records
+//! a range of them. Drawloom finds what each view sees, sorts it, divides it among the workers, and replays the bundles
+//! in which nothing changed.
+//!
+//! - The process says where the draws go: a [`RenderProcess`] with the targets that your pipelines draw into, and
+//!   [`Draws::Items`](crate::process::Draws::Items).
+//! - The loop over what you draw becomes [`RecordItems`](crate::process::RecordItems). It gets its items in the order of
+//!   their keys, and records into a [`RenderEncoder`](wgpu::util::RenderEncoder), which passes and bundles both are. Code
+//!   that sets viewports or scissors is a [`RecordItemsInPass`](crate::process::RecordItemsInPass).
+//! - [`Renderer::record_with`] takes the items of a frame beside its scene, whose cameras they are culled for.
+//!
+//! [`Items`](crate::process::Items) has all of that as an example.
+//!
+//! # 7. Keep a pass of your own
 //!
 //! What Drawloom has no words for, as a library that encodes its own passes, gets the encoder in a [`RawPass`], at its
 //! place in the frame, on a worker:
@@ -266,7 +282,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # 7. Overlap, and look
+//! # 8. Overlap, and look
 //!
 //! The world is free from the end of `record` on. So the next update runs on the workers while this thread submits; and
 //! an engine that says what changed pays for that alone. The timeline shows whether it helps.

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 #[cfg(feature = "wgpu")]
 use super::RawPass;
 use super::{
-    BlendEquation, BufferOffset, ComputeDispatch, DrawCount, FaceCulling, ProceduralDraws, ShaderResource, Stencil,
-    StencilOperation, Workgroups,
+    BlendEquation, BufferOffset, ComputeDispatch, DrawCount, FaceCulling, ItemDraws, ProceduralDraws, ShaderResource,
+    Stencil, StencilOperation, Workgroups,
 };
 use crate::command::{DrawOrder, Selection};
 use crate::scene::{Blend, ColumnLayout};
@@ -26,6 +26,8 @@ pub enum Draws<'a> {
     Procedural(ProceduralDraws<'a>),
     /// A compute shader runs; nothing is drawn.
     Compute(ComputeDispatch<'a>),
+    /// What the engine lends and records itself: culled, sorted and divided by the frame.
+    Items(ItemDraws),
     /// Commands that the process encodes itself: compute, copies, render passes.
     #[cfg(feature = "wgpu")]
     Raw(&'a dyn RawPass),
@@ -242,6 +244,7 @@ impl Draws<'_> {
             Self::Lights(lights) => &lights.resources,
             Self::Procedural(procedural) => &procedural.resources,
             Self::Compute(dispatch) => &dispatch.resources,
+            Self::Items(_) => &[],
             #[cfg(feature = "wgpu")]
             Self::Raw(_) => &[],
         }
@@ -278,6 +281,7 @@ impl Draws<'_> {
             Self::Lights(lights) => &lights.parameters,
             Self::Procedural(procedural) => &procedural.parameters,
             Self::Compute(dispatch) => &dispatch.parameters,
+            Self::Items(_) => &[],
             #[cfg(feature = "wgpu")]
             Self::Raw(_) => &[],
         }

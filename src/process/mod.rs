@@ -22,6 +22,7 @@ mod draws;
 mod face_culling;
 mod format;
 mod injection_point;
+mod items;
 mod mip_levels;
 mod parameters;
 mod pipeline;
@@ -62,6 +63,9 @@ pub use draws::{CommandDraws, Draws, FullScreen, LightDraws, MaskedEntryPoints};
 pub use face_culling::FaceCulling;
 pub use format::Format;
 pub use injection_point::InjectionPoint;
+#[cfg(feature = "wgpu")]
+pub use items::{ItemContext, ItemRecorder, RecordItems, RecordItemsInPass};
+pub use items::{ItemDraws, ItemOrder, ItemRange, Items};
 pub use parameters::Parameters;
 pub use pipeline::{DeviceSupport, Pipeline, PipelineProcesses};
 pub use plan::PlanError;

@@ -12,7 +12,7 @@ use super::chunk_users::ChunkUsers;
 
 /// A column of a scene that [CPU nodes](crate::CpuNode) write while the frame is recorded, before the stages read it:
 /// positions that an animation moves, or a simulation. The engine lends its own storage, so nothing is copied, and has
-/// it back when [`record_with_nodes`](crate::Renderer::record_with_nodes) returns.
+/// it back when [`record_with`](crate::Renderer::record_with) returns.
 ///
 /// It is cut into chunks of [`NodeColumn::CHUNK`] objects. Nodes write a chunk as often as they like, each after those
 /// that it is ordered after, until its first read; after that, a write is an error. So an engine makes a column for

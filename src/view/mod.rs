@@ -13,6 +13,7 @@ mod gpu_light;
 mod gpu_object;
 mod gpu_view;
 mod bounds4;
+mod item_table;
 mod levels_of_detail;
 mod light_table;
 mod map_owners;
@@ -37,8 +38,10 @@ pub(crate) use draw_states::{TableLimits, possible_draw_states};
 pub(crate) use drawn_objects::{
     DrawFilter, Fill, VisibleRange, bin_objects, bin_visible, can_scan_bin_order, recordable_objects,
 };
+pub use frustum::BoundingSphere;
 pub use gpu_view::GpuView;
 pub(crate) use internal::*;
+pub(crate) use item_table::{ItemColumns, ItemTable, ItemVisibility};
 pub(crate) use levels_of_detail::{LevelSelector, MeshLevels, ObjectLevels};
 pub use light_table::LightClass;
 pub(crate) use map_owners::MapOwners;
@@ -55,7 +58,7 @@ pub mod internal {
     pub use super::bounding_boxes::BoundingBoxes;
     pub use super::draw_states::UsedMeshes;
     pub use super::fixed_position::FixedPosition;
-    pub use super::frustum::{BoundingSphere, BoundingSpheres, Frustum};
+    pub use super::frustum::{BoundingSpheres, Frustum};
     pub use super::gpu_light::GpuLight;
     pub use super::gpu_object::GpuObject;
     pub use super::light_table::LightTable;

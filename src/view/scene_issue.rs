@@ -49,9 +49,16 @@ impl SceneIssues {
         self.list_with(|_, _| None)
     }
 
-    /// The scene issues of a frame of this scene, with names.
-    pub(crate) fn list_of(&self, scene: &SceneRef<'_>) -> Vec<SceneIssue> {
-        self.list_with(|reason, first| reason.name_of(first, scene).map(Arc::from))
+    /// The scene issues of a frame of this scene, with names. `process_of` names the process that draws an item.
+    pub(crate) fn list_of<'a>(
+        &self,
+        scene: &SceneRef<'a>,
+        process_of: impl Fn(usize) -> Option<&'a str>,
+    ) -> Vec<SceneIssue> {
+        self.list_with(|reason, first| match reason {
+            IssueReason::InvalidItemBounds => process_of(first).map(Arc::from),
+            _ => reason.name_of(first, scene).map(Arc::from),
+        })
     }
 
     fn list_with(&self, name_of: impl Fn(IssueReason, usize) -> Option<Arc<str>>) -> Vec<SceneIssue> {
@@ -71,11 +78,11 @@ pub struct SceneIssue {
     pub reason: IssueReason,
     /// The number of them.
     pub count: usize,
-    /// The lowest of their indices: among the scene's objects or lights, or the slot of a
-    /// [handle](crate::handle::Handle::index) to a material or texture.
+    /// The lowest of their indices: among the scene's objects or lights; among all items that are lent, one set after
+    /// the other; or the slot of a [handle](crate::handle::Handle::index) to a material or texture.
     pub first: usize,
     /// The name of the material or texture at that index; of an object that of its mesh, or of its material where that
-    /// is the reason. `None` for a light, and for what was removed.
+    /// is the reason; of an item that of its process. `None` for a light, and for what was removed.
     pub name: Option<Arc<str>>,
 }
 
@@ -141,10 +148,12 @@ pub enum IssueReason {
     /// [`Quality::radiance_sum`](crate::quality::Quality::radiance_sum) asks for them. It is drawn nevertheless, with
     /// the error of [`RadianceSum::HalfFloat`](crate::quality::RadianceSum::HalfFloat). One object counts for all.
     HalfFloatBlending,
+    /// The bounds of an [item](crate::process::Items) are not finite, or have a negative radius. It is not drawn.
+    InvalidItemBounds,
 }
 
 impl IssueReason {
-    const ALL: [Self; 21] = [
+    const ALL: [Self; 22] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -166,6 +175,7 @@ impl IssueReason {
         Self::ReducedTexture,
         Self::UnknownObject,
         Self::HalfFloatBlending,
+        Self::InvalidItemBounds,
     ];
 
     /// The description that reports print.
@@ -192,6 +202,7 @@ impl IssueReason {
             Self::ReducedTexture => "texture with more pixels than are drawn",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
             Self::HalfFloatBlending => "blended object in half floats, because the device does not blend floats",
+            Self::InvalidItemBounds => "item with invalid bounds",
         }
     }
 
@@ -223,7 +234,8 @@ impl IssueReason {
             | Self::InvalidLight
             | Self::LightLimit
             | Self::ShadowMapLimit
-            | Self::UnknownObject => None,
+            | Self::UnknownObject
+            | Self::InvalidItemBounds => None,
         }
     }
 }

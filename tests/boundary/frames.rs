@@ -13,7 +13,7 @@ use drawloom::scene::{
     Camera, Changes, Material, MaterialPredicate, Mesh, Redraw, RenderObject, Scene, SceneRef, ViewFilter, ViewKind,
 };
 use drawloom::task::Scheduler;
-use drawloom::{CpuNode, Renderer, Submitter};
+use drawloom::{CpuNode, FrameInputs, Renderer, Submitter};
 
 use crate::engine::{CALLSITES, OwnBackend, OwnNode, OwnProcess, Subject};
 use crate::fuse::{self, Kind, Owned, PLANNED};
@@ -64,7 +64,7 @@ impl<S: Subject> Fixture<S> {
         self.worlds[world].cameras[0].filter = ViewFilter::ALL.of_materials(predicate);
         let scene = SceneRef { changes, ..self.worlds[world].as_scene_ref() };
         let nodes: [&dyn CpuNode; 1] = [&OwnNode];
-        let recorded = self.renderer.record_with_nodes(scene, &nodes);
+        let recorded = self.renderer.record_with(FrameInputs { nodes: &nodes, ..FrameInputs::new(scene) });
         let mut recorded = recorded.map_err(|error| error.to_string())?;
         match recorded.read_back_whole(0, "picture") {
             Err(error) if error.to_string().contains("panicked") => return Err(error.to_string()),

@@ -4,7 +4,7 @@
 use drawloom::glam::DVec3;
 use drawloom::graph::GraphProblem;
 use drawloom::scene::{Changes, NodeColumn, SceneError, SceneRef, WrittenColumns};
-use drawloom::{FrameData, FrameError, NodeAccesses};
+use drawloom::{FrameData, FrameError, FrameInputs, NodeAccesses};
 use drawloom_testing::scenes::field;
 
 use crate::{TestNode, lent, renderer};
@@ -20,7 +20,10 @@ fn error_of(nodes: &[TestNode<'_>]) -> FrameError {
     for workers in [1, 2, 4] {
         let (mut renderer, submitter) = renderer(workers);
         let expected = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
-        let error = renderer.record_with_nodes(scene.as_scene_ref(), &lent(nodes)).map(drop).unwrap_err();
+        let error = renderer
+            .record_with(FrameInputs { nodes: &lent(nodes), ..FrameInputs::new(scene.as_scene_ref()) })
+            .map(drop)
+            .unwrap_err();
         let next = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
         assert_eq!(next.submission.passes, expected.submission.passes);
         assert_eq!(next.statistics.views, expected.statistics.views);
@@ -169,7 +172,11 @@ fn a_column_is_not_written_after_it_was_read() {
         },
     );
     let (mut renderer, _submitter) = renderer(2);
-    let error = renderer.record_with_nodes(SceneRef { written, ..scene }, &[&late]).map(drop).unwrap_err().to_string();
+    let error = renderer
+        .record_with(FrameInputs { nodes: &[&late], ..FrameInputs::new(SceneRef { written, ..scene }) })
+        .map(drop)
+        .unwrap_err()
+        .to_string();
     assert!(error.starts_with("late failed: chunk 1 of the column has been read"), "{error}");
 }
 
@@ -190,7 +197,10 @@ fn error_of_column(objects: usize, changes: Changes<'_>) -> FrameError {
             Ok(())
         },
     );
-    renderer.record_with_nodes(SceneRef { written, changes, ..scene }, &[&node]).map(drop).unwrap_err()
+    renderer
+        .record_with(FrameInputs { nodes: &[&node], ..FrameInputs::new(SceneRef { written, changes, ..scene }) })
+        .map(drop)
+        .unwrap_err()
 }
 
 #[test]

@@ -8,7 +8,7 @@ use drawloom::graph::{GraphProblem, NodeError};
 use drawloom::process::Deferred;
 use drawloom::scene::{GeneratedBuffer, Vertex};
 use drawloom::task::Scheduler;
-use drawloom::{FrameError, NodeAccesses, NodeContext, Renderer, Submitter};
+use drawloom::{FrameError, FrameInputs, NodeAccesses, NodeContext, Renderer, Submitter};
 use drawloom_testing::hills::{self, GeneratedHills};
 
 use crate::{TestNode, renderer};
@@ -37,7 +37,9 @@ fn a_mesh_that_nodes_make_looks_like_one_that_the_engine_makes() {
         // All are in flight at the same time.
         let recorded = [0, 1, 2, 3].map(|frame| {
             let (vertices, indices) = made.nodes(frame);
-            renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices]).unwrap()
+            renderer
+                .record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene.as_scene_ref()) })
+                .unwrap()
         });
         for (frame, recorded) in recorded.into_iter().enumerate() {
             let picture = submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap();
@@ -83,7 +85,9 @@ fn what_is_no_mesh_is_left_out_and_the_next_frame_is_right() {
                 Ok(())
             },
         );
-        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &[&node.with_width(2)]).unwrap();
+        let recorded = renderer
+            .record_with(FrameInputs { nodes: &[&node.with_width(2)], ..FrameInputs::new(scene.as_scene_ref()) })
+            .unwrap();
         submitter.submit(recorded).unwrap().submission.read(0, "picture").unwrap()
     };
     let expected = submit(0.0);
@@ -108,7 +112,8 @@ fn a_buffer_is_filled_as_declared() {
                 Ok(())
             },
         );
-        match renderer.record_with_nodes(scene.as_scene_ref(), &[&half]).map(drop) {
+        match renderer.record_with(FrameInputs { nodes: &[&half], ..FrameInputs::new(scene.as_scene_ref()) }).map(drop)
+        {
             Err(FrameError::UnfilledBuffer { buffer, chunk: 0 }) => assert_eq!(buffer, "numbers"),
             other => panic!("{other:?}"),
         }
@@ -120,11 +125,18 @@ fn a_buffer_is_filled_as_declared() {
                 Ok(())
             },
         );
-        let error = renderer.record_with_nodes(scene.as_scene_ref(), &[&undeclared]).map(drop).unwrap_err().to_string();
+        let error = renderer
+            .record_with(FrameInputs { nodes: &[&undeclared], ..FrameInputs::new(scene.as_scene_ref()) })
+            .map(drop)
+            .unwrap_err()
+            .to_string();
         assert!(error.starts_with("sly failed: the node does not declare that it fills Buffer"), "{error}");
         let both =
             ["one", "two"].map(|name| TestNode::new(name, |accesses| _ = accesses.fills(&buffer), |_, _| Ok(())));
-        match renderer.record_with_nodes(scene.as_scene_ref(), &[&both[0], &both[1]]).map(drop) {
+        match renderer
+            .record_with(FrameInputs { nodes: &[&both[0], &both[1]], ..FrameInputs::new(scene.as_scene_ref()) })
+            .map(drop)
+        {
             Err(FrameError::Nodes(GraphProblem::UnorderedWriters { resource, .. })) => {
                 assert!(resource.starts_with("numbers"), "{resource}");
             }
@@ -156,7 +168,9 @@ fn a_buffer_is_filled_as_declared() {
             },
         );
         let (fill, add) = (fill.with_width(2), add.with_width(2));
-        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &[&add, &fill]).unwrap();
+        let recorded = renderer
+            .record_with(FrameInputs { nodes: &[&add, &fill], ..FrameInputs::new(scene.as_scene_ref()) })
+            .unwrap();
         // 0 to 6, in 7 elements of 4 bytes.
         assert_eq!((sum.load(Ordering::Relaxed), recorded.statistics().generated), (21, 28));
         drop(submitter.submit(recorded).unwrap());
@@ -188,7 +202,11 @@ fn error_of_reader(
         },
         |frame, _| run(frame, &buffer),
     );
-    renderer.record_with_nodes(scene.as_scene_ref(), &[&make, &reader]).map(drop).unwrap_err().to_string()
+    renderer
+        .record_with(FrameInputs { nodes: &[&make, &reader], ..FrameInputs::new(scene.as_scene_ref()) })
+        .map(drop)
+        .unwrap_err()
+        .to_string()
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use drawloom::graph::GraphProblem;
 use drawloom::timeline::{Log, NodeInfo};
-use drawloom::{FrameData, FrameError, NodeAccesses, NodeContext, NodeResource};
+use drawloom::{FrameData, FrameError, FrameInputs, NodeAccesses, NodeContext, NodeResource};
 use drawloom_testing::scenes::field;
 use proptest::prelude::*;
 
@@ -129,7 +129,9 @@ fn check(nodes: &[Declared], workers: usize) -> Result<(), TestCaseError> {
     renderer.scheduler().timeline().start();
     let scene = field(300);
     let before = required_order(nodes);
-    let outcome = renderer.record_with_nodes(scene.as_scene_ref(), &lent(&lent_nodes)).map(drop);
+    let outcome = renderer
+        .record_with(FrameInputs { nodes: &lent(&lent_nodes), ..FrameInputs::new(scene.as_scene_ref()) })
+        .map(drop);
     let log = renderer.scheduler().timeline().take();
 
     let is_circular = (0..before.len()).any(|node| before[node][node]);

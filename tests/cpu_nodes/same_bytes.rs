@@ -10,7 +10,7 @@ use drawloom::process::Deferred;
 use drawloom::quality::{CullingVolume, Quality};
 use drawloom::scene::{Bounds, Changes, NodeColumn, Scene, SceneRef, StaticGroup, WrittenColumns};
 use drawloom::task::Scheduler;
-use drawloom::{FrameData, Renderer};
+use drawloom::{FrameData, FrameInputs, Renderer};
 use drawloom_testing::scenes::field;
 use drawloom_testing::scenes::leveled::plates;
 
@@ -35,7 +35,7 @@ fn nodes_see_the_objects_of_executed_static_groups() {
     let mut executed = Vec::new();
     for changes in [Changes::Unknown, Changes::NONE, Changes::NONE, Changes::NONE] {
         let scene = SceneRef { changes, ..scene.as_scene_ref() };
-        let recorded = renderer.record_with_nodes(scene, &[&node]).unwrap();
+        let recorded = renderer.record_with(FrameInputs { nodes: &[&node], ..FrameInputs::new(scene) }).unwrap();
         executed.push(recorded.statistics().views[0].static_groups);
         submitter.submit(recorded).unwrap();
     }
@@ -153,7 +153,8 @@ fn with_nodes<B: drawloom::backend::Backend, R>(
             // Of the slices none is read.
             let (positions, orientations, scales, bounds) = (&[][..], &[][..], &[][..], &[][..]);
             let lent = SceneRef { written, changes, positions, orientations, scales, bounds, ..base };
-            let recorded = renderer.record_with_nodes(lent, &[&animate, &scale]).unwrap();
+            let recorded =
+                renderer.record_with(FrameInputs { nodes: &[&animate, &scale], ..FrameInputs::new(lent) }).unwrap();
             take(renderer, recorded)
         })
         .collect()
@@ -256,7 +257,9 @@ fn nodes_see_what_the_frame_draws() {
         for _frame in 0..2 {
             seen.lock().unwrap().clear();
             drawn.lock().unwrap().clear();
-            let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &[&visible, &lists]).unwrap();
+            let recorded = renderer
+                .record_with(FrameInputs { nodes: &[&visible, &lists], ..FrameInputs::new(scene.as_scene_ref()) })
+                .unwrap();
             assert_eq!(seen.lock().unwrap().len(), recorded.statistics().views[0].visible);
             let seen: BTreeSet<_> = seen.lock().unwrap().iter().copied().collect();
             let drawn: BTreeSet<_> = drawn.lock().unwrap().iter().map(|object| *object as usize).collect();

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
 use drawloom::report::{FrameReport, Replay, SchedulerCosts, write_chrome_trace, write_page};
-use drawloom::{FrameData, NodeContext};
+use drawloom::{FrameData, FrameInputs, NodeContext};
 use drawloom_testing::scenes::field;
 use tracing::Dispatch;
 use tracing::subscriber::NoSubscriber;
@@ -37,10 +37,18 @@ fn reports_and_traces_name_nodes() {
         let (mut renderer, submitter) = renderer(workers);
         let nodes = nodes();
         for _frame in 0..3 {
-            submitter.submit(renderer.record_with_nodes(scene.as_scene_ref(), &lent(&nodes)).unwrap()).unwrap();
+            submitter
+                .submit(
+                    renderer
+                        .record_with(FrameInputs { nodes: &lent(&nodes), ..FrameInputs::new(scene.as_scene_ref()) })
+                        .unwrap(),
+                )
+                .unwrap();
         }
         renderer.scheduler().timeline().start();
-        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), &lent(&nodes)).unwrap();
+        let recorded = renderer
+            .record_with(FrameInputs { nodes: &lent(&nodes), ..FrameInputs::new(scene.as_scene_ref()) })
+            .unwrap();
         assert!(recorded.statistics().stages.nodes >= Duration::from_micros(3_000));
         let submitted = submitter.submit(recorded).unwrap();
         assert!(submitted.statistics.stages.total() >= submitted.statistics.stages.nodes);
@@ -88,7 +96,11 @@ fn a_changed_declaration_has_another_graph_and_an_equal_one_the_same() {
         [TestNode::new("node", declare, |_, _| Ok(()))]
     };
     let mut graph_of = |is_early: bool| {
-        drop(renderer.record_with_nodes(scene.as_scene_ref(), &lent(&node(is_early))).unwrap());
+        drop(
+            renderer
+                .record_with(FrameInputs { nodes: &lent(&node(is_early)), ..FrameInputs::new(scene.as_scene_ref()) })
+                .unwrap(),
+        );
         renderer.stage_graph_to_dot().unwrap()
     };
     let [early, late] = [graph_of(true), graph_of(false)];
@@ -128,7 +140,11 @@ fn spans_name_nodes() {
         .finish();
     tracing::subscriber::with_default(subscriber, || {
         let (mut renderer, _submitter) = renderer(1);
-        drop(renderer.record_with_nodes(scene.as_scene_ref(), &lent(&nodes())).unwrap());
+        drop(
+            renderer
+                .record_with(FrameInputs { nodes: &lent(&nodes()), ..FrameInputs::new(scene.as_scene_ref()) })
+                .unwrap(),
+        );
     });
     let written = String::from_utf8(written.0.lock().unwrap().clone()).unwrap();
     for name in ["animation", "sound"] {

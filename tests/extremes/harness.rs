@@ -11,7 +11,7 @@ use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Scene, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::SceneIssue;
-use drawloom::{BuildError, CpuNode, FrameError, Renderer, SubmitError, Submitter};
+use drawloom::{BuildError, CpuNode, FrameError, FrameInputs, Renderer, SubmitError, Submitter};
 use drawloom_testing::adapter;
 use libtest_mimic::Failed;
 
@@ -244,7 +244,7 @@ impl<B: Backend<Submission: Pictures>> RendererOn<B> {
 
 impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
     fn draw(&mut self, scene: &SceneRef<'_>, nodes: &[&dyn CpuNode]) -> Result<Outcome, Failed> {
-        let recorded = match self.renderer.record_with_nodes(*scene, nodes) {
+        let recorded = match self.renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(*scene) }) {
             Ok(recorded) => recorded,
             Err(FrameError::Panicked { stage, message }) => return Err(format!("{stage} panicked: {message}").into()),
             Err(FrameError::Scheduler(panic)) => return Err(format!("a job panicked: {panic}").into()),

@@ -7,7 +7,7 @@ use drawloom::process::{Deferred, Fxaa, ToneMapping};
 use drawloom::quality::{Quality, ShadowQuality};
 use drawloom::scene::{Camera, Changes, RenderObject, Scene, SceneRef};
 use drawloom::task::Scheduler;
-use drawloom::{CpuNode, FrameError, Granularity, Renderer, RendererBuilder, SubmitError, Submitter};
+use drawloom::{CpuNode, FrameError, FrameInputs, Granularity, Renderer, RendererBuilder, SubmitError, Submitter};
 use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::scenes::everything::everything;
 use libtest_mimic::Failed;
@@ -81,7 +81,7 @@ impl<S: Subject> Fixture<S> {
         scene: SceneRef<'_>,
         nodes: &[&dyn CpuNode],
     ) -> Result<Result<Vec<u8>, Refusal>, Failed> {
-        let recorded = match self.renderer.record_with_nodes(scene, nodes) {
+        let recorded = match self.renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(scene) }) {
             Ok(recorded) => recorded,
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };

@@ -1,7 +1,7 @@
 //! What frames that fail draw in turn.
 
 use drawloom::scene::{Changes, RenderObject, Scene, SceneRef, StaticGroup};
-use drawloom::{FrameError, RecordedFrame, Renderer};
+use drawloom::{FrameError, FrameInputs, RecordedFrame, Renderer};
 use drawloom_testing::fault_injection::FaultyBackend;
 use drawloom_testing::hills::GeneratedHills;
 use libtest_mimic::Failed;
@@ -57,7 +57,7 @@ impl Worlds {
             None => renderer.record(scene),
             Some(hills) => {
                 let (vertices, indices) = hills.nodes(index);
-                renderer.record_with_nodes(scene, &[&vertices, &indices])
+                renderer.record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene) })
             }
         }
     }

@@ -15,6 +15,8 @@ mod deferred;
 mod determinism;
 mod failing_process;
 mod granularity;
+#[cfg(feature = "wgpu")]
+mod items;
 mod left_out;
 mod layers;
 mod levels_of_detail;

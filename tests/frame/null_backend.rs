@@ -45,6 +45,8 @@ fn broken_rule(calls: impl FnOnce(&NullFrame, &DrawList, &FrameRequest<'_>) -> R
         passes: &[PASS],
         sampled_views: &SampledViews::default(),
         scene: &scene.as_scene_ref(),
+        items: &[],
+        items_of_process: &[],
         objects: &objects,
         list_capacity: objects.len(),
         generated: &[],

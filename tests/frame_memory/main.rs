@@ -23,7 +23,7 @@ use drawloom::glam::DVec3;
 use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Scene};
 use drawloom::task::Scheduler;
-use drawloom::{CpuNode, Renderer};
+use drawloom::{CpuNode, FrameInputs, Renderer};
 use drawloom_testing::demo;
 use drawloom_testing::hills::{self, GeneratedHills};
 use drawloom_testing::{adapter, scenes};
@@ -93,7 +93,8 @@ fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Repor
         Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {
         counting_allocator::count(is_counted);
-        let recorded = renderer.record_with_nodes(scene.as_scene_ref(), nodes).unwrap();
+        let recorded =
+            renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(scene.as_scene_ref()) }).unwrap();
         let submission: WgpuSubmission = submitter.submit(recorded).unwrap().submission;
         counting_allocator::count(false);
         submission.wait().unwrap();

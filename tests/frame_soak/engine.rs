@@ -10,7 +10,7 @@ use drawloom::process::{Declare, Deferred, Draws, FullScreen, RenderProcess, Ton
 use drawloom::quality::Quality;
 use drawloom::scene::SceneRef;
 use drawloom::task::Scheduler;
-use drawloom::{Buffering, FinishedFrame, FrameError, FrameLoop, FrameLoopError, Renderer};
+use drawloom::{Buffering, FinishedFrame, FrameError, FrameInputs, FrameLoop, FrameLoopError, Renderer};
 use drawloom_async_post::{AsyncPost, Bloom, LayerSettings};
 use drawloom_testing::adapter;
 use drawloom_testing::fault_injection::{CallKind, Fault, FaultyBackend};
@@ -159,7 +159,10 @@ impl Engine {
         let movement = Movement::new(&mut positions, &moving, self.totals.frames);
         let scene = SceneRef { written: movement.columns(), ..self.world.report(&moving) };
         self.bloom.begin_frame(self.frames.renderer(), scene.cameras);
-        let recorded = self.frames.renderer().record_with_nodes(scene, &[&movement, &self.sparks]);
+        let recorded = self
+            .frames
+            .renderer()
+            .record_with(FrameInputs { nodes: &[&movement, &self.sparks], ..FrameInputs::new(scene) });
         drop(movement);
         // A frame that fails was told of them too, and the next one need not be told again.
         self.world.forget_changes();

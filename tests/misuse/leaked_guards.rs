@@ -13,7 +13,7 @@ use drawloom::graph::NodeError;
 use drawloom::process::Deferred;
 use drawloom::scene::{GeneratedBuffer, NodeColumn, SceneRef, WrittenColumns};
 use drawloom::task::{Scheduler, Worker};
-use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeContext};
+use drawloom::{CpuNode, FrameData, FrameError, FrameInputs, NodeAccesses, NodeContext};
 use libtest_mimic::Failed;
 
 use crate::Case;
@@ -89,7 +89,7 @@ where
 }
 
 fn record(fixture: &mut Fixture<NullBackend>, scene: SceneRef<'_>, node: &dyn CpuNode) -> Result<(), FrameError> {
-    fixture.renderer.record_with_nodes(scene, &[node]).map(drop)
+    fixture.renderer.record_with(FrameInputs { nodes: &[node], ..FrameInputs::new(scene) }).map(drop)
 }
 
 fn node_draw_lists() -> Result<(), Failed> {

@@ -8,7 +8,7 @@ use drawloom::graph::NodeError;
 use drawloom::process::{ClearColor, Declare, DrawCount, Draws, Format, ProceduralDraws, RenderProcess, StorageBuffer};
 use drawloom::scene::{Camera, GeneratedBuffer, Scene};
 use drawloom::task::Worker;
-use drawloom::{CpuNode, NodeAccesses, NodeContext};
+use drawloom::{CpuNode, FrameInputs, NodeAccesses, NodeContext};
 use drawloom_testing::hills::{self, GeneratedHills};
 use drawloom_testing::scenes::sized;
 use libtest_mimic::Failed;
@@ -34,7 +34,9 @@ fn same_picture() -> Result<(), Failed> {
         let scene = hills::scene(made.mesh()?)?;
         for (frame, expected) in expected.iter().enumerate() {
             let (vertices, indices) = made.nodes(frame);
-            let recorded = fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices])?;
+            let recorded = fixture
+                .renderer
+                .record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene.as_scene_ref()) })?;
             let picture = fixture.submit(recorded)?.read(0, "picture")?;
             assert!(picture.bytes == expected.bytes, "frame {frame} on {workers} workers");
         }
@@ -52,7 +54,11 @@ fn in_flight() -> Result<(), Failed> {
     let mut recorded = Vec::new();
     for frame in 0..FRAMES {
         let (vertices, indices) = made.nodes(frame);
-        recorded.push(fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices])?);
+        recorded.push(
+            fixture
+                .renderer
+                .record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene.as_scene_ref()) })?,
+        );
     }
     // One that is dropped leaves nothing behind.
     drop(recorded.remove(1));
@@ -60,9 +66,15 @@ fn in_flight() -> Result<(), Failed> {
     // Frames share their targets, so only the last picture can be read.
     assert!(submissions[2].read(0, "picture")?.bytes == expected[3].bytes);
     let (vertices, indices) = made.nodes(2);
-    let later = fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices])?;
+    let later = fixture
+        .renderer
+        .record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene.as_scene_ref()) })?;
     let (vertices, indices) = made.nodes(0);
-    drop(fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&vertices, &indices])?);
+    drop(
+        fixture
+            .renderer
+            .record_with(FrameInputs { nodes: &[&vertices, &indices], ..FrameInputs::new(scene.as_scene_ref()) })?,
+    );
     assert!(fixture.submit(later)?.read(0, "picture")?.bytes == expected[2].bytes, "the later frame overwrote it");
     Ok(())
 }
@@ -143,7 +155,9 @@ fn particles() -> Result<(), Failed> {
     let mut columns = Columns { colors: COLORS.generated(), arguments: ARGUMENTS.generated(), count: 0 };
     for count in [3, 8, 0, 5] {
         columns.count = count;
-        let recorded = fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&columns])?;
+        let recorded = fixture
+            .renderer
+            .record_with(FrameInputs { nodes: &[&columns], ..FrameInputs::new(scene.as_scene_ref()) })?;
         assert_eq!(recorded.statistics().generated, 16 * count as u64 + 16);
         let picture = fixture.submit(recorded)?.read(0, "picture")?;
         for column in 0..8 {

@@ -30,6 +30,7 @@ mod geometry;
 mod history;
 mod image_distance;
 mod imported_targets;
+mod items;
 mod kept_processes;
 mod large_lists;
 mod levels_of_detail;
@@ -108,6 +109,7 @@ fn main() {
         (geometry::CASES, Needs::Adapter),
         (history::CASES, Needs::Adapter),
         (imported_targets::CASES, Needs::Adapter),
+        (items::CASES, Needs::Adapter),
         (kept_processes::CASES, Needs::Adapter),
         (large_lists::CASES, Needs::Adapter),
         (levels_of_detail::CASES, Needs::Adapter),

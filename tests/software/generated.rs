@@ -8,7 +8,7 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, GeneratedBuffer, Material, Mesh, RenderObject, Scene, Topology, Vertex};
 use drawloom::task::Worker;
 use drawloom::view::IssueReason;
-use drawloom::{CpuNode, NodeAccesses, NodeContext};
+use drawloom::{CpuNode, FrameInputs, NodeAccesses, NodeContext};
 use drawloom_testing::scenes::{sized, square};
 
 use crate::Fixture;
@@ -62,7 +62,10 @@ fn objects_with_a_mesh_that_is_filled_wrongly_are_counted_until_it_is_filled_wel
     let (none, [first, second]) = ((0, 0), [(1, 2), (2, 1)]);
     let mut frame = |is_wrong: [bool; 2], (count, first): (usize, usize)| {
         let node = Fill { vertices: &vertices, indices: indices.each_ref(), is_wrong };
-        let recorded = fixture.renderer.record_with_nodes(scene.as_scene_ref(), &[&node]).unwrap();
+        let recorded = fixture
+            .renderer
+            .record_with(FrameInputs { nodes: &[&node], ..FrameInputs::new(scene.as_scene_ref()) })
+            .unwrap();
         let scene_issues = recorded.statistics().scene_issues.clone();
         let found: Vec<_> = scene_issues.iter().map(|known| (known.reason, known.count, known.first)).collect();
         let expected = (count > 0).then_some((IssueReason::UndrawableMesh, count, first));

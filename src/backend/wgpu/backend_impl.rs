@@ -108,7 +108,7 @@ impl Backend for WgpuBackend {
     fn recording_choice(&self, frame: &WgpuFrame, pass: usize, labels: &Arc<Labels>) -> Option<TuningChoice> {
         let strategies = self.strategies.strategies();
         let state = frame.pass(pass);
-        if strategies.len() == 1 || !state.draws_commands {
+        if strategies.len() == 1 || !state.is_tuned {
             return None;
         }
         let (view, pipelines) = (state.pass.view_index, frame.pipelines(state.pass));
@@ -224,7 +224,11 @@ impl FrameRecorder for WgpuBackend {
         &PassRequest { frame: request, index, pass, list }: &PassRequest<'_>,
     ) -> Result<(), BackendError> {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
-        pass.timing.set_size(list.batches.len(), list.bundle_count(), pass.strategy.part_count(list));
+        pass.timing.set_size(list.draw_count(), list.bundle_count(), pass.strategy.part_count(list));
+        if pass.draws_items {
+            pass.bundle_cache.set_item_bundle_count(list.items.slot_count());
+            return Ok(());
+        }
         if self.streamer.is_some() {
             mark_drawn(frame, request, list);
         }
@@ -267,14 +271,16 @@ impl FrameRecorder for WgpuBackend {
         let encoders = pass.strategy.encoder_count(request.list.bundle_count());
         let encoder = PassEncoder::new(&self.device, frame, request);
         // Cached bundles need no error scope, which locks the device twice.
-        pass.timing.time_parallel(|| {
+        let replayed = pass.timing.time_parallel(|| {
             while !parts.is_empty()
-                && let Some(cached) = encoder.cached_bundle(parts.start)
+                && let Some(cached) = encoder.cached_bundle(parts.start)?
             {
                 emit(cached);
                 parts.start += 1;
             }
+            Ok(())
         });
+        replayed.inspect_err(|error| self.fail_frame(error))?;
         if parts.is_empty() {
             return Ok(());
         }

@@ -16,7 +16,7 @@ use crate::backend::error::broken_rule;
 use crate::backend::mip_schedule::MipSchedule;
 use crate::backend::{BackendError, FrameRequest};
 use crate::command::DrawList;
-use crate::process::{Access, Draws, FramePlan, Pass, PlannedProcess, ShaderResource};
+use crate::process::{Access, Draws, FramePlan, ItemRecorder, Pass, PlannedProcess, ShaderResource};
 use crate::scene::Mesh;
 use crate::unwind::hold_events;
 
@@ -150,7 +150,11 @@ impl WgpuBackend {
             self.update_bind_groups(request, pipelines, targets, storage_buffers, &resources, pass)?;
 
             let (mut index, mut is_trial) = (0, false);
-            if strategies.len() > 1 && pass.draws_commands {
+            let lent = request.items_of(process).filter(|_| pass.draws_items);
+            let into_passes = lent.is_some_and(|items| matches!(items.recorder, ItemRecorder::Pass(_)));
+            let fixed = into_passes.then(|| self.strategies.into_passes(request.passes.len() < request.workers));
+            pass.is_tuned = pass.has_list() && fixed.is_none();
+            if strategies.len() > 1 && pass.is_tuned {
                 let is_distinct = |index: usize, batches| {
                     strategies[index].is_distinct(batches)
                         && (strategies[index].divides_bundles() || !request.records_bundles)
@@ -159,10 +163,11 @@ impl WgpuBackend {
                     .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
             }
             pass.clamps_depth = request.views[view].clamps_depth() && pipelines.has_clamped_pipelines();
-            pass.set_strategy(strategies[index], index, is_trial);
+            let strategy = fixed.unwrap_or(strategies[index]);
+            pass.set_strategy(strategy, index, is_trial);
             pass.can_share_encoder =
                 pass.strategy.encoding != EncodingStrategy::OnSubmit && pass.is_small(&request.draws[process]);
-            let caches_bundles = pass.draws_commands && pass.strategy.recording == RecordingStrategy::CachedBundles;
+            let caches_bundles = pass.has_list() && pass.strategy.recording == RecordingStrategy::CachedBundles;
             let shared = pass.frame_bind_group.as_ref().zip(resources.materials_bind_group);
             if let Some((frame_bind_group, materials_bind_group)) = shared.filter(|_| caches_bundles) {
                 pass.bundle_cache.begin_frame(BundleKey {

@@ -144,6 +144,13 @@ impl StrategySet {
         Self { encoding: Some(encoding), ..self }.enumerated()
     }
 
+    /// The strategy for code that records into passes only. `divides` says whether one that divides passes keeps more
+    /// workers busy.
+    pub(crate) fn into_passes(&self, divides: bool) -> PassStrategy {
+        let encoding = if divides { EncodingStrategy::Split } else { EncodingStrategy::PerPass };
+        PassStrategy { recording: RecordingStrategy::Direct, encoding: self.encoding.unwrap_or(encoding) }
+    }
+
     /// In the order in which they are tried.
     pub(crate) fn strategies(&self) -> &[PassStrategy] {
         &self.strategies

@@ -116,13 +116,13 @@ impl WgpuBackend {
 
     /// Reports the frame's measured costs to the tuners, and keeps the statistics of its passes.
     fn report_costs(&self, frame: &WgpuFrame) {
-        let passes = frame.buffers.passes().iter().filter(|pass| pass.draws_commands);
+        let passes = frame.buffers.passes().iter().filter(|pass| pass.has_list());
         let all = passes.clone().map(|pass| pass.timing.total()).sum();
         let mut latest = self.latest.lock();
         let mut count = 0;
         for pass in passes {
             let pipelines = frame.pipelines(pass.pass);
-            if self.strategies.strategies().len() > 1 {
+            if self.strategies.strategies().len() > 1 && pass.is_tuned {
                 let sample = pass.cost_sample(all, frame.workers);
                 let report = |tuner: &mut Tuner| tuner.report(frame.number, pass.strategy_index, sample);
                 pipelines.with_tuner(pass.pass.view_index, &self.strategies, report);

@@ -19,7 +19,7 @@ use crate::view::RenderView;
 
 /// Work of the engine's own that is done by the jobs of a frame (S 9.5, L 5): animation before the objects are read,
 /// geometry, particles, rays for a few pixels, a mix of sound.
-/// [`Renderer::record_with_nodes`](crate::Renderer::record_with_nodes) takes nodes for one frame, so they borrow what
+/// [`Renderer::record_with`](crate::Renderer::record_with) takes nodes for one frame, so they borrow what
 /// they work on.
 ///
 /// What a node reads and writes decides when it runs: before the stages of the frame, between them, after or beside

@@ -9,7 +9,8 @@ use crate::backend::{Backend, FrameRequest, PassRequest};
 use crate::command::{DrawList, Splitters};
 use crate::frame::encoders::{FrameEncoders, PassRecording};
 use crate::frame::nodes::borrowed_nodes::BorrowedNodes;
-use crate::view::{DrawFilter, ObjectLevels, VisibleRange};
+use crate::process::Items;
+use crate::view::{DrawFilter, ItemTable, ObjectLevels, VisibleRange};
 
 /// Fewer visible objects than this cost less than a job and the copy that joins its segment.
 const MIN_OBJECTS_PER_SEGMENT: usize = 4096;
@@ -139,6 +140,12 @@ impl<B: Backend> FrameContext<'_, B> {
     /// What the backend records of a pass.
     pub(in crate::frame) fn pass_request<'b>(&'b self, pass: usize, list: &'b DrawList) -> PassRequest<'b> {
         PassRequest { frame: self.request, index: pass, pass: self.request.passes[pass], list }
+    }
+
+    /// The items that a pass draws, in draw order and as the engine lends them; `None` if it draws none.
+    pub(in crate::frame) fn items_of(&self, pass: usize) -> Option<(&ItemTable, &Items<'_>)> {
+        let index = self.tables.items_of_process[self.request.passes[pass].process_index]?;
+        Some((&self.tables.items[index], &self.request.items[index]))
     }
 
     /// The number of parts that the backend records a pass in.

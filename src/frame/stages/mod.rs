@@ -43,6 +43,8 @@ impl<B: Backend> Stage<B> {
         stage("objects", Frame, &[], Mode::always, changed_blocks, ByCost, Visibility, update_objects),
         stage("bins", Frame, &["objects"], Mode::always, one, PerItem, Visibility, complete_objects),
         stage("upload", Frame, &["objects"], Mode::always, outdated_blocks, ByCost, Record, upload_objects),
+        stage("item order", Frame, &[], Mode::draws_items, lent_items, PerItem, Sort, sort_items),
+        stage("item bounds", Frame, &["item order"], Mode::draws_items, item_blocks, ByCost, Visibility, copy_item_bounds),
         stage("record static groups", Frame, &["bins"], Mode::has_static_groups, changed_groups, PerItem, Sort, record_groups),
 
         stage("visibility", View, &["bins"], Mode::draws_objects, tested_words, ByCost, Visibility, test_frustum),
@@ -55,6 +57,8 @@ impl<B: Backend> Stage<B> {
         stage("occlusion", View, &["coarse depth"], Mode::tests_occlusion, objects_if_testing, ByCost, Visibility, test_occlusion),
         stage("compact", View, &["occlusion", "levels", "visibility"], Mode::draws_objects, one, PerItem, Visibility, rank_visible),
 
+        stage("cull items", Pass, &["item bounds"], Mode::draws_items, item_blocks_of_pass, ByCost, Visibility, cull_items),
+        stage("list items", Pass, &["cull items"], Mode::draws_items, one, PerItem, Sort, list_items),
         stage("fill", Pass, &["compact"], Mode::sorts_commands, visible_objects, ByDraws { draws_per_item: 1 }, Fill, make_commands),
         // It chooses the size of the sort's jobs.
         stage("split", Pass, &["fill"], Mode::sorts_commands, one_unless_kept, PerItem, Sort, divide_commands).with_costs_of("sort"),
@@ -67,8 +71,8 @@ impl<B: Backend> Stage<B> {
         stage("triangles", Pass, &["join"], Mode::has_cullable_meshes, cullable_draws, ByDraws { draws_per_item: 1 }, Instance, cull_triangles),
         #[cfg(feature = "occlusion")]
         stage("cull list", Pass, &["triangles"], Mode::has_cullable_meshes, one, PerItem, Instance, remove_culled),
-        stage("prepare", Pass, &["cull list", "join"], Mode::draws_objects, one, PerItem, Record, prepare),
-        stage("record", Pass, &["prepare"], Mode::draws_objects, parts, ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE }, Record, record),
+        stage("prepare", Pass, &["cull list", "join", "list items"], Mode::has_list, one, PerItem, Record, prepare),
+        stage("record", Pass, &["prepare"], Mode::has_list, parts, ByDraws { draws_per_item: DrawList::BATCHES_PER_BUNDLE }, Record, record),
         stage("finish", Pass, &["record"], Mode::always, one, PerItem, Record, finish),
     ];
 

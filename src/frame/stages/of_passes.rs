@@ -14,6 +14,7 @@ use crate::command::{DrawList, instance, sort};
 use crate::frame::encoders::PassRecording;
 use crate::frame::encoders::{FailedPass, FrameEncoders, PassFailure};
 use crate::graph::NodeError;
+use crate::quality::CullingVolume;
 use crate::task::catch;
 use crate::view;
 use crate::view::DrawFilter;
@@ -25,6 +26,30 @@ pub(super) fn one_unless_kept<B: Backend>(frame: &FrameContext<'_, B>, pass: usi
 /// The visible objects; 0 if the pass keeps its draw list, as for all stages that make it.
 pub(super) fn visible_objects<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
     if frame.keeps_list(pass) { 0 } else { frame.visible_count(pass) }
+}
+
+/// The blocks of the items that a pass draws.
+pub(super) fn item_blocks_of_pass<B: Backend>(frame: &FrameContext<'_, B>, pass: usize) -> usize {
+    frame.items_of(pass).map_or(0, |(table, _)| table.block_count())
+}
+
+/// Finds the items that the pass's view sees. An item of the stage is a block of items.
+pub(super) fn cull_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
+    let Some((table, lent)) = frame.items_of(job.of) else { return Ok(()) };
+    let (view, visible) =
+        (&frame.request.views[frame.view_index_of(job.of)], &frame.tables.passes[job.of].visible_items);
+    let culls = frame.request.quality.culling != CullingVolume::None;
+    job.items.for_each(|block| table.cull(&lent.columns(), (view, culls), block, visible));
+    Ok(())
+}
+
+/// Lists the items that the pass's view sees, in draw order, and divides them into bundles.
+pub(super) fn list_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
+    let (pass, per_bundle) = (&frame.tables.passes[job.of], frame.granularity.batches_per_bundle());
+    if let Some((table, _)) = frame.items_of(job.of) {
+        table.list(&pass.visible_items, per_bundle, &mut pass.list.write().items);
+    }
+    Ok(())
 }
 
 /// Makes a command for each visible object (M 10.3).

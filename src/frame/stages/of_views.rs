@@ -5,7 +5,7 @@ use super::stage::StageJob;
 use super::tables::PassTable;
 use crate::backend::Backend;
 use crate::graph::NodeError;
-use crate::view;
+use crate::view::{self, IssueReason, ItemTable};
 
 pub(super) fn changed_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
     frame.tables.objects.changed_block_count()
@@ -41,6 +41,39 @@ pub(super) fn outdated_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize)
 /// Uploads what changed of the object table since the backend's buffers were written. An item is a block of objects.
 pub(super) fn upload_objects<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     Ok(frame.backend.upload_objects(frame.backend_frame, frame.request, job.items)?)
+}
+
+/// The sets of items that the engine lends.
+pub(super) fn lent_items<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
+    frame.tables.items.len()
+}
+
+/// Orders items, if they do not have the order of the frame before. An item of the stage is a set of them.
+pub(super) fn sort_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
+    frame.tables.items[job.items].iter().for_each(ItemTable::sort);
+    Ok(())
+}
+
+/// The blocks of all sets of items.
+pub(super) fn item_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
+    frame.tables.items.iter().map(ItemTable::block_count).sum()
+}
+
+/// Copies the bounds of items in draw order, for all views, and counts those that are invalid. An item of the stage is a
+/// block of items.
+pub(super) fn copy_item_bounds<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
+    let (mut first_block, mut first_item) = (0, 0);
+    for (table, lent) in frame.tables.items.iter().zip(frame.request.items) {
+        let end = first_block + table.block_count();
+        let reject = |item| {
+            frame.request.scene_issues.count(IssueReason::InvalidItemBounds, first_item + item as usize);
+        };
+        for block in job.items.start.max(first_block)..job.items.end.min(end) {
+            table.copy_bounds(&lent.columns(), block - first_block, reject);
+        }
+        (first_block, first_item) = (end, first_item + lent.keys.len());
+    }
+    Ok(())
 }
 
 /// The words of objects that the view tests: all of them, or those with changed objects.

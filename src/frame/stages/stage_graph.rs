@@ -58,6 +58,7 @@ struct GraphKey {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct DrawsKey {
     selection: Option<Selection>,
+    draws_items: bool,
     hides: bool,
     writes_stencil_where_hidden: bool,
 }
@@ -114,7 +115,8 @@ impl ViewKey {
 impl DrawsKey {
     fn new(draws: &Draws<'_>) -> Self {
         let (hides, writes_stencil_where_hidden) = (draws.hides(), draws.writes_stencil_where_hidden());
-        Self { selection: draws.selection(), hides, writes_stencil_where_hidden }
+        let draws_items = matches!(draws, Draws::Items(_));
+        Self { selection: draws.selection(), draws_items, hides, writes_stencil_where_hidden }
     }
 }
 
@@ -212,6 +214,7 @@ impl<B: Backend> StageGraph<B> {
             let by_bin = |selection| orders_by_bin(selection, &views[pass.view_index], opaque_order);
             PassMode {
                 draws_objects: selection.is_some(),
+                draws_items: matches!(draws[pass.process_index], Draws::Items(_)),
                 orders_by_bin: selection.is_some_and(by_bin),
                 has_static_groups,
                 chooses_levels,
@@ -220,7 +223,8 @@ impl<B: Backend> StageGraph<B> {
             }
         };
         let modes: Vec<_> = passes.iter().map(mode_of).collect();
-        let of_frame = PassMode { has_static_groups, ..PassMode::default() };
+        let draws_items = modes.iter().any(|mode: &PassMode| mode.draws_items);
+        let of_frame = PassMode { draws_items, has_static_groups, ..PassMode::default() };
         let frame = builder.add(NodeOwner::default(), (StageOwner::Frame, 0), of_frame);
         let mut view_owners = vec![None; views.len()];
         for (index, (pass, mode)) in passes.iter().zip(&modes).enumerate() {

@@ -63,11 +63,13 @@ pub struct ViewStatistics {
     pub occluded: usize,
     /// Lights that reach it.
     pub lights: usize,
+    /// Items that it sees, over all its processes.
+    pub items: usize,
     /// Commands, over all its processes.
     pub commands: usize,
     /// Instanced draws, over all its processes.
     pub batches: usize,
-    /// Bundles that the batches fill, whether they are recorded as bundles or not.
+    /// Bundles that the batches and items fill, whether they are recorded as bundles or not.
     pub bundles: usize,
     /// Triangles that were tested and culled on the CPU, over all its processes: see
     /// `Mesh::with_triangle_culling`. 0 without the feature `occlusion`.
@@ -157,10 +159,20 @@ impl FrameStatistics {
             generated: request.generated.iter().map(|contents| contents.byte_count() as u64).sum(),
             targets,
             stages,
-            scene_issues: request.scene_issues.list_of(request.scene),
+            scene_issues: request.scene_issues.list_of(request.scene, |item| process_of_item(request, item)),
             tuning,
         }
     }
+}
+
+/// The process that draws an item, by its index among all that are lent.
+fn process_of_item<'a>(request: &FrameRequest<'a>, item: usize) -> Option<&'a str> {
+    let mut end = 0;
+    let lent = request.items.iter().find(|lent| {
+        end += lent.keys.len();
+        item < end
+    });
+    lent.map(|lent| lent.process)
 }
 
 impl ViewStatistics {
@@ -176,6 +188,7 @@ impl ViewStatistics {
             objects_of_static_groups: visibility.static_groups.object_count(),
             occluded: tables.culling.hidden(index),
             lights: tables.lights[index].light_count(),
+            items: 0,
             commands: 0,
             batches: 0,
             bundles: 0,
@@ -186,6 +199,7 @@ impl ViewStatistics {
 
     fn add_pass(&mut self, table: &PassTable, assets: &Assets) {
         let list = table.list.read();
+        self.items += list.items.items().len();
         self.commands += list.drawn_count();
         self.batches += list.batches.len();
         self.bundles += list.bundle_count();

@@ -24,10 +24,13 @@ use crate::frame::static_groups::{ListConditions, StaticGroupTable};
 use crate::frame::views::FrameViews;
 use crate::frame::views::view_visibility::{Retest, ViewVisibility};
 use crate::leaked_guards::unlock;
-use crate::process::{FramePlan, Pass, ProcessId};
+use crate::process::{Draws, FramePlan, ItemOrder, Items, Pass, ProcessId};
 use crate::quality::DepthPrecision;
 use crate::scene::{Camera, Projection, SceneError, SceneRef};
-use crate::view::{IssueReason, LevelSelector, LightTable, MeshLevels, ObjectLevels, ObjectTable, PerView, RenderView};
+use crate::view::{
+    IssueReason, ItemTable, ItemVisibility, LevelSelector, LightTable, MeshLevels, ObjectLevels, ObjectTable, PerView,
+    RenderView,
+};
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
 #[derive(Default)]
@@ -46,6 +49,10 @@ pub(in crate::frame) struct FrameTables {
     pub(in crate::frame) levels: PerView<ViewLevels>,
     /// The lights that reach each view.
     pub(in crate::frame) lights: Vec<LightTable>,
+    /// One for each set of items that the engine lends.
+    pub(in crate::frame) items: Vec<ItemTable>,
+    /// The items of each process, by index; `None` for one that draws none.
+    pub(in crate::frame) items_of_process: Vec<Option<usize>>,
     /// One for each pass.
     pub(in crate::frame) passes: Vec<PassTable>,
     /// What each of these belongs to, and the passes that these keys were made of: those of a stage graph.
@@ -97,6 +104,23 @@ impl FrameTables {
         self.pass_keys.extend(passes.iter().map(key));
         let taken: Vec<_> = self.pass_keys.iter().map(|key| before.get(key).copied()).collect();
         rearrange(&mut self.passes, &taken);
+    }
+
+    /// Begins a frame of the items that the engine lends. The tables of these passes have begun it already.
+    pub(in crate::frame) fn begin_items(&mut self, items: &[Items<'_>], draws: &[Draws<'_>], passes: &[Pass]) {
+        self.items.resize_with(items.len(), ItemTable::default);
+        for (index, (table, items)) in self.items.iter_mut().zip(items).enumerate() {
+            let mut processes = draws.iter().zip(&self.items_of_process).filter(|(_, own)| **own == Some(index));
+            match processes.next() {
+                Some((Draws::Items(draws), _)) => table.begin_frame(items.keys, draws.order == ItemOrder::ByKey),
+                _ => table.begin_frame(&[], false),
+            }
+        }
+        for (pass, table) in passes.iter().zip(&mut self.passes) {
+            if let Some(index) = self.items_of_process[pass.process_index] {
+                table.visible_items.begin_frame(self.items[index].len());
+            }
+        }
     }
 
     /// Begins a frame of a scene's static groups. The tables of these passes have begun it already.
@@ -224,6 +248,8 @@ pub(in crate::frame) struct PassTable {
     /// What the list was made from; `None` if the next frame has to make it anew.
     pub(in crate::frame) list_inputs: RwLock<Option<ListInputs>>,
     pub(in crate::frame) triangles: RwLock<PassTriangles>,
+    /// Of the items, if it draws any, those that the view sees.
+    pub(in crate::frame) visible_items: ItemVisibility,
 }
 
 impl PassTable {
@@ -385,6 +411,8 @@ impl ViewTimes {
 pub(in crate::frame) struct PassMode {
     /// Whether it draws objects.
     pub(in crate::frame) draws_objects: bool,
+    /// Whether it draws items of the engine's own.
+    pub(in crate::frame) draws_items: bool,
     /// Whether it orders its objects by bin, and so makes no commands.
     pub(in crate::frame) orders_by_bin: bool,
     /// Whether the scene has static groups.
@@ -404,6 +432,15 @@ impl PassMode {
 
     pub(in crate::frame) fn draws_objects(self) -> bool {
         self.draws_objects
+    }
+
+    pub(in crate::frame) fn draws_items(self) -> bool {
+        self.draws_items
+    }
+
+    /// Whether the pass has a draw list.
+    pub(in crate::frame) fn has_list(self) -> bool {
+        self.draws_objects || self.draws_items
     }
 
     /// Whether the pass makes commands of its objects, and sorts them.

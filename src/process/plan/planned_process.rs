@@ -121,7 +121,7 @@ impl PlannedProcess {
         let draws = catch(|| self.process.draws()).map_err(panicked)?;
         let is_raw = match draws {
             Draws::Commands(_) | Draws::FullScreen(_) | Draws::Lights(_) => false,
-            Draws::Procedural(_) | Draws::Compute(_) => false,
+            Draws::Procedural(_) | Draws::Compute(_) | Draws::Items(_) => false,
             #[cfg(feature = "wgpu")]
             Draws::Raw(_) => true,
         };

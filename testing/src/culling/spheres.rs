@@ -3,7 +3,8 @@
 use std::array;
 use std::ops::Range;
 
-use drawloom::view::internal::{BoundingSphere, BoundingSpheres, Frustum, VisibleSet};
+use drawloom::view::BoundingSphere;
+use drawloom::view::internal::{BoundingSpheres, Frustum, VisibleSet};
 
 use super::cameras::{any_camera, magnitude};
 use super::lanes::SphereArrays;

@@ -7,7 +7,8 @@ use drawloom::process::Deferred;
 use drawloom::scene::{Camera, Redraw};
 use drawloom::task::{Scheduler, Worker};
 use drawloom::{
-    BudgetedView, CpuNode, Granularity, NodeAccesses, NodeContext, QualityLevel, Renderer, ViewBudget, ViewVariant,
+    BudgetedView, CpuNode, FrameInputs, Granularity, NodeAccesses, NodeContext, QualityLevel, Renderer, ViewBudget,
+    ViewVariant,
 };
 use libtest_mimic::Failed;
 use std::ops::Range;
@@ -166,7 +167,9 @@ fn node_widths() -> Result<(), Failed> {
             (1 << 63, Some(1 << 61)),
         ] {
             let node = Counts { width, items_per_job, done: AtomicUsize::new(0) };
-            let recorded = fixture.renderer.record_with_nodes(scene().as_scene_ref(), &[&node])?;
+            let recorded = fixture
+                .renderer
+                .record_with(FrameInputs { nodes: &[&node], ..FrameInputs::new(scene().as_scene_ref()) })?;
             fixture.submitter.submit(recorded)?;
             same(node.done.into_inner(), width, format_args!("items, {items_per_job:?} per job"))?;
         }

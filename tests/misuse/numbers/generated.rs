@@ -8,7 +8,7 @@ use drawloom::process::{Deferred, StorageBuffer};
 use drawloom::scene::{GeneratedBuffer, Mesh, NodeColumn, Topology, Vertex};
 use drawloom::task::Worker;
 use drawloom::view::{IssueReason, SceneIssue};
-use drawloom::{CpuNode, FrameData, FrameError, NodeAccesses, NodeContext};
+use drawloom::{CpuNode, FrameData, FrameError, FrameInputs, NodeAccesses, NodeContext};
 use libtest_mimic::Failed;
 
 use super::NumberCase;
@@ -76,7 +76,7 @@ fn record(
     run: impl Fn(&NodeContext<'_>) -> Result<(), NodeError> + Send + Sync,
 ) -> Result<(), FrameError> {
     let node = Node { fills: buffer, run };
-    fixture.renderer.record_with_nodes(scene().as_scene_ref(), &[&node]).map(drop)
+    fixture.renderer.record_with(FrameInputs { nodes: &[&node], ..FrameInputs::new(scene().as_scene_ref()) }).map(drop)
 }
 
 fn capacities() -> Result<(), Failed> {

@@ -47,6 +47,10 @@ pub(crate) struct WgpuPassState {
     pub(crate) label: String,
     /// Whether it draws commands.
     pub(crate) draws_commands: bool,
+    /// Whether it draws items of the engine's own.
+    pub(crate) draws_items: bool,
+    /// Whether it is recorded by the strategy that is measured to be the cheapest.
+    pub(crate) is_tuned: bool,
     /// Whether it draws what is in front of the near plane as if it were on it, with pipelines of its own.
     pub(crate) clamps_depth: bool,
     /// The place of its list of objects in their buffer: a range of one place, empty for a pass without commands.
@@ -93,6 +97,8 @@ impl Default for WgpuPassState {
             id: PassId::default(),
             label: String::new(),
             draws_commands: false,
+            draws_items: false,
+            is_tuned: false,
             clamps_depth: false,
             object_list: 0..0,
             timed_pass_index: None,
@@ -153,6 +159,7 @@ impl WgpuPassState {
         self.pass = pass;
         self.latest_batches = self.timing.latest_batches();
         self.draws_commands = matches!(draws, Draws::Commands(_));
+        self.draws_items = matches!(draws, Draws::Items(_));
         if !self.draws_commands {
             self.clear_partial_indices();
         }
@@ -164,9 +171,16 @@ impl WgpuPassState {
         match draws {
             // The engine's own code, which may do anything.
             Draws::Raw(_) => false,
-            Draws::Commands(_) => self.latest_batches.is_some_and(|batches| batches <= Self::MAX_BATCHES_OF_SMALL_PASS),
+            Draws::Commands(_) | Draws::Items(_) => {
+                self.latest_batches.is_some_and(|batches| batches <= Self::MAX_BATCHES_OF_SMALL_PASS)
+            }
             _ => true,
         }
+    }
+
+    /// Whether it draws a list, of commands or items.
+    pub(crate) fn has_list(&self) -> bool {
+        self.draws_commands || self.draws_items
     }
 
     /// Drops the caches that keep other resources alive.
@@ -266,6 +280,16 @@ impl PartialEq for BundleKey {
 pub(crate) struct BundleCache {
     key: Option<BundleKey>,
     bundles: Mutex<Vec<Option<CachedBundle>>>,
+    /// Those of a pass that draws items.
+    of_items: Mutex<Vec<Option<CachedItems>>>,
+}
+
+/// A bundle of items: each item, with its key and its version.
+struct CachedItems {
+    items: Vec<(u32, u64, u64)>,
+    bundle: wgpu::RenderBundle,
+    /// Of the bundle's commands; 0 without debug assertions.
+    digest: u64,
 }
 
 struct CachedBundle {
@@ -278,19 +302,21 @@ struct CachedBundle {
 impl BundleCache {
     /// Whether an earlier frame has left bundles.
     pub(crate) fn is_warm(&mut self) -> bool {
-        self.key.is_some() && !self.bundles.get_mut().is_empty()
+        self.key.is_some() && !(self.bundles.get_mut().is_empty() && self.of_items.get_mut().is_empty())
     }
 
     /// Drops everything.
     pub(crate) fn clear(&mut self) {
         self.key = None;
         *self.bundles.get_mut() = Vec::new();
+        *self.of_items.get_mut() = Vec::new();
     }
 
     /// Begins a frame: drops all bundles if the key changed.
     pub(crate) fn begin_frame(&mut self, key: BundleKey) {
         if self.key.as_ref() != Some(&key) {
             self.bundles.get_mut().clear();
+            self.of_items.get_mut().clear();
             self.key = Some(key);
         }
     }
@@ -298,6 +324,37 @@ impl BundleCache {
     /// Makes room for this many bundles, and drops further ones.
     pub(crate) fn set_bundle_count(&self, bundles: usize) {
         self.bundles.lock().resize_with(bundles, || None);
+    }
+
+    /// Makes room for this many bundles of items, and drops further ones.
+    pub(crate) fn set_item_bundle_count(&self, bundles: usize) {
+        self.of_items.lock().resize_with(bundles, || None);
+    }
+
+    /// The bundle of items at an index, with its digest, if it draws these: each with its key and its version.
+    pub(crate) fn get_items(
+        &self,
+        index: usize,
+        items: impl Iterator<Item = (u32, u64, u64)>,
+    ) -> Option<(wgpu::RenderBundle, u64)> {
+        let bundles = self.of_items.lock();
+        let cached = bundles.get(index)?.as_ref()?;
+        items.eq(cached.items.iter().copied()).then(|| (cached.bundle.clone(), cached.digest))
+    }
+
+    /// Replaces the bundle of items at an index.
+    pub(crate) fn insert_items(
+        &self,
+        index: usize,
+        items: impl Iterator<Item = (u32, u64, u64)>,
+        (bundle, digest): (wgpu::RenderBundle, u64),
+    ) {
+        if let Some(slot) = self.of_items.lock().get_mut(index) {
+            let mut cached = slot.take().map_or_else(Vec::new, |cached| cached.items);
+            cached.clear();
+            cached.extend(items);
+            *slot = Some(CachedItems { items: cached, bundle, digest });
+        }
     }
 
     /// The bundle at an index, if it draws these batches.

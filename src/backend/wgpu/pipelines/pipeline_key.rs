@@ -86,7 +86,7 @@ impl<'a> PipelineKey<'a> {
                 with(draws.shader, VertexSource::Procedural(draws.primitive), draws.fragment, draws.writes_depth)
             }
             Draws::Compute(dispatch) => with(dispatch.shader, VertexSource::Compute, None, false),
-            Draws::Raw(_) => with("", VertexSource::None, None, false),
+            Draws::Items(_) | Draws::Raw(_) => with("", VertexSource::None, None, false),
         }
     }
 

@@ -216,15 +216,22 @@ impl<'a> BatchRecorder<'a> {
 
 impl PassEncoder<'_> {
     /// The cached bundle at an index of a pass with one encoder, if the strategy caches bundles and this one is cached.
-    pub(crate) fn cached_bundle(&self, bundle: usize) -> Option<WgpuPart> {
+    ///
+    /// # Errors
+    /// With debug assertions, if the versions of its items do not say that they changed.
+    pub(crate) fn cached_bundle(&self, bundle: usize) -> Result<Option<WgpuPart>, BackendError> {
         let (state, list) = (self.state, self.list);
+        if state.draws_items && state.strategy.encoder_count(list.bundle_count()) == 1 {
+            return Ok(self.cached_items(bundle)?.map(|bundle| WgpuPart(RecordedPart::Bundle(bundle))));
+        }
         if !self.is_cacheable(bundle) || state.strategy.encoder_count(list.bundle_count()) > 1 {
-            return None;
+            return Ok(None);
         }
         let subdivided = self.frame.buffers.subdivided().read();
-        let bundle = state.bundle_cache.get(list.bundle_slot(bundle), list.bundle(bundle), &subdivided)?;
+        let cached = state.bundle_cache.get(list.bundle_slot(bundle), list.bundle(bundle), &subdivided);
+        let Some(bundle) = cached else { return Ok(None) };
         state.timing.count_bundle(true);
-        Some(WgpuPart(RecordedPart::Bundle(bundle)))
+        Ok(Some(WgpuPart(RecordedPart::Bundle(bundle))))
     }
 
     /// Records one bundle, or reuses the cached one.
@@ -232,6 +239,9 @@ impl PassEncoder<'_> {
     /// # Errors
     /// If a resource of a batch is missing. This is a bug in Drawloom.
     pub(crate) fn record_bundle(&self, bundle: usize) -> Result<wgpu::RenderBundle, BackendError> {
+        if self.state.draws_items {
+            return self.record_item_bundle(bundle);
+        }
         let (state, slot, batches) = (self.state, self.list.bundle_slot(bundle), self.list.bundle(bundle));
         let subdivided = self.frame.buffers.subdivided().read();
         if !self.is_cacheable(bundle) {
@@ -251,7 +261,8 @@ impl PassEncoder<'_> {
     /// Whether later frames may replay a bundle. The remaining triangles of partial batches change, so bundles with
     /// them are not cached.
     fn is_cacheable(&self, bundle: usize) -> bool {
-        self.state.strategy.recording == RecordingStrategy::CachedBundles && self.list.bundle_is_whole(bundle)
+        let caches = self.state.strategy.recording == RecordingStrategy::CachedBundles;
+        caches && !self.state.draws_items && self.list.bundle_is_whole(bundle)
     }
 
     fn new_bundle(

@@ -7,8 +7,8 @@ use crate::backend::wgpu::strategy::{PassSegment, RecordingStrategy};
 use crate::backend::{BackendError, FrameRequest, PassRequest};
 use crate::command::DrawList;
 use crate::process::{
-    BufferLayout, ClearColor, ComputeDispatch, DrawCount, Draws, PlannedProcess, ProceduralDraws, RawAccess, RawPass,
-    RawPassResources, Workgroups,
+    BufferLayout, ClearColor, ComputeDispatch, DrawCount, Draws, ItemContext, Items, PlannedProcess, ProceduralDraws,
+    RawAccess, RawPass, RawPassResources, Workgroups,
 };
 
 /// No device supports more colour attachments.
@@ -26,6 +26,8 @@ pub(crate) struct PassEncoder<'a> {
     pub(super) pipelines: &'a ProcessPipelines,
     pub(super) draws: &'a Draws<'a>,
     pub(super) list: &'a DrawList,
+    /// The items that the engine lends, of a pass that draws items.
+    pub(super) items: Option<&'a Items<'a>>,
 }
 
 impl<'a> PassEncoder<'a> {
@@ -34,7 +36,8 @@ impl<'a> PassEncoder<'a> {
         let state = frame.pass(index);
         let process = state.pass.process_index;
         let (planned, draws) = (&request.plan.processes()[process], &request.draws[process]);
-        Self { device, frame, request, index, state, planned, pipelines: frame.pipelines(state.pass), draws, list }
+        let (pipelines, items) = (frame.pipelines(state.pass), pass.items());
+        Self { device, frame, request, index, state, planned, pipelines, draws, list, items }
     }
 
     /// Begins the pass, or a segment of it. Only the first segment clears the targets.
@@ -187,6 +190,23 @@ impl<'a> PassEncoder<'a> {
     /// If the raw pass asks for what its process does not declare, or reports an error, or a resource of the pass is
     /// missing. The latter is a bug in Drawloom.
     pub(super) fn encode_raw(&self, encoder: &mut wgpu::CommandEncoder, raw: &dyn RawPass) -> Result<(), BackendError> {
+        let queries = self.queries();
+        if let Some((set, [begin, _])) = queries {
+            encoder.write_timestamp(set, begin);
+        }
+        self.with_context(|context| raw.encode(encoder, &context.resources))?.map_err(BackendError::RawPass)?;
+        if let Some((set, [_, end])) = queries {
+            encoder.write_timestamp(set, end);
+        }
+        Ok(())
+    }
+
+    /// Calls the engine's code with what it may use.
+    ///
+    /// # Errors
+    /// If the code asks for what its process does not declare, or a resource of the pass is missing. The latter is a bug
+    /// in Drawloom.
+    pub(super) fn with_context<R>(&self, call: impl FnOnce(&ItemContext<'_>) -> R) -> Result<R, BackendError> {
         let (frame, pass, plan) = (self.frame, self.state.pass, self.request.plan);
         let PlannedProcess { name, declaration, requests, .. } = self.planned;
         let textures = |name: &str| {
@@ -208,10 +228,11 @@ impl<'a> PassEncoder<'a> {
         let of_materials = frame.buffers.materials_bind_group();
         let of_materials =
             of_materials.ok_or_else(|| broken_rule("a frame has its materials before it is recorded"))?;
+        let view = &self.request.views[pass.view_index];
         let resources = RawPassResources {
             device: self.device,
             view: pass.view_index,
-            size: self.request.views[pass.view_index].camera.size,
+            size: view.camera.size,
             bind_group_layouts: [&frame.layouts.frame, &frame.layouts.assets],
             bind_groups: [of_frame, of_materials],
             access: RawAccess::new(name, declaration, requests),
@@ -221,19 +242,12 @@ impl<'a> PassEncoder<'a> {
             textures: &textures,
             layered: &layered,
         };
-        let queries = self.queries();
-        if let Some((set, [begin, _])) = queries {
-            encoder.write_timestamp(set, begin);
-        }
-        let encoded = raw.encode(encoder, &resources);
-        // Before the pass's own error, which may follow from it, and even if there is none: a pass that goes on without
-        // a resource draws something else than its process promises.
-        resources.access.end().map_err(BackendError::Access)?;
-        encoded.map_err(BackendError::RawPass)?;
-        if let Some((set, [_, end])) = queries {
-            encoder.write_timestamp(set, end);
-        }
-        Ok(())
+        let context = ItemContext { view, resources };
+        let result = call(&context);
+        // Before the code's own error, which may follow from it, and even if there is none: code that goes on without a
+        // resource draws something else than its process promises.
+        context.resources.access.end().map_err(BackendError::Access)?;
+        Ok(result)
     }
 
     /// The timestamp queries at the beginning and the end of the pass, if it is timed.
@@ -318,12 +332,16 @@ impl PassEncoder<'_> {
         match (self.draws, strategy.recording) {
             (Draws::Raw(raw), _) => self.encode_raw(encoder, *raw)?,
             // A pass that would only load and store its targets.
-            (Draws::Commands(_), _) if self.list.batches.is_empty() && timed_pass_index.is_none() && !clears => {}
+            (Draws::Commands(_) | Draws::Items(_), _)
+                if self.list.draw_count() == 0 && timed_pass_index.is_none() && !clears => {}
             (Draws::Compute(dispatch), _) => self.encode_compute(encoder, dispatch)?,
             (Draws::Commands(_), Direct) => {
                 self.record_batches(encoder, PassSegment::WHOLE, 0..self.list.bundle_count())?;
             }
-            (Draws::Commands(_), Bundles | CachedBundles) => {
+            (Draws::Items(_), Direct) => {
+                self.record_items(encoder, PassSegment::WHOLE, 0..self.list.bundle_count())?;
+            }
+            (Draws::Commands(_) | Draws::Items(_), Bundles | CachedBundles) => {
                 let bundles = parts.iter().filter_map(|part| match &part.0 {
                     RecordedPart::Bundle(bundle) => Some(bundle),
                     RecordedPart::Encoder(_) => None,
@@ -345,7 +363,10 @@ impl PassEncoder<'_> {
         let bundles = strategy.bundles_of_encoder(self.list, segment);
         let segment = strategy.segment_of_encoder(self.list, segment);
         let encoder = match strategy.recording {
-            Direct => self.encode(|encoder| self.record_batches(encoder, segment, bundles)),
+            Direct => self.encode(|encoder| match self.draws {
+                Draws::Items(_) => self.record_items(encoder, segment, bundles),
+                _ => self.record_batches(encoder, segment, bundles),
+            }),
             Bundles | CachedBundles => {
                 let recorded = bundles.map(|bundle| self.record_bundle(bundle));
                 let recorded = recorded.collect::<Result<Vec<_>, _>>()?;

@@ -115,6 +115,7 @@ impl Simulation {
                 objects_of_static_groups: 0,
                 occluded: 0,
                 lights: 0,
+                items: 0,
                 commands: 0,
                 batches: 0,
                 bundles: 0,

@@ -1,0 +1,237 @@
+//! Draws of an engine's own: which items a pass draws, in which order, and what is refused.
+
+use std::error::Error;
+use std::sync::Arc;
+
+use drawloom::backend::NullBackend;
+use drawloom::glam::DVec3;
+use drawloom::process::{
+    Declare, Draws, Format, ItemContext, ItemDraws, ItemOrder, ItemRange, ItemRecorder, Items, RecordItems,
+    RenderProcess,
+};
+use drawloom::scene::{Assets, Camera, LayerMask, SceneRef};
+use drawloom::task::Scheduler;
+use drawloom::view::internal::Frustum;
+use drawloom::view::{BoundingSphere, IssueReason};
+use drawloom::wgpu::util::RenderEncoder;
+use drawloom::{FrameError, FrameInputs, Granularity, Renderer, Submitter};
+use proptest::prelude::*;
+
+/// Draws items of this name.
+struct Own {
+    name: &'static str,
+    order: ItemOrder,
+}
+
+impl RenderProcess for Own {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth(self.name, Format::Depth32Float);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Items(ItemDraws { order: self.order })
+    }
+}
+
+/// The null backend calls no code of an engine's.
+struct Never;
+
+impl RecordItems for Never {
+    fn record<'e>(
+        &'e self,
+        _: &mut dyn RenderEncoder<'e>,
+        _: ItemRange<'e>,
+        _: &'e ItemContext<'_>,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        Err("nothing is recorded".into())
+    }
+}
+
+fn items<'a>(process: &'a str, keys: &'a [u64]) -> Items<'a> {
+    Items { process, keys, bounds: &[], layers: &[], versions: &[], recorder: ItemRecorder::Any(&Never) }
+}
+
+fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
+    let builder = Renderer::builder(NullBackend)
+        .granularity(granularity)
+        .process(Own { name: "sorted", order: ItemOrder::ByKey })
+        .process(Own { name: "as lent", order: ItemOrder::AsLent });
+    builder.build(Arc::new(Scheduler::new(workers).unwrap())).unwrap()
+}
+
+/// Two cameras that look in opposite directions, and draw different layers.
+fn cameras() -> [Camera; 2] {
+    let one = Camera::looking_at("one", DVec3::ZERO, DVec3::NEG_Z);
+    let other = Camera::looking_at("other", DVec3::ZERO, DVec3::Z);
+    [Camera { layers: LayerMask(0b01), ..one }, Camera { layers: LayerMask(0b11), ..other }]
+}
+
+fn list(renderer: &Renderer<NullBackend>, process: &str, view: usize) -> Vec<u32> {
+    renderer.draw_list(process, view).unwrap().items.items().to_vec()
+}
+
+/// What a loop over all items draws.
+fn naive(camera: &Camera, items: &Items<'_>, sorts: bool) -> Vec<u32> {
+    let frustum = Frustum::new(camera);
+    let is_seen = |item: &u32| {
+        let item = *item as usize;
+        let is_near = |sphere: &BoundingSphere| frustum.intersects_sphere(sphere.center, sphere.radius);
+        items.bounds.get(item).is_none_or(is_near)
+            && items.layers.get(item).is_none_or(|layers| layers.0 & camera.layers.0 != 0)
+    };
+    let mut seen: Vec<_> = (0..items.keys.len() as u32).filter(is_seen).collect();
+    if sorts {
+        seen.sort_by_key(|item| items.keys[*item as usize]);
+    }
+    seen
+}
+
+fn any_granularity() -> impl Strategy<Value = Granularity> {
+    prop_oneof![
+        Just(Granularity::Adaptive),
+        Just(Granularity::PerCamera),
+        Just(Granularity::PerDraw),
+        (1..700_usize).prop_map(Granularity::Chunk),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Frames whose items move, come and go. Some of them fail.
+    #[test]
+    fn views_draw_the_items_that_they_see_in_order(
+        workers in 1_usize..4,
+        granularity in any_granularity(),
+        counts in prop::collection::vec(prop_oneof![0_usize..40, 0_usize..3_000], 1..6),
+        spread in 1_u64..2_000,
+        seed in any::<u64>(),
+        has_layers in any::<bool>(),
+    ) {
+        let (mut renderer, submitter) = renderer(workers, granularity);
+        let (assets, cameras) = (Assets::default(), cameras());
+        let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+        for (frame, count) in (0_u64..).zip(counts) {
+            let number = |item: usize, of: u64| (item as u64 + 1 + of).wrapping_mul(seed | 1).rotate_left(29);
+            let keys: Vec<_> = (0..count).map(|item| number(item, frame / 2) % spread).collect();
+            let coordinate = |item, of| (number(item, of) % 1_000) as f64 / 10.0 - 50.0;
+            let center = |item| DVec3::new(coordinate(item, 1), coordinate(item, 2), coordinate(item, 3 + frame));
+            let bounds: Vec<_> = (0..count).map(|item| BoundingSphere { center: center(item), radius: 2.0 }).collect();
+            let layers: Vec<_> = (0..count).map(|item| LayerMask((number(item, 9) % 4) as u32)).collect();
+            let layers = if has_layers { &layers[..] } else { &[] };
+            let lent = ["sorted", "as lent"].map(|process| Items { bounds: &bounds, layers, ..items(process, &keys) });
+            if frame % 3 == 1 {
+                let cameras = [Camera::looking_at("far away", DVec3::splat(1e12), DVec3::ZERO)];
+                let scene = SceneRef { cameras: &cameras, ..scene };
+                let failed = renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) });
+                prop_assert!(failed.is_err());
+            }
+            let inputs = FrameInputs { items: &lent, ..FrameInputs::new(scene) };
+            let recorded = renderer.record_with(inputs).unwrap();
+            for (view, camera) in cameras.iter().enumerate() {
+                let expected = [true, false].map(|sorts| naive(camera, &lent[0], sorts));
+                let found = ["sorted", "as lent"].map(|process| list(&renderer, process, view));
+                let statistics = &recorded.statistics().views[view];
+                prop_assert_eq!(statistics.items, found[0].len() + found[1].len());
+                prop_assert_eq!(found, expected);
+            }
+            let submitted = submitter.submit(recorded).unwrap();
+            for pass in &submitted.submission.passes {
+                let expected = list(&renderer, &pass.process, pass.view);
+                prop_assert_eq!((pass.items, pass.batches, pass.objects), (expected.len(), 0, 0));
+                prop_assert!(pass.bundles >= expected.len().div_ceil(256));
+            }
+        }
+    }
+}
+
+#[test]
+fn items_that_do_not_fit_the_processes_are_refused_by_name_and_the_next_frame_is_right() {
+    let (mut renderer, _) = renderer(2, Granularity::Adaptive);
+    let (assets, cameras) = (Assets::default(), cameras());
+    let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+    let (sorted, as_lent) = (items("sorted", &[3, 1, 2]), items("as lent", &[]));
+    let one_sphere = [BoundingSphere { center: DVec3::ZERO, radius: 1.0 }];
+    let two_layers = [LayerMask::ALL; 2];
+    let cases = [
+        (vec![sorted], "process \"as lent\" draws items, and none are lent for it"),
+        (vec![sorted, as_lent, sorted], "two sets of items are lent for process \"sorted\""),
+        (
+            vec![Items { bounds: &one_sphere, ..sorted }, as_lent],
+            "the items of process \"sorted\" have 3 keys but 1 bounds",
+        ),
+        (
+            vec![as_lent, Items { layers: &two_layers, ..sorted }],
+            "the items of process \"sorted\" have 3 keys but 2 layers",
+        ),
+        (
+            vec![as_lent, Items { versions: &[0; 4], ..sorted }],
+            "the items of process \"sorted\" have 3 keys but 4 versions",
+        ),
+    ];
+    for (lent, expected) in cases {
+        let error = renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).err().unwrap();
+        assert_eq!(error.to_string(), expected);
+        // Items for a process that there is not are nobody's.
+        let lent = [as_lent, sorted, items("none", &[1])];
+        drop(renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).unwrap());
+        assert_eq!(list(&renderer, "sorted", 0), [1, 2, 0]);
+    }
+}
+
+#[test]
+fn items_for_a_process_that_draws_none_are_refused() {
+    struct Nothing;
+    impl RenderProcess for Nothing {
+        fn name(&self) -> &str {
+            "nothing"
+        }
+
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_depth("nothing", Format::Depth32Float);
+            declare.keep();
+        }
+
+        fn draws(&self) -> Draws<'_> {
+            Draws::FullScreen(drawloom::process::FullScreen::default())
+        }
+    }
+    let builder = Renderer::builder(NullBackend).process(Nothing);
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let (assets, cameras) = (Assets::default(), cameras());
+    let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+    let lent = [items("nothing", &[1])];
+    let error = renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).err().unwrap();
+    assert!(matches!(&error, FrameError::UnexpectedItems { process } if process == "nothing"), "{error}");
+}
+
+#[test]
+fn items_with_invalid_bounds_are_left_out_counted_and_named() {
+    let (mut renderer, _) = renderer(2, Granularity::Adaptive);
+    let (assets, cameras) = (Assets::default(), cameras());
+    let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+    let at = |center: DVec3, radius: f32| BoundingSphere { center, radius };
+    let seen = DVec3::NEG_Z * 5.0;
+    let bounds = [
+        at(seen, 1.0),
+        at(DVec3::NAN, 1.0),
+        at(DVec3::X * f64::INFINITY, 1.0),
+        at(seen, -1.0),
+        at(seen, f32::NAN),
+        // Seen by every view.
+        at(DVec3::Z * 1e9, f32::INFINITY),
+        at(seen, 0.0),
+    ];
+    let lent = [items("as lent", &[0; 10]), Items { bounds: &bounds, ..items("sorted", &[0; 7]) }];
+    let recorded = renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).unwrap();
+    assert_eq!([0, 1].map(|view| list(&renderer, "sorted", view)), [vec![0, 5, 6], vec![5]]);
+    let issues = &recorded.statistics().scene_issues;
+    let found: Vec<_> = issues.iter().map(|issue| (issue.reason, issue.count, issue.first)).collect();
+    assert_eq!(found, [(IssueReason::InvalidItemBounds, 4, 11)]);
+    assert_eq!(issues[0].name.as_deref(), Some("sorted"));
+}
