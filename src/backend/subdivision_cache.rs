@@ -33,6 +33,14 @@ pub(crate) struct CachedSubdivision<T> {
     used_in: AtomicU64,
 }
 
+#[cfg(all(test, feature = "wgpu"))]
+impl<T> CachedSubdivision<T> {
+    /// One of which nothing is drawn.
+    pub(crate) fn without_geometry() -> Self {
+        Self { geometry: None, is_coarse: false, triangles: 0, used_in: AtomicU64::new(0) }
+    }
+}
+
 /// The subdivided meshes of a frame, by what [`subdivision_of`] a batch is drawn.
 pub(crate) type SubdividedMeshes<T> = HashMap<Subdivision, Arc<CachedSubdivision<T>>>;
 

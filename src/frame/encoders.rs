@@ -81,7 +81,7 @@ pub(super) enum PassFailure {
 }
 
 /// What the jobs of one pass record: its parts in any order, then the finished pass. It keeps its memory from frame to
-/// frame.
+/// frame, and is empty between frames: a frame takes out what is finished, or is abandoned and drops it.
 pub(super) struct PassRecording<B: Backend> {
     /// By part index.
     parts: Mutex<Vec<Option<B::Part>>>,
@@ -160,12 +160,6 @@ impl<B: Backend> PassRecording<B> {
     }
 }
 
-impl<B: Backend> Drop for PassRecording<B> {
-    fn drop(&mut self) {
-        self.clear();
-    }
-}
-
 /// Makes `recordings` one for each pass, empty.
 pub(super) fn reset_recordings<B: Backend>(recordings: &mut Vec<PassRecording<B>>, passes: usize) {
     recordings.resize_with(passes, PassRecording::default);
@@ -177,6 +171,16 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
+    use crate::backend::NullBackend;
+
+    #[test]
+    fn a_pass_without_a_part_is_not_finished() {
+        let recording = PassRecording::<NullBackend>::default();
+        recording.reserve(0);
+        assert!(recording.ordered_parts().is_ok_and(|parts| parts.is_empty()));
+        recording.reserve(1);
+        assert!(recording.ordered_parts().is_err());
+    }
 
     fn begin(encoders: &mut FrameEncoders, passes: usize, shares_encoder: impl Fn(usize) -> bool) {
         let Ok(()) = encoders.begin_frame(passes, |pass| Ok::<_, Infallible>(shares_encoder(pass)));

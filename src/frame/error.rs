@@ -339,3 +339,16 @@ impl SubmitError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_backend_says_is_found_behind_a_panic_that_followed() {
+        let error = |error: FrameError| FrameError::DiscardPanicked { error: Box::new(error), message: String::new() };
+        let lost = BackendError::DeviceLost { message: String::new() };
+        assert!(error(FrameError::Backend(lost)).backend_error().is_some());
+        assert!(error(FrameError::NoView).backend_error().is_none());
+    }
+}

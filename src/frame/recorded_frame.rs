@@ -344,3 +344,27 @@ impl std::fmt::Display for FencePoint<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fence_point_comes_after_the_last_of_its_passes() {
+        let pass = |(process_index, view_index)| Pass { process_index, view_index };
+        let order = [(0, 0), (1, 0), (0, 1), (1, 0), (1, 1)].map(pass);
+        let passes_before = |point: FencePoint<'_>| point.passes_before(&order, |process| ["one", "other"][process]);
+        let of_pass = |process, view| passes_before(FencePoint::Pass { process, view });
+        assert_eq!([of_pass("one", 0), of_pass("other", 0)], [Some(1), Some(4)]);
+        assert_eq!([of_pass("one", 1), of_pass("other", 1)], [Some(3), Some(5)]);
+        assert_eq!([of_pass("third", 0), of_pass("one", 2)], [None, None]);
+        assert_eq!([0, 1, 2].map(|view| passes_before(FencePoint::View(view))), [Some(4), Some(5), None]);
+        assert_eq!(passes_before(FencePoint::End), Some(5));
+    }
+
+    #[test]
+    fn a_fence_point_is_named_by_process_and_view() {
+        let points = [FencePoint::Pass { process: "lights", view: 2 }, FencePoint::View(1), FencePoint::End];
+        assert_eq!(points.map(|point| point.to_string()), [r#"process "lights" in view 2"#, "view 1", "the end"]);
+    }
+}

@@ -332,8 +332,74 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Blend, Changes, RenderObject, Scene, Topology, Vertex};
+    use crate::scene::{Blend, Camera, Changes, RenderObject, Scene, Topology, Vertex};
     use crate::view::TableLimits;
+
+    /// A scene of one triangle, which this many objects have.
+    fn triangles(objects: usize) -> Scene {
+        let mut scene = Scene::new();
+        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+        let mesh = crate::scene::Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2]);
+        let mesh = scene.add(mesh.unwrap()).unwrap();
+        let material = scene.add(Material::default()).unwrap();
+        let object = RenderObject::new(mesh, material, DVec3::ZERO);
+        for _ in 0..objects {
+            scene.add_object(object).unwrap();
+        }
+        scene
+    }
+
+    #[test]
+    fn a_picture_without_width_or_without_height_is_an_error() {
+        let mut scene = triangles(1);
+        scene.cameras.push(Camera::looking_at("main", DVec3::Z, DVec3::ZERO));
+        for (size, is_empty) in [([4, 3], false), ([0, 3], true), ([4, 0], true), ([0, 0], true)] {
+            scene.cameras[0].size = size;
+            let error = check_scene(&scene.as_scene_ref()).err();
+            assert_eq!(matches!(error, Some(FrameError::EmptyTarget { .. })), is_empty, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn changes_that_are_not_reported_are_found_among_the_objects_with_room() {
+        const NUMBER: ObjectColumn<u32> = ObjectColumn::new("number");
+        let scene = triangles(4);
+        let layers = [LayerMask::default(); 4];
+        let other_layers = {
+            let mut layers = layers;
+            layers[0] = LayerMask::NONE;
+            layers
+        };
+        // Two of the objects have room.
+        let can_draw = |_: &crate::scene::Mesh| true;
+        let within = TableLimits { objects: 2, can_draw: &can_draw, ..TableLimits::NONE };
+        let mut table = ObjectTable::default();
+        let mut found = |numbers: [u32; 4], layers: &[LayerMask; 4]| {
+            let mut check = ChangeCheck::default();
+            let mut outcome = |changes: Changes<'_>, numbers: &[u32; 4], layers: &[LayerMask]| {
+                let columns = [NUMBER.values(numbers)];
+                let frame = SceneRef { columns: &columns, layers, changes, ..scene.as_scene_ref() };
+                table.begin_frame_within(&frame, &within);
+                table.describe(&frame, 0..table.changed_block_count());
+                table.finish();
+                let outcome = check.check_columns(&frame, &[NUMBER.layout()], &table);
+                table.end_frame();
+                outcome
+            };
+            outcome(Changes::Unknown, &[0; 4], &[LayerMask::default(); 4]).unwrap();
+            outcome(Changes::Objects(&[1]), &numbers, layers).err().map(|error| match error {
+                SceneError::UnreportedColumnChange { object, .. } => ("a column", object),
+                SceneError::UnreportedChange { object } => ("layers", object),
+                error => panic!("{error}"),
+            })
+        };
+        assert_eq!(found([0; 4], &layers), None);
+        assert_eq!(found([1, 0, 0, 0], &layers), Some(("a column", 0)));
+        assert_eq!(found([0, 1, 0, 0], &layers), None, "it is reported");
+        assert_eq!(found([0, 0, 1, 1], &layers), None, "they have no room");
+        assert_eq!(found([0; 4], &other_layers), Some(("layers", 0)));
+    }
 
     /// The device's room for objects changes after the frame's processes are decided on, in both directions.
     #[test]

@@ -347,6 +347,7 @@
 //! [`RawPass`]: crate::process::RawPass
 //! [`RenderProcess`]: crate::process::RenderProcess
 //! [`Renderer::prepare_pipelines`]: crate::Renderer::prepare_pipelines
+//! [`Renderer::record_with`]: crate::Renderer::record_with
 //! [`Renderer::record`]: crate::Renderer::record
 //! [`Renderer::replace_backend`]: crate::Renderer::replace_backend
 //! [`Scene`]: crate::scene::Scene

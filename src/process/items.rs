@@ -1,5 +1,6 @@
 //! Draws of an engine's own: items that a process draws with the engine's own pipelines, bind groups and draw calls.
 
+#[cfg(feature = "wgpu")]
 use std::error::Error;
 
 #[cfg(feature = "wgpu")]

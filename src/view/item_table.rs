@@ -269,7 +269,7 @@ mod tests {
                 };
                 let rejected = frame(&mut table, (&mut visible, &mut list), (&keys, &columns), &view, (sorts, per_bundle));
                 prop_assert_eq!(list.items(), naive((&keys, &columns), &view, sorts));
-                let is_invalid = |sphere: &&BoundingSphere| !sphere.center.is_finite() || !(sphere.radius >= 0.0);
+                let is_invalid = |sphere: &&BoundingSphere| !sphere.center.is_finite() || sphere.radius < 0.0 || sphere.radius.is_nan();
                 prop_assert_eq!(rejected, columns.bounds.iter().filter(is_invalid).count());
                 let bundled: Vec<_> = (0..list.bundle_count()).flat_map(|bundle| list.bundle_range(bundle)).collect();
                 prop_assert_eq!(bundled, (0..list.items().len()).collect::<Vec<_>>());

@@ -153,6 +153,10 @@ mod tests {
         assert_eq!(found(&before[1..], &[(Main, "other"), (Main, "side")]), [Some((1, false)), Some((2, true))]);
         assert_eq!(found(&before[..2], &[(Main, "mirror"), (Main, "main")]), [Some((1, false)), Some((0, true))]);
         assert_eq!(found(&[], &[(Main, "main")]), [None]);
+        // As many views as before, with another kind or another name.
+        for other in [(Reflection, "main"), (Main, "side")] {
+            assert_eq!(found(&before[..1], &[other]), [Some((0, false))]);
+        }
     }
 
     #[test]

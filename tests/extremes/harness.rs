@@ -244,7 +244,7 @@ impl<B: Backend<Submission: Pictures>> RendererOn<B> {
 
 impl<B: Backend<Submission: Pictures>> Runner for RendererOn<B> {
     fn draw(&mut self, scene: &SceneRef<'_>, nodes: &[&dyn CpuNode]) -> Result<Outcome, Failed> {
-        let recorded = match self.renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(*scene) }) {
+        let recorded = match self.renderer.record_with(FrameInputs { nodes, ..FrameInputs::new(*scene) }) {
             Ok(recorded) => recorded,
             Err(FrameError::Panicked { stage, message }) => return Err(format!("{stage} panicked: {message}").into()),
             Err(FrameError::Scheduler(panic)) => return Err(format!("a job panicked: {panic}").into()),

@@ -81,7 +81,7 @@ impl<S: Subject> Fixture<S> {
         scene: SceneRef<'_>,
         nodes: &[&dyn CpuNode],
     ) -> Result<Result<Vec<u8>, Refusal>, Failed> {
-        let recorded = match self.renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(scene) }) {
+        let recorded = match self.renderer.record_with(FrameInputs { nodes, ..FrameInputs::new(scene) }) {
             Ok(recorded) => recorded,
             Err(error) => return Ok(Err(Refusal::Frame(error))),
         };

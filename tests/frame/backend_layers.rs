@@ -4,12 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use drawloom::backend::{
-    Backend, BackendExtras, BackendLayer, NoExtras, SceneLimits, StreamingBudget, TargetMemory, WgpuBackend,
+    Backend, BackendError, BackendExtras, BackendLayer, FrameRecorder, NoExtras, NullBackend, PassRequest, SceneLimits,
+    StreamingBudget, TargetMemory, WgpuBackend,
 };
 use drawloom::process::Deferred;
+use drawloom::quality::{Quality, VertexFormat};
+use drawloom::scene::Mesh;
 use drawloom::task::Scheduler;
 use drawloom::timeline::{TuningChoice, TuningSubject};
-use drawloom::{FrameStatistics, RecordedFrame, Renderer};
+use drawloom::{FrameError, FrameStatistics, RecordedFrame, Renderer};
 use drawloom_testing::adapter;
 use drawloom_testing::scenes::field;
 
@@ -114,6 +117,67 @@ fn layers_lose_no_call_and_no_extra() {
     let outer = renderer.backend();
     assert_eq!(*outer.called.lock().unwrap(), all);
     assert_eq!(*outer.inner.called.lock().unwrap(), all);
+}
+
+/// Draws nothing. Fails when it has finished all passes of an encoder.
+struct FailsAfterwards(NullBackend);
+
+impl BackendLayer for FailsAfterwards {
+    type Inner = NullBackend;
+
+    fn inner(&self) -> &NullBackend {
+        &self.0
+    }
+
+    fn finish(
+        &self,
+        frame: &<NullBackend as FrameRecorder>::Frame,
+        passes: &[PassRequest<'_>],
+        parts: &mut [Vec<<NullBackend as FrameRecorder>::Part>],
+        emit: &mut dyn FnMut(<NullBackend as FrameRecorder>::Commands),
+    ) -> Result<(), BackendError> {
+        self.0.finish(frame, passes, parts, emit)?;
+        Err(BackendError::CannotReadBack)
+    }
+}
+
+#[test]
+fn an_error_after_all_passes_are_finished_is_that_of_the_last_one() {
+    let builder = Renderer::builder(FailsAfterwards(NullBackend)).pipeline(Deferred::to_picture());
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let Err(error) = renderer.record(field(10).as_scene_ref()) else { panic!("it has not failed") };
+    assert!(matches!(error, FrameError::Failed { .. }), "{error}");
+    assert!(matches!(error.backend_error(), Some(BackendError::CannotReadBack)), "{error}");
+}
+
+/// Draws nothing, and no mesh with full vertices.
+struct PackedOnly(NullBackend);
+
+impl BackendLayer for PackedOnly {
+    type Inner = NullBackend;
+
+    fn inner(&self) -> &NullBackend {
+        &self.0
+    }
+
+    fn check_mesh(&self, _: &Mesh, vertices: VertexFormat) -> Result<(), BackendError> {
+        if vertices == VertexFormat::Packed { Ok(()) } else { Err(BackendError::CannotReadBack) }
+    }
+}
+
+#[test]
+fn a_backend_is_asked_again_which_meshes_it_draws_when_their_format_changes() {
+    let builder = Renderer::builder(PackedOnly(NullBackend)).pipeline(Deferred::to_picture());
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    let scene = field(10);
+    for (vertices, left_out) in
+        [(VertexFormat::Packed, 0), (VertexFormat::Full, 10), (VertexFormat::Packed, 0), (VertexFormat::Full, 10)]
+    {
+        renderer.set_quality(Quality { vertices, ..Quality::balanced() }).unwrap();
+        let recorded = renderer.record(scene.as_scene_ref()).unwrap();
+        let issues: usize = recorded.statistics().scene_issues.iter().map(|issue| issue.count).sum();
+        assert_eq!(issues, left_out, "{:?}", recorded.statistics().scene_issues);
+    }
 }
 
 /// Counts bytes itself, and asks another backend for the rest.

@@ -8,7 +8,7 @@ use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Deformation, Draws, Format, RenderProcess};
 use drawloom::quality::{CullingVolume, Quality};
-use drawloom::scene::{Blend, Camera, LayerMask, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
+use drawloom::scene::{Blend, Camera, Changes, LayerMask, Light, Material, RenderObject, Scene, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameStatistics, Granularity, Renderer, ViewStatistics};
 use drawloom_testing::scenes::{cube, field, sized};
@@ -75,6 +75,20 @@ fn hidden_objects_are_culled_and_all_others_are_drawn() {
         assert_eq!(with.visible + with.occluded, without.visible);
         assert!(with.occluded > hidden.len() && with.commands < without.commands, "{with:?}");
     }
+}
+
+#[test]
+fn what_was_hidden_is_drawn_when_its_occluder_moves_away() {
+    let mut scene = wall_and_cubes();
+    let mut renderer = renderer(Some(8), 1, Granularity::default());
+    let (behind_the_wall, _) = drawn(&mut renderer, &scene, "geometry buffer");
+    let wall = scene.objects().next().unwrap();
+    let moved = RenderObject { position: DVec3::X * 1e4, ..scene.object(wall).unwrap() };
+    scene.replace_object(wall, moved).unwrap();
+    drop(renderer.record(SceneRef { changes: Changes::Objects(&[0]), ..scene.as_scene_ref() }).unwrap());
+    let found: BTreeSet<u32> = renderer.draw_list("geometry buffer", 0).unwrap().objects.iter().copied().collect();
+    let (expected, _) = drawn(&mut self::renderer(None, 1, Granularity::default()), &scene, "geometry buffer");
+    assert!(found == expected[0] && found.len() > 2 * behind_the_wall[0].len(), "{found:?}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::command::{DrawOrder, Selection};
 use drawloom::process::{CommandDraws, Declare, Draws, Format, PlanError, RenderProcess};
-use drawloom::scene::{Changes, ObjectColumn, Scene, SceneError, SceneRef};
+use drawloom::scene::{Changes, ObjectColumn, Projection, Scene, SceneError, SceneRef, StaticGroup, ViewKind};
 use drawloom::task::Scheduler;
 use drawloom::{FrameError, Renderer};
 use drawloom_testing::scenes::field;
@@ -72,6 +72,80 @@ fn objects_are_drawn_by_distance() {
         for pair in far_to_near.windows(2) {
             assert!(depths[pair[0] as usize] >= depths[pair[1] as usize] - step, "{pair:?}");
         }
+    }
+}
+
+/// Draws all objects by state.
+struct ByState;
+
+impl RenderProcess for ByState {
+    fn name(&self) -> &str {
+        "by state"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.clears_depth("other depth", Format::Depth32Float);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn objects_of_static_groups_are_drawn_in_order_too() {
+    let mut scene = field(200);
+    scene.cameras.truncate(1);
+    let expected = objects_of(&mut renderer(DrawOrder::FrontToBack, 1), scene.as_scene_ref());
+    scene.static_groups.push(StaticGroup::new("all", (0..200).collect()));
+    let builder = Renderer::builder(NullBackend).process(ByState).process(Ordered(DrawOrder::FrontToBack));
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+    for _ in 0..4 {
+        let unchanged = SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() };
+        assert_eq!(objects_of(&mut renderer, unchanged), expected);
+    }
+}
+
+/// Draws all objects by state in shadow maps.
+struct ShadowMaps;
+
+impl RenderProcess for ShadowMaps {
+    fn name(&self) -> &str {
+        "shadow maps"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.views(ViewKind::Shadow);
+        declare.clears_depth_layer("shadow maps", Format::Depth32Float);
+        declare.keep();
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws::default())
+    }
+}
+
+#[test]
+fn a_camera_that_becomes_a_paraboloid_draws_what_a_new_renderer_draws() {
+    let new = || {
+        let builder = Renderer::builder(NullBackend).process(ShadowMaps);
+        builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap().0
+    };
+    let batches = |renderer: &mut Renderer<NullBackend>, scene: SceneRef<'_>| {
+        drop(renderer.record(scene).unwrap());
+        renderer.draw_list("shadow maps", 0).unwrap().batches.clone()
+    };
+    let (mut scene, mut kept) = (field(200), new());
+    scene.cameras.truncate(1);
+    (scene.cameras[0].kind, scene.cameras[0].far) = (ViewKind::Shadow, 100.0);
+    let perspective = scene.cameras[0].projection;
+    let in_perspective = batches(&mut kept, scene.as_scene_ref());
+    for projection in [Projection::Paraboloid, perspective] {
+        scene.cameras[0].projection = projection;
+        let found = batches(&mut kept, SceneRef { changes: Changes::NONE, ..scene.as_scene_ref() });
+        assert_eq!(found, batches(&mut new(), scene.as_scene_ref()), "{projection:?}");
+        assert_eq!(found == in_perspective, projection == perspective, "in a paraboloid, meshes are subdivided");
     }
 }
 

@@ -129,6 +129,22 @@ fn lights_with_several_maps_have_all_of_them_cached() {
     assert_eq!(fixture.drawn(&scene).len(), 1 + 3 + 6 + 3);
 }
 
+/// The plan and the names of the maps stay the same.
+#[test]
+fn lights_that_become_others_of_another_kind_draw_their_maps() {
+    let (position, intensity) = (DVec3::new(3.0, 30.0, 3.0), Vec3::splat(100.0));
+    let hemispherical =
+        Light::Hemispherical { position, direction: Vec3::NEG_Y, intensity, range: 60.0, casts_shadow: true };
+    let (mut scene, mut fixture) = (two_lights(), Fixture::new(100));
+    scene.lights = vec![spot(3.0), hemispherical, spot(5.0)];
+    let all = [2, 3, 4];
+    assert_eq!(fixture.drawn(&scene), all);
+    scene.lights.swap(0, 2);
+    assert!(fixture.drawn(&scene).is_empty(), "lights of one kind keep their maps while they move");
+    scene.lights.swap(1, 2);
+    assert_eq!(fixture.drawn(&scene), all);
+}
+
 #[test]
 fn a_cached_map_costs_no_culling_and_no_commands() {
     let (scene, mut fixture) = (two_lights(), Fixture::new(4));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drawloom::backend::NullBackend;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::Deferred;
-use drawloom::quality::{CullingVolume, Quality};
+use drawloom::quality::{CullingVolume, Quality, TransformPrecision};
 use drawloom::report::{FrameReport, SchedulerCosts};
 use drawloom::scene::{
     Blend, Camera, Changes, Light, Material, MaterialPredicate, ObjectSet, RenderObject, Scene, SceneError, SceneRef,
@@ -18,7 +18,8 @@ use drawloom::view::IssueReason;
 use drawloom::{FrameError, FrameStatistics, Renderer, StaticGroupStatistics, Submitter};
 use drawloom_testing::changing_world::ChangingWorld;
 use drawloom_testing::random::Random;
-use drawloom_testing::scenes::cube;
+use drawloom_testing::scenes::leveled::globe;
+use drawloom_testing::scenes::{cube, culled};
 use proptest::prelude::*;
 
 fn renderer(quality: Quality, workers: usize) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -220,6 +221,24 @@ fn a_static_group_of_another_mesh_or_material_is_recorded_anew_and_others_are_no
     let recorded = rows.renderer.record(SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() }).unwrap();
     let view = &recorded.statistics().views[0];
     assert_eq!((view.objects_of_static_groups, view.visible), (ROWS * IN_ROW - 1, ROWS * IN_ROW));
+}
+
+#[test]
+fn objects_whose_mesh_depends_on_the_view_are_drawn_beside_their_static_group() {
+    let absolute = Quality { transforms: TransformPrecision::Absolute, ..Quality::balanced() };
+    for (mesh, quality, beside) in
+        [(globe(), Quality::balanced(), 1), (culled(&cube()), Quality::balanced(), 1), (culled(&cube()), absolute, 0)]
+    {
+        let mut rows = Rows::new();
+        rows.renderer = renderer(quality, 2).0;
+        let object = rows.scene.objects().nth(3).unwrap();
+        let mesh = rows.scene.add(mesh).unwrap();
+        let now = RenderObject { mesh, ..rows.scene.object(object).unwrap() };
+        rows.scene.replace_object(object, now).unwrap();
+        rows.settle();
+        let recorded = rows.renderer.record(SceneRef { changes: Changes::NONE, ..rows.scene.as_scene_ref() }).unwrap();
+        assert_eq!(recorded.statistics().views[0].objects_of_static_groups, ROWS * IN_ROW - beside);
+    }
 }
 
 #[test]

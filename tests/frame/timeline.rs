@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use drawloom::report::{Replay, ReportError, SchedulerCosts};
-use drawloom::{FrameError, Granularity};
+use drawloom::{FencePoint, FrameError, Granularity};
 use drawloom_testing::scenes::field;
 
 use crate::renderer;
@@ -20,6 +20,19 @@ fn a_frame_draws_the_same_while_the_timeline_records() {
         assert_eq!(recorded.submission.passes, plain.submission.passes);
         assert_eq!(recorded.statistics.views, plain.statistics.views);
     }
+}
+
+#[test]
+fn fences_are_named_after_the_frame() {
+    let (mut renderer, _) = renderer(1, Granularity::default());
+    let scene = field(3);
+    let mut name = |records: bool| {
+        if records {
+            renderer.scheduler().timeline().start();
+        }
+        renderer.record(scene.as_scene_ref()).unwrap().fence_at(FencePoint::View(1)).unwrap().name().to_owned()
+    };
+    assert_eq!([false, true].map(&mut name), ["view 1 of a frame", "view 1 of frame 0"]);
 }
 
 #[test]

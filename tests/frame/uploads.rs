@@ -51,6 +51,19 @@ fn statistics_and_timeline_report_the_uploaded_bytes() {
 }
 
 #[test]
+fn a_frame_beside_another_one_in_flight_uploads_all_objects() {
+    let (device, queue) = adapter::noop_device().unwrap();
+    let builder = Renderer::builder(WgpuBackend::new(device, queue).unwrap()).pipeline(Deferred::to_picture());
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let scene = field(600);
+    let mut record = |changes| renderer.record(SceneRef { changes, ..scene.as_scene_ref() }).unwrap();
+    let in_flight = [record(Changes::Unknown), record(Changes::NONE), record(Changes::NONE)];
+    let objects = (600 * size_of::<GpuObject>()) as u64;
+    let uploaded = in_flight.each_ref().map(|frame| frame.statistics().uploaded);
+    assert!(uploaded.iter().all(|uploaded| *uploaded >= objects), "{uploaded:?}");
+}
+
+#[test]
 fn objects_of_static_groups_are_uploaded_once() {
     let (device, queue) = adapter::noop_device().unwrap();
     let backend = WgpuBackend::new(device, queue).unwrap();

@@ -118,6 +118,19 @@ fn a_budget_whose_choices_frames_do_not_report_is_warned_of_once() {
     assert_eq!([warnings(true), warnings(false)], [0, 1]);
 }
 
+#[cfg(feature = "wgpu")]
+#[test]
+fn a_budget_that_gets_no_complete_times_of_the_device_warns_once() {
+    use drawloom::backend::DevicePassTimes;
+    let warnings = |skipped: usize| {
+        let mut budget = ViewBudget::new(GENEROUS).unwrap();
+        let times = DevicePassTimes { passes: Vec::new(), skipped };
+        let text = reported(|| (0..30).for_each(|_| budget.update_from_device(&FrameStatistics::default(), &times)));
+        text.matches("the device's times lack passes").count()
+    };
+    assert_eq!([0, 1].map(warnings), [0, 1]);
+}
+
 #[test]
 fn the_times_of_views_are_those_of_their_stages() {
     let (mut renderer, submitter) = renderer();

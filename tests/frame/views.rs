@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use drawloom::backend::NullBackend;
 use drawloom::backend::internal::NullPass;
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
 use drawloom::process::{CommandDraws, Declare, Deferred, Draws, Format, RenderProcess};
-use drawloom::scene::{Light, ViewKind};
+use drawloom::scene::{Camera, Light, SceneRef, ViewKind};
 use drawloom::task::Scheduler;
-use drawloom::{Granularity, Renderer};
+use drawloom::{FrameError, Granularity, Renderer};
 use drawloom_testing::scenes::field;
 
+use crate::layers::Depth;
 use crate::renderer;
 
 /// Draws a light's depth.
@@ -114,4 +116,38 @@ fn bundles_hold_256_batches_unless_the_granularity_asks_for_fewer() {
             assert_eq!((pass.bundles, pass.batches), (view.bundles, view.batches));
         }
     }
+}
+
+#[test]
+fn a_frame_has_at_most_as_many_views_as_it_may() {
+    let scene = field(1);
+    let mut renderer = renderer_of_depth();
+    for (count, is_drawn) in [(FrameError::MAX_VIEWS, true), (FrameError::MAX_VIEWS + 1, false)] {
+        let cameras: Vec<_> =
+            (0..count).map(|index| Camera { name: index.to_string(), ..scene.cameras[0].clone() }).collect();
+        let error = renderer.record(SceneRef { cameras: &cameras, ..scene.as_scene_ref() }).err();
+        assert_eq!(error.is_none(), is_drawn);
+        assert!(error.is_none_or(|error| matches!(error, FrameError::TooManyViews { views } if views == count)));
+    }
+}
+
+fn renderer_of_depth() -> Renderer<NullBackend> {
+    let process = Depth { name: "depth".to_owned(), selection: Selection::ALL };
+    let builder = Renderer::builder(NullBackend).process(process);
+    builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap().0
+}
+
+#[test]
+fn without_shadow_maps_lights_that_cast_shadows_are_drawn_like_others() {
+    let drawn = |casts_shadow: bool| -> Vec<(String, usize)> {
+        let mut scene = field(10);
+        let (position, intensity, range) = (DVec3::new(3.0, 30.0, 3.0), Vec3::splat(100.0), 60.0);
+        scene.lights = vec![Light::Point { position, intensity, range, casts_shadow }];
+        let builder = Renderer::builder(NullBackend).pipeline(Deferred::to_picture().shadow_maps(None));
+        let (mut renderer, submitter) = builder.build(Arc::new(Scheduler::new(1).unwrap())).unwrap();
+        let submitted = submitter.submit(renderer.record(scene.as_scene_ref()).unwrap()).unwrap();
+        submitted.submission.passes.into_iter().map(|pass| (pass.process, pass.lights)).collect()
+    };
+    assert_eq!(drawn(true), drawn(false));
+    assert!(drawn(true).iter().any(|(_, lights)| *lights > 0), "{:?}", drawn(true));
 }

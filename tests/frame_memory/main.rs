@@ -93,8 +93,7 @@ fn steady_frames(scene: &Scene, nodes: &[&dyn CpuNode], workers: usize) -> Repor
         Renderer::builder(backend).pipeline(Deferred::to_picture()).build(scheduler).unwrap();
     let mut frame = |is_counted: bool| {
         counting_allocator::count(is_counted);
-        let recorded =
-            renderer.record_with(FrameInputs { nodes: nodes, ..FrameInputs::new(scene.as_scene_ref()) }).unwrap();
+        let recorded = renderer.record_with(FrameInputs { nodes, ..FrameInputs::new(scene.as_scene_ref()) }).unwrap();
         let submission: WgpuSubmission = submitter.submit(recorded).unwrap().submission;
         counting_allocator::count(false);
         submission.wait().unwrap();

@@ -152,7 +152,7 @@ impl WgpuBackend {
             let (mut index, mut is_trial) = (0, false);
             let lent = request.items_of(process).filter(|_| pass.draws_items);
             let into_passes = lent.is_some_and(|items| matches!(items.recorder, ItemRecorder::Pass(_)));
-            let fixed = into_passes.then(|| self.strategies.into_passes(request.passes.len() < request.workers));
+            let fixed = into_passes.then(|| self.strategies.of_passes_alone(request.passes.len() < request.workers));
             pass.is_tuned = pass.has_list() && fixed.is_none();
             if strategies.len() > 1 && pass.is_tuned {
                 let is_distinct = |index: usize, batches| {

@@ -146,7 +146,7 @@ impl StrategySet {
 
     /// The strategy for code that records into passes only. `divides` says whether one that divides passes keeps more
     /// workers busy.
-    pub(crate) fn into_passes(&self, divides: bool) -> PassStrategy {
+    pub(crate) fn of_passes_alone(&self, divides: bool) -> PassStrategy {
         let encoding = if divides { EncodingStrategy::Split } else { EncodingStrategy::PerPass };
         PassStrategy { recording: RecordingStrategy::Direct, encoding: self.encoding.unwrap_or(encoding) }
     }

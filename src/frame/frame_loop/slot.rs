@@ -388,3 +388,47 @@ impl<Task, Awaited, Finished> Drop for LoopQueues<Task, Awaited, Finished> {
         discard_all(self.state.get_mut().finished.drain(..));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::NullBackend;
+
+    #[test]
+    fn the_device_is_idle_from_the_end_of_a_frame_to_the_submission_of_the_next() {
+        let start = Instant::now();
+        let times = |submitted: u64, finished: u64| {
+            let at = |milliseconds| start + Duration::from_millis(milliseconds);
+            FrameTimes {
+                waited: Duration::ZERO,
+                begun: start,
+                recorded: start,
+                submission_began: start,
+                submitted: at(submitted),
+                finished: at(finished),
+            }
+        };
+        assert_eq!(times(9, 12).device_idle_since(&times(1, 4)), Duration::from_millis(5));
+        assert_eq!(times(3, 12).device_idle_since(&times(1, 4)), Duration::ZERO);
+    }
+
+    #[test]
+    fn what_the_backend_says_is_found_wherever_the_frame_was_lost() {
+        let lost = || BackendError::DeviceLost { message: String::new() };
+        let errors = [
+            FrameLoopError::Device(lost()),
+            FrameLoopError::Frame(FrameError::Backend(lost())),
+            FrameLoopError::Submit(SubmitError::Backend(lost())),
+        ];
+        assert!(errors.iter().all(|error| error.backend_error().is_some()));
+        assert!(FrameLoopError::ForeignSubmitter.backend_error().is_none());
+    }
+
+    #[test]
+    fn a_slot_knows_how_long_it_was_waited_for() {
+        let queues = Arc::new(FrameQueues::<NullBackend>::new(Buffering::Double, Duration::ZERO));
+        drop(queues.take_slot(false));
+        let slot = FrameSlot::new(Arc::clone(&queues), 7, Instant::now(), Duration::from_millis(3));
+        assert_eq!((slot.number(), slot.waited()), (7, Duration::from_millis(3)));
+    }
+}

@@ -209,3 +209,19 @@ fn resource_name(resource: NodeResource) -> String {
         NodeResource::Buffer { name, identity } => format!("{name} (buffer {identity})"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_with_a_graph_is_said_of_its_stages_or_of_its_nodes() {
+        let error_of = |names: &[&str]| {
+            let keys = names.iter().map(|name| NodeKey { name: Arc::from(*name), accesses: Vec::new() }).collect();
+            NodeKeys { keys }.error_of(GraphProblem::DuplicateNode { name: "one".to_owned() })
+        };
+        assert!(matches!(error_of(&[]), FrameError::StageGraph(_)));
+        assert!(matches!(error_of(&["one", "other"]), FrameError::InvalidNode { .. }), "a stage has the name");
+        assert!(matches!(error_of(&["one", "one"]), FrameError::Nodes(_)));
+    }
+}

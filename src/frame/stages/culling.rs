@@ -535,8 +535,82 @@ impl PassTriangles {
 #[cfg(test)]
 mod tests {
     use drawloom_signal::{ControllerBounds, Signal, check_controller};
+    use glam::DVec3;
 
     use super::*;
+    use crate::process::{ClearColor, CommandDraws, Declare, Format, RenderProcess};
+    use crate::scene::Camera;
+
+    /// Draws objects after another process.
+    struct Drawing {
+        name: String,
+        follows: Option<String>,
+        declares: fn(&mut Declare),
+    }
+
+    impl RenderProcess for Drawing {
+        fn name(&self) -> &str {
+            &self.name
+        }
+
+        fn declare(&self, declare: &mut Declare) {
+            (self.declares)(declare);
+            self.follows.iter().for_each(|before| declare.after(before));
+            declare.keep();
+        }
+
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws::default())
+        }
+    }
+
+    /// How many of the processes that declare this, one after the other, draw what may occlude; `None` if no object of
+    /// their view may be removed.
+    fn occluding(declares: &[fn(&mut Declare)]) -> Option<usize> {
+        let name = |index: usize| format!("process {index}");
+        let process = |(index, declares): (usize, &fn(&mut Declare))| {
+            let follows = index.checked_sub(1).map(name);
+            Arc::new(Drawing { name: name(index), follows, declares: *declares }) as Arc<dyn RenderProcess>
+        };
+        let plan = FramePlan::new(declares.iter().enumerate().map(process).collect(), &[]).unwrap();
+        let view = RenderView::new(&Camera::looking_at("main", DVec3::Z, DVec3::ZERO));
+        let passes = plan.passes(std::slice::from_ref(&view)).unwrap().passes;
+        occluders(&plan, &plan.draws().unwrap(), &passes, (0, &view)).map(|occluders| occluders.len())
+    }
+
+    fn clears_depth(declare: &mut Declare) {
+        declare.clears_depth("depth", Format::Depth32Float);
+    }
+
+    fn clears_color(declare: &mut Declare, target: &str) {
+        declare.clears_color(target, Format::Rgba8Unorm, ClearColor::Background);
+    }
+
+    #[test]
+    fn occluders_are_drawn_before_all_else_into_the_same_targets() {
+        let colored = |declare: &mut Declare| {
+            clears_depth(declare);
+            clears_color(declare, "color");
+        };
+        let more = |declare: &mut Declare| {
+            declare.draws_depth("depth");
+            declare.draws_over("color");
+        };
+        let elsewhere = |declare: &mut Declare| {
+            declare.draws_depth("depth");
+            clears_color(declare, "other color");
+        };
+        let depth_alone = |declare: &mut Declare| declare.draws_depth("depth");
+        let tests = |declare: &mut Declare| {
+            declare.tests_depth("depth");
+            clears_color(declare, "tested color");
+        };
+        assert_eq!(occluding(&[colored, more, tests]), Some(2));
+        assert_eq!(occluding(&[clears_depth, elsewhere, depth_alone]), Some(3), "depth alone has no colour target");
+        assert_eq!(occluding(&[colored, elsewhere]), None, "other targets");
+        assert_eq!(occluding(&[clears_depth, tests, depth_alone]), None, "an object is tested before all are drawn");
+        assert_eq!(occluding(&[colored, clears_depth]), None, "the depth is cleared again");
+    }
 
     fn control() -> OcclusionControl {
         OcclusionControl::with_occluders(Some(Vec::new()))

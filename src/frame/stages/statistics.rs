@@ -293,3 +293,91 @@ impl Warnings {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use tracing::span::{Attributes, Id, Record};
+    use tracing::subscriber::NoSubscriber;
+    use tracing::{Dispatch, Event, Metadata, Subscriber};
+
+    use super::*;
+
+    #[test]
+    fn the_total_of_a_frame_is_that_of_all_groups_of_stages() {
+        let [visibility, fill, sort, instance, record, nodes, submit] =
+            [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000].map(Duration::from_nanos);
+        let times = StageTimes { visibility, fill, sort, instance, record, nodes, submit };
+        assert_eq!(times.total(), Duration::from_nanos(1_111_111));
+    }
+
+    /// Counts events.
+    struct Counter(Arc<AtomicUsize>);
+
+    impl Subscriber for Counter {
+        fn enabled(&self, _: &Metadata<'_>) -> bool {
+            true
+        }
+
+        fn new_span(&self, _: &Attributes<'_>) -> Id {
+            Id::from_u64(1)
+        }
+
+        fn record(&self, _: &Id, _: &Record<'_>) {}
+
+        fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+        fn event(&self, _: &Event<'_>) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+
+        fn enter(&self, _: &Id) {}
+
+        fn exit(&self, _: &Id) {}
+    }
+
+    #[test]
+    fn an_issue_is_reported_when_it_changes_and_not_because_a_frame_sees_a_part_of_it() {
+        use IssueReason::{CoarseEdges, UndrawableMesh, UnknownObject};
+        // With a single subscriber, the first thread to reach an event would decide for all whether it is wanted.
+        let _second = Dispatch::new(NoSubscriber::default());
+        let events = Arc::new(AtomicUsize::new(0));
+        let subscriber = Dispatch::new(Counter(Arc::clone(&events)));
+        let mut warnings = Warnings::default();
+        let first = Cell::new(0);
+        let mut warned = |issues: &[(IssueReason, usize)], has_cached_views| {
+            let issues: Vec<_> = issues
+                .iter()
+                .map(|&(reason, count)| SceneIssue { reason, count, first: first.get(), name: None })
+                .collect();
+            tracing::dispatcher::with_default(&subscriber, || warnings.report(&issues, has_cached_views));
+            events.swap(0, Ordering::Relaxed)
+        };
+        let (all, with_cached_views) = (false, true);
+        assert_eq!(warned(&[(CoarseEdges, 5)], all), 1);
+        assert_eq!(warned(&[(CoarseEdges, 5)], all), 0, "it is known");
+        assert_eq!(warned(&[(CoarseEdges, 3)], with_cached_views), 0, "a part of it");
+        assert_eq!(warned(&[], with_cached_views), 0);
+        assert_eq!(warned(&[(CoarseEdges, 5)], all), 0, "it was there all the time");
+        assert_eq!(warned(&[(CoarseEdges, 6)], with_cached_views), 1, "more than were known");
+        assert_eq!(warned(&[(CoarseEdges, 6)], with_cached_views), 0, "they are known now");
+        first.set(3);
+        assert_eq!(warned(&[(CoarseEdges, 6)], with_cached_views), 0, "as many others");
+        assert_eq!(warned(&[(CoarseEdges, 6)], all), 0, "these are known too");
+        first.set(0);
+        assert_eq!(warned(&[(CoarseEdges, 4)], all), 1, "fewer, as all views are drawn");
+        assert_eq!(warned(&[(CoarseEdges, 4), (UndrawableMesh, 2)], with_cached_views), 1, "another reason");
+        assert_eq!(warned(&[(UndrawableMesh, 1)], with_cached_views), 0);
+        assert_eq!(warned(&[(CoarseEdges, 4), (UndrawableMesh, 2)], all), 0);
+        assert_eq!(
+            warned(&[(CoarseEdges, 4), (UndrawableMesh, 2), (UnknownObject, 1)], all),
+            1,
+            "a reason of all frames"
+        );
+        assert_eq!(warned(&[(CoarseEdges, 4), (UndrawableMesh, 2)], all), 0);
+        assert_eq!(warned(&[(CoarseEdges, 4), (UndrawableMesh, 2), (UnknownObject, 1)], all), 1, "it is back");
+    }
+}

@@ -235,9 +235,8 @@ impl ViewCost {
             return;
         }
         self.expected = None;
-        if let (Some((level, cost)), Some(measured)) = (self.reference.take(), self.estimate.get())
-            && cost > 0.0
-        {
+        // No cost is 0, as no sample is.
+        if let (Some((level, cost)), Some(measured)) = (self.reference.take(), self.estimate.get()) {
             let share = (self.share(level) * measured / cost).clamp(SHARES[0], SHARES[1]);
             self.shares[self.first_alike[self.measured_on]] = share;
         }
@@ -266,5 +265,105 @@ impl ViewCost {
         let settled = self.estimate.get().filter(|_| self.estimate.is_settled() && is_comparable);
         self.reference = settled.map(|cost| (self.measured_on, cost));
         (self.estimate, self.expected, self.measured_on) = (Estimate::default(), None, level);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    const WORSE: ViewVariant = ViewVariant { interval: 2, size: 0.5, level_of_detail_scale: 3.0, max_cameras: 4 };
+
+    #[test]
+    fn a_quality_level_is_named_after_what_makes_it_worse() {
+        let names = [QualityLevel::BEST, QualityLevel::Drawn(WORSE), QualityLevel::LeftOut].map(QualityLevel::name);
+        let worse = "every 2 frames, 50% of the size, meshes coarser by 3, 4 cameras";
+        assert_eq!(names, ["at its best", worse, "left out"]);
+    }
+
+    #[test]
+    fn what_a_camera_costs_depends_on_its_size_and_its_meshes() {
+        let [best, worse] = [QualityLevel::BEST, QualityLevel::Drawn(WORSE)];
+        assert_eq!([best, worse, QualityLevel::LeftOut].map(QualityLevel::expected_share), [1.0, 0.25, 0.0]);
+        let like = |variant| worse.draws_like(QualityLevel::Drawn(variant));
+        assert!(like(ViewVariant { interval: 7, max_cameras: 1, ..WORSE }));
+        assert!(
+            !like(ViewVariant { size: 0.75, ..WORSE }) && !like(ViewVariant { level_of_detail_scale: 2.0, ..WORSE })
+        );
+        assert!(!worse.draws_like(QualityLevel::LeftOut));
+    }
+
+    #[test]
+    fn an_interval_of_0_frames_stays_an_error() {
+        let redrawn = |redraw| {
+            let camera = Camera { redraw, ..Camera::looking_at("main", DVec3::Z, DVec3::ZERO) };
+            QualityLevel::Drawn(WORSE).cameras(&[camera]).next().unwrap().redraw
+        };
+        assert_eq!(redrawn(Redraw::Interval(0)), Redraw::Interval(0));
+        assert_eq!([1, 5].map(|interval| redrawn(Redraw::Interval(interval))), [2, 5].map(Redraw::Interval));
+        assert_eq!(redrawn(Redraw::EveryFrame), Redraw::Interval(2));
+    }
+
+    const LEVELS: [QualityLevel; 3] = [QualityLevel::BEST, QualityLevel::Drawn(SMALL), QualityLevel::LeftOut];
+    const SMALL: ViewVariant = ViewVariant { size: 0.5, ..ViewVariant::BEST };
+
+    fn add(cost: &mut ViewCost, milliseconds: f32, samples: u32) {
+        (0..samples).for_each(|_| cost.add(milliseconds * 1e6));
+    }
+
+    /// What a camera costs on each of the quality levels.
+    fn milliseconds(cost: &ViewCost) -> [Option<f64>; 3] {
+        std::array::from_fn(|level| cost.on(level).map(|nanoseconds| f64::from(nanoseconds.round()) / 1e6))
+    }
+
+    #[test]
+    fn a_share_is_what_was_measured_compared_with_the_quality_level_before() {
+        let mut cost = ViewCost::new(&LEVELS);
+        assert_eq!(milliseconds(&cost), [None; 3]);
+        add(&mut cost, 8.0, 3);
+        assert_eq!(milliseconds(&cost), [Some(8.0), Some(2.0), Some(0.0)], "a quarter of the pixels");
+        cost.move_to(1, &LEVELS);
+        add(&mut cost, 6.0, 2);
+        assert_eq!(milliseconds(&cost), [Some(8.0), Some(2.0), Some(0.0)], "not settled");
+        add(&mut cost, 6.0, 1);
+        assert_eq!(milliseconds(&cost), [Some(8.0), Some(6.0), Some(0.0)]);
+        // Back up, compared with a quality level whose share is not 1.
+        cost.move_to(0, &LEVELS);
+        add(&mut cost, 12.0, 3);
+        assert_eq!(milliseconds(&cost), [Some(12.0), Some(6.0), Some(0.0)]);
+    }
+
+    #[test]
+    fn nothing_is_compared_with_a_cost_that_is_not_settled() {
+        let mut cost = ViewCost::new(&LEVELS);
+        add(&mut cost, 8.0, 1);
+        cost.move_to(1, &LEVELS);
+        add(&mut cost, 6.0, 3);
+        assert_eq!(milliseconds(&cost), [Some(24.0), Some(6.0), Some(0.0)], "as the pixels are");
+    }
+
+    #[test]
+    fn a_trial_is_compared_with_the_quality_level_before_unless_the_view_was_left_out() {
+        let settled_on = |level| {
+            let mut cost = ViewCost::new(&LEVELS);
+            cost.move_to(level, &LEVELS);
+            add(&mut cost, 8.0, 3);
+            cost
+        };
+        let measured = |mut cost: ViewCost, level, was_left_out| {
+            cost.measure_on(level, was_left_out);
+            assert_eq!(milliseconds(&cost), [None; 3], "nothing is expected of it");
+            add(&mut cost, 6.0, 3);
+            milliseconds(&cost)
+        };
+        assert_eq!(measured(settled_on(0), 1, false), [Some(8.0), Some(6.0), Some(0.0)]);
+        assert_eq!(measured(settled_on(0), 1, true), [Some(24.0), Some(6.0), Some(0.0)]);
+        // The same quality level has cost 8 ms, which says nothing about others.
+        assert_eq!(measured(settled_on(1), 1, false), [Some(24.0), Some(6.0), Some(0.0)]);
+        let mut unsettled = ViewCost::new(&LEVELS);
+        add(&mut unsettled, 8.0, 1);
+        assert_eq!(measured(unsettled, 1, false), [Some(24.0), Some(6.0), Some(0.0)]);
     }
 }

@@ -320,3 +320,17 @@ fn rank_of_first_reached(light: &Light, views: &[RenderView], owners: &MapOwners
     }
     first
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_cached_map_covers_a_range_that_is_an_eighth_larger() {
+        let map = |far| RenderView::new(&Camera { far, ..Camera::looking_at("map", DVec3::Z, DVec3::ZERO) });
+        let covered = [80.0, 90.0, 90.1].map(|far| covers(&map(80.0), &map(far)));
+        assert_eq!(covered, [true, true, false]);
+    }
+}

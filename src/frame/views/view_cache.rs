@@ -212,7 +212,7 @@ impl Turns {
         let place = of_light.map_or_else(|| self.count(interval), |(_, place)| place);
         self.latest_light = maps.map(|maps| (maps.light, place));
         let groups = u64::from(interval.min(Self::MAX_GROUPS));
-        let offset = (place + maps.map_or(0, |maps| maps.rank)) % groups * u64::from(interval) / groups;
+        let offset = (place + maps.map_or(0, |maps| maps.rank)) * u64::from(interval) / groups;
         (self.frame + offset).is_multiple_of(u64::from(interval))
     }
 
@@ -307,5 +307,48 @@ impl FrameOutcome {
         let before = std::mem::replace(&mut *self.state.lock(), state);
         // The earlier frames are not needed any more, which keeps the chains of frames short.
         drop(before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(earlier: &[&Arc<FrameOutcome>]) -> Arc<FrameOutcome> {
+        Arc::new(FrameOutcome::in_flight(earlier.iter().copied()))
+    }
+
+    /// The number of frames that it waits for.
+    fn pending(frame: &FrameOutcome) -> usize {
+        match &*frame.state.lock() {
+            State::InFlight(pending) => pending.len(),
+            State::Submitted | State::Lost => 0,
+        }
+    }
+
+    #[test]
+    fn a_frame_relies_on_all_earlier_ones_that_are_not_submitted_once() {
+        let [one, other] = [frame(&[]), frame(&[])];
+        let third = frame(&[&one, &other, &one]);
+        assert_eq!(pending(&third), 2);
+        let fourth = frame(&[&third, &one]);
+        assert_eq!(pending(&fourth), 3);
+        one.submit();
+        assert_eq!(pending(&frame(&[&third, &one])), 2, "the third and the other");
+        assert!(!third.is_lost() && !fourth.is_lost());
+        other.lose();
+        assert!(other.is_lost() && third.is_lost() && fourth.is_lost() && !one.is_lost());
+    }
+
+    #[test]
+    fn a_frame_misses_a_view_until_the_frame_that_draws_it_is_submitted() {
+        let [one, other] = [frame(&[]), frame(&[])];
+        let kept = vec![(3, Arc::clone(&one)), (5, Arc::clone(&other))];
+        let in_flight = InFlight { outcome: None, lost: Arc::default(), kept };
+        assert_eq!(in_flight.missing_view(), Some(3));
+        one.submit();
+        assert_eq!(in_flight.missing_view(), Some(5));
+        other.submit();
+        assert_eq!(in_flight.missing_view(), None);
     }
 }

@@ -495,3 +495,187 @@ fn bytes_of_process<'a>(
 
 /// What a view takes in the buffer of views.
 const GPU_VIEW_BYTES: usize = size_of::<GpuView>().next_multiple_of(ALIGNMENT);
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::backend::SceneLimits;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::resources::MaterialCache;
+    use crate::process::{CommandDraws, Declare, Format, FramePlan, RenderProcess, SampledViews};
+    use crate::quality::Quality;
+    use crate::scene::{Camera, Light, Material, Mesh, RenderObject, Scene, Topology, Vertex};
+    use crate::view::{LightTable, ObjectTable, RenderView, SceneIssues, ViewRegistry};
+
+    /// Draws objects into a depth target of its own.
+    struct Depth(&'static str);
+
+    impl RenderProcess for Depth {
+        fn name(&self) -> &str {
+            self.0
+        }
+
+        fn declare(&self, declare: &mut Declare) {
+            declare.clears_depth(self.0, Format::Depth32Float);
+            declare.keep();
+        }
+
+        fn draws(&self) -> Draws<'_> {
+            Draws::Commands(CommandDraws::default())
+        }
+    }
+
+    /// What a frame asks for.
+    #[derive(Clone, Copy)]
+    struct Asked {
+        views: usize,
+        /// Those that reach the first view.
+        lights: usize,
+        /// The passes, of at most two in each view.
+        passes: usize,
+        objects: usize,
+        limits: SceneLimits,
+    }
+
+    const ASKED: Asked = Asked { views: 1, lights: 0, passes: 1, objects: 10, limits: SceneLimits::NONE };
+
+    /// What frames have in common: their plan, and their views.
+    struct Frames {
+        plan: FramePlan,
+        registry: ViewRegistry,
+    }
+
+    fn frames() -> Frames {
+        let plan = FramePlan::new(vec![Arc::new(Depth("one")), Arc::new(Depth("other"))], &[]).unwrap();
+        Frames { plan, registry: ViewRegistry::default() }
+    }
+
+    /// Calls `begin` with the request for a frame, whose draw lists have 1,000 objects at most.
+    fn with_request<R>(
+        Frames { plan, registry }: &mut Frames,
+        asked: Asked,
+        begin: impl FnOnce(&FrameRequest<'_>) -> R,
+    ) -> R {
+        let mut scene = Scene::new();
+        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+        let mesh = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2]).unwrap();
+        let (mesh, material) = (scene.add(mesh).unwrap(), scene.add(Material::default()).unwrap());
+        for _ in 0..asked.objects {
+            scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO)).unwrap();
+        }
+        let camera = |index: usize| Camera::looking_at(format!("view {index}"), DVec3::Z * 9.0, DVec3::ZERO);
+        let mut views: Vec<_> = (0..asked.views).map(|index| RenderView::new(&camera(index))).collect();
+        registry.begin_frame(&mut views);
+        registry.end_frame();
+        let (position, intensity) = (DVec3::ZERO, Vec3::ONE);
+        let light = Light::Point { position, intensity, range: 1.0, casts_shadow: false };
+        let lights = vec![light; asked.lights];
+        let mut light_tables: Vec<_> = views.iter().map(|_| LightTable::default()).collect();
+        light_tables[0].fill(&views[0], &lights, &views, false);
+        let passes = plan.passes(&views).unwrap().passes;
+        let mut objects = ObjectTable::default();
+        objects.update(&scene.as_scene_ref());
+        begin(&FrameRequest {
+            plan,
+            draws: &plan.draws().unwrap(),
+            views: &views,
+            lights: &lights,
+            light_tables: &light_tables,
+            passes: &passes[..asked.passes],
+            sampled_views: &SampledViews::default(),
+            scene: &scene.as_scene_ref(),
+            items: &[],
+            items_of_process: &[],
+            objects: &objects,
+            list_capacity: 1_000,
+            generated: &[],
+            records_bundles: false,
+            workers: 1,
+            quality: &Quality::balanced(),
+            limits: asked.limits,
+            scene_issues: &SceneIssues::default(),
+        })
+    }
+
+    #[test]
+    fn a_pass_is_bound_again_when_several_buffers_are_replaced_at_once() {
+        let (device, queue) = noop_device();
+        let (uploads, layouts) = (CountedQueue::new(queue), BindGroupLayouts::new(&device));
+        // The lights of the first view leave room for those of eight others.
+        let many_lights = Asked { lights: 1_000, ..ASKED };
+        for (before, after) in [
+            // The lists, and the views.
+            (many_lights, Asked { views: 9, passes: 18, ..many_lights }),
+            // The objects, and the lists.
+            (ASKED, Asked { passes: 2, objects: 1_000, ..ASKED }),
+        ] {
+            let (mut cache, mut frames) = (MaterialCache::default(), frames());
+            let mut buffers = Arc::new(BufferPool::new(false)).take(&device).unwrap();
+            let mut bound = |asked| {
+                with_request(&mut frames, asked, |request| {
+                    let (limits, assets) = ((SceneLimits::NONE, request.scene_issues), request.scene.assets);
+                    cache.begin_frame(&device, &uploads, assets, false).unwrap();
+                    let materials = cache.snapshot(&device, assets, &[], limits);
+                    buffers.begin(&device, &uploads, &layouts, &materials, request).unwrap();
+                    let of_first_view = buffers.passes().iter().find(|state| state.pass.view_index == 0).unwrap();
+                    (of_first_view.frame_ranges.clone(), of_first_view.frame_bind_group.clone())
+                })
+            };
+            let first = bound(before);
+            assert!(bound(before) == first, "nothing changed");
+            let second = bound(after);
+            assert!(second.0 == first.0, "the ranges are the same: {:?} {:?}", first.0, second.0);
+            assert!(second.1 != first.1, "but not the buffers");
+        }
+    }
+
+    #[test]
+    fn lights_have_headroom_if_a_buffer_holds_it() {
+        let exact = with_request(&mut frames(), Asked { lights: 100, ..ASKED }, |request| {
+            size_of_val(request.light_tables[0].gpu_lights()).next_multiple_of(ALIGNMENT)
+        });
+        let roomy = (exact + exact / 4).next_multiple_of(ALIGNMENT);
+        for (buffer_bytes, expected) in [(u64::MAX, roomy), (roomy as u64, roomy), (roomy as u64 - 1, exact)] {
+            let limits = SceneLimits { buffer_bytes, ..SceneLimits::NONE };
+            let asked = Asked { lights: 100, limits, ..ASKED };
+            let mut buffers = Buffers::new(false);
+            with_request(&mut frames(), asked, |request| buffers.set_views(request).unwrap());
+            assert_eq!(buffers.view_ranges[0].lights.len(), expected, "in a buffer of {buffer_bytes} bytes");
+        }
+    }
+
+    #[test]
+    fn lists_move_together_only_if_one_buffer_does_not_hold_them() {
+        for (max, expected) in [(u64::MAX, 5), (5, 5), (4, 3)] {
+            let mut buffers = Buffers::new(false);
+            for object_list in [0..1, 1..2, 4..5] {
+                let mut pass = WgpuPassState::default();
+                (pass.draws_commands, pass.object_list) = (true, object_list);
+                buffers.passes.push(pass);
+            }
+            assert_eq!(buffers.allot_object_lists(max), expected, "of at most {max}");
+        }
+    }
+
+    #[test]
+    fn buffers_that_are_in_flight_when_the_pool_is_cleared_do_not_return() {
+        let (device, _) = noop_device();
+        let pool = Arc::new(BufferPool::new(false));
+        let free = || pool.free.lock().buffers.len();
+        drop(pool.take(&device).unwrap());
+        assert_eq!(free(), 1);
+        pool.clear();
+        assert_eq!(free(), 0);
+        for _ in 0..2 {
+            let in_flight = pool.take(&device).unwrap();
+            pool.clear();
+            drop(in_flight);
+            assert_eq!(free(), 0);
+        }
+        drop(pool.take(&device).unwrap());
+        assert_eq!(free(), 1);
+    }
+}

@@ -424,8 +424,11 @@ fn new_buffer() -> GrowingBuffer {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
-    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::noop_device::{noop_device, noop_device_with};
+    use crate::scene::{Material, Mesh, ObjectColumn, RenderObject, Scene, Topology, Vertex};
 
     fn submit(buffer: &ObjectBuffer, queue: &wgpu::Queue) {
         buffer.unmap();
@@ -487,5 +490,124 @@ mod tests {
         submit(&buffer, &queue);
         buffer.map(&device).unwrap();
         assert!(buffer.is_ready() && !can_write(&buffer, 0..64));
+    }
+
+    const NUMBER: ObjectColumn<u32> = ObjectColumn::new("number");
+
+    #[test]
+    fn there_is_a_buffer_for_the_objects_and_one_for_each_column() {
+        const LIMIT: u64 = 10_000;
+        let (device, _) =
+            noop_device_with(wgpu::Limits { max_storage_buffer_binding_size: LIMIT + 2, ..wgpu::Limits::default() });
+        let columns = [NUMBER.layout()];
+        let mut buffers = ObjectBuffers::new(false);
+        assert!(buffers.reserve(&device, &columns, 10).unwrap(), "both are new");
+        assert!(!buffers.reserve(&device, &columns, 10).unwrap());
+        assert_eq!(buffers.sizes().count(), 2);
+        let max = LIMIT as usize / size_of::<GpuObject>();
+        assert!(buffers.reserve(&device, &columns, max).unwrap());
+        // With headroom it is larger than what a shader can bind.
+        let bound = buffers.gpu_objects().and_then(|binding| binding.size).map(NonZeroU64::get);
+        assert!(buffers.gpu_objects.on_device.size() > LIMIT && bound == Some(LIMIT), "{bound:?}");
+        assert!(matches!(buffers.reserve(&device, &columns, max + 1), Err(BackendError::Limit { .. })));
+    }
+
+    #[test]
+    fn all_buffers_are_mapped_when_the_device_is_done_with_them() {
+        let (device, queue) = noop_device();
+        let mut buffers = ObjectBuffers::new(true);
+        buffers.reserve(&device, &[NUMBER.layout()], 10).unwrap();
+        assert!(!buffers.are_ready());
+        buffers.unmap();
+        queue.submit([]);
+        buffers.await_submission(&queue);
+        poll(&device, wgpu::PollType::Poll).unwrap();
+        assert!(buffers.are_ready());
+        buffers.map(&device).unwrap();
+        assert!(buffers.all().count() == 2 && buffers.all().all(ObjectBuffer::is_mapped));
+    }
+
+    /// The bytes of a buffer.
+    fn read(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u8> {
+        let copy = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: buffer.size(),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+        queue.submit([encoder.finish()]);
+        copy.map_async(wgpu::MapMode::Read, .., |_| ());
+        poll(device, wgpu::PollType::Poll).unwrap();
+        copy.get_mapped_range(..).unwrap().to_vec()
+    }
+
+    /// Two blocks and a part of a third one, which are written one after the other. The column's values are so large
+    /// that a block takes several staged writes.
+    #[test]
+    fn each_block_is_written_to_its_place() {
+        const LARGE: ObjectColumn<[u32; 2048]> = ObjectColumn::new("large");
+        const OBJECTS: usize = 2 * ObjectTable::BLOCK_SIZE + 10;
+        use wgpu::BufferUsages;
+        let mut scene = Scene::new();
+        let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vertices = vertices.map(|position| Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2] });
+        let mesh = Mesh::new("triangle", Topology::TriangleList, vertices.to_vec(), vec![0, 1, 2]).unwrap();
+        let (mesh, material) = (scene.add(mesh).unwrap(), scene.add(Material::default()).unwrap());
+        for object in 0..OBJECTS {
+            scene.add_object(RenderObject::new(mesh, material, DVec3::X * object as f64)).unwrap();
+        }
+        let values: Vec<_> = (0..OBJECTS as u32).map(|object| [object + 1; 2048]).collect();
+        let columns = [LARGE.values(&values)];
+        let scene = SceneRef { columns: &columns, ..scene.as_scene_ref() };
+        let mut objects = ObjectTable::default();
+        objects.begin_frame(&scene);
+        objects.describe(&scene, 0..objects.changed_block_count());
+        objects.finish();
+        let (device, queue) = noop_device();
+        for maps_memory in [false, true] {
+            let mut buffers = ObjectBuffers::new(maps_memory);
+            buffers.reserve(&device, &[LARGE.layout()], OBJECTS).unwrap();
+            let mapped = if maps_memory { BufferUsages::MAP_WRITE } else { BufferUsages::empty() };
+            for buffer in buffers.all_mut() {
+                let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | mapped;
+                buffer.on_device = GrowingBuffer::new("objects", usage);
+            }
+            buffers.reserve(&device, &[LARGE.layout()], OBJECTS).unwrap();
+            if maps_memory {
+                buffers.unmap();
+                queue.submit([]);
+                buffers.await_submission(&queue);
+                poll(&device, wgpu::PollType::Poll).unwrap();
+                buffers.map(&device).unwrap();
+            }
+            let uploads = CountedQueue::new(queue.clone());
+            for block in [1, 2, 0] {
+                // Another job may write its own block meanwhile.
+                let other = (block > 0).then(|| buffers.columns[0].1.mapped(0..8).unwrap());
+                buffers.write(&uploads, &objects, &scene, block..block + 1, 0).unwrap();
+                drop(other);
+            }
+            assert_eq!(uploads.bytes() as usize, OBJECTS * (size_of::<GpuObject>() + LARGE.layout().stride));
+            buffers.unmap();
+            let written = buffers.all().map(|buffer| read(&device, &queue, buffer.on_device.buffer().unwrap()));
+            let [gpu_objects, large] = &written.collect::<Vec<_>>()[..] else { panic!() };
+            let mut expected = Vec::new();
+            for_each_part(&objects, 0..OBJECTS, &mut |_, bytes| expected.extend_from_slice(bytes));
+            assert!(gpu_objects[..expected.len()] == expected, "maps memory: {maps_memory}");
+            let expected: &[u8] = bytemuck::cast_slice(&values);
+            assert!(large[..expected.len()] == *expected, "maps memory: {maps_memory}");
+        }
+    }
+
+    #[test]
+    fn lists_have_room_for_all_objects_and_do_not_overlap() {
+        let (device, _) = noop_device();
+        let mut lists = ObjectLists::new();
+        assert!(lists.reserve(&device, 3, 1000, SceneLimits::NONE).unwrap());
+        let [first, second] = [0..1, 1..2].map(|list| lists.bytes_of(&list));
+        assert!(first.len() >= 4000 && first.end <= second.start && second.len() >= 4000, "{first:?} {second:?}");
+        assert!(lists.sizes().sum::<u64>() >= 12_000);
     }
 }

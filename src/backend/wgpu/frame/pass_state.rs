@@ -509,3 +509,94 @@ pub struct WgpuPassStatistics {
     /// The number of cached bundles that it replays.
     pub replayed_bundles: usize,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::wgpu::noop_device::noop_device;
+    use crate::backend::wgpu::pipelines::SharedPipelines;
+    use crate::backend::wgpu::resources::BindGroupLayouts;
+    use crate::command::{Cull, DrawState};
+    use crate::process::{GeometryBuffer, GeometryFormats};
+    use crate::quality::Quality;
+    use crate::scene::{Blend, Topology};
+
+    fn pipelines(device: &wgpu::Device) -> Arc<ProcessPipelines> {
+        let process = Arc::new(GeometryBuffer::new(GeometryFormats::default()));
+        let plan = FramePlan::new(vec![process], &["diffuse".to_owned()]).unwrap();
+        let draws = plan.draws().unwrap();
+        let (layouts, shared, quality) =
+            (BindGroupLayouts::new(device), SharedPipelines::new(false), Quality::balanced());
+        let planned = &plan.processes()[0];
+        Arc::new(ProcessPipelines::new(device, (&shared, &layouts), &plan, planned, &draws[0], &quality).unwrap())
+    }
+
+    fn bind_group(device: &wgpu::Device) -> wgpu::BindGroup {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &[] });
+        device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &[] })
+    }
+
+    fn key(device: &wgpu::Device) -> BundleKey {
+        BundleKey {
+            frame_bind_group: bind_group(device),
+            materials_bind_group: bind_group(device),
+            process_bind_group: None,
+            engine_bind_group: None,
+            meshes: 1,
+            pipelines: pipelines(device),
+            clamps_depth: false,
+        }
+    }
+
+    fn batch(mesh: u32, subdivision_level: u32) -> Batch {
+        let state = DrawState::new(Topology::TriangleList, Cull::Back, Blend::None);
+        Batch { mesh, state: state.with_subdivision_level(subdivision_level), first: 0, count: 1 }
+    }
+
+    fn bundle(device: &wgpu::Device) -> wgpu::RenderBundle {
+        let descriptor = wgpu::RenderBundleEncoderDescriptor {
+            color_formats: &[Some(wgpu::TextureFormat::Rgba8Unorm)],
+            sample_count: 1,
+            ..wgpu::RenderBundleEncoderDescriptor::default()
+        };
+        device.create_render_bundle_encoder(&descriptor).finish(&wgpu::RenderBundleDescriptor::default())
+    }
+
+    #[test]
+    fn bundles_are_replayed_only_with_all_of_their_inputs() {
+        let (device, _) = noop_device();
+        let key = key(&device);
+        let others = [
+            BundleKey { frame_bind_group: bind_group(&device), ..key.clone() },
+            BundleKey { materials_bind_group: bind_group(&device), ..key.clone() },
+            BundleKey { process_bind_group: Some(bind_group(&device)), ..key.clone() },
+            BundleKey { engine_bind_group: Some(bind_group(&device)), ..key.clone() },
+            BundleKey { meshes: 2, ..key.clone() },
+            BundleKey { clamps_depth: true, ..key.clone() },
+            BundleKey { pipelines: pipelines(&device), ..key.clone() },
+        ];
+        assert!(key == key.clone());
+        let equal: Vec<_> = (0..others.len()).filter(|index| others[*index] == key).collect();
+        assert!(equal.is_empty(), "{equal:?}");
+    }
+
+    #[test]
+    fn a_bundle_is_replayed_with_the_batches_and_the_subdivided_meshes_that_it_draws() {
+        let (device, _) = noop_device();
+        let mut cache = BundleCache::default();
+        assert!(!cache.is_warm());
+        cache.begin_frame(key(&device));
+        cache.set_bundle_count(1);
+        let batches = [batch(1, 0), batch(2, 3)];
+        let subdivided = || SubdividedMeshes::from([((2, 0, 3), Arc::new(CachedSubdivision::without_geometry()))]);
+        let drawn = subdivided();
+        cache.insert(0, &batches, &drawn, bundle(&device));
+        assert!(cache.is_warm() && cache.get(0, &batches, &drawn).is_some());
+        assert!(cache.get(1, &batches, &drawn).is_none(), "there is no such bundle");
+        assert!(cache.get(0, &[batch(7, 0), batch(2, 3)], &drawn).is_none(), "another mesh");
+        assert!(cache.get(0, &batches, &subdivided()).is_none(), "the mesh was subdivided again");
+        assert!(cache.get(0, &batches, &SubdividedMeshes::new()).is_none());
+        cache.clear();
+        assert!(!cache.is_warm());
+    }
+}

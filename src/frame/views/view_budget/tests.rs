@@ -1,5 +1,6 @@
 //! The controller with costs of simulated frames.
 
+mod decisions;
 mod simulation;
 
 use fastrand::Rng;
