@@ -254,10 +254,13 @@ impl Engine {
         self.totals.losses += 1;
     }
 
-    /// Makes everything as it was at first, and waits for all frames.
+    /// Makes everything as it was at first, and waits for all frames. Another quality drops the stage graphs of the
+    /// latest worlds.
     pub fn rest(&mut self) {
         self.world.reset();
-        self.frames.renderer().set_quality(Quality::balanced()).unwrap();
+        for quality in [Quality::exact(), Quality::balanced()] {
+            self.frames.renderer().set_quality(quality).unwrap();
+        }
         self.frames.set_buffering(Buffering::Double);
         for _ in 0..150 {
             self.draw().unwrap();
