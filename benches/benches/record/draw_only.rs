@@ -4,12 +4,13 @@ use std::num::NonZeroU64;
 use std::ops::Range;
 
 use drawloom::glam::Mat4;
-use drawloom::scene::{Mesh, SceneRef};
+use drawloom::scene::SceneRef;
 use drawloom::wgpu;
 use drawloom::wgpu::util::{DeviceExt, RenderEncoder};
 
 use crate::fixture::Fixture;
-use crate::objects::{GpuObject, colors};
+use crate::geometry::Geometry;
+use crate::objects::{GpuObject, Sphere, colors};
 use crate::spheres::{LANES, SphereGroup};
 use crate::technique::Failure;
 use crate::threads::Threads;
@@ -18,10 +19,7 @@ use crate::threads::Threads;
 pub struct DrawOnly {
     pub fixture: Fixture,
     pipeline: wgpu::RenderPipeline,
-    vertices: wgpu::Buffer,
-    indices: wgpu::Buffer,
-    /// By slot.
-    meshes: Vec<MeshRange>,
+    geometry: Geometry,
     objects: wgpu::Buffer,
     cameras: Vec<CameraBuffers>,
     /// Bounding spheres of all objects.
@@ -47,12 +45,6 @@ struct CameraBuffers {
     group: wgpu::BindGroup,
 }
 
-struct MeshRange {
-    first_index: u32,
-    index_count: u32,
-    base_vertex: i32,
-}
-
 impl DrawOnly {
     /// An instance is an object.
     pub fn new(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
@@ -68,23 +60,12 @@ impl DrawOnly {
     /// `object_index` is the shader's function of that name.
     fn with_object_index(fixture: Fixture, scene: &SceneRef<'_>, object_index: &str, has_instances: bool) -> Self {
         let device = &fixture.device;
-        let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
-        for (_, mesh) in scene.assets.iter::<Mesh>() {
-            let (first_index, base_vertex) = (indices.len() as u32, vertices.len() as i32);
-            meshes.push(MeshRange { first_index, index_count: mesh.indices().len() as u32, base_vertex });
-            vertices.extend_from_slice(mesh.vertices());
-            indices.extend_from_slice(mesh.indices());
-        }
         let groups = vec![SphereGroup::EMPTY; scene.object_count().div_ceil(LANES)];
         let gpu_objects = vec![GpuObject::default(); groups.len() * LANES];
         let buffer = |usage: wgpu::BufferUsages, contents: &[u8]| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
         };
-        let (vertices, indices) = (
-            buffer(wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(&vertices)),
-            buffer(wgpu::BufferUsages::INDEX, bytemuck::cast_slice(&indices)),
-        );
         let objects = buffer(wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(&gpu_objects));
         let colors = buffer(wgpu::BufferUsages::STORAGE, bytemuck::cast_slice(&colors(scene)));
         let layout = layout(device, has_instances);
@@ -101,8 +82,9 @@ impl DrawOnly {
             CameraBuffers { clip_from_world, instances, group }
         };
         let cameras = scene.cameras.iter().map(camera).collect();
-        let pipeline = fixture.pipeline(&[&layout], &(include_str!("draw_only.wgsl").to_owned() + object_index));
-        Self { pipeline, vertices, indices, meshes, objects, cameras, groups, fixture }
+        let shader = include_str!("draw_only.wgsl").to_owned() + object_index;
+        let pipeline = fixture.pipeline(&[&layout], None, &shader);
+        Self { pipeline, geometry: Geometry::new(device, scene), objects, cameras, groups, fixture }
     }
 
     /// Computes all objects in the memory from which they are uploaded.
@@ -133,7 +115,7 @@ impl DrawOnly {
     }
 
     pub fn mesh_count(&self) -> usize {
-        self.meshes.len()
+        self.geometry.mesh_count()
     }
 
     /// Uploads a camera.
@@ -153,8 +135,7 @@ impl DrawOnly {
     pub fn set<'a>(&'a self, encoder: &mut impl RenderEncoder<'a>, camera: usize) {
         encoder.set_pipeline(&self.pipeline);
         encoder.set_bind_group(0, Some(&self.cameras[camera].group), &[]);
-        encoder.set_vertex_buffer(0, Some(self.vertices.slice(..)));
-        encoder.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        self.geometry.set(encoder);
     }
 
     pub fn draw<'a>(&self, encoder: &mut impl RenderEncoder<'a>, scene: &SceneRef<'_>, object: usize) {
@@ -164,8 +145,7 @@ impl DrawOnly {
 
     /// Draws some instances of the mesh in a slot.
     pub fn draw_mesh<'a>(&self, encoder: &mut impl RenderEncoder<'a>, mesh: usize, instances: Range<u32>) {
-        let MeshRange { first_index, index_count, base_vertex } = self.meshes[mesh];
-        encoder.draw_indexed(first_index..first_index + index_count, base_vertex, instances);
+        self.geometry.draw(encoder, mesh, instances);
     }
 }
 
@@ -176,7 +156,7 @@ impl Chunk<'_> {
             let mut gpu_objects = [GpuObject::default(); LANES];
             for (lane, object) in (first..scene.object_count()).take(LANES).enumerate() {
                 gpu_objects[lane] = GpuObject::new(scene, object);
-                group.set(lane, scene, object);
+                group.set(lane, &Sphere::new(scene, object));
             }
             let bytes = bytemuck::bytes_of(&gpu_objects).first_chunk();
             staged.write(*bytes.expect("a group has this many bytes"));

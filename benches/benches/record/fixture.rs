@@ -50,8 +50,13 @@ impl Fixture {
         Ok(Self { queue: backend.queue().clone(), pictures, device })
     }
 
-    /// A pipeline for the scene's vertex format.
-    pub fn pipeline(&self, layouts: &[&wgpu::BindGroupLayout], shader: &str) -> wgpu::RenderPipeline {
+    /// A pipeline for the scene's vertex format, and for a buffer of instances, if there is one.
+    pub fn pipeline(
+        &self,
+        layouts: &[&wgpu::BindGroupLayout],
+        instances: Option<wgpu::VertexBufferLayout<'_>>,
+        shader: &str,
+    ) -> wgpu::RenderPipeline {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
             source: wgpu::ShaderSource::Wgsl(shader.into()),
@@ -75,7 +80,7 @@ impl Fixture {
                 module: &module,
                 entry_point: Some("vertex"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[Some(vertices)],
+                buffers: &[Some(vertices), instances],
             },
             primitive: wgpu::PrimitiveState { cull_mode: Some(wgpu::Face::Back), ..wgpu::PrimitiveState::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
@@ -136,6 +141,17 @@ impl Fixture {
 
     pub fn encoder(&self) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// The layout of a bind group with one uniform.
+    pub fn uniform_layout(&self, has_dynamic_offset: bool, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayout {
+        let ty = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset,
+            min_binding_size: None,
+        };
+        let entries = &[wgpu::BindGroupLayoutEntry { binding: 0, visibility, ty, count: None }];
+        self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries })
     }
 
     /// Waits until the device is idle.

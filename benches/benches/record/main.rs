@@ -49,11 +49,13 @@ mod draw_only;
 mod encoders;
 mod extents;
 mod fixture;
+mod geometry;
 mod independent_threads;
 mod measure;
 mod naive;
 mod noop_backend;
 mod objects;
+mod own_draws;
 mod pictures;
 mod renderer;
 mod report;
@@ -128,6 +130,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     if backends.contains(&BackendName::Noop) {
         report.extents = extents::measure(&extent, &workers, &progress)?;
+        report.own_draws = own_draws::measure(&extent, &workers, &progress)?;
     }
     progress.finish_and_clear();
     report.print();

@@ -34,12 +34,12 @@ pub struct Naive {
 impl Naive {
     pub fn new(fixture: Fixture, scene: &SceneRef<'_>) -> Self {
         let device = &fixture.device;
-        let layout = |has_dynamic_offset, visibility| uniform_layout(device, has_dynamic_offset, visibility);
+        let layout = |has_dynamic_offset, visibility| fixture.uniform_layout(has_dynamic_offset, visibility);
         let camera_layout = layout(false, wgpu::ShaderStages::VERTEX);
         let material_layout = layout(false, wgpu::ShaderStages::FRAGMENT);
         let object_layout = layout(true, wgpu::ShaderStages::VERTEX);
-        let pipeline =
-            fixture.pipeline(&[&camera_layout, &material_layout, &object_layout], include_str!("naive.wgsl"));
+        let layouts = [&camera_layout, &material_layout, &object_layout];
+        let pipeline = fixture.pipeline(&layouts, None, include_str!("naive.wgsl"));
 
         let buffer = |usage: wgpu::BufferUsages, contents: &[u8]| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
@@ -123,15 +123,4 @@ impl Technique for Naive {
     fn picture(&mut self, camera: usize) -> Result<Vec<u8>, Failure> {
         self.fixture.read(camera)
     }
-}
-
-fn uniform_layout(
-    device: &wgpu::Device,
-    has_dynamic_offset: bool,
-    visibility: wgpu::ShaderStages,
-) -> wgpu::BindGroupLayout {
-    let ty =
-        wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, has_dynamic_offset, min_binding_size: None };
-    let entries = &[wgpu::BindGroupLayoutEntry { binding: 0, visibility, ty, count: None }];
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries })
 }

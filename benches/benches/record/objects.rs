@@ -10,7 +10,7 @@ use drawloom::view::internal::Frustum;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct GpuObject {
-    world_from_object: Mat4,
+    pub world_from_object: Mat4,
     material: u32,
     /// Pads to a multiple of 16 bytes.
     padding: [u32; 3],

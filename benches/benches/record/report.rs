@@ -15,6 +15,7 @@ use drawloom_output::print_line;
 use crate::Extent;
 use crate::extents::{self, ExtentRow};
 use crate::measure::Measured;
+use crate::own_draws::{self, OwnRow};
 use crate::technique::BY_MESH_SCENES;
 
 /// A technique on a number of workers.
@@ -48,6 +49,7 @@ pub struct Report {
     workers: Vec<usize>,
     pub measured: Vec<Measured>,
     pub extents: Vec<ExtentRow>,
+    pub own_draws: Vec<OwnRow>,
 }
 
 impl Report {
@@ -59,6 +61,7 @@ impl Report {
             workers: workers.to_vec(),
             measured: Vec::new(),
             extents: Vec::new(),
+            own_draws: Vec::new(),
         }
     }
 
@@ -88,6 +91,9 @@ impl Report {
         print_line!();
         if !self.extents.is_empty() {
             extents::print(&self.extents);
+        }
+        if !self.own_draws.is_empty() {
+            own_draws::print(&self.own_draws);
         }
     }
 
@@ -176,6 +182,7 @@ impl Report {
             1.3,
             per_object(extents::MOVING_MANY) / per_object(extents::MOVING_FEW),
         );
+        own_draws::add_targets(&self.own_draws, &self.workers, &mut targets);
         targets
     }
 
@@ -197,6 +204,7 @@ impl Report {
     pub fn write(&self) -> Result<(), Box<dyn Error>> {
         results::write_json("record.json", &self.rows().collect::<Vec<_>>())?;
         results::write_json("record_extents.json", &self.extents)?;
+        results::write_json("record_own_draws.json", &self.own_draws)?;
         let panel = |&backend: &BackendName| {
             let rows = self.rows().filter(|row| row.backend == backend);
             let mut bars: Vec<_> = rows.map(bar).collect();
@@ -221,6 +229,6 @@ fn bar(row: &Row) -> (String, f64, usize) {
     (format!("{technique}, {scene}, {}", threads.trim_end()), row.ns_per_object_view, color)
 }
 
-fn count(number: usize, noun: &str) -> String {
+pub fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

@@ -1,7 +1,7 @@
 //! Bounding spheres in f32, which the techniques on several threads cull eight at a time.
 
 use drawloom::glam::{Mat4, Vec4};
-use drawloom::scene::SceneRef;
+use multiversion::multiversion;
 
 use crate::objects::Sphere;
 
@@ -20,9 +20,8 @@ pub struct SphereGroup {
 impl SphereGroup {
     pub const EMPTY: Self = Self { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], radius: [-1.0; LANES] };
 
-    /// Sets the sphere of a lane to that of an object.
-    pub fn set(&mut self, lane: usize, scene: &SceneRef<'_>, object: usize) {
-        let Sphere { center, radius } = Sphere::new(scene, object);
+    /// Sets the sphere of a lane.
+    pub fn set(&mut self, lane: usize, &Sphere { center, radius }: &Sphere) {
         let [x, y, z] = center.as_vec3().to_array();
         (self.x[lane], self.y[lane], self.z[lane], self.radius[lane]) = (x, y, z, radius);
     }
@@ -67,4 +66,16 @@ pub fn visible_objects(groups: &[SphereGroup], first: usize, planes: &Planes) ->
             })
         })
     })
+}
+
+/// Appends the objects that a camera sees, of groups from the group `first` on, in their order.
+#[multiversion(targets("x86_64+avx2"))]
+pub fn append_visible(groups: &[SphereGroup], first: usize, planes: &Planes, visible: &mut Vec<u32>) {
+    for (index, group) in groups.iter().enumerate() {
+        let mut mask = group.visible(planes);
+        while mask != 0 {
+            visible.push(((first + index) * LANES) as u32 + mask.trailing_zeros());
+            mask &= mask - 1;
+        }
+    }
 }
