@@ -3,6 +3,7 @@
 
 use drawloom::scene::Camera;
 use drawloom::view::BoundingSphere;
+use drawloom::wgpu;
 
 use super::OwnTechnique;
 use super::commands::Commands;
@@ -86,6 +87,85 @@ impl OwnTechnique for Encoders {
         });
         commands.fixture.queue.submit(encoded);
         Ok(visible.iter().map(Vec::len).sum())
+    }
+
+    fn wait(&self) -> Result<(), Failure> {
+        self.commands.fixture.wait()
+    }
+
+    fn commands(&self) -> &Commands {
+        &self.commands
+    }
+}
+
+/// Bundles of 256 draws of a camera, each recorded on any thread, and an encoder for each camera, which executes them.
+pub struct Bundles {
+    commands: Commands,
+    sorted: SortedItems,
+    threads: Threads,
+    /// Whether a bundle is executed again, as long as it draws the same items.
+    keeps_bundles: bool,
+    /// By camera.
+    cameras: Vec<CameraBundles>,
+}
+
+/// The draws of a camera, and a bundle for each chunk of them.
+#[derive(Default)]
+struct CameraBundles {
+    visible: Vec<u32>,
+    bundles: Vec<Bundle>,
+}
+
+#[derive(Default)]
+struct Bundle {
+    items: Vec<u32>,
+    bundle: Option<wgpu::RenderBundle>,
+}
+
+/// Fewer draws make bundles costly, more leave threads without work at the end.
+const DRAWS_PER_BUNDLE: usize = 256;
+
+impl Bundles {
+    pub fn new(commands: Commands, world: &World, threads: &Threads, keeps_bundles: bool) -> Self {
+        let cameras = world.cameras().iter().map(|_| CameraBundles::default()).collect();
+        Self { commands, sorted: SortedItems::new(world), threads: threads.clone(), keeps_bundles, cameras }
+    }
+}
+
+impl OwnTechnique for Bundles {
+    fn frame(&mut self, world: &World) -> Result<usize, Failure> {
+        let Self { commands, sorted, threads, keeps_bundles, cameras } = self;
+        commands.upload(world);
+        if world.kind().moves_items() {
+            sorted.update(&world.bounds, threads);
+        }
+        let mut views: Vec<_> = world.cameras().iter().zip(cameras.iter_mut()).collect();
+        threads.for_each(&mut views, |(camera, own)| {
+            sorted.find_visible(camera, &mut own.visible);
+            own.bundles.resize_with(own.visible.len().div_ceil(DRAWS_PER_BUNDLE), Bundle::default);
+        });
+        let mut chunks = Vec::new();
+        for (camera, own) in cameras.iter_mut().enumerate() {
+            let own = own.visible.chunks(DRAWS_PER_BUNDLE).zip(&mut own.bundles);
+            chunks.extend(own.map(|(items, bundle)| (camera, items, bundle)));
+        }
+        threads.for_each(&mut chunks, |(camera, items, bundle)| {
+            if !*keeps_bundles || bundle.bundle.is_none() || bundle.items != *items {
+                let mut encoder = commands.fixture.bundle_encoder();
+                commands.record(&mut encoder, *camera, items);
+                bundle.bundle = Some(encoder.finish(&wgpu::RenderBundleDescriptor::default()));
+                items.clone_into(&mut bundle.items);
+            }
+        });
+        let mut views: Vec<_> = cameras.iter().enumerate().collect();
+        let encoded = threads.map(&mut views, |(index, own)| {
+            let mut encoder = commands.fixture.encoder();
+            let bundles = own.bundles.iter().filter_map(|bundle| bundle.bundle.as_ref());
+            commands.fixture.pass(&mut encoder, *index).execute_bundles(bundles);
+            encoder.finish()
+        });
+        commands.fixture.queue.submit(encoded);
+        Ok(cameras.iter().map(|own| own.visible.len()).sum())
     }
 
     fn wait(&self) -> Result<(), Failure> {
