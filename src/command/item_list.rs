@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
+use super::Version;
 use crate::bit_set::{BITS_PER_WORD, set_bits};
 
 /// The items that a pass draws, in draw order, and the bundles that divide them.
 ///
-/// An item's place in draw order is its rank. Ranks lie in blocks of 256, and blocks in groups of one size. A bundle has the visible items of blocks of one group
-/// that follow each other. So an item that comes into view, or leaves it, changes the bundles of its group alone.
+/// An item's place in draw order is its rank. Ranks lie in blocks of 256, and blocks in groups of one size. A bundle has
+/// the visible items of blocks of one group that follow each other. So an item that comes into view, or leaves it,
+/// changes the bundles of its group alone.
 #[derive(Clone, Debug, Default)]
 pub struct ItemList {
     items: Vec<u32>,
@@ -15,6 +17,11 @@ pub struct ItemList {
     /// The number of blocks in a group; 0 before the first frame.
     group: usize,
     slots: usize,
+    /// What it was made from, and the version that it has since; `None` if it is empty.
+    made_from: Option<(Version, usize)>,
+    version: Version,
+    /// The version of the keys and versions of all items that are lent.
+    pub(crate) contents_version: Version,
 }
 
 /// A bit for each rank of a block: whether the view sees the item.
@@ -70,26 +77,54 @@ impl ItemList {
         self.items.clear();
         self.bundles.clear();
         self.slots = 0;
+        self.made_from = None;
+    }
+
+    /// Equal versions are of equal bundles, whose items have equal keys and versions.
+    pub(crate) fn versions(&self) -> [Version; 2] {
+        [self.version, self.contents_version]
+    }
+
+    /// Makes it the list of the visible ones of these items, which are in a draw order of this version: see
+    /// [`fill`](Self::fill). If `has_same_bits`, it is kept, as long as the rest is the same too.
+    pub(crate) fn update(
+        &mut self,
+        (order, order_version): (&[u32], Version),
+        visible: impl Fn(usize) -> BlockBits,
+        per_bundle: usize,
+        has_same_bits: bool,
+        version: Version,
+    ) {
+        let made_from = Some((order_version, per_bundle));
+        if !has_same_bits || self.made_from != made_from {
+            self.fill(order, visible, per_bundle);
+            (self.made_from, self.version) = (made_from, version);
+        }
     }
 
     /// Makes it the list of the visible ones of these items, which are in draw order, with at most `per_bundle` items in
     /// a bundle. `visible` has a bit for each rank of a block.
-    pub(crate) fn fill(&mut self, order: &[u32], visible: impl Fn(usize) -> BlockBits, per_bundle: usize) {
+    fn fill(&mut self, order: &[u32], visible: impl Fn(usize) -> BlockBits, per_bundle: usize) {
         self.clear();
         let blocks = order.len().div_ceil(Self::BLOCK_SIZE);
-        let count_of = |block| visible(block).iter().map(|bits| bits.count_ones() as usize).sum::<usize>();
-        self.choose_group((0..blocks).map(count_of).sum(), blocks);
+        let count_of = |bits: BlockBits| bits.iter().map(|bits| bits.count_ones() as usize).sum::<usize>();
+        self.choose_group((0..blocks).map(|block| count_of(visible(block))).sum(), blocks);
         let (mut slot, mut start) = (0, 0);
-        for block in 0..blocks {
-            let before = self.items.len();
-            if block % self.group == 0 || before + count_of(block) - start > Self::ITEMS_PER_BUNDLE {
+        for (block, order) in order.chunks(Self::BLOCK_SIZE).enumerate() {
+            let (before, words) = (self.items.len(), visible(block));
+            let count = count_of(words);
+            if block % self.group == 0 || before + count - start > Self::ITEMS_PER_BUNDLE {
                 self.end_bundle(slot);
                 (slot, start) = (block, before);
             }
-            let first = block * Self::BLOCK_SIZE;
-            for (word, bits) in visible(block).into_iter().enumerate() {
-                self.items.extend(set_bits(bits).map(|bit| order[first + word * BITS_PER_WORD + bit]));
+            if count == order.len() {
+                self.items.extend_from_slice(order);
+                continue;
             }
+            self.items.resize(before + count, 0);
+            let bits = words.into_iter().enumerate();
+            let seen = bits.flat_map(|(word, bits)| set_bits(bits).map(move |bit| word * BITS_PER_WORD + bit));
+            self.items[before..].iter_mut().zip(seen).for_each(|(item, rank)| *item = order[rank]);
         }
         self.end_bundle(slot);
         self.slots = blocks;
@@ -106,10 +141,10 @@ impl ItemList {
         }
     }
 
-    /// Chooses the size of groups: the items that are seen of one fill half a bundle at least. A size stays until it is
-    /// wrong by a quarter.
+    /// Chooses the size of groups: the items that are seen of one fill a quarter of a bundle at least. Fewer make bundles
+    /// costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a quarter.
     fn choose_group(&mut self, count: usize, blocks: usize) {
-        let least = Self::ITEMS_PER_BUNDLE / 2;
+        let least = Self::ITEMS_PER_BUNDLE / 4;
         let smallest = |least: usize| {
             let is_suitable = |group: &usize| *group >= blocks || count * group >= least * blocks;
             (0..usize::BITS).map(|power| 1 << power).find(is_suitable).unwrap_or(1)

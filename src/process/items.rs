@@ -136,7 +136,7 @@ pub struct Items<'a> {
 
 impl<'a> Items<'a> {
     pub(crate) fn columns(&self) -> ItemColumns<'a> {
-        ItemColumns { bounds: self.bounds, layers: self.layers }
+        ItemColumns { keys: self.keys, bounds: self.bounds, layers: self.layers, versions: self.versions }
     }
 }
 

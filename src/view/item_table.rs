@@ -1,36 +1,47 @@
 //! The items of an engine's own in draw order, which all views of a frame share, and which of them a view sees.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use drawloom_jobs::internal::ChunkedArray;
 use parking_lot::RwLock;
 
 use super::{BoundingSphere, BoundingSpheres, Frustum, RenderView};
 use crate::bit_set::{BITS_PER_WORD, set_bits};
-use crate::command::{BlockBits, ItemList};
+use crate::command::{BlockBits, ItemList, Version};
 use crate::leaked_guards::unlock;
 use crate::scene::LayerMask;
 
 /// The columns of items, as an engine lends them.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ItemColumns<'a> {
+    pub(crate) keys: &'a [u64],
     /// Empty if all items are always drawn.
     pub(crate) bounds: &'a [BoundingSphere],
     /// Empty if all items are in all layers.
     pub(crate) layers: &'a [LayerMask],
+    /// Empty if nothing is known about the commands of items.
+    pub(crate) versions: &'a [u64],
 }
 
 /// Items in draw order. An item's place in that order is its rank.
 ///
-/// It is kept from frame to frame. If no key changed, the order holds.
+/// It is kept from frame to frame: order, bounds, and what views see of them hold as long as nothing changes that they
+/// depend on.
 #[derive(Debug, Default)]
 pub(crate) struct ItemTable {
     order: RwLock<DrawOrder>,
-    /// The keys that items are ordered by; empty if they keep the order in which they are lent.
+    /// Whether the items are ordered by their keys, or as they are lent.
+    sorts: bool,
     keys: Vec<u64>,
-    /// By rank. Items that are left out have [`BoundingSphere::EMPTY`].
-    bounds: Vec<RwLock<Box<BoundingSpheres>>>,
-    length: usize,
+    versions: Vec<u64>,
+    /// The version of what this frame changes.
+    frame: Version,
+    /// The versions of the order, and of the items' keys and versions.
+    order_version: Version,
+    contents_version: Version,
+    has_bounds: bool,
+    has_layers: bool,
+    blocks: Vec<RwLock<ItemBlock>>,
 }
 
 #[derive(Debug, Default)]
@@ -41,23 +52,47 @@ struct DrawOrder {
     is_current: bool,
 }
 
+/// What views need to know about the items of a block of ranks.
+#[derive(Debug, Default)]
+struct ItemBlock {
+    /// By rank. Items that are left out have [`BoundingSphere::EMPTY`].
+    spheres: Box<BoundingSpheres>,
+    /// Whether items are left out. Each frame counts them.
+    has_rejected: bool,
+    /// The version of all that decides which of the items a view sees.
+    version: Version,
+}
+
 impl ItemTable {
     /// The number of ranks in a block.
     pub(crate) const BLOCK_SIZE: usize = ItemList::BLOCK_SIZE;
     const WORDS: usize = Self::BLOCK_SIZE / BITS_PER_WORD;
 
-    /// Begins a frame of items with these keys, which are ordered by them, or as they are lent.
-    pub(crate) fn begin_frame(&mut self, keys: &[u64], sorts: bool) {
+    /// Begins a frame of items, which are ordered by their keys, or as they are lent. The version is one that no other
+    /// frame and no other table gets.
+    pub(crate) fn begin_frame(&mut self, columns: &ItemColumns<'_>, sorts: bool, version: Version) {
         unlock(&mut self.order);
-        self.bounds.iter_mut().for_each(unlock);
-        let sorted_by = if sorts { keys } else { &[] };
-        if self.length != keys.len() || self.keys != sorted_by {
-            self.order.get_mut().is_current = false;
-            self.length = keys.len();
-            self.keys.clear();
-            self.keys.extend_from_slice(sorted_by);
+        self.blocks.iter_mut().for_each(unlock);
+        self.frame = version;
+        let (has_same_keys, has_same_length) = (self.keys == columns.keys, self.keys.len() == columns.keys.len());
+        let keeps_order = self.sorts == sorts && has_same_length && (has_same_keys || !sorts);
+        let (has_bounds, has_layers) = (!columns.bounds.is_empty(), !columns.layers.is_empty());
+        // No copy of layers is kept, so they count as changed.
+        let keeps_columns = self.has_bounds == has_bounds && !self.has_layers && !has_layers;
+        (self.sorts, self.has_bounds, self.has_layers) = (sorts, has_bounds, has_layers);
+        if !has_same_keys || self.versions != columns.versions {
+            columns.keys.clone_into(&mut self.keys);
+            columns.versions.clone_into(&mut self.versions);
+            self.contents_version = version;
         }
-        self.bounds.resize_with(self.length.div_ceil(Self::BLOCK_SIZE), RwLock::default);
+        self.blocks.resize_with(self.len().div_ceil(Self::BLOCK_SIZE), RwLock::default);
+        if !keeps_order {
+            self.order.get_mut().is_current = false;
+            self.order_version = version;
+        }
+        if !(keeps_order && keeps_columns) {
+            self.blocks.iter_mut().for_each(|block| block.get_mut().version = version);
+        }
     }
 
     /// Finds the order, if it does not hold. Items of equal keys keep the order in which they are lent.
@@ -65,8 +100,8 @@ impl ItemTable {
         let mut order = self.order.write();
         if !order.is_current {
             order.items.clear();
-            order.items.extend(0..self.length as u32);
-            if !self.keys.is_empty() {
+            order.items.extend(0..self.len() as u32);
+            if self.sorts {
                 order.items.sort_unstable_by_key(|&item| (self.keys[item as usize], item));
             }
             order.is_current = true;
@@ -75,38 +110,46 @@ impl ItemTable {
 
     /// The number of items.
     pub(crate) fn len(&self) -> usize {
-        self.length
+        self.keys.len()
     }
 
     /// The number of blocks of ranks.
     pub(crate) fn block_count(&self) -> usize {
-        self.bounds.len()
+        self.blocks.len()
     }
 
-    /// Copies the bounds of a block's items. Calls `reject` with each item whose bounds are invalid, and leaves it out.
+    /// Copies the bounds of a block's items, where they changed. Calls `reject` with each item whose bounds are invalid,
+    /// and leaves it out.
     pub(crate) fn copy_bounds(&self, columns: &ItemColumns<'_>, block: usize, mut reject: impl FnMut(u32)) {
         if columns.bounds.is_empty() {
             return;
         }
-        let (order, mut spheres) = (self.order.read(), self.bounds[block].write());
-        for (entry, &item) in order.items[self.ranks_of(block)].iter().enumerate() {
+        let (order, mut own) = (self.order.read(), self.blocks[block].write());
+        let items = &order.items[self.ranks_of(block)];
+        if !own.has_rejected && own.holds(items, columns.bounds) {
+            return;
+        }
+        (own.version, own.has_rejected) = (self.frame, false);
+        for (entry, &item) in items.iter().enumerate() {
             let sphere = columns.bounds[item as usize];
             // An infinite radius is one of an item that is always drawn.
             let is_valid = sphere.center.is_finite() && sphere.radius >= 0.0;
             if !is_valid {
+                own.has_rejected = true;
                 reject(item);
             }
-            spheres.set(entry, if is_valid { sphere } else { BoundingSphere::EMPTY });
+            own.spheres.set(entry, if is_valid { sphere } else { BoundingSphere::EMPTY });
         }
     }
 
     fn ranks_of(&self, block: usize) -> Range<usize> {
         let first = block * Self::BLOCK_SIZE;
-        first..(first + Self::BLOCK_SIZE).min(self.length)
+        first..(first + Self::BLOCK_SIZE).min(self.len())
     }
 
     /// Finds which items of a block a view sees: those whose bounds intersect its frustum, unless `culls` is false, and
-    /// that are in one of its layers.
+    /// that are in one of its layers. What was found in an earlier frame holds as long as the block and the view do not
+    /// change.
     pub(crate) fn cull(
         &self,
         columns: &ItemColumns<'_>,
@@ -114,8 +157,12 @@ impl ItemTable {
         block: usize,
         visible: &ItemVisibility,
     ) {
+        let (own, mut found) = (self.blocks[block].read(), visible.blocks[block].write());
+        if found.tested == own.version {
+            return;
+        }
         let (ranks, order) = (self.ranks_of(block), self.order.read());
-        let spheres = (!columns.bounds.is_empty()).then(|| self.bounds[block].read());
+        let spheres = (!columns.bounds.is_empty()).then_some(&*own.spheres);
         let mut words = [0; Self::WORDS];
         for (word, bits) in words.iter_mut().enumerate() {
             let first = word * BITS_PER_WORD;
@@ -124,20 +171,46 @@ impl ItemTable {
                 break;
             }
             let all = u64::MAX >> (BITS_PER_WORD - count);
-            *bits =
-                all & spheres.as_ref().map_or(u64::MAX, |spheres| intersecting(&view.frustum, spheres, first, culls));
+            *bits = all & spheres.map_or(u64::MAX, |spheres| intersecting(&view.frustum, spheres, first, culls));
             if !columns.layers.is_empty() {
                 let of_word = &order.items[ranks.start + first..];
                 let is_hidden = |bit: &usize| !columns.layers[of_word[*bit] as usize].intersects(view.camera.layers);
                 *bits &= !set_bits(*bits).filter(is_hidden).fold(0, |hidden, bit| hidden | 1 << bit);
             }
         }
-        visible.put(block, words);
+        if found.words != words {
+            // Relaxed: it is read after all blocks.
+            visible.changed.store(true, Ordering::Relaxed);
+        }
+        *found = BlockVisibility { words, tested: own.version };
     }
 
-    /// Makes a list what a view sees, with at most `per_bundle` items in a bundle.
-    pub(crate) fn list(&self, visible: &ItemVisibility, per_bundle: usize, list: &mut ItemList) {
-        list.fill(&self.order.read().items, |block| visible.words(block), per_bundle);
+    /// Makes a list what a view sees, with at most `per_bundle` items in a bundle, unless it is that already. Every list
+    /// of a frame has another index.
+    pub(crate) fn list(&self, visible: &ItemVisibility, per_bundle: usize, index: usize, list: &mut ItemList) {
+        let version = Version { index, ..self.frame };
+        // Relaxed: all blocks have been culled.
+        let is_same = !visible.changed.load(Ordering::Relaxed);
+        list.contents_version = self.contents_version;
+        list.update(
+            (&self.order.read().items, self.order_version),
+            |block| visible.words(block),
+            per_bundle,
+            is_same,
+            version,
+        );
+    }
+}
+
+impl ItemBlock {
+    /// Whether its spheres are those of these items.
+    fn holds(&self, items: &[u32], bounds: &[BoundingSphere]) -> bool {
+        let ([x, y, z], radii) = (self.spheres.coordinates(), self.spheres.radii());
+        items.iter().zip(x).zip(y).zip(z).zip(radii).all(|((((item, x), y), z), radius)| {
+            let lent = &bounds[*item as usize];
+            // Without branches but one: nearly always all are equal.
+            (lent.center.x == *x) & (lent.center.y == *y) & (lent.center.z == *z) & (lent.radius == *radius)
+        })
     }
 }
 
@@ -153,33 +226,39 @@ fn intersecting(frustum: &Frustum, spheres: &BoundingSpheres, first: usize, cull
     (0..).zip(radii).fold(0, |bits, (bit, radius)| bits | u64::from(*radius >= 0.0) << bit)
 }
 
-/// Which items a view sees: a bit for each rank.
+/// Which items a view sees. It is kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct ItemVisibility {
-    words: ChunkedArray<u64>,
+    blocks: Vec<RwLock<BlockVisibility>>,
+    /// The view's frustum, and whether it culls.
+    tested_with: Option<(Frustum, bool)>,
+    /// Whether the view sees other items, or other ranks, than in the frame before.
+    changed: AtomicBool,
+}
+
+/// Which items of a block a view sees.
+#[derive(Clone, Copy, Debug, Default)]
+struct BlockVisibility {
+    words: BlockBits,
+    /// The version of the block that was tested.
+    tested: Version,
 }
 
 impl ItemVisibility {
-    /// Makes room for this many items.
-    pub(crate) fn begin_frame(&mut self, items: usize) {
-        self.words.grow(items.div_ceil(ItemTable::BLOCK_SIZE) * ItemTable::WORDS, 0);
+    /// Begins a frame of a view and these items.
+    pub(crate) fn begin_frame(&mut self, table: &ItemTable, view: &RenderView, culls: bool) {
+        self.blocks.iter_mut().for_each(unlock);
+        *self.changed.get_mut() = self.blocks.len() != table.block_count();
+        self.blocks.resize_with(table.block_count(), RwLock::default);
+        let is_same = self.tested_with.as_ref().is_some_and(|(frustum, had)| (frustum, *had) == (&view.frustum, culls));
+        if !is_same {
+            self.tested_with = Some((view.frustum.clone(), culls));
+            self.blocks.iter_mut().for_each(|block| block.get_mut().tested = Version::default());
+        }
     }
 
-    fn put(&self, block: usize, words: BlockBits) {
-        let (chunk, first) = Self::place_of(block);
-        self.words.write(chunk)[first..][..ItemTable::WORDS].copy_from_slice(&words);
-    }
-
-    /// The words of a block.
     fn words(&self, block: usize) -> BlockBits {
-        let (chunk, first) = Self::place_of(block);
-        *self.words.read(chunk)[first..].first_chunk().expect("blocks do not straddle chunks")
-    }
-
-    /// Where the words of a block are: their chunk, and the first in it.
-    fn place_of(block: usize) -> (usize, usize) {
-        let (first, chunk) = (block * ItemTable::WORDS, ChunkedArray::<u64>::BLOCK_SIZE);
-        (first / chunk, first % chunk)
+        self.blocks[block].read().words
     }
 }
 
@@ -196,10 +275,10 @@ mod tests {
     }
 
     /// A frame of these items in one view, item by item.
-    fn naive((keys, columns): (&[u64], &ItemColumns<'_>), view: &RenderView, sorts: bool) -> Vec<u32> {
-        let mut items: Vec<_> = (0..keys.len()).collect();
+    fn naive(columns: &ItemColumns<'_>, view: &RenderView, sorts: bool) -> Vec<u32> {
+        let mut items: Vec<_> = (0..columns.keys.len()).collect();
         if sorts {
-            items.sort_by_key(|item| keys[*item]);
+            items.sort_by_key(|item| columns.keys[*item]);
         }
         let is_seen = |item: &usize| {
             let is_near = columns.bounds.get(*item).is_none_or(|sphere| {
@@ -212,23 +291,31 @@ mod tests {
         items.into_iter().filter(is_seen).map(|item| item as u32).collect()
     }
 
-    fn frame(
-        table: &mut ItemTable,
-        (visible, list): (&mut ItemVisibility, &mut ItemList),
-        (keys, columns): (&[u64], &ItemColumns<'_>),
-        view: &RenderView,
-        (sorts, per_bundle): (bool, usize),
-    ) -> usize {
-        let mut rejected = 0;
-        table.begin_frame(keys, sorts);
-        table.sort();
-        visible.begin_frame(table.len());
-        for block in 0..table.block_count() {
-            table.copy_bounds(columns, block, |_| rejected += 1);
-            table.cull(columns, (view, true), block, visible);
+    /// What is kept from frame to frame, for one view.
+    #[derive(Default)]
+    struct Kept {
+        table: ItemTable,
+        visible: ItemVisibility,
+        list: ItemList,
+        frames: u64,
+    }
+
+    impl Kept {
+        /// Runs a frame, and returns the number of items that were rejected.
+        fn frame(&mut self, columns: &ItemColumns<'_>, view: &RenderView, (sorts, per_bundle): (bool, usize)) -> usize {
+            let Self { table, visible, list, frames } = self;
+            *frames += 1;
+            let mut rejected = 0;
+            table.begin_frame(columns, sorts, Version { frame: *frames, index: 0 });
+            visible.begin_frame(table, view, true);
+            table.sort();
+            for block in 0..table.block_count() {
+                table.copy_bounds(columns, block, |_| rejected += 1);
+                table.cull(columns, (view, true), block, visible);
+            }
+            table.list(visible, per_bundle, 0, list);
+            rejected
         }
-        table.list(visible, per_bundle, list);
-        rejected
     }
 
     fn any_sphere() -> impl Strategy<Value = BoundingSphere> {
@@ -245,31 +332,46 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Frames of one table, whose items, keys and bounds change.
+        /// Frames of one table, whose items, keys and bounds change or stay, seen by a view that turns or stays.
         #[test]
         fn lists_have_what_a_loop_over_all_items_finds(
             frames in prop::collection::vec(
-                (0_usize..2_000, 0_u64..4, any::<[bool; 3]>(), 1_usize..600, any::<u64>()),
-                1..5,
+                (
+                    prop_oneof![Just(600_usize), 0_usize..2_000],
+                    0_u64..4,
+                    any::<[bool; 4]>(),
+                    prop_oneof![Just(600_usize), 1_usize..600],
+                    0_u64..3,
+                    prop_oneof![2 => Just(0_usize), 1 => 0_usize..2_000],
+                ),
+                1..8,
             ),
             spheres in prop::collection::vec(any_sphere(), 2_000),
             layers in prop::collection::vec(any::<bool>(), 2_000),
         ) {
-            let (mut table, mut visible, mut list) =
-                (ItemTable::default(), ItemVisibility::default(), ItemList::default());
-            let camera = Camera { layers: LayerMask::layer(3), ..view().camera };
-            let view = RenderView::new(&camera);
+            let mut kept = Kept::default();
+            let camera = |turns| {
+                let target = if turns { DVec3::new(0.5, 0.0, -1.0) } else { DVec3::NEG_Z };
+                Camera { layers: LayerMask::layer(3), ..Camera::looking_at("main", DVec3::ZERO, target) }
+            };
+            let mut spheres = spheres;
             let layers: Vec<_> = layers.iter().map(|own| LayerMask::layer(if *own { 3 } else { 4 })).collect();
-            for (count, key_bits, [sorts, has_bounds, has_layers], per_bundle, seed) in frames {
+            for (count, key_bits, [sorts, has_bounds, has_layers, turns], per_bundle, seed, moved) in frames {
+                spheres.rotate_left(moved);
+                let view = RenderView::new(&camera(turns));
                 let key = |item: usize| (item as u64 ^ seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - 1 - key_bits);
                 let keys: Vec<_> = (0..count).map(key).collect();
                 let columns = ItemColumns {
+                    keys: &keys,
+                    versions: &[],
                     bounds: if has_bounds { &spheres[..count] } else { &[] },
                     layers: if has_layers { &layers[..count] } else { &[] },
                 };
-                let rejected = frame(&mut table, (&mut visible, &mut list), (&keys, &columns), &view, (sorts, per_bundle));
-                prop_assert_eq!(list.items(), naive((&keys, &columns), &view, sorts));
-                let is_invalid = |sphere: &&BoundingSphere| !sphere.center.is_finite() || sphere.radius < 0.0 || sphere.radius.is_nan();
+                let rejected = kept.frame(&columns, &view, (sorts, per_bundle));
+                let list = &kept.list;
+                prop_assert_eq!(list.items(), naive(&columns, &view, sorts));
+                let is_invalid =
+                    |sphere: &&BoundingSphere| !sphere.center.is_finite() || sphere.radius < 0.0 || sphere.radius.is_nan();
                 prop_assert_eq!(rejected, columns.bounds.iter().filter(is_invalid).count());
                 let bundled: Vec<_> = (0..list.bundle_count()).flat_map(|bundle| list.bundle_range(bundle)).collect();
                 prop_assert_eq!(bundled, (0..list.items().len()).collect::<Vec<_>>());
@@ -290,12 +392,13 @@ mod tests {
         let far = BoundingSphere { center: DVec3::Z * 50.0, radius: 1.0 };
         let mut bounds = vec![BoundingSphere { center: DVec3::NEG_Z * 5.0, radius: 1.0 }; 3_000];
         bounds[700] = far;
-        let (mut table, mut visible, mut list) = (ItemTable::default(), ItemVisibility::default(), ItemList::default());
+        let mut kept = Kept::default();
         let mut bundles = Vec::new();
         for sphere in [far, bounds[0]] {
             bounds[700] = sphere;
-            let columns = ItemColumns { bounds: &bounds, layers: &[] };
-            frame(&mut table, (&mut visible, &mut list), (&[0; 3_000], &columns), &view(), (true, usize::MAX));
+            let columns = ItemColumns { keys: &[0; 3_000], bounds: &bounds, ..ItemColumns::default() };
+            kept.frame(&columns, &view(), (true, usize::MAX));
+            let list = &kept.list;
             let of_slot = |bundle| (list.bundle_slot(bundle), list.items()[list.bundle_range(bundle)].to_vec());
             bundles.push((0..list.bundle_count()).map(of_slot).collect::<Vec<_>>());
         }
@@ -310,10 +413,42 @@ mod tests {
             .map(|item| DVec3::Z * if item % 16 == 0 { -5.0 } else { 50.0 })
             .map(|center| BoundingSphere { center, radius: 1.0 })
             .collect();
-        let (mut table, mut visible, mut list) = (ItemTable::default(), ItemVisibility::default(), ItemList::default());
-        let columns = ItemColumns { bounds: &bounds, layers: &[] };
-        frame(&mut table, (&mut visible, &mut list), (&[0; 25_600], &columns), &view(), (true, usize::MAX));
-        assert_eq!((list.items().len(), list.bundle_count()), (1_600, 13));
-        assert!((0..12).all(|bundle| list.bundle_range(bundle).len() == 128));
+        let mut kept = Kept::default();
+        kept.frame(
+            &ItemColumns { keys: &[0; 25_600], bounds: &bounds, ..ItemColumns::default() },
+            &view(),
+            (true, usize::MAX),
+        );
+        let list = &kept.list;
+        assert_eq!((list.items().len(), list.bundle_count()), (1_600, 25));
+        assert!((0..25).all(|bundle| list.bundle_range(bundle).len() == 64));
+    }
+    #[test]
+    fn a_list_is_kept_until_the_view_sees_other_items() {
+        let near = BoundingSphere { center: DVec3::NEG_Z * 5.0, radius: 1.0 };
+        let (mut bounds, mut keys, mut versions) = (vec![near; 1_000], vec![1; 1_000], vec![0; 1_000]);
+        let mut kept = Kept::default();
+        let mut frame = |kept: &mut Kept, (keys, bounds, versions): (&[u64], &[BoundingSphere], &[u64])| {
+            kept.frame(&ItemColumns { keys, bounds, versions, layers: &[] }, &view(), (true, usize::MAX));
+            kept.list.versions()
+        };
+        let first = frame(&mut kept, (&keys, &bounds, &versions));
+        assert_eq!(frame(&mut kept, (&keys, &bounds, &versions)), first);
+        bounds[700].center.x += 0.1;
+        assert_eq!(frame(&mut kept, (&keys, &bounds, &versions)), first, "it sees the same items");
+        versions[3] = 1;
+        let with_version = frame(&mut kept, (&keys, &bounds, &versions));
+        assert_eq!(with_version[0], first[0]);
+        assert_ne!(with_version[1], first[1]);
+        bounds[700].center.z = 50.0;
+        let without_item = frame(&mut kept, (&keys, &bounds, &versions));
+        assert_ne!(without_item[0], first[0]);
+        assert_eq!(without_item[1], with_version[1]);
+        keys[5] = 0;
+        let in_other_order = frame(&mut kept, (&keys, &bounds, &versions));
+        assert!(in_other_order[0] != without_item[0] && in_other_order[1] != without_item[1]);
+        assert_eq!(kept.list.items()[0], 5);
+        let none = frame(&mut kept, (&[], &[], &[]));
+        assert!(none[0] != in_other_order[0] && kept.list.items().is_empty());
     }
 }

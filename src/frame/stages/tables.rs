@@ -2,6 +2,7 @@
 //! from.
 
 use std::collections::HashMap;
+use std::mem;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -25,11 +26,11 @@ use crate::frame::views::FrameViews;
 use crate::frame::views::view_visibility::{Retest, ViewVisibility};
 use crate::leaked_guards::unlock;
 use crate::process::{Draws, FramePlan, ItemOrder, Items, Pass, ProcessId};
-use crate::quality::DepthPrecision;
+use crate::quality::{CullingVolume, DepthPrecision};
 use crate::scene::{Camera, Projection, SceneError, SceneRef};
 use crate::view::{
-    IssueReason, ItemTable, ItemVisibility, LevelSelector, LightTable, MeshLevels, ObjectLevels, ObjectTable, PerView,
-    RenderView,
+    IssueReason, ItemColumns, ItemTable, ItemVisibility, LevelSelector, LightTable, MeshLevels, ObjectLevels,
+    ObjectTable, PerView, RenderView,
 };
 
 /// The tables that the stages of a frame fill for each other. They keep their memory from frame to frame.
@@ -107,18 +108,29 @@ impl FrameTables {
     }
 
     /// Begins a frame of the items that the engine lends. The tables of these passes have begun it already.
-    pub(in crate::frame) fn begin_items(&mut self, items: &[Items<'_>], draws: &[Draws<'_>], passes: &[Pass]) {
+    pub(in crate::frame) fn begin_items(
+        &mut self,
+        items: &[Items<'_>],
+        draws: &[Draws<'_>],
+        (passes, views): (&[Pass], &[RenderView]),
+        volume: CullingVolume,
+    ) {
         self.items.resize_with(items.len(), ItemTable::default);
+        let frame = self.frames;
         for (index, (table, items)) in self.items.iter_mut().zip(items).enumerate() {
             let mut processes = draws.iter().zip(&self.items_of_process).filter(|(_, own)| **own == Some(index));
+            let version = Version { frame, index };
             match processes.next() {
-                Some((Draws::Items(draws), _)) => table.begin_frame(items.keys, draws.order == ItemOrder::ByKey),
-                _ => table.begin_frame(&[], false),
+                Some((Draws::Items(draws), _)) => {
+                    table.begin_frame(&items.columns(), draws.order == ItemOrder::ByKey, version);
+                }
+                _ => table.begin_frame(&ItemColumns::default(), false, version),
             }
         }
         for (pass, table) in passes.iter().zip(&mut self.passes) {
             if let Some(index) = self.items_of_process[pass.process_index] {
-                table.visible_items.begin_frame(self.items[index].len());
+                let culls = volume != CullingVolume::None;
+                table.visible_items.begin_frame(&self.items[index], &views[pass.view_index], culls);
             }
         }
     }
@@ -154,7 +166,7 @@ impl FrameTables {
 
     /// Ends a frame that failed: the next one derives everything anew. The draw lists are empty if the frame had begun.
     pub(in crate::frame) fn abandon_frame(&mut self) {
-        if std::mem::take(&mut self.is_in_frame) {
+        if mem::take(&mut self.is_in_frame) {
             self.passes.iter_mut().for_each(PassTable::clear_list);
             self.levels.clear();
         }
@@ -272,7 +284,11 @@ impl PassTable {
         self.keeps_list.take();
         self.has_coarse_edges.take();
         if selection.is_none() || culls_triangles {
+            let items = mem::take(&mut self.list.get_mut().items);
             self.clear_list();
+            if mode.draws_items {
+                self.list.get_mut().items = items;
+            }
         }
         self.triangles.get_mut().begin_frame(culls_triangles);
         if mode.orders_by_bin {

@@ -287,6 +287,8 @@ pub(crate) struct BundleCache {
 /// A bundle of items: each item, with its key and its version.
 struct CachedItems {
     items: Vec<(u32, u64, u64)>,
+    /// The versions of the latest list that the bundle was found to draw a part of.
+    list: [Version; 2],
     bundle: wgpu::RenderBundle,
     /// Of the bundle's commands; 0 without debug assertions.
     digest: u64,
@@ -331,21 +333,30 @@ impl BundleCache {
         self.of_items.lock().resize_with(bundles, || None);
     }
 
-    /// The bundle of items at an index, with its digest, if it draws these: each with its key and its version.
+    /// The bundle of items at an index, with its digest, if it draws these, of a list of these versions: each with its
+    /// key and its version.
     pub(crate) fn get_items(
         &self,
         index: usize,
+        list: [Version; 2],
         items: impl Iterator<Item = (u32, u64, u64)>,
     ) -> Option<(wgpu::RenderBundle, u64)> {
-        let bundles = self.of_items.lock();
-        let cached = bundles.get(index)?.as_ref()?;
-        items.eq(cached.items.iter().copied()).then(|| (cached.bundle.clone(), cached.digest))
+        let mut bundles = self.of_items.lock();
+        let cached = bundles.get_mut(index)?.as_mut()?;
+        if cached.list != list {
+            if !items.eq(cached.items.iter().copied()) {
+                return None;
+            }
+            cached.list = list;
+        }
+        Some((cached.bundle.clone(), cached.digest))
     }
 
     /// Replaces the bundle of items at an index.
     pub(crate) fn insert_items(
         &self,
         index: usize,
+        list: [Version; 2],
         items: impl Iterator<Item = (u32, u64, u64)>,
         (bundle, digest): (wgpu::RenderBundle, u64),
     ) {
@@ -353,7 +364,7 @@ impl BundleCache {
             let mut cached = slot.take().map_or_else(Vec::new, |cached| cached.items);
             cached.clear();
             cached.extend(items);
-            *slot = Some(CachedItems { items: cached, bundle, digest });
+            *slot = Some(CachedItems { items: cached, list, bundle, digest });
         }
     }
 

@@ -45,11 +45,11 @@ impl PassEncoder<'_> {
     /// With debug assertions, if the items' versions do not say that they changed.
     pub(super) fn cached_items(&self, bundle: usize) -> Result<Option<wgpu::RenderBundle>, BackendError> {
         let Some(lent) = self.cacheable_items() else { return Ok(None) };
-        let slot = self.list.items.bundle_slot(bundle);
-        let cached = self.state.bundle_cache.get_items(slot, self.versions(lent, bundle));
+        let (list, cache) = (&self.list.items, &self.state.bundle_cache);
+        let cached = cache.get_items(list.bundle_slot(bundle), list.versions(), self.versions(lent, bundle));
         let Some((cached, digest)) = cached else { return Ok(None) };
         if cfg!(debug_assertions) && self.digest_of(bundle)? != digest {
-            let (range, count) = (self.list.items.bundle_range(bundle), self.list.items.items().len());
+            let (range, count) = (list.bundle_range(bundle), list.items().len());
             return Err(BackendError::ItemVersions { first: range.start, end: range.end, count });
         }
         self.state.timing.count_bundle(true);
@@ -67,8 +67,9 @@ impl PassEncoder<'_> {
         self.state.timing.count_bundle(false);
         let (recorded, digest) = self.new_item_bundle(bundle)?;
         if let Some(lent) = self.cacheable_items() {
-            let (slot, versions) = (self.list.items.bundle_slot(bundle), self.versions(lent, bundle));
-            self.state.bundle_cache.insert_items(slot, versions, (recorded.clone(), digest));
+            let (list, versions) = (&self.list.items, self.versions(lent, bundle));
+            let (slot, of_list) = (list.bundle_slot(bundle), list.versions());
+            self.state.bundle_cache.insert_items(slot, of_list, versions, (recorded.clone(), digest));
         }
         Ok(recorded)
     }
