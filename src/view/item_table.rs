@@ -332,32 +332,45 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Frames of one table, whose items, keys and bounds change or stay, seen by a view that turns or stays.
+        /// Frames of one table, of which each changes one of its inputs, or none.
         #[test]
         fn lists_have_what_a_loop_over_all_items_finds(
             frames in prop::collection::vec(
-                (
-                    prop_oneof![Just(600_usize), 0_usize..2_000],
-                    0_u64..4,
-                    any::<[bool; 4]>(),
-                    prop_oneof![Just(600_usize), 1_usize..600],
-                    0_u64..3,
-                    prop_oneof![2 => Just(0_usize), 1 => 0_usize..2_000],
-                ),
-                1..8,
+                (0..10, 0_usize..2_000, 0_u64..4, 1_usize..600, any::<u64>(), 0_usize..2_000),
+                1..12,
             ),
             spheres in prop::collection::vec(any_sphere(), 2_000),
             layers in prop::collection::vec(any::<bool>(), 2_000),
+            has_invalid: bool,
         ) {
             let mut kept = Kept::default();
             let camera = |turns| {
                 let target = if turns { DVec3::new(0.5, 0.0, -1.0) } else { DVec3::NEG_Z };
                 Camera { layers: LayerMask::layer(3), ..Camera::looking_at("main", DVec3::ZERO, target) }
             };
+            let is_invalid =
+                |sphere: &BoundingSphere| !sphere.center.is_finite() || sphere.radius.is_nan() || sphere.radius < 0.0;
             let mut spheres = spheres;
+            if !has_invalid {
+                let valid = BoundingSphere { center: DVec3::NEG_Z, radius: 1.0 };
+                spheres.iter_mut().filter(|sphere| is_invalid(sphere)).for_each(|sphere| *sphere = valid);
+            }
             let layers: Vec<_> = layers.iter().map(|own| LayerMask::layer(if *own { 3 } else { 4 })).collect();
-            for (count, key_bits, [sorts, has_bounds, has_layers, turns], per_bundle, seed, moved) in frames {
-                spheres.rotate_left(moved);
+            let (mut count, mut key_bits, mut per_bundle, mut seed) = (1_000, 2, 400, 0);
+            let (mut sorts, mut has_bounds, mut has_layers, mut turns) = (true, true, false, false);
+            for (changed, new_count, new_bits, new_per_bundle, new_seed, moved) in frames {
+                match changed {
+                    0 => count = new_count,
+                    1 => key_bits = new_bits,
+                    2 => per_bundle = new_per_bundle,
+                    3 => seed = new_seed,
+                    4 => sorts ^= true,
+                    5 => has_bounds ^= true,
+                    6 => has_layers ^= true,
+                    7 => turns ^= true,
+                    8 => spheres.rotate_left(moved),
+                    _ => {}
+                }
                 let view = RenderView::new(&camera(turns));
                 let key = |item: usize| (item as u64 ^ seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - 1 - key_bits);
                 let keys: Vec<_> = (0..count).map(key).collect();
@@ -370,9 +383,7 @@ mod tests {
                 let rejected = kept.frame(&columns, &view, (sorts, per_bundle));
                 let list = &kept.list;
                 prop_assert_eq!(list.items(), naive(&columns, &view, sorts));
-                let is_invalid =
-                    |sphere: &&BoundingSphere| !sphere.center.is_finite() || sphere.radius < 0.0 || sphere.radius.is_nan();
-                prop_assert_eq!(rejected, columns.bounds.iter().filter(is_invalid).count());
+                prop_assert_eq!(rejected, columns.bounds.iter().filter(|sphere| is_invalid(sphere)).count());
                 let bundled: Vec<_> = (0..list.bundle_count()).flat_map(|bundle| list.bundle_range(bundle)).collect();
                 prop_assert_eq!(bundled, (0..list.items().len()).collect::<Vec<_>>());
                 let mut slots: Vec<_> = (0..list.bundle_count()).map(|bundle| list.bundle_slot(bundle)).collect();
@@ -428,7 +439,7 @@ mod tests {
         let near = BoundingSphere { center: DVec3::NEG_Z * 5.0, radius: 1.0 };
         let (mut bounds, mut keys, mut versions) = (vec![near; 1_000], vec![1; 1_000], vec![0; 1_000]);
         let mut kept = Kept::default();
-        let mut frame = |kept: &mut Kept, (keys, bounds, versions): (&[u64], &[BoundingSphere], &[u64])| {
+        let frame = |kept: &mut Kept, (keys, bounds, versions): (&[u64], &[BoundingSphere], &[u64])| {
             kept.frame(&ItemColumns { keys, bounds, versions, layers: &[] }, &view(), (true, usize::MAX));
             kept.list.versions()
         };
