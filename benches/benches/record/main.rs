@@ -37,10 +37,23 @@
 //! renderer's own allocations, counted on a backend that does nothing. Ratios are those of the medians that the tables
 //! show.
 //!
-//! On noop a third table shows how frames of this crate grow with the number of objects and of cameras. The last line
-//! names the targets that were missed.
+//! On noop a third table shows how frames of this crate grow with the number of objects and of cameras, and a fourth
+//! one has draws of an engine's own: 10,000 items, each one indexed draw with a transform in a buffer of instances, of 16
+//! pipelines and 256 bind groups. In *moving* and *at rest* each camera sees all of them, in *moving, cameras turning*
+//! most of them, and other ones in each frame, and in *a tenth in view* a tenth of them, while the cameras turn slowly.
 //!
-//! `target/drawloom/record.json` and `.svg`, and `record_extents.json`, have the same.
+//! - *plain loop* is one thread, which culls the items of each camera in draw order, eight at a time, and records them
+//!   directly into an encoder, in every frame. It sets pipelines and bind groups where they change, and it knows when
+//!   nothing moves, and copies nothing then.
+//! - *encoders* is the same on spinning threads, with a camera each.
+//! - *bundles* records a bundle of 256 draws after the other on a pool of rayon's, and *kept bundles* executes those
+//!   again whose items are the same.
+//! - *drawloom* has a process that draws items, and *without versions* it is not told that their commands are those of
+//!   the frame before, so that it records all.
+//!
+//! The last line names the targets that were missed.
+//!
+//! `target/drawloom/record.json` and `.svg`, `record_extents.json` and `record_own_draws.json` have the same.
 
 mod allocations;
 mod bundles;
