@@ -7,8 +7,8 @@ use crate::bit_set::{BITS_PER_WORD, set_bits};
 
 /// The items that a pass draws, in draw order, and the bundles that divide them.
 ///
-/// An item's place in draw order is its rank. Ranks lie in blocks of 256, and blocks in groups of one size. A bundle has
-/// the visible items of blocks of one group that follow each other. So an item that comes into view, or leaves it,
+/// An item's place in draw order is its rank. Ranks lie in blocks of 256, and blocks in groups of one size. A bundle
+/// has the visible items of blocks of one group that follow each other. So an item that comes into view, or leaves it,
 /// changes the bundles of its group alone.
 #[derive(Clone, Debug, Default)]
 pub struct ItemList {
@@ -141,8 +141,8 @@ impl ItemList {
         }
     }
 
-    /// Chooses the size of groups: the items that are seen of one fill a quarter of a bundle at least. Fewer make bundles
-    /// costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a quarter.
+    /// Chooses the size of groups: the items that are seen of one fill a quarter of a bundle at least. Fewer make
+    /// bundles costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a quarter.
     fn choose_group(&mut self, count: usize, blocks: usize) {
         let least = Self::ITEMS_PER_BUNDLE / 4;
         let smallest = |least: usize| {

@@ -118,8 +118,8 @@ impl ItemTable {
         self.blocks.len()
     }
 
-    /// Copies the bounds of a block's items, where they changed. Calls `reject` with each item whose bounds are invalid,
-    /// and leaves it out.
+    /// Copies the bounds of a block's items, where they changed. Calls `reject` with each item whose bounds are
+    /// invalid, and leaves it out.
     pub(crate) fn copy_bounds(&self, columns: &ItemColumns<'_>, block: usize, mut reject: impl FnMut(u32)) {
         if columns.bounds.is_empty() {
             return;
@@ -185,8 +185,8 @@ impl ItemTable {
         *found = BlockVisibility { words, tested: own.version };
     }
 
-    /// Makes a list what a view sees, with at most `per_bundle` items in a bundle, unless it is that already. Every list
-    /// of a frame has another index.
+    /// Makes a list what a view sees, with at most `per_bundle` items in a bundle, unless it is that already. Every
+    /// list of a frame has another index.
     pub(crate) fn list(&self, visible: &ItemVisibility, per_bundle: usize, index: usize, list: &mut ItemList) {
         let version = Version { index, ..self.frame };
         // Relaxed: all blocks have been culled.

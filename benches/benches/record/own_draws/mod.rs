@@ -1,5 +1,5 @@
-//! Draws of an engine's own, recorded by its own code: items, each an indexed draw with a transform, of 16 pipelines and
-//! 256 bind groups.
+//! Draws of an engine's own, recorded by its own code: items, each an indexed draw with a transform, of 16 pipelines
+//! and 256 bind groups.
 
 mod by_hand;
 mod commands;
