@@ -142,7 +142,8 @@ impl ItemList {
     }
 
     /// Chooses the size of groups: the items that are seen of one fill a quarter of a bundle at least. Fewer make
-    /// bundles costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a quarter.
+    /// bundles costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a
+    /// quarter.
     fn choose_group(&mut self, count: usize, blocks: usize) {
         let least = Self::ITEMS_PER_BUNDLE / 4;
         let smallest = |least: usize| {
