@@ -434,6 +434,7 @@ mod tests {
         assert_eq!((list.items().len(), list.bundle_count()), (1_600, 25));
         assert!((0..25).all(|bundle| list.bundle_range(bundle).len() == 64));
     }
+
     #[test]
     fn a_list_is_kept_until_the_view_sees_other_items() {
         let near = BoundingSphere { center: DVec3::NEG_Z * 5.0, radius: 1.0 };
