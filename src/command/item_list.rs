@@ -7,18 +7,19 @@ use crate::bit_set::{BITS_PER_WORD, set_bits};
 
 /// The items that a pass draws, in draw order, and the bundles that divide them.
 ///
-/// An item's place in draw order is its rank. Ranks lie in blocks of 256, and blocks in groups of one size. A bundle
-/// has the visible items of blocks of one group that follow each other. So an item that comes into view, or leaves it,
-/// changes the bundles of its group alone.
+/// An item's place in draw order is its rank. Ranks lie in groups of one size, a power of two, and a bundle has the
+/// visible items of one group, or of a part of it if these are many. So an item that comes into view, or leaves it,
+/// changes one bundle.
 #[derive(Clone, Debug, Default)]
 pub struct ItemList {
     items: Vec<u32>,
     bundles: Vec<ItemBundle>,
-    /// The number of blocks in a group; 0 before the first frame.
+    /// The number of ranks in a group; 0 before the first frame.
     group: usize,
+    size: BundleSize,
     slots: usize,
     /// What it was made from, and the version that it has since; `None` if it is empty.
-    made_from: Option<(Version, usize)>,
+    made_from: Option<MadeFrom>,
     version: Version,
     /// The version of the keys and versions of all items that are lent.
     pub(crate) contents_version: Version,
@@ -27,6 +28,25 @@ pub struct ItemList {
 /// A bit for each rank of a block: whether the view sees the item.
 pub(crate) type BlockBits = [u64; ItemList::BLOCK_SIZE / BITS_PER_WORD];
 
+/// What changed since a list was updated last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ListChanges {
+    /// The number of ranks that came into view or left it; `None` if that is unknown.
+    pub(crate) seen: Option<usize>,
+    /// The number of items, of all that are lent, that have another version; `None` if items have none.
+    pub(crate) versions: Option<usize>,
+}
+
+/// What a list is made from, beside what the view sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MadeFrom {
+    /// The version of the draw order.
+    order: Version,
+    /// The number of items in a bundle; `None` if groups decide.
+    per_bundle: Option<usize>,
+    group: usize,
+}
+
 /// The end of a bundle in the list, and where it is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct ItemBundle {
@@ -34,11 +54,68 @@ struct ItemBundle {
     slot: usize,
 }
 
+/// The number of items in a bundle: large bundles are cheap to replay, and of small ones fewer items are recorded anew
+/// where one changes.
+///
+/// It is chosen as one decides between renting and buying. Another size costs that all items are recorded anew, so it is
+/// taken once it would have saved as much in the frames before.
+#[derive(Clone, Copy, Debug)]
+struct BundleSize {
+    /// The current size, as an index of [`BundleSize::ALL`].
+    current: usize,
+    /// What each size would have saved, in the costs of recording an item.
+    saved: [f32; Self::ALL.len()],
+}
+
+impl Default for BundleSize {
+    fn default() -> Self {
+        Self { current: Self::FIRST, saved: [0.0; Self::ALL.len()] }
+    }
+}
+
+impl BundleSize {
+    const ALL: [usize; 6] = [32, 64, 128, 256, 512, 1024];
+    /// The size as long as nothing is known: cheap, and enough bundles for all workers.
+    const FIRST: usize = 3;
+    /// A bundle that is replayed costs as much as so many items that are recorded.
+    const REPLAY: f32 = 4.0;
+    /// Larger bundles than the first size leave a pass at least as many, for workers and encoders.
+    const MIN_BUNDLES: usize = 16;
+
+    fn items(self) -> usize {
+        Self::ALL[self.current]
+    }
+
+    /// Adds a frame, in which `changed` of the `count` items that a view sees came, went or changed. Returns whether
+    /// another size is better from now on.
+    fn add(&mut self, changed: f32, count: f32) -> bool {
+        let rate = changed / count;
+        // Of the bundles of n items as many stay the same as n items that change at this rate.
+        let cost = |items: f32| count / items * Self::REPLAY + count * (1.0 - (-rate * items).exp());
+        let current = cost(self.items() as f32);
+        for (saved, items) in self.saved.iter_mut().zip(Self::ALL) {
+            *saved = (*saved + current - cost(items as f32)).max(0.0);
+        }
+        let is_possible =
+            |index: &usize| *index <= Self::FIRST || (Self::ALL[*index] * Self::MIN_BUNDLES) as f32 <= count;
+        let best = (0..Self::ALL.len())
+            .filter(is_possible)
+            .max_by(|&one, &other| self.saved[one].total_cmp(&self.saved[other]));
+        match best.filter(|best| self.saved[*best] > count) {
+            Some(best) => *self = Self { current: best, ..Self::default() },
+            None => return false,
+        }
+        true
+    }
+}
+
 impl ItemList {
-    /// The most items in a bundle: as many as a [draw list](super::DrawList) has batches in one.
-    pub const ITEMS_PER_BUNDLE: usize = 256;
+    /// The most items in a bundle.
+    pub const ITEMS_PER_BUNDLE: usize = 1024;
     /// The number of ranks in a block.
     pub(crate) const BLOCK_SIZE: usize = 256;
+    /// The least number of ranks in a group.
+    const MIN_GROUP: usize = 32;
 
     /// The visible items in draw order, by index among those that are lent.
     pub fn items(&self) -> &[u32] {
@@ -80,77 +157,109 @@ impl ItemList {
         self.made_from = None;
     }
 
+    /// The number of ranks in a group. Bundles of groups of another size are other ones.
+    pub(crate) fn group_size(&self) -> usize {
+        self.group
+    }
+
     /// Equal versions are of equal bundles, whose items have equal keys and versions.
     pub(crate) fn versions(&self) -> [Version; 2] {
         [self.version, self.contents_version]
     }
 
-    /// Makes it the list of the visible ones of these items, which are in a draw order of this version: see
-    /// [`fill`](Self::fill). If `has_same_bits`, it is kept, as long as the rest is the same too.
+    /// Makes it the list of the visible ones of these items, which are in a draw order of this version. `visible` has a
+    /// bit for each rank of a block. A bundle has `per_bundle` items, or as many as change little. If the view sees the
+    /// same items as before, it is kept, as long as the rest is the same too.
     pub(crate) fn update(
         &mut self,
         (order, order_version): (&[u32], Version),
         visible: impl Fn(usize) -> BlockBits,
-        per_bundle: usize,
-        has_same_bits: bool,
+        per_bundle: Option<usize>,
+        changes: ListChanges,
         version: Version,
     ) {
-        let made_from = Some((order_version, per_bundle));
-        if !has_same_bits || self.made_from != made_from {
-            self.fill(order, visible, per_bundle);
-            (self.made_from, self.version) = (made_from, version);
+        let made_from = |list: &Self| Some(MadeFrom { order: order_version, per_bundle, group: list.group });
+        let is_same = changes.seen == Some(0) && self.made_from == made_from(self);
+        let count = if is_same {
+            self.items.len()
+        } else {
+            let blocks = order.len().div_ceil(Self::BLOCK_SIZE);
+            (0..blocks).map(|block| count_of(visible(block))).sum()
+        };
+        self.choose_group(count, order.len(), changes);
+        if !is_same || self.made_from != made_from(self) {
+            self.fill(order, visible, count);
+            if let Some(per_bundle) = per_bundle {
+                self.divide_evenly(per_bundle);
+            }
+            (self.made_from, self.version) = (made_from(self), version);
         }
     }
 
-    /// Makes it the list of the visible ones of these items, which are in draw order, with at most `per_bundle` items in
-    /// a bundle. `visible` has a bit for each rank of a block.
-    fn fill(&mut self, order: &[u32], visible: impl Fn(usize) -> BlockBits, per_bundle: usize) {
+    /// Makes it the list of the visible ones of these items, which are `count`.
+    fn fill(&mut self, order: &[u32], visible: impl Fn(usize) -> BlockBits, count: usize) {
         self.clear();
-        let blocks = order.len().div_ceil(Self::BLOCK_SIZE);
-        let count_of = |bits: BlockBits| bits.iter().map(|bits| bits.count_ones() as usize).sum::<usize>();
-        self.choose_group((0..blocks).map(|block| count_of(visible(block))).sum(), blocks);
-        let (mut slot, mut start) = (0, 0);
+        self.items.reserve(count);
+        let step = self.group.min(Self::BLOCK_SIZE);
+        let (mut slot, mut start, mut end) = (0, 0, 0);
         for (block, order) in order.chunks(Self::BLOCK_SIZE).enumerate() {
-            let (before, words) = (self.items.len(), visible(block));
-            let count = count_of(words);
-            if block % self.group == 0 || before + count - start > Self::ITEMS_PER_BUNDLE {
-                self.end_bundle(slot);
-                (slot, start) = (block, before);
+            let (first, words) = (block * Self::BLOCK_SIZE, visible(block));
+            for rank in (first..first + order.len()).step_by(step) {
+                let count = count_of_ranks(words, rank - first, step);
+                if rank % self.group == 0 || end + count - start > Self::ITEMS_PER_BUNDLE {
+                    self.end_bundle(slot, start..end);
+                    (slot, start) = (rank / Self::MIN_GROUP, end);
+                }
+                end += count;
             }
-            if count == order.len() {
+            let before = self.items.len();
+            if end - before == order.len() {
                 self.items.extend_from_slice(order);
                 continue;
             }
-            self.items.resize(before + count, 0);
+            self.items.resize(end, 0);
             let bits = words.into_iter().enumerate();
             let seen = bits.flat_map(|(word, bits)| set_bits(bits).map(move |bit| word * BITS_PER_WORD + bit));
             self.items[before..].iter_mut().zip(seen).for_each(|(item, rank)| *item = order[rank]);
         }
-        self.end_bundle(slot);
-        self.slots = blocks;
-        if per_bundle < Self::ITEMS_PER_BUNDLE {
-            self.divide_evenly(per_bundle);
-        }
+        self.end_bundle(slot, start..end);
+        self.slots = order.len().div_ceil(Self::MIN_GROUP);
     }
 
-    /// Ends a bundle behind the latest item, unless it is empty.
-    fn end_bundle(&mut self, slot: usize) {
-        let end = self.items.len();
-        if self.bundles.last().map_or(0, |bundle| bundle.end) < end {
+    /// Adds a bundle of this range of items, unless it is empty.
+    fn end_bundle(&mut self, slot: usize, Range { start, end }: Range<usize>) {
+        if start < end {
             self.bundles.push(ItemBundle { end, slot });
         }
     }
 
-    /// Chooses the size of groups: the items that are seen of one fill a quarter of a bundle at least. Fewer make
-    /// bundles costly; of more, fewer bundles stay the same while a camera turns. A size stays until it is wrong by a
-    /// quarter.
-    fn choose_group(&mut self, count: usize, blocks: usize) {
-        let least = Self::ITEMS_PER_BUNDLE / 4;
-        let smallest = |least: usize| {
-            let is_suitable = |group: &usize| *group >= blocks || count * group >= least * blocks;
-            (0..usize::BITS).map(|power| 1 << power).find(is_suitable).unwrap_or(1)
+    /// Chooses the size of groups of `ranks` ranks, of which the view sees `count`. It stays while bundles have about as
+    /// many items as they should: with another one all are recorded anew.
+    fn choose_group(&mut self, count: usize, ranks: usize, changes: ListChanges) {
+        if count == 0 {
+            self.group = self.group.max(Self::MIN_GROUP);
+            return;
+        }
+        match changes {
+            ListChanges { seen: Some(seen), versions: Some(versions) } => {
+                let of_visible = versions as f32 * count as f32 / ranks as f32;
+                if self.size.add(seen as f32 + of_visible, count as f32) {
+                    self.group = 0;
+                }
+            }
+            ListChanges { versions: None, .. } => self.size = BundleSize::default(),
+            ListChanges { seen: None, .. } => {}
+        }
+        // The largest group of which the view sees at most so many items.
+        let largest = |items: usize| {
+            let mut group = Self::MIN_GROUP;
+            while group < ranks && 2 * group * count <= items * ranks {
+                group *= 2;
+            }
+            group
         };
-        self.group = self.group.clamp(smallest(least * 3 / 4), smallest(least * 5 / 4));
+        let items = self.size.items();
+        self.group = self.group.clamp(largest(items), largest(items * 9 / 4));
     }
 
     /// Divides it into bundles of this many items.
@@ -160,5 +269,26 @@ impl ItemList {
         let bundle = |slot| ItemBundle { end: items.min((slot + 1) * per_bundle), slot };
         self.bundles.clear();
         self.bundles.extend((0..self.slots).map(bundle));
+    }
+}
+
+/// The number of visible ranks of a block.
+fn count_of(bits: BlockBits) -> usize {
+    bits.iter().map(|bits| bits.count_ones() as usize).sum()
+}
+
+/// The number of visible ones of `count` ranks of a block from `first` on: of a whole block, a whole number of words,
+/// or a part of a word.
+fn count_of_ranks(bits: BlockBits, first: usize, count: usize) -> usize {
+    match count {
+        ItemList::BLOCK_SIZE => count_of(bits),
+        BITS_PER_WORD.. => {
+            let words = &bits[first / BITS_PER_WORD..(first + count) / BITS_PER_WORD];
+            words.iter().map(|bits| bits.count_ones() as usize).sum()
+        }
+        _ => {
+            let bits = bits[first / BITS_PER_WORD] >> (first % BITS_PER_WORD);
+            (bits & (u64::MAX >> (BITS_PER_WORD - count))).count_ones() as usize
+        }
     }
 }

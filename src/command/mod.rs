@@ -20,7 +20,7 @@ pub use bucket::{Batch, RenderCommand};
 pub use draw_list::DrawList;
 pub use draw_state::{Cull, DrawState};
 pub(crate) use internal::*;
-pub(crate) use item_list::BlockBits;
+pub(crate) use item_list::{BlockBits, ListChanges};
 pub(crate) use partition::Partition;
 pub(crate) use selection::{Blending, MaterialShare, MaterialTypes};
 pub use selection::{DrawOrder, Selection};

@@ -122,6 +122,15 @@ pub enum FrameError {
         /// The length of `keys`.
         keys: usize,
     },
+    /// An item changed, and [`Items::changes`](crate::process::Items::changes) do not report it. Only found with debug
+    /// assertions.
+    #[error("item {item} of process {process:?} changed, which is not reported")]
+    UnreportedItemChange {
+        /// The process.
+        process: String,
+        /// The item's index.
+        item: usize,
+    },
     /// Items are more than can be numbered by 32 bits.
     #[error("{count} items are lent for process {process:?}, and at most {} can be drawn", u32::MAX)]
     TooManyItems {

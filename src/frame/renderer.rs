@@ -367,7 +367,7 @@ impl<B: Backend> Renderer<B> {
         let graph = self.graphs.get(&plan, &draws, views, features, nodes)?;
         let workers = self.scheduler.workers();
         graph.begin_frame(&mut self.tables, scene, (views, &draws), &self.quality, workers, self.granularity)?;
-        self.tables.begin_items(items, &draws, (&graph.passes, views), self.quality.culling);
+        self.tables.begin_items(items, (&plan, &draws), (&graph.passes, views), self.quality.culling)?;
         let clock = StageClock::new(self.scheduler.timeline());
         let separate_shadowed_lights = self.plans.separates_shadowed_lights();
         let fill_lights = || self.tables.fill_lights(&frame_views, separate_shadowed_lights, limits);

@@ -8,7 +8,7 @@ use wgpu::util::RenderEncoder;
 
 #[cfg(feature = "wgpu")]
 use super::RawPassResources;
-use crate::scene::LayerMask;
+use crate::scene::{Changes, LayerMask};
 #[cfg(feature = "wgpu")]
 use crate::view::RenderView;
 use crate::view::{BoundingSphere, ItemColumns};
@@ -46,7 +46,7 @@ pub enum ItemOrder {
 ///     ClearColor, Declare, Draws, Format, ItemContext, ItemDraws, ItemRange, ItemRecorder, Items, RecordItems,
 ///     RenderProcess,
 /// };
-/// use drawloom::scene::SceneRef;
+/// use drawloom::scene::{Changes, SceneRef};
 /// use drawloom::view::BoundingSphere;
 /// use drawloom::wgpu::util::RenderEncoder;
 /// use drawloom::{FrameInputs, wgpu};
@@ -106,6 +106,7 @@ pub enum ItemOrder {
 ///             bounds: &self.bounds,
 ///             layers: &[],
 ///             versions: &[],
+///             changes: Changes::Unknown,
 ///             recorder: ItemRecorder::Any(self),
 ///         }
 ///     }
@@ -129,6 +130,10 @@ pub struct Items<'a> {
     /// commands, with the same buffers, bind groups and pipelines; these may have other contents. Bundles of such items
     /// are kept. Empty if nothing is known about that: then all are recorded in every frame.
     pub versions: &'a [u64],
+    /// Which items have another entry in one of these slices than in the [`Items`] that the same renderer was given for
+    /// this process last, as for the [objects of a scene](crate::scene::SceneRef::changes). If it is
+    /// [`Changes::Unknown`], all are compared.
+    pub changes: Changes<'a>,
     /// The code that records them.
     #[cfg(feature = "wgpu")]
     pub recorder: ItemRecorder<'a>,
@@ -136,7 +141,8 @@ pub struct Items<'a> {
 
 impl<'a> Items<'a> {
     pub(crate) fn columns(&self) -> ItemColumns<'a> {
-        ItemColumns { keys: self.keys, bounds: self.bounds, layers: self.layers, versions: self.versions }
+        let Self { keys, bounds, layers, versions, changes, .. } = *self;
+        ItemColumns { keys, bounds, layers, versions, changes }
     }
 }
 

@@ -9,7 +9,7 @@ use drawloom::process::{
     Declare, Draws, Format, ItemContext, ItemDraws, ItemOrder, ItemRange, ItemRecorder, Items, RecordItems,
     RenderProcess,
 };
-use drawloom::scene::{Assets, Camera, LayerMask, SceneRef};
+use drawloom::scene::{Assets, Camera, Changes, LayerMask, SceneRef};
 use drawloom::task::Scheduler;
 use drawloom::view::internal::Frustum;
 use drawloom::view::{BoundingSphere, IssueReason};
@@ -53,7 +53,15 @@ impl RecordItems for Never {
 }
 
 fn items<'a>(process: &'a str, keys: &'a [u64]) -> Items<'a> {
-    Items { process, keys, bounds: &[], layers: &[], versions: &[], recorder: ItemRecorder::Any(&Never) }
+    Items {
+        process,
+        keys,
+        bounds: &[],
+        layers: &[],
+        versions: &[],
+        changes: Changes::Unknown,
+        recorder: ItemRecorder::Any(&Never),
+    }
 }
 
 fn renderer(workers: usize, granularity: Granularity) -> (Renderer<NullBackend>, Submitter<NullBackend>) {
@@ -112,19 +120,33 @@ proptest! {
         spread in 1_u64..2_000,
         seed in any::<u64>(),
         has_layers in any::<bool>(),
+        reports in any::<bool>(),
     ) {
         let (mut renderer, submitter) = renderer(workers, granularity);
         let (assets, cameras) = (Assets::default(), cameras());
         let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
-        for (frame, count) in (0_u64..).zip(counts) {
+        let mut before: Option<(Vec<_>, Vec<_>, Vec<_>)> = None;
+        for (frame, count) in (0_u64..).zip(counts.into_iter().flat_map(|count| [count; 2])) {
             let number = |item: usize, of: u64| (item as u64 + 1 + of).wrapping_mul(seed | 1).rotate_left(29);
             let keys: Vec<_> = (0..count).map(|item| number(item, frame / 2) % spread).collect();
             let coordinate = |item, of| (number(item, of) % 1_000) as f64 / 10.0 - 50.0;
-            let center = |item| DVec3::new(coordinate(item, 1), coordinate(item, 2), coordinate(item, 3 + frame));
+            // A third of the items move.
+            let moves = |item| u64::from(number(item, 5) % 3 == 0) * frame;
+            let center = |item| DVec3::new(coordinate(item, 1), coordinate(item, 2), coordinate(item, 3 + moves(item)));
             let bounds: Vec<_> = (0..count).map(|item| BoundingSphere { center: center(item), radius: 2.0 }).collect();
             let layers: Vec<_> = (0..count).map(|item| LayerMask((number(item, 9) % 4) as u32)).collect();
             let layers = if has_layers { &layers[..] } else { &[] };
-            let lent = ["sorted", "as lent"].map(|process| Items { bounds: &bounds, layers, ..items(process, &keys) });
+            let is_other = |&item: &u32| before.as_ref().is_none_or(|(keys_before, bounds_before, layers_before)| {
+                let item = item as usize;
+                keys_before.get(item) != keys.get(item)
+                    || bounds_before.get(item) != bounds.get(item)
+                    || layers_before.get(item) != layers.get(item)
+            });
+            let others: Vec<_> = (0..count as u32).filter(is_other).collect();
+            let changes = if reports { Changes::Objects(&others) } else { Changes::Unknown };
+            let of = |process| Items { bounds: &bounds, layers, changes, ..items(process, &keys) };
+            let lent = ["sorted", "as lent"].map(of);
+            before = Some((keys.clone(), bounds.clone(), layers.to_vec()));
             if frame % 3 == 1 {
                 let cameras = [Camera::looking_at("far away", DVec3::splat(1e12), DVec3::ZERO)];
                 let scene = SceneRef { cameras: &cameras, ..scene };
@@ -144,9 +166,43 @@ proptest! {
             for pass in &submitted.submission.passes {
                 let expected = list(&renderer, &pass.process, pass.view);
                 prop_assert_eq!((pass.items, pass.batches, pass.objects), (expected.len(), 0, 0));
-                prop_assert!(pass.bundles >= expected.len().div_ceil(256));
+                prop_assert!(pass.bundles >= expected.len().div_ceil(1024));
             }
         }
+    }
+}
+
+#[test]
+fn what_changed_counts_from_the_items_lent_last_for_the_process_even_if_that_frame_failed() {
+    let names = ["one", "other"];
+    let builder = names
+        .into_iter()
+        .fold(Renderer::builder(NullBackend), |builder, name| builder.process(Own { name, order: ItemOrder::ByKey }));
+    let (mut renderer, _) = builder.build(Arc::new(Scheduler::new(2).unwrap())).unwrap();
+    let (assets, cameras) = (Assets::default(), cameras());
+    let scene = SceneRef { cameras: &cameras, ..SceneRef::new(&assets) };
+    let sphere = |z: f64| BoundingSphere { center: DVec3::Z * z, radius: 1.0 };
+    let mut bounds = [[sphere(-5.0), sphere(5.0)], [sphere(5.0), sphere(-5.0)]];
+    let mut draw = |bounds: &[[BoundingSphere; 2]; 2], changes, order: [usize; 2]| {
+        let lent = order.map(|set| Items { bounds: &bounds[set], changes, ..items(names[set], &[0; 2]) });
+        let drawn = renderer.record_with(FrameInputs { items: &lent, ..FrameInputs::new(scene) }).map(drop);
+        drawn.map(|()| names.map(|process| list(&renderer, process, 0)))
+    };
+    let expected = [vec![0], vec![1]];
+    assert_eq!(draw(&bounds, Changes::Unknown, [0, 1]).unwrap(), expected);
+    assert_eq!(draw(&bounds, Changes::NONE, [0, 1]).unwrap(), expected);
+    assert_eq!(draw(&bounds, Changes::NONE, [1, 0]).unwrap(), expected, "in another order");
+    bounds[1].swap(0, 1);
+    assert!(draw(&bounds, Changes::Objects(&[0, 1]), [1, 1]).is_err(), "twice for one process");
+    assert_eq!(draw(&bounds, Changes::NONE, [1, 0]).unwrap(), [[0], [0]]);
+    bounds[0].swap(0, 1);
+    assert_eq!(draw(&bounds, Changes::Ranges(&[0..2]), [1, 0]).unwrap(), [[1], [0]]);
+    bounds[0][1].center.x = 0.1;
+    let unreported = draw(&bounds, Changes::NONE, [1, 0]);
+    if cfg!(debug_assertions) {
+        let expected = "item 1 of process \"one\" changed, which is not reported";
+        assert_eq!(unreported.unwrap_err().to_string(), expected);
+        assert_eq!(draw(&bounds, Changes::NONE, [1, 0]).unwrap(), [[1], [0]], "the frame before has failed");
     }
 }
 

@@ -226,7 +226,7 @@ impl FrameRecorder for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.draw_count(), list.bundle_count(), pass.strategy.part_count(list));
         if pass.draws_items {
-            pass.bundle_cache.set_item_bundle_count(list.items.slot_count());
+            pass.bundle_cache.begin_items(list.items.slot_count(), list.items.group_size());
             return Ok(());
         }
         if self.streamer.is_some() {

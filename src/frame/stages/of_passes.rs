@@ -45,7 +45,8 @@ pub(super) fn cull_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<
 
 /// Lists the items that the pass's view sees, in draw order, and divides them into bundles.
 pub(super) fn list_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
-    let (pass, per_bundle) = (&frame.tables.passes[job.of], frame.granularity.batches_per_bundle());
+    let (pass, granularity) = (&frame.tables.passes[job.of], frame.granularity);
+    let per_bundle = granularity.draws_per_job().map(|_| granularity.batches_per_bundle());
     let list = &mut pass.list.write().items;
     match frame.items_of(job.of) {
         Some((table, _)) => table.list(&pass.visible_items, per_bundle, job.of, list),

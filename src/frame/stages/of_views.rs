@@ -5,7 +5,7 @@ use super::stage::StageJob;
 use super::tables::PassTable;
 use crate::backend::Backend;
 use crate::graph::NodeError;
-use crate::view::{self, IssueReason, ItemTable};
+use crate::view::{self, IssueReason};
 
 pub(super) fn changed_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
     frame.tables.objects.changed_block_count()
@@ -50,20 +50,20 @@ pub(super) fn lent_items<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> u
 
 /// Orders items, if they do not have the order of the frame before. An item of the stage is a set of them.
 pub(super) fn sort_items<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
-    frame.tables.items[job.items].iter().for_each(ItemTable::sort);
+    frame.tables.items[job.items].iter().for_each(|(table, _)| table.sort());
     Ok(())
 }
 
 /// The blocks of all sets of items.
 pub(super) fn item_blocks<B: Backend>(frame: &FrameContext<'_, B>, _: usize) -> usize {
-    frame.tables.items.iter().map(ItemTable::block_count).sum()
+    frame.tables.items.iter().map(|(table, _)| table.block_count()).sum()
 }
 
 /// Copies the bounds of items in draw order, for all views, and counts those that are invalid. An item of the stage is a
 /// block of items.
 pub(super) fn copy_item_bounds<B: Backend>(frame: &FrameContext<'_, B>, job: StageJob<'_>) -> Result<(), NodeError> {
     let (mut first_block, mut first_item) = (0, 0);
-    for (table, lent) in frame.tables.items.iter().zip(frame.request.items) {
+    for ((table, _), lent) in frame.tables.items.iter().zip(frame.request.items) {
         let end = first_block + table.block_count();
         let reject = |item| {
             frame.request.scene_issues.count(IssueReason::InvalidItemBounds, first_item + item as usize);

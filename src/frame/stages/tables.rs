@@ -20,6 +20,7 @@ use crate::command::{
     BinnedSegment, Blending, Bucket, DrawList, DrawOrder, Partition, RenderCommand, Selection, SortScratch, Splitters,
     Version,
 };
+use crate::frame::FrameError;
 use crate::frame::scene_check::BlendedTracker;
 use crate::frame::static_groups::{ListConditions, StaticGroupTable};
 use crate::frame::views::FrameViews;
@@ -50,8 +51,8 @@ pub(in crate::frame) struct FrameTables {
     pub(in crate::frame) levels: PerView<ViewLevels>,
     /// The lights that reach each view.
     pub(in crate::frame) lights: Vec<LightTable>,
-    /// One for each set of items that the engine lends.
-    pub(in crate::frame) items: Vec<ItemTable>,
+    /// One for each set of items that the engine lends, and the process that drew them last.
+    pub(in crate::frame) items: Vec<(ItemTable, Option<ProcessId>)>,
     /// The items of each process, by index; `None` for one that draws none.
     pub(in crate::frame) items_of_process: Vec<Option<usize>>,
     /// One for each pass.
@@ -108,31 +109,43 @@ impl FrameTables {
     }
 
     /// Begins a frame of the items that the engine lends. The tables of these passes have begun it already.
+    ///
+    /// # Errors
+    /// With debug assertions, if an item changed although the engine did not report it.
     pub(in crate::frame) fn begin_items(
         &mut self,
         items: &[Items<'_>],
-        draws: &[Draws<'_>],
+        (plan, draws): (&FramePlan, &[Draws<'_>]),
         (passes, views): (&[Pass], &[RenderView]),
         volume: CullingVolume,
-    ) {
-        self.items.resize_with(items.len(), ItemTable::default);
+    ) -> Result<(), FrameError> {
+        self.items.resize_with(items.len(), Default::default);
         let frame = self.frames;
-        for (index, (table, items)) in self.items.iter_mut().zip(items).enumerate() {
-            let mut processes = draws.iter().zip(&self.items_of_process).filter(|(_, own)| **own == Some(index));
+        for (index, ((table, owner), items)) in self.items.iter_mut().zip(items).enumerate() {
             let version = Version { frame, index };
-            match processes.next() {
-                Some((Draws::Items(draws), _)) => {
-                    table.begin_frame(&items.columns(), draws.order == ItemOrder::ByKey, version);
-                }
-                _ => table.begin_frame(&ItemColumns::default(), false, version),
+            let process = self.items_of_process.iter().position(|own| *own == Some(index));
+            let process = process.map(|process| (&plan.processes()[process], &draws[process]));
+            let Some((planned, Draws::Items(draws))) = process else {
+                table.begin_frame(&ItemColumns::default(), false, version);
+                continue;
+            };
+            if owner.replace(planned.id) != Some(planned.id) {
+                table.invalidate();
+            }
+            table.begin_frame(&items.columns(), draws.order == ItemOrder::ByKey, version);
+            if cfg!(debug_assertions)
+                && let Some(item) = table.unreported_change(&items.columns())
+            {
+                return Err(FrameError::UnreportedItemChange { process: planned.name.clone(), item });
             }
         }
         for (pass, table) in passes.iter().zip(&mut self.passes) {
             if let Some(index) = self.items_of_process[pass.process_index] {
                 let culls = volume != CullingVolume::None;
-                table.visible_items.begin_frame(&self.items[index], &views[pass.view_index], culls);
+                table.visible_items.begin_frame(&self.items[index].0, &views[pass.view_index], culls);
             }
         }
+        Ok(())
     }
 
     /// Begins a frame of a scene's static groups. The tables of these passes have begun it already.
@@ -177,6 +190,7 @@ impl FrameTables {
     pub(in crate::frame) fn invalidate(&mut self) {
         self.objects.invalidate();
         self.static_groups.invalidate();
+        self.items.iter_mut().for_each(|(table, _)| table.invalidate());
         self.visibility.slots_mut().iter_mut().for_each(ViewVisibility::invalidate);
         self.passes.iter_mut().for_each(PassTable::invalidate);
     }

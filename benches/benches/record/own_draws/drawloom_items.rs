@@ -8,6 +8,7 @@ use drawloom::process::{
     ClearColor, Declare, Draws, Format, ItemContext, ItemDraws, ItemRange, ItemRecorder, Items, RecordItems,
     RenderProcess,
 };
+use drawloom::scene::Changes;
 use drawloom::task::Scheduler;
 use drawloom::wgpu::util::RenderEncoder;
 use drawloom::{FrameInputs, Renderer, Submitter};
@@ -47,6 +48,7 @@ impl OwnTechnique for DrawloomItems {
             bounds: &world.bounds,
             layers: &[],
             versions: if self.has_versions { &world.versions } else { &[] },
+            changes: if world.kind().moves_items() { Changes::Unknown } else { Changes::NONE },
             recorder: ItemRecorder::Any(&self.commands),
         };
         let inputs = FrameInputs { items: &[items], ..FrameInputs::new(world.as_scene_ref()) };

@@ -1,6 +1,7 @@
 //! The state of one pass in a frame's buffers: its bind groups, its strategy, its cached bundles, and what recording it
 //! cost.
 
+use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -281,7 +282,14 @@ pub(crate) struct BundleCache {
     key: Option<BundleKey>,
     bundles: Mutex<Vec<Option<CachedBundle>>>,
     /// Those of a pass that draws items.
-    of_items: Mutex<Vec<Option<CachedItems>>>,
+    of_items: Mutex<CachedItemBundles>,
+}
+
+#[derive(Default)]
+struct CachedItemBundles {
+    bundles: Vec<Option<CachedItems>>,
+    /// The size of the groups that they draw.
+    group_size: usize,
 }
 
 /// A bundle of items: each item, with its key and its version.
@@ -304,21 +312,21 @@ struct CachedBundle {
 impl BundleCache {
     /// Whether an earlier frame has left bundles.
     pub(crate) fn is_warm(&mut self) -> bool {
-        self.key.is_some() && !(self.bundles.get_mut().is_empty() && self.of_items.get_mut().is_empty())
+        self.key.is_some() && !(self.bundles.get_mut().is_empty() && self.of_items.get_mut().bundles.is_empty())
     }
 
     /// Drops everything.
     pub(crate) fn clear(&mut self) {
         self.key = None;
         *self.bundles.get_mut() = Vec::new();
-        *self.of_items.get_mut() = Vec::new();
+        *self.of_items.get_mut() = CachedItemBundles::default();
     }
 
     /// Begins a frame: drops all bundles if the key changed.
     pub(crate) fn begin_frame(&mut self, key: BundleKey) {
         if self.key.as_ref() != Some(&key) {
             self.bundles.get_mut().clear();
-            self.of_items.get_mut().clear();
+            self.of_items.get_mut().bundles.clear();
             self.key = Some(key);
         }
     }
@@ -328,9 +336,14 @@ impl BundleCache {
         self.bundles.lock().resize_with(bundles, || None);
     }
 
-    /// Makes room for this many bundles of items, and drops further ones.
-    pub(crate) fn set_item_bundle_count(&self, bundles: usize) {
-        self.of_items.lock().resize_with(bundles, || None);
+    /// Makes room for this many bundles of items of groups of this size. Drops those of groups of another size, and
+    /// further ones.
+    pub(crate) fn begin_items(&self, bundles: usize, group_size: usize) {
+        let CachedItemBundles { bundles: cached, group_size: before } = &mut *self.of_items.lock();
+        if mem::replace(before, group_size) != group_size {
+            cached.clear();
+        }
+        cached.resize_with(bundles, || None);
     }
 
     /// The bundle of items at an index, with its digest, if it draws these, of a list of these versions: each with its
@@ -341,8 +354,8 @@ impl BundleCache {
         list: [Version; 2],
         items: impl Iterator<Item = (u32, u64, u64)>,
     ) -> Option<(wgpu::RenderBundle, u64)> {
-        let mut bundles = self.of_items.lock();
-        let cached = bundles.get_mut(index)?.as_mut()?;
+        let mut of_items = self.of_items.lock();
+        let cached = of_items.bundles.get_mut(index)?.as_mut()?;
         if cached.list != list {
             if !items.eq(cached.items.iter().copied()) {
                 return None;
@@ -360,7 +373,7 @@ impl BundleCache {
         items: impl Iterator<Item = (u32, u64, u64)>,
         (bundle, digest): (wgpu::RenderBundle, u64),
     ) {
-        if let Some(slot) = self.of_items.lock().get_mut(index) {
+        if let Some(slot) = self.of_items.lock().bundles.get_mut(index) {
             let mut cached = slot.take().map_or_else(Vec::new, |cached| cached.items);
             cached.clear();
             cached.extend(items);
