@@ -80,7 +80,7 @@ impl BundleSize {
     /// A bundle that is replayed costs as much as so many items that are recorded.
     const REPLAY: f32 = 4.0;
     /// Larger bundles than the first size leave a pass at least as many, for workers and encoders.
-    const MIN_BUNDLES: usize = 16;
+    const MIN_BUNDLES: usize = 8;
 
     fn items(self) -> usize {
         Self::ALL[self.current]

@@ -226,7 +226,10 @@ impl FrameRecorder for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.draw_count(), list.bundle_count(), pass.strategy.part_count(list));
         if pass.draws_items {
-            pass.bundle_cache.begin_items(list.items.slot_count(), list.items.group_size());
+            let caches_bundles = pass.strategy.recording == RecordingStrategy::CachedBundles;
+            if caches_bundles && pass.bundle_cache.begin_items(list.items.slot_count(), list.items.group_size()) {
+                pass.timing.set_cold();
+            }
             return Ok(());
         }
         if self.streamer.is_some() {

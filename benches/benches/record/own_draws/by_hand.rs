@@ -74,7 +74,7 @@ impl Encoders {
 impl OwnTechnique for Encoders {
     fn frame(&mut self, world: &World) -> Result<usize, Failure> {
         let Self { commands, sorted, threads, visible } = self;
-        commands.upload(world);
+        commands.upload(world, threads);
         if world.kind().moves_items() {
             sorted.update(&world.bounds, threads);
         }
@@ -135,7 +135,7 @@ impl Bundles {
 impl OwnTechnique for Bundles {
     fn frame(&mut self, world: &World) -> Result<usize, Failure> {
         let Self { commands, sorted, threads, keeps_bundles, cameras } = self;
-        commands.upload(world);
+        commands.upload(world, threads);
         if world.kind().moves_items() {
             sorted.update(&world.bounds, threads);
         }

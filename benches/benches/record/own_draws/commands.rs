@@ -14,6 +14,7 @@ use crate::fixture::Fixture;
 use crate::geometry::Geometry;
 use crate::objects::clip_from_world;
 use crate::technique::Failure;
+use crate::threads::Threads;
 
 pub struct Commands {
     pub fixture: Fixture,
@@ -86,12 +87,34 @@ impl Commands {
         })
     }
 
-    /// Uploads what moved in the latest step.
-    pub fn upload(&self, world: &World) {
-        let queue = &self.fixture.queue;
-        if world.kind().moves_items() {
-            queue.write_buffer(&self.transforms, 0, bytemuck::cast_slice(&world.transforms));
+    /// Uploads what moved in the latest step: transforms in chunks, each on any thread.
+    pub fn upload(&self, world: &World, threads: &Threads) {
+        self.upload_cameras(world);
+        let mut chunks: Vec<_> = (0..Self::chunk_count(world, threads.count())).collect();
+        let count = chunks.len();
+        threads.for_each(&mut chunks, |chunk| self.upload_chunk(world, *chunk, count));
+    }
+
+    /// The number of chunks that transforms are uploaded in by a number of threads: 0 if none moved.
+    pub fn chunk_count(world: &World, threads: usize) -> usize {
+        match (world.kind().moves_items(), threads) {
+            (false, _) => 0,
+            (true, 1) => 1,
+            (true, threads) => 2 * threads,
         }
+    }
+
+    /// Uploads one of several chunks of the transforms.
+    pub fn upload_chunk(&self, world: &World, chunk: usize, count: usize) {
+        let items = world.transforms.len();
+        let [start, end] = [chunk, chunk + 1].map(|chunk| chunk * items / count);
+        let offset = (start * size_of::<Mat4>()) as u64;
+        self.fixture.queue.write_buffer(&self.transforms, offset, bytemuck::cast_slice(&world.transforms[start..end]));
+    }
+
+    /// Uploads the matrices of cameras that turned in the latest step.
+    pub fn upload_cameras(&self, world: &World) {
+        let queue = &self.fixture.queue;
         if world.kind().moves_cameras() {
             for (camera, (buffer, _)) in world.cameras().iter().zip(&self.cameras) {
                 queue.write_buffer(buffer, 0, bytemuck::bytes_of(&clip_from_world(camera)));

@@ -1,17 +1,19 @@
 //! The same draws by this crate: a process that draws items, and the engine's code that records them.
 
 use std::error::Error;
+use std::ops::Range;
 use std::sync::Arc;
 
 use drawloom::backend::{WgpuBackend, WgpuSubmission};
+use drawloom::graph::NodeError;
 use drawloom::process::{
     ClearColor, Declare, Draws, Format, ItemContext, ItemDraws, ItemRange, ItemRecorder, Items, RecordItems,
     RenderProcess,
 };
 use drawloom::scene::Changes;
-use drawloom::task::Scheduler;
+use drawloom::task::{Scheduler, Worker};
 use drawloom::wgpu::util::RenderEncoder;
-use drawloom::{FrameInputs, Renderer, Submitter};
+use drawloom::{CpuNode, FrameInputs, NodeAccesses, NodeContext, Renderer, Submitter};
 
 use super::OwnTechnique;
 use super::commands::Commands;
@@ -22,6 +24,7 @@ pub struct DrawloomItems {
     commands: Commands,
     renderer: Renderer<WgpuBackend>,
     submitter: Submitter<WgpuBackend>,
+    workers: usize,
     /// Whether the engine says which items are recorded to the same commands as before.
     has_versions: bool,
     last: Option<WgpuSubmission>,
@@ -35,13 +38,15 @@ impl DrawloomItems {
     pub fn new(backend: WgpuBackend, commands: Commands, workers: usize, has_versions: bool) -> Result<Self, Failure> {
         let builder = Renderer::builder(backend).process(OwnDraws).output(COLOR);
         let (renderer, submitter) = builder.build(Arc::new(Scheduler::new(workers)?))?;
-        Ok(Self { commands, renderer, submitter, has_versions, last: None })
+        Ok(Self { commands, renderer, submitter, workers, has_versions, last: None })
     }
 }
 
 impl OwnTechnique for DrawloomItems {
     fn frame(&mut self, world: &World) -> Result<usize, Failure> {
-        self.commands.upload(world);
+        self.commands.upload_cameras(world);
+        let upload = UploadNode { commands: &self.commands, world, chunks: Commands::chunk_count(world, self.workers) };
+        let nodes: &[&dyn CpuNode] = &[&upload];
         let items = Items {
             process: OWN_DRAWS,
             keys: &world.keys,
@@ -51,7 +56,7 @@ impl OwnTechnique for DrawloomItems {
             changes: if world.kind().moves_items() { Changes::Unknown } else { Changes::NONE },
             recorder: ItemRecorder::Any(&self.commands),
         };
-        let inputs = FrameInputs { items: &[items], ..FrameInputs::new(world.as_scene_ref()) };
+        let inputs = FrameInputs { nodes, items: &[items], ..FrameInputs::new(world.as_scene_ref()) };
         let submitted = self.submitter.submit(self.renderer.record_with(inputs)?)?;
         self.last = Some(submitted.submission);
         Ok(submitted.statistics.views.iter().map(|view| view.items).sum())
@@ -63,6 +68,30 @@ impl OwnTechnique for DrawloomItems {
 
     fn commands(&self) -> &Commands {
         &self.commands
+    }
+}
+
+/// The engine's upload, on the frame's workers.
+struct UploadNode<'a> {
+    commands: &'a Commands,
+    world: &'a World,
+    chunks: usize,
+}
+
+impl CpuNode for UploadNode<'_> {
+    fn name(&self) -> &str {
+        "upload transforms"
+    }
+
+    fn declare(&self, _: &mut NodeAccesses) {}
+
+    fn width(&self, _: &NodeContext<'_>) -> usize {
+        self.chunks
+    }
+
+    fn run(&self, _: &NodeContext<'_>, chunks: Range<usize>, _: &Worker) -> Result<(), NodeError> {
+        chunks.for_each(|chunk| self.commands.upload_chunk(self.world, chunk, self.chunks));
+        Ok(())
     }
 }
 

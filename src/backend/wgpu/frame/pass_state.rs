@@ -238,7 +238,8 @@ impl WgpuPassState {
     pub(crate) fn cost_sample(&self, all: f64, workers: usize) -> CostSample {
         let own = self.timing.total();
         let cost = own.max(self.timing.critical_path(workers) * workers as f64 - (all - own));
-        CostSample { nanoseconds: cost, units: self.timing.batches(), is_warm: self.is_warm }
+        let is_warm = self.is_warm && !self.timing.is_cold.load(Ordering::Relaxed);
+        CostSample { nanoseconds: cost, units: self.timing.batches(), is_warm }
     }
 }
 
@@ -337,13 +338,15 @@ impl BundleCache {
     }
 
     /// Makes room for this many bundles of items of groups of this size. Drops those of groups of another size, and
-    /// further ones.
-    pub(crate) fn begin_items(&self, bundles: usize, group_size: usize) {
+    /// further ones. Returns whether groups have another size, so that all are recorded anew.
+    pub(crate) fn begin_items(&self, bundles: usize, group_size: usize) -> bool {
         let CachedItemBundles { bundles: cached, group_size: before } = &mut *self.of_items.lock();
-        if mem::replace(before, group_size) != group_size {
+        let has_other_size = mem::replace(before, group_size) != group_size;
+        if has_other_size {
             cached.clear();
         }
         cached.resize_with(bundles, || None);
+        has_other_size
     }
 
     /// The bundle of items at an index, with its digest, if it draws these, of a list of these versions: each with its
@@ -442,9 +445,16 @@ pub(crate) struct PassTiming {
     bundles: AtomicUsize,
     recorded_bundles: AtomicUsize,
     replayed_bundles: AtomicUsize,
+    /// Whether the cost is no sample of the strategy's, because the caches were dropped.
+    is_cold: AtomicBool,
 }
 
 impl PassTiming {
+    /// Says that caches were dropped, so that the cost is no sample of the strategy's.
+    pub(crate) fn set_cold(&self) {
+        self.is_cold.store(true, Ordering::Relaxed);
+    }
+
     /// Sets the size of the pass.
     pub(crate) fn set_size(&self, batches: usize, bundles: usize, parts: usize) {
         self.batches.store(batches, Ordering::Relaxed);
