@@ -77,8 +77,11 @@ impl BundleSize {
     const ALL: [usize; 6] = [32, 64, 128, 256, 512, 1024];
     /// The size as long as nothing is known: cheap, and enough bundles for all workers.
     const FIRST: usize = 3;
-    /// A bundle that is replayed costs as much as so many items that are recorded.
-    const REPLAY: f32 = 4.0;
+    /// A bundle that is replayed costs as much as so many items that are recorded, in 0.3 to 0.7 µs: more if the caches
+    /// do not have it any more.
+    const REPLAY: f32 = 5.0;
+    /// Another size costs as much as so many times all items: they are recorded anew, and strategies are compared again.
+    const CHANGE: f32 = 2.0;
     /// Larger bundles than the first size leave a pass at least as many, for workers and encoders.
     const MIN_BUNDLES: usize = 8;
 
@@ -101,7 +104,7 @@ impl BundleSize {
         let best = (0..Self::ALL.len())
             .filter(is_possible)
             .max_by(|&one, &other| self.saved[one].total_cmp(&self.saved[other]));
-        match best.filter(|best| self.saved[*best] > count) {
+        match best.filter(|best| self.saved[*best] > Self::CHANGE * count) {
             Some(best) => *self = Self { current: best, ..Self::default() },
             None => return false,
         }

@@ -639,15 +639,15 @@ mod tests {
             (kept.list.bundle_count(), group_sizes.len() - 1)
         };
         assert_eq!(frames(1, (0, 0), None), (100, 1));
-        assert_eq!(frames(50, (0, 0), None), (100, 0), "another size costs more than it has saved");
+        assert_eq!(frames(100, (0, 0), None), (100, 0), "another size costs more than it has saved");
         assert_eq!(frames(100, (0, 0), None), (25, 1));
         assert_eq!(frames(1, (1, 0), None), (25, 0), "it may go on resting");
-        // One of 200 goes.
-        assert_eq!(frames(5, (128, 0), None), (800, 1));
-        assert_eq!(frames(1, (0, 0), Some(100)), (250, 0));
+        // One of 100 goes.
+        assert_eq!(frames(5, (256, 0), None), (800, 1));
+        assert_eq!(frames(1, (0, 0), Some(100)), (244, 0));
         assert_eq!(frames(100, (0, 0), None), (25, 1));
-        // One of 200 has a new version.
-        assert_eq!(frames(5, (0, 512), None), (800, 1));
+        // One of 100 has a new version.
+        assert_eq!(frames(5, (0, 1024), None), (800, 1));
     }
 
     #[test]

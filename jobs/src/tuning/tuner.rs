@@ -157,6 +157,13 @@ impl Tuner {
         }
     }
 
+    /// Says that some alternatives cost something else from this frame on: they are measured anew, and soon.
+    pub fn invalidate(&mut self, frame: u64, is_invalid: impl Fn(usize) -> bool) {
+        for (_, candidate) in self.candidates.iter_mut().enumerate().filter(|(index, _)| is_invalid(*index)) {
+            (candidate.cost, candidate.due, candidate.pause) = (Estimate::default(), frame, MIN_PAUSE);
+        }
+    }
+
     /// The estimated cost of each alternative in nanoseconds per unit: `None` for those that were not tried since
     /// learning started.
     pub fn costs(&self) -> impl Iterator<Item = Option<f32>> {
@@ -400,6 +407,27 @@ mod tests {
             tuner.report(0, 0, CostSample { nanoseconds: 1e9, units, is_warm });
             assert!(tuner.costs().all(|cost| cost.is_none()));
         }
+    }
+
+    #[test]
+    fn an_alternative_that_becomes_cheaper_is_tried_at_once_if_the_tuner_is_told() {
+        for is_told in [false, true] {
+            let mut simulation = Simulation::new();
+            simulation.run(100, |alternative| if alternative == 0 { 40.0 } else { 30.0 });
+            assert_ne!(simulation.tuner.current, 0);
+            if is_told {
+                simulation.tuner.invalidate(simulation.frame, |alternative| alternative == 0);
+            }
+            simulation.run(8, cheapest(0));
+            assert_eq!(simulation.tuner.current == 0, is_told, "{:?}", simulation.used);
+        }
+        // One that is in use stays in use, and no other is tried.
+        let mut simulation = Simulation::new();
+        simulation.run(100, cheapest(2));
+        let switches = simulation.switches();
+        simulation.tuner.invalidate(simulation.frame, |alternative| alternative == 2);
+        simulation.run(8, cheapest(2));
+        assert_eq!((simulation.switches(), simulation.used[0]), (0, 2), "{switches}");
     }
 
     #[test]

@@ -117,7 +117,7 @@ impl Backend for WgpuBackend {
             nanoseconds,
         };
         let alternatives = pipelines
-            .with_tuner(view, &self.strategies, |tuner| strategies.iter().zip(tuner.costs()).map(named).collect());
+            .with_tuner(view, &self.strategies, |own| strategies.iter().zip(own.tuner.costs()).map(named).collect());
         Some(TuningChoice {
             subject: TuningSubject::Recording,
             labels: Arc::clone(labels),
@@ -226,8 +226,10 @@ impl FrameRecorder for WgpuBackend {
         let (pipelines, pass) = (frame.pipelines(pass), frame.pass(index));
         pass.timing.set_size(list.draw_count(), list.bundle_count(), pass.strategy.part_count(list));
         if pass.draws_items {
+            let (slots, group_size) = (list.items.slot_count(), list.items.group_size());
+            pass.timing.set_group_size(group_size);
             let caches_bundles = pass.strategy.recording == RecordingStrategy::CachedBundles;
-            if caches_bundles && pass.bundle_cache.begin_items(list.items.slot_count(), list.items.group_size()) {
+            if caches_bundles && pass.bundle_cache.begin_items(slots, group_size) {
                 pass.timing.set_cold();
             }
             return Ok(());

@@ -160,7 +160,7 @@ impl WgpuBackend {
                         && (strategies[index].divides_bundles() || !request.records_bundles)
                 };
                 (index, is_trial) = pipelines
-                    .with_tuner(view, &self.strategies, |tuner| tuner.choose(*number, &mut may_try, is_distinct));
+                    .with_tuner(view, &self.strategies, |own| own.tuner.choose(*number, &mut may_try, is_distinct));
             }
             pass.clamps_depth = request.views[view].clamps_depth() && pipelines.has_clamped_pipelines();
             let strategy = fixed.unwrap_or(strategies[index]);

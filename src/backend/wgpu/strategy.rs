@@ -157,8 +157,8 @@ impl StrategySet {
     }
 
     /// A tuner that chooses among the strategies, by index.
-    pub(crate) fn tuner(&self) -> Tuner {
-        Tuner::new(self.strategies.iter().map(|_| MAX_PAUSE))
+    pub(crate) fn tuner(&self) -> PassTuner {
+        PassTuner { tuner: Tuner::new(self.strategies.iter().map(|_| MAX_PAUSE)), group_size: 0 }
     }
 
     fn enumerated(self) -> Self {
@@ -178,6 +178,25 @@ impl StrategySet {
         let combined = |encoding| recordings.iter().map(move |&recording| PassStrategy { recording, encoding });
         let strategies = encodings.into_iter().flat_map(combined).filter(is_candidate).collect();
         Self { strategies, ..self }
+    }
+}
+
+/// The tuner of a pass.
+pub(crate) struct PassTuner {
+    /// It chooses among the strategies of a [`StrategySet`].
+    pub(crate) tuner: Tuner,
+    /// The size of the groups that bundles of items draw; 0 in a pass without items.
+    group_size: usize,
+}
+
+impl PassTuner {
+    /// Sets the size of the groups that bundles of items draw in a frame: with another one, those that are cached cost
+    /// something else.
+    pub(crate) fn set_group_size(&mut self, ranks: usize, set: &StrategySet, frame: u64) {
+        if std::mem::replace(&mut self.group_size, ranks) != ranks {
+            let caches = |strategy: usize| set.strategies[strategy].recording == RecordingStrategy::CachedBundles;
+            self.tuner.invalidate(frame, caches);
+        }
     }
 }
 

@@ -4,13 +4,12 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drawloom_jobs::internal::Tuner;
-
 use super::backend::WgpuBackend;
 use super::error_scope::{catch_wgpu_panic, check_device, poll, with_error_scope};
 use super::frame::{PassCommands, RecordedPart, WgpuCommands, WgpuFrame, WgpuPart};
 use super::read_back::new_read_back;
 use super::resources::WgpuTargets;
+use super::strategy::PassTuner;
 use super::timing::{DevicePassTimes, TimestampReadback};
 use crate::backend::{BackendError, FrameFence, Picture, ViewQueue};
 use crate::fence::{DeviceProgress, FenceSetter};
@@ -124,7 +123,10 @@ impl WgpuBackend {
             let pipelines = frame.pipelines(pass.pass);
             if self.strategies.strategies().len() > 1 && pass.is_tuned {
                 let sample = pass.cost_sample(all, frame.workers);
-                let report = |tuner: &mut Tuner| tuner.report(frame.number, pass.strategy_index, sample);
+                let report = |own: &mut PassTuner| {
+                    own.set_group_size(pass.timing.group_size(), &self.strategies, frame.number);
+                    own.tuner.report(frame.number, pass.strategy_index, sample);
+                };
                 pipelines.with_tuner(pass.pass.view_index, &self.strategies, report);
             }
             // Reuses the string of the frame before.

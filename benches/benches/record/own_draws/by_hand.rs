@@ -130,12 +130,10 @@ impl Bundles {
         let cameras = world.cameras().iter().map(|_| CameraBundles::default()).collect();
         Self { commands, sorted: SortedItems::new(world), threads: threads.clone(), keeps_bundles, cameras }
     }
-}
 
-impl OwnTechnique for Bundles {
-    fn frame(&mut self, world: &World) -> Result<usize, Failure> {
+    /// Finds what each camera sees, and records the bundles that draw something else than before.
+    fn record(&mut self, world: &World) {
         let Self { commands, sorted, threads, keeps_bundles, cameras } = self;
-        commands.upload(world, threads);
         if world.kind().moves_items() {
             sorted.update(&world.bounds, threads);
         }
@@ -157,6 +155,17 @@ impl OwnTechnique for Bundles {
                 items.clone_into(&mut bundle.items);
             }
         });
+    }
+}
+
+impl OwnTechnique for Bundles {
+    fn frame(&mut self, world: &World) -> Result<usize, Failure> {
+        self.commands.upload(world, &self.threads);
+        let moves = world.kind().moves_items() || world.kind().moves_cameras();
+        if moves || !self.keeps_bundles || self.cameras.iter().any(|own| own.bundles.is_empty()) {
+            self.record(world);
+        }
+        let Self { commands, threads, cameras, .. } = self;
         let mut views: Vec<_> = cameras.iter().enumerate().collect();
         let encoded = threads.map(&mut views, |(index, own)| {
             let mut encoder = commands.fixture.encoder();

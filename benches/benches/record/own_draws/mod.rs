@@ -165,6 +165,10 @@ fn sample(technique: &mut dyn OwnTechnique, world: &mut World, at_least: Duratio
     Ok(Sample { seconds, draws: draws as f64 / f64::from(frames) })
 }
 
+/// How much longer a sample is than elsewhere: so long that it has several of the longest frames, and that tuners have
+/// settled before samples count.
+const SAMPLES: u32 = 3;
+
 const PLAIN_LOOP: &str = "plain loop";
 const DRAWLOOM: &str = "drawloom";
 /// The engine does not say which commands are those of the frame before, so all are recorded.
@@ -181,8 +185,8 @@ pub fn measure(extent: &Extent, workers: &[usize], progress: &ProgressBar) -> Re
     }
     progress.set_message("own draws");
     let rounds = Rounds { warm_up: extent.warm_up[0], measured: extent.rounds[0] };
-    let samples =
-        Harness::new(rounds, progress).measure(&mut contenders, |contender, _| contender.sample(extent.sample[0]))?;
+    let samples = Harness::new(rounds, progress)
+        .measure(&mut contenders, |contender, _| contender.sample(SAMPLES * extent.sample[0]))?;
     let row = |(contender, samples): (&OwnContender, Vec<Sample>)| OwnRow {
         technique: contender.name,
         scene: contender.world.kind().name(),

@@ -291,6 +291,11 @@ struct CachedItemBundles {
     bundles: Vec<Option<CachedItems>>,
     /// The size of the groups that they draw.
     group_size: usize,
+    /// Those that this frame replaces. The frames that the device has not drawn yet keep them alive, so the next frame
+    /// with these buffers drops them: on workers, and in the time of the pass, which the tuner sees.
+    replaced: Vec<wgpu::RenderBundle>,
+    /// Those that earlier frames have replaced.
+    unused: Vec<wgpu::RenderBundle>,
 }
 
 /// A bundle of items: each item, with its key and its version.
@@ -330,6 +335,11 @@ impl BundleCache {
             self.of_items.get_mut().bundles.clear();
             self.key = Some(key);
         }
+        let CachedItemBundles { replaced, unused, .. } = self.of_items.get_mut();
+        if replaced.is_empty() {
+            unused.clear();
+        }
+        unused.append(replaced);
     }
 
     /// Makes room for this many bundles, and drops further ones.
@@ -340,7 +350,7 @@ impl BundleCache {
     /// Makes room for this many bundles of items of groups of this size. Drops those of groups of another size, and
     /// further ones. Returns whether groups have another size, so that all are recorded anew.
     pub(crate) fn begin_items(&self, bundles: usize, group_size: usize) -> bool {
-        let CachedItemBundles { bundles: cached, group_size: before } = &mut *self.of_items.lock();
+        let CachedItemBundles { bundles: cached, group_size: before, .. } = &mut *self.of_items.lock();
         let has_other_size = mem::replace(before, group_size) != group_size;
         if has_other_size {
             cached.clear();
@@ -376,12 +386,20 @@ impl BundleCache {
         items: impl Iterator<Item = (u32, u64, u64)>,
         (bundle, digest): (wgpu::RenderBundle, u64),
     ) {
-        if let Some(slot) = self.of_items.lock().bundles.get_mut(index) {
-            let mut cached = slot.take().map_or_else(Vec::new, |cached| cached.items);
-            cached.clear();
-            cached.extend(items);
-            *slot = Some(CachedItems { items: cached, list, bundle, digest });
+        let mut of_items = self.of_items.lock();
+        let CachedItemBundles { bundles, replaced, unused, .. } = &mut *of_items;
+        let Some(slot) = bundles.get_mut(index) else { return };
+        let mut cached = Vec::new();
+        if let Some(before) = slot.take() {
+            cached = before.items;
+            replaced.push(before.bundle);
         }
+        cached.clear();
+        cached.extend(items);
+        *slot = Some(CachedItems { items: cached, list, bundle, digest });
+        let unused = [unused.pop(), unused.pop()];
+        drop(of_items);
+        drop(unused);
     }
 
     /// The bundle at an index, if it draws these batches.
@@ -447,6 +465,8 @@ pub(crate) struct PassTiming {
     replayed_bundles: AtomicUsize,
     /// Whether the cost is no sample of the strategy's, because the caches were dropped.
     is_cold: AtomicBool,
+    /// What cached bundles are divided by, in a pass of items: see [`ItemList`](crate::command::ItemList).
+    group_size: AtomicUsize,
 }
 
 impl PassTiming {
@@ -460,6 +480,16 @@ impl PassTiming {
         self.batches.store(batches, Ordering::Relaxed);
         self.bundles.store(bundles, Ordering::Relaxed);
         self.parts.store(parts, Ordering::Relaxed);
+    }
+
+    /// Sets the size of the groups that bundles of items draw.
+    pub(crate) fn set_group_size(&self, ranks: usize) {
+        self.group_size.store(ranks, Ordering::Relaxed);
+    }
+
+    /// The size of the groups that bundles of items draw; 0 in a pass without items.
+    pub(crate) fn group_size(&self) -> usize {
+        self.group_size.load(Ordering::Relaxed)
     }
 
     /// Times work that several workers may do at once.

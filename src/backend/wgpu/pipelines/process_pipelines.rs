@@ -3,7 +3,6 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::OnceLock;
 
-use drawloom_jobs::internal::Tuner;
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
@@ -17,7 +16,7 @@ use super::shared_pipelines::{RenderPipelineDescription, SharedGroupLayout, Shar
 use super::vertex_buffers::{VertexBuffers, attribute_defaults};
 use crate::backend::BackendError;
 use crate::backend::wgpu::resources::{BindGroupLayouts, engine_layout_entries, process_layout_entries};
-use crate::backend::wgpu::strategy::StrategySet;
+use crate::backend::wgpu::strategy::{PassTuner, StrategySet};
 use crate::command::{Cull, DrawState};
 use crate::process::{Access, DeclaredAttribute, Draws, FramePlan, PlannedProcess, Primitive};
 use crate::quality::Quality;
@@ -42,7 +41,7 @@ pub(crate) struct ProcessPipelines {
     /// What it shares with other processes.
     shared: SharedPipelines,
     /// The tuner of each view's pass.
-    tuners: Mutex<Vec<Option<Tuner>>>,
+    tuners: Mutex<Vec<Option<PassTuner>>>,
 }
 
 impl ProcessPipelines {
@@ -174,7 +173,7 @@ impl ProcessPipelines {
     }
 
     /// Calls `work` with the tuner of one view's pass, which chooses among the strategies of the set.
-    pub(crate) fn with_tuner<R>(&self, view: usize, set: &StrategySet, work: impl FnOnce(&mut Tuner) -> R) -> R {
+    pub(crate) fn with_tuner<R>(&self, view: usize, set: &StrategySet, work: impl FnOnce(&mut PassTuner) -> R) -> R {
         let mut tuners = self.tuners.lock();
         if tuners.len() <= view {
             tuners.resize_with(view + 1, || None);
