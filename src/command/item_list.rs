@@ -57,8 +57,8 @@ struct ItemBundle {
 /// The number of items in a bundle: large bundles are cheap to replay, and of small ones fewer items are recorded anew
 /// where one changes.
 ///
-/// It is chosen as one decides between renting and buying. Another size costs that all items are recorded anew, so it is
-/// taken once it would have saved as much in the frames before.
+/// It is chosen as one decides between renting and buying: another size is taken once it would have saved, in the frames
+/// before, what the change costs.
 #[derive(Clone, Copy, Debug)]
 struct BundleSize {
     /// The current size, as an index of [`BundleSize::ALL`].

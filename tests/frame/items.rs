@@ -196,7 +196,7 @@ fn what_changed_counts_from_the_items_lent_last_for_the_process_even_if_that_fra
     assert!(draw(&bounds, Changes::Objects(&[0, 1]), [1, 1]).is_err(), "twice for one process");
     assert_eq!(draw(&bounds, Changes::NONE, [1, 0]).unwrap(), [[0], [0]]);
     bounds[0].swap(0, 1);
-    assert_eq!(draw(&bounds, Changes::Ranges(&[0..2]), [1, 0]).unwrap(), [[1], [0]]);
+    assert_eq!(draw(&bounds, Changes::Ranges(&[0..1, 1..2]), [1, 0]).unwrap(), [[1], [0]]);
     bounds[0][1].center.x = 0.1;
     let unreported = draw(&bounds, Changes::NONE, [1, 0]);
     if cfg!(debug_assertions) {
