@@ -1,37 +1,23 @@
-//! Mip chains of textures, scaled to the layer size of a texture array. Filters average linear values, not sRGB bytes.
+//! Mip levels of textures. Filters average linear values, not sRGB bytes.
 
+use std::borrow::Cow;
 use std::sync::LazyLock;
 
+use half::f16;
+
 use crate::raster::Real;
-use crate::scene::{Assets, Texture};
+use crate::scene::{Texture, TextureFormat};
 
-/// The layer sizes of the texture arrays in pixels; layers are square. All backends scale textures to these.
-pub(super) const ARRAY_SIDES: [u32; 4] = [256, 512, 1024, Texture::MAX_DETAIL];
-
-/// The index in [`ARRAY_SIDES`] that a texture is scaled to: the smallest that is large enough, or the largest.
-pub(super) fn array_for(texture: &Texture) -> usize {
-    let size = texture.width().max(texture.height());
-    ARRAY_SIDES.iter().position(|&side| size <= side).unwrap_or(ARRAY_SIDES.len() - 1)
-}
-
-/// The slots of the textures that have more pixels, in one direction at least, than what they are scaled to.
-pub(super) fn reduced_textures(assets: &Assets) -> impl Iterator<Item = usize> {
-    let reduced = assets.textures.iter().filter(|(_, texture)| {
-        let side = ARRAY_SIDES[array_for(texture)];
-        texture.width() > side || texture.height() > side
-    });
-    reduced.map(|(handle, _)| handle.index() as usize)
-}
-
-/// All mip levels of a texture scaled to a square, from `side` pixels down to one; RGBA bytes, sRGB encoded.
-pub(super) fn mip_chain(texture: &Texture, side: u32) -> Vec<Vec<u8>> {
-    let mut level = scaled(texture, side);
-    let mut side = side as usize;
-    let mut chain = vec![encoded(&level)];
-    while side > 1 {
-        level = halved(&level, side);
-        side /= 2;
-        chain.push(encoded(&level));
+/// All mip levels of a texture, in its format: its own, or those that are made from its first one.
+pub(super) fn mip_chain(texture: &Texture) -> Vec<Cow<'_, [u8]>> {
+    let (class, levels) = (texture.class(), texture.levels());
+    let mut chain: Vec<_> = levels.iter().map(|level| Cow::Borrowed(level.as_slice())).collect();
+    if chain.len() < class.mip_levels as usize {
+        let mut level = decode(class.format, texture.pixels());
+        for index in 1..class.mip_levels {
+            level = reduced(&level, class.level_size(index - 1), class.level_size(index));
+            chain.push(Cow::Owned(encode(class.format, &level)));
+        }
     }
     chain
 }
@@ -52,23 +38,29 @@ pub(super) fn srgb_to_linear<R: Real>(value: R) -> R {
 
 type Texel = [f32; 4];
 
-/// Magnifies bilinearly; minifies with a tent filter.
-fn scaled(texture: &Texture, side: u32) -> Vec<Texel> {
-    let (width, height) = (texture.width() as usize, texture.height() as usize);
-    let texels: Vec<Texel> = texture.pixels().as_chunks().0.iter().copied().map(decoded).collect();
-    if [texture.width(), texture.height()] == [side; 2] {
-        // Every weight would be 1.
-        return texels;
+/// The level of a smaller size: each texel is the mean of what it covers.
+fn reduced(level: &[Texel], from: [u32; 2], to: [u32; 2]) -> Vec<Texel> {
+    let ([width, _], size) = (from.map(|side| side as usize), to.map(|side| side as usize));
+    let mut result = Vec::with_capacity(size[0] * size[1]);
+    if from == to.map(|side| 2 * side) {
+        for rows in level.chunks_exact(2 * width) {
+            let (upper, lower) = rows.split_at(width);
+            let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+            result.extend(pairs.map(|(upper, lower)| -> Texel {
+                std::array::from_fn(|channel| {
+                    (upper[0][channel] + upper[1][channel] + lower[0][channel] + lower[1][channel]) * 0.25
+                })
+            }));
+        }
+        return result;
     }
-    let columns = weights(width, side as usize);
-    let rows = weights(height, side as usize);
-    let mut result = Vec::with_capacity(rows.len() * columns.len());
+    let [columns, rows] = std::array::from_fn(|axis| coverage(from[axis], to[axis]));
     for row in &rows {
         for column in &columns {
             let mut sum = [0.0; 4];
             for &(y, row_weight) in row {
                 for &(x, column_weight) in column {
-                    let texel = texels[y * width + x];
+                    let texel = level[y * width + x];
                     for channel in 0..4 {
                         sum[channel] += texel[channel] * row_weight * column_weight;
                     }
@@ -80,54 +72,68 @@ fn scaled(texture: &Texture, side: u32) -> Vec<Texel> {
     result
 }
 
-/// The filter weights of a resampling from `from` to `to` pixels: for each new pixel, old pixels and their weights. The
-/// filter is a tent as wide as the coarser grid's pixels. Indices wrap around, as texture coordinates do.
-fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
-    let step = from as f64 / to as f64;
-    let radius = step.max(1.0);
-    let weights_of = |pixel: usize| {
-        let center = (pixel as f64 + 0.5) * step - 0.5;
-        let first = (center - radius).floor() as i64;
-        let last = (center + radius).ceil() as i64;
-        let tent = |old: i64| (1.0 - (old as f64 - center).abs() / radius).max(0.0);
-        let total: f64 = (first..=last).map(tent).sum();
-        let wrapped = |old: i64| old.rem_euclid(from as i64) as usize;
-        let weighted = (first..=last).map(|old| (wrapped(old), (tent(old) / total) as f32));
-        weighted.filter(|(_, weight)| *weight > 0.0).collect()
+/// Of a row of `from` texels that is reduced to `to`: for each new texel the old ones that it covers, each with its
+/// share.
+fn coverage(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
+    let step = f64::from(from) / f64::from(to);
+    let covered = |texel: u32| {
+        let (start, end) = (f64::from(texel) * step, f64::from(texel + 1) * step);
+        let shares = (start as usize..(end.ceil() as usize).min(from as usize)).map(move |old| {
+            let overlap = (old as f64 + 1.0).min(end) - (old as f64).max(start);
+            (old, (overlap / step) as f32)
+        });
+        shares.filter(|(_, share)| *share > 0.0).collect()
     };
-    (0..to).map(weights_of).collect()
+    (0..to).map(covered).collect()
 }
 
-fn halved(level: &[Texel], side: usize) -> Vec<Texel> {
-    let half = side / 2;
-    let mut result = Vec::with_capacity(half * half);
-    for rows in level.chunks_exact(2 * side) {
-        let (upper, lower) = rows.split_at(side);
-        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
-        result.extend(pairs.map(|(upper, lower)| -> Texel {
-            std::array::from_fn(|channel| {
-                (upper[0][channel] + upper[1][channel] + lower[0][channel] + lower[1][channel]) * 0.25
-            })
-        }));
-    }
-    result
-}
-
-fn decoded(pixel: [u8; 4]) -> Texel {
+/// The texels of a level, linear. Channels that the format lacks are 0.
+fn decode(format: TextureFormat, bytes: &[u8]) -> Vec<Texel> {
     static LINEAR: LazyLock<[f32; 256]> =
         LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
-    let [red, green, blue, alpha] = pixel;
-    let linear = |byte: u8| LINEAR[usize::from(byte)];
-    [linear(red), linear(green), linear(blue), f32::from(alpha) / 255.0]
+    let unorm = |byte: u8| f32::from(byte) / 255.0;
+    if format == TextureFormat::Rgba8Srgb {
+        let linear = &*LINEAR;
+        let color = |byte: u8| linear[usize::from(byte)];
+        let texels = bytes.as_chunks().0.iter();
+        return texels
+            .map(|&[red, green, blue, alpha]| [color(red), color(green), color(blue), unorm(alpha)])
+            .collect();
+    }
+    let texels = bytes.chunks_exact(format.block_bytes() as usize);
+    let decoded = texels.map(|bytes| {
+        let mut texel = [0.0; 4];
+        if has_half_floats(format) {
+            let halves = bytes.as_chunks().0.iter().map(|half| f16::from_le_bytes(*half).to_f32());
+            texel.iter_mut().zip(halves).for_each(|(channel, half)| *channel = half);
+        } else {
+            texel.iter_mut().zip(bytes).for_each(|(channel, byte)| *channel = unorm(*byte));
+        }
+        texel
+    });
+    decoded.collect()
 }
 
-fn encoded(level: &[Texel]) -> Vec<u8> {
-    let (bytes, alpha) = (&*SRGB_BYTES, |value: f32| (value * 255.0 + 0.5) as u8);
-    let mut result = Vec::with_capacity(level.len() * 4);
-    for &[red, green, blue, opacity] in level {
-        result.extend([bytes.encode(red), bytes.encode(green), bytes.encode(blue), alpha(opacity)]);
+/// The bytes of texels in a format that is not compressed.
+fn encode(format: TextureFormat, level: &[Texel]) -> Vec<u8> {
+    let unorm = |value: f32| (value * 255.0 + 0.5) as u8;
+    let (table, bytes) = (&*SRGB_BYTES, format.block_bytes() as usize);
+    let mut result = Vec::with_capacity(level.len() * bytes);
+    for texel in level {
+        let &[red, green, blue, alpha] = texel;
+        if format == TextureFormat::Rgba8Srgb {
+            result.extend([table.encode(red), table.encode(green), table.encode(blue), unorm(alpha)]);
+        } else if has_half_floats(format) {
+            result.extend(texel[..bytes / 2].iter().flat_map(|value| f16::from_f32(*value).to_le_bytes()));
+        } else {
+            result.extend(texel[..bytes].iter().map(|value| unorm(*value)));
+        }
     }
     result
+}
+
+fn has_half_floats(format: TextureFormat) -> bool {
+    matches!(format, TextureFormat::R16Float | TextureFormat::Rg16Float | TextureFormat::Rgba16Float)
 }
 
 static SRGB_BYTES: LazyLock<SrgbBytes> = LazyLock::new(SrgbBytes::new);
@@ -180,13 +186,32 @@ fn srgb_byte(value: f32) -> u8 {
 mod tests {
     use super::*;
 
+    fn chain_of(format: TextureFormat, size: [u32; 2], bytes: Vec<u8>) -> Vec<Vec<u8>> {
+        let texture = Texture::with_levels("texture", format, size, vec![bytes]).unwrap();
+        mip_chain(&texture).into_iter().map(Cow::into_owned).collect()
+    }
+
     #[test]
-    fn a_texture_of_its_layers_size_keeps_every_byte() {
+    fn a_texture_keeps_every_byte_and_gets_levels_down_to_one_texel() {
         let pixels: Vec<u8> = (0..=255).cycle().take(8 * 8 * 4).collect();
-        let texture = Texture::new("all bytes", 8, 8, pixels.clone()).unwrap();
-        let chain = mip_chain(&texture, 8);
+        let chain = chain_of(TextureFormat::Rgba8Srgb, [8, 8], pixels.clone());
         assert_eq!(chain.iter().map(Vec::len).collect::<Vec<_>>(), [256, 64, 16, 4]);
         assert_eq!(chain[0], pixels);
+        let own = vec![vec![1; 32], vec![2; 16], vec![3; 16]];
+        let blocks = Texture::with_levels("blocks", TextureFormat::Bc7Srgb, [8, 4], own.clone()).unwrap();
+        assert_eq!(mip_chain(&blocks).into_iter().map(Cow::into_owned).collect::<Vec<_>>(), own);
+    }
+
+    #[test]
+    fn a_level_is_the_mean_of_what_it_covers() {
+        // 5 texels are reduced to 2, each of which covers two and a half.
+        let chain = chain_of(TextureFormat::R8Unorm, [5, 1], vec![0, 100, 200, 50, 150]);
+        assert_eq!(chain[1..], [vec![80, 120], vec![100]]);
+        let chain = chain_of(TextureFormat::Rg8Unorm, [1, 3], vec![30, 0, 60, 90, 90, 0]);
+        assert_eq!(chain[1], [60, 30]);
+        let halves = [1.0, 65504.0, 3.0, 0.0].map(|value| f16::from_f32(value).to_le_bytes()).concat();
+        let chain = chain_of(TextureFormat::Rg16Float, [2, 1], halves);
+        assert_eq!(chain[1], [2.0, 32752.0].map(|value| f16::from_f32(value).to_le_bytes()).concat());
     }
 
     #[test]
@@ -202,17 +227,17 @@ mod tests {
     #[test]
     fn black_and_white_average_to_half_the_linear_value() {
         let pixels = [[0, 0, 0, 255], [255, 255, 255, 255], [255, 255, 255, 255], [0, 0, 0, 255]].concat();
-        let texture = Texture::new("checker", 2, 2, pixels).unwrap();
-        assert_eq!(mip_chain(&texture, 2)[1], [188, 188, 188, 255]);
+        assert_eq!(chain_of(TextureFormat::Rgba8Srgb, [2, 2], pixels.clone())[1], [188, 188, 188, 255]);
+        assert_eq!(chain_of(TextureFormat::Rgba8Unorm, [2, 2], pixels)[1], [128, 128, 128, 255]);
     }
 
     #[test]
     fn a_uniform_colour_stays_the_same_at_every_size() {
-        for (width, height, side) in [(1, 1, 256), (3, 5, 256), (300, 7, 256), (700, 300, 512)] {
-            let pixels = [10, 100, 200, 50].repeat(width as usize * height as usize);
-            let texture = Texture::new("plain", width, height, pixels).unwrap();
-            for level in mip_chain(&texture, side) {
-                assert!(level.chunks(4).all(|pixel| pixel == [10, 100, 200, 50]));
+        for (width, height) in [(1, 1), (3, 5), (300, 7), (64, 64), (64, 2), (1, 33)] {
+            let color = [10, 100, 200, 50];
+            let pixels = color.repeat(width as usize * height as usize);
+            for level in chain_of(TextureFormat::Rgba8Srgb, [width, height], pixels) {
+                assert!(level.chunks(4).all(|pixel| pixel == color));
             }
         }
     }

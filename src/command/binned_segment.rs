@@ -1,6 +1,7 @@
 //! Bins: the draw states and meshes that a scene's objects have; and a segment of a view's visible objects, ordered by
 //! bin.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::DrawState;
@@ -12,8 +13,10 @@ use super::DrawState;
 /// Numbers depend on timing: use [`Bins::in_order`] wherever order matters.
 #[derive(Debug, Default)]
 pub struct Bins {
-    /// For each mesh, by slot, the number of its bin by state; [`NO_BIN`] where it has none.
+    /// For each mesh, by slot, the number of its bin by state of texture set 0; [`NO_BIN`] where it has none.
     numbers: Vec<[u32; STATES]>,
+    /// The numbers of the bins of other texture sets.
+    of_texture_sets: HashMap<Bin, u32>,
     /// By number.
     bins: Vec<Bin>,
     /// The numbers in draw order; the bins from `in_order.len()` on are not in it yet.
@@ -23,7 +26,7 @@ pub struct Bins {
 }
 
 /// What the objects of a bin have in common.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Bin {
     /// The fixed-function state, of subdivision level 0 and level of detail 0.
     pub state: DrawState,
@@ -31,7 +34,7 @@ pub struct Bin {
     pub mesh: u32,
 }
 
-/// The number of states of subdivision level 0 and level of detail 0.
+/// The number of states of subdivision level 0, level of detail 0 and texture set 0.
 const STATES: usize = DrawState::COUNT >> 6;
 
 const NO_BIN: u32 = u32::MAX;
@@ -39,6 +42,9 @@ const NO_BIN: u32 = u32::MAX;
 impl Bins {
     /// The number of a bin, if it has one.
     pub fn find(&self, bin: Bin) -> Option<u32> {
+        if bin.state.texture_set() > 0 {
+            return self.of_texture_sets.get(&bin).copied();
+        }
         let number = *self.numbers.get(bin.mesh as usize)?.get(bin.state.index())?;
         (number != NO_BIN).then_some(number)
     }
@@ -51,12 +57,15 @@ impl Bins {
         if let Some(number) = self.find(bin) {
             return number;
         }
-        let mesh = bin.mesh as usize;
-        if mesh >= self.numbers.len() {
-            self.numbers.resize(mesh + 1, [NO_BIN; STATES]);
+        let (number, mesh) = (self.bins.len() as u32, bin.mesh as usize);
+        if bin.state.texture_set() > 0 {
+            self.of_texture_sets.insert(bin, number);
+        } else {
+            if mesh >= self.numbers.len() {
+                self.numbers.resize(mesh + 1, [NO_BIN; STATES]);
+            }
+            self.numbers[mesh][bin.state.index()] = number;
         }
-        let number = self.bins.len() as u32;
-        self.numbers[mesh][bin.state.index()] = number;
         self.bins.push(bin);
         number
     }

@@ -1,23 +1,26 @@
-//! The fixed-function state of a draw, in two bytes.
+//! The state of a draw, in four bytes.
 
 use crate::scene::{Blend, LevelOfDetail, Topology};
 
-/// Topology, culling, blending, mask, subdivision level and level of detail in two bytes (M listing 10.1). With the
-/// process that draws, it determines a command's pipeline; with the mesh, its triangles.
+/// Topology, culling, blending, mask, subdivision level, level of detail and texture set in four bytes (M listing 10.1).
+/// With the process that draws, it determines a command's pipeline and bind groups; with the mesh, its triangles.
 ///
 /// ```text
-/// bit   11 10  9        | 8  7  6     | 5    | 4  3 | 2  1 | 0
-///       level of detail | subdivision | mask | blend| cull | topology
+/// bit   27 … 12     | 11 10  9        | 8  7  6     | 5    | 4  3 | 2  1 | 0
+///       texture set | level of detail | subdivision | mask | blend| cull | topology
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct DrawState(u16);
+pub struct DrawState(u32);
 
 impl DrawState {
     /// A single-sided opaque triangle list.
     pub const PLAIN: Self = Self(0);
 
-    /// The number of states: [`DrawState::index`] is less.
+    /// The number of states with texture set 0: their [`DrawState::index`] is less.
     pub const COUNT: usize = 1 << 12;
+
+    /// The highest texture set.
+    pub const MAX_TEXTURE_SET: u32 = u16::MAX as u32;
 
     /// The highest subdivision level: a mesh's edges can be halved 7 times.
     pub const MAX_SUBDIVISION_LEVEL: u32 = 7;
@@ -25,19 +28,19 @@ impl DrawState {
     /// The coarsest level of detail: see [`Mesh::levels`](crate::scene::Mesh::levels).
     pub const MAX_LEVEL_OF_DETAIL: u32 = LevelOfDetail::MAX_COUNT as u32;
 
-    /// A state without a mask, of subdivision level 0 and level of detail 0.
+    /// A state without a mask, of subdivision level 0, level of detail 0 and texture set 0.
     pub fn new(topology: Topology, cull: Cull, blend: Blend) -> Self {
-        Self(topology as u16 | (cull as u16) << 1 | (blend as u16) << 3)
+        Self(topology as u32 | (cull as u32) << 1 | (blend as u32) << 3)
     }
 
     /// The same state with another topology.
     pub(crate) fn with_topology(self, topology: Topology) -> Self {
-        Self(self.0 & !1 | topology as u16)
+        Self(self.0 & !1 | topology as u32)
     }
 
     /// The same state of an object whose material [is a mask](crate::scene::Material::is_masked), or is not.
     pub fn with_mask(self, is_masked: bool) -> Self {
-        Self(self.0 & !(1 << 5) | u16::from(is_masked) << 5)
+        Self(self.0 & !(1 << 5) | u32::from(is_masked) << 5)
     }
 
     /// Whether the object's material is a mask.
@@ -47,45 +50,55 @@ impl DrawState {
 
     /// The same state with another subdivision level, at most [`DrawState::MAX_SUBDIVISION_LEVEL`].
     pub fn with_subdivision_level(self, level: u32) -> Self {
-        Self(self.0 & !(0b111 << 6) | (level.min(Self::MAX_SUBDIVISION_LEVEL) as u16) << 6)
+        Self(self.0 & !(0b111 << 6) | level.min(Self::MAX_SUBDIVISION_LEVEL) << 6)
     }
 
     /// How often the mesh's edges are halved.
     pub fn subdivision_level(self) -> u32 {
-        u32::from(self.0 >> 6 & 0b111)
+        self.0 >> 6 & 0b111
     }
 
     /// The same state with another level of detail, at most [`DrawState::MAX_LEVEL_OF_DETAIL`].
     pub fn with_level_of_detail(self, level: u32) -> Self {
-        Self(self.0 & !(0b111 << 9) | (level.min(Self::MAX_LEVEL_OF_DETAIL) as u16) << 9)
+        Self(self.0 & !(0b111 << 9) | level.min(Self::MAX_LEVEL_OF_DETAIL) << 9)
     }
 
     /// Which of the mesh's levels is drawn: 0 for the mesh itself.
     pub fn level_of_detail(self) -> u32 {
-        u32::from(self.0 >> 9)
+        self.0 >> 9 & 0b111
     }
 
-    /// The part of the state that selects the pipeline, on which the level of detail has no influence. A subdivided
-    /// mesh is a triangle list, whatever its own topology is.
+    /// The same state with another texture set, at most [`DrawState::MAX_TEXTURE_SET`].
+    pub(crate) fn with_texture_set(self, set: u32) -> Self {
+        Self(self.0 & 0xfff | set.min(Self::MAX_TEXTURE_SET) << 12)
+    }
+
+    /// Which [set of textures](crate::view::TextureSets) is bound while it is drawn.
+    pub fn texture_set(self) -> u32 {
+        self.0 >> 12
+    }
+
+    /// The part of the state that selects the pipeline, on which level of detail and texture set have no influence. A
+    /// subdivided mesh is a triangle list, whatever its own topology is.
     pub fn pipeline_state(self) -> Self {
         match self.subdivision_level() {
-            0 => self.with_level_of_detail(0),
+            0 => self.with_level_of_detail(0).with_texture_set(0),
             _ => Self::new(Topology::TriangleList, self.cull(), self.blend()).with_mask(self.is_masked()),
         }
     }
 
     /// The bits as an index: [`DrawState::from_bits`] is the inverse.
     pub fn index(self) -> usize {
-        usize::from(self.0)
+        self.0 as usize
     }
 
     /// The state with these bits, which are its [index](DrawState::index); `None` if there is none.
-    pub fn from_bits(bits: u16) -> Option<Self> {
-        (usize::from(bits) < Self::COUNT).then_some(Self(bits))
+    pub fn from_bits(bits: u32) -> Option<Self> {
+        (bits >> 28 == 0).then_some(Self(bits))
     }
 
     /// The bits.
-    pub(super) fn bits(self) -> u16 {
+    pub(super) fn bits(self) -> u32 {
         self.0
     }
 
@@ -158,7 +171,14 @@ mod tests {
                             (0, DrawState::MAX_LEVEL_OF_DETAIL, DrawState::MAX_SUBDIVISION_LEVEL)
                         );
                         assert_eq!(coarse.with_level_of_detail(0), subdivided);
-                        assert_eq!(state.with_level_of_detail(3).pipeline_state(), state);
+                        assert_eq!(state.with_level_of_detail(3).with_texture_set(5).pipeline_state(), state);
+                        let textured = coarse.with_texture_set(1 << 20);
+                        assert_eq!(
+                            (textured.texture_set(), textured.level_of_detail(), textured.cull()),
+                            (DrawState::MAX_TEXTURE_SET, DrawState::MAX_LEVEL_OF_DETAIL, cull)
+                        );
+                        assert_eq!((textured.with_texture_set(0), coarse.texture_set()), (coarse, 0));
+                        assert_eq!(DrawState::from_bits(textured.bits()), Some(textured));
                         assert!(seen.insert(state));
                     }
                 }
@@ -168,7 +188,7 @@ mod tests {
 
     #[test]
     fn no_state_has_more_bits_than_all_fields_together() {
-        assert!(DrawState::from_bits(DrawState::COUNT as u16 - 1).is_some());
-        assert_eq!(DrawState::from_bits(DrawState::COUNT as u16), None);
+        assert!(DrawState::from_bits((1 << 28) - 1).is_some());
+        assert_eq!(DrawState::from_bits(1 << 28), None);
     }
 }

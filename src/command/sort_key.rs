@@ -6,8 +6,8 @@ use super::DrawState;
 /// Commands with equal keys are ordered by object index.
 ///
 /// ```text
-/// bit    63 62 | 61 … 55 | 54 … 23 | 22 … 20         | 19 … 0
-/// opaque  0  0 | state   | mesh    | level of detail | depth, near to far
+/// bit    63 62 | 61 … 55 | 54 … 47     | 46 … 23 | 22 … 20         | 19 … 0
+/// opaque  0  0 | state   | texture set | mesh    | level of detail | depth, near to far
 ///
 /// bit    63 62 | 61 … 30             | 29 … 0
 /// blended 0 1  | depth, far to near  | 0
@@ -24,7 +24,8 @@ use super::DrawState;
 /// the sort skips bits that are equal.
 ///
 /// Materials have no bits: shaders find them by object, so a change of material is no change of state, and sorting by
-/// material would split batches.
+/// material would split batches. Of the texture set's number a key has the lower 8 bits, and of the mesh's the lower 24:
+/// draws of others in between only split batches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SortKey(u64);
 
@@ -35,13 +36,14 @@ impl SortKey {
     /// The largest key, of empty commands.
     pub const LAST: Self = Self(u64::MAX);
 
-    /// The key of an opaque command: by state, mesh and level of detail, then front to back. `depth` is a
+    /// The key of an opaque command: by state, texture set, mesh and level of detail, then front to back. `depth` is a
     /// [quantised](crate::quality::DepthPrecision::quantize) depth.
     pub fn opaque(state: DrawState, mesh: u32, depth: u32) -> Self {
         let (bits, level) = (u64::from(state.bits()), u64::from(state.level_of_detail()));
         // Subdivision level, mask, culling and topology.
-        let state = (bits >> 5 & 0b1111) << 3 | bits & 0b111;
-        Self(state << 55 | u64::from(mesh) << 23 | level << 20 | u64::from(depth >> 12))
+        let fixed = (bits >> 5 & 0b1111) << 3 | bits & 0b111;
+        let (set, mesh) = (u64::from(state.texture_set() & 0xff), u64::from(mesh & 0xff_ffff));
+        Self(fixed << 55 | set << 47 | mesh << 23 | level << 20 | u64::from(depth >> 12))
     }
 
     /// The key of a blended command: back to front, exact to the last bit of `depth`, a
@@ -104,11 +106,15 @@ mod tests {
         }
 
         #[test]
-        fn opaque_commands_go_by_mesh_before_depth(first in any::<(u32, u32)>(), second in any::<(u32, u32)>()) {
-            let key = |(mesh, depth)| SortKey::opaque(DrawState::PLAIN, mesh, depth);
-            if first.0 < second.0 {
+        fn opaque_commands_go_by_texture_set_then_by_mesh_then_by_depth(
+            first in (0..256_u32, 0..1_u32 << 24, any::<u32>()),
+            second in (0..256_u32, 0..1_u32 << 24, any::<u32>()),
+        ) {
+            let key = |(set, mesh, depth)| SortKey::opaque(DrawState::PLAIN.with_texture_set(set), mesh, depth);
+            if (first.0, first.1) < (second.0, second.1) {
                 prop_assert!(key(first) < key(second));
             }
+            prop_assert!(key(first) < SortKey::blended(u32::MAX), "whatever the set");
         }
     }
 

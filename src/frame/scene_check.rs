@@ -137,6 +137,7 @@ impl SceneCapacity {
         TableLimits {
             objects: limits.max_objects(self.column_stride).min(TableLimits::MAX_OBJECTS),
             material_bytes: limits.binding_bytes,
+            texture_layers: limits.texture_layers,
             can_draw,
             revision: self.revision,
         }

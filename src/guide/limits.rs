@@ -21,9 +21,8 @@
 //!   that none of them holds, are left out, counted and [named](crate::view::SceneIssue); everything else is drawn.
 //!   With the limits that every device has, a scene has two million objects, as many materials, and 1.6 million lights
 //!   in a view; request the limits of the adapter for more.
-//! - **Textures of more than 2048 × 2048 pixels.** Larger ones are scaled down, and
-//!   [named](crate::view::IssueReason::ReducedTexture). A texture of any shape takes the memory of a square with
-//!   sides of 256, 512, 1024 or 2048 pixels.
+//! - **Few changes of bindings with textures of many sizes.** Textures of one size and format are layers of an array,
+//!   and four arrays are bound together; materials that need others are drawn apart.
 //! - **More than one frame in flight on the device's queue, by itself.** The engine decides when it submits, and how
 //!   many frames it keeps.
 //! - **Recursion by itself.** A mirror in a mirror, or a portal in a portal, is as deep as the engine has cameras for

@@ -1,5 +1,6 @@
 //! Errors of scenes.
 
+use super::TextureFormat;
 use crate::handle::StaleHandle;
 
 /// Why a scene, or a part of it, is invalid.
@@ -99,19 +100,25 @@ pub enum SceneError {
         /// Its name.
         material: String,
     },
-    /// A texture with an invalid size, or with a number of bytes that does not match its size.
+    /// A texture with an invalid size, or with mip levels that do not fit its size and format.
     #[error(
-        "texture `{texture}` has {width}x{height} pixels in {bytes} bytes; both sides must be 1 to 8192, with 4 bytes a pixel"
+        "texture `{texture}` has {width}x{height} texels of {format:?} in levels of {bytes:?} bytes; both sides must be 1 \
+         to 32768 and multiples of {side}, each level must be half as wide and high as the one before, and a block of \
+         {side}x{side} texels has {block} bytes",
+        side = format.block_side(),
+        block = format.block_bytes()
     )]
     InvalidTexture {
         /// Its name.
         texture: String,
-        /// Its width in pixels.
+        /// Its format.
+        format: TextureFormat,
+        /// Its width in texels.
         width: u32,
-        /// Its height in pixels.
+        /// Its height in texels.
         height: u32,
-        /// The number of bytes.
-        bytes: usize,
+        /// The number of bytes of each level.
+        bytes: Vec<usize>,
     },
     /// An object whose position, orientation or scale is not finite, or whose orientation is not of unit length.
     #[error("object {object}: its transform is not finite, or its orientation is not of unit length")]

@@ -1,10 +1,8 @@
-//! Materials and textures.
-
-use std::sync::Arc;
+//! Materials.
 
 use glam::Vec3;
 
-use super::{MaterialValues, SceneError};
+use super::{MaterialValues, Texture};
 use crate::handle::Handle;
 
 /// The optical properties of a surface.
@@ -95,61 +93,4 @@ pub enum Blend {
     Additive = 2,
     /// It is subtracted from what is behind it.
     Subtractive = 3,
-}
-
-/// An RGBA image for a material. Clones share their pixels.
-///
-/// Backends scale a texture to a square with sides of 256, 512, 1024 or 2048 pixels: to the smallest that is at least
-/// as wide and as high, so that it keeps its detail, or else to the largest. One that has more pixels than
-/// [`Texture::MAX_DETAIL`] in a direction is drawn with that many, filtered when it is uploaded, and counted as
-/// [`ReducedTexture`](crate::view::IssueReason::ReducedTexture) in every frame: details that are finer become their
-/// mean.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Texture {
-    name: String,
-    width: u32,
-    height: u32,
-    pixels: Arc<Vec<u8>>,
-}
-
-impl Texture {
-    /// The largest width and height that a texture may be given with. More than [`Texture::MAX_DETAIL`] are not drawn.
-    pub const MAX_SIZE: u32 = 8192;
-
-    /// The largest width and height that frames draw: wider and higher textures are scaled down to it.
-    pub const MAX_DETAIL: u32 = 2048;
-
-    /// A texture of RGBA bytes, sRGB encoded, rows from top to bottom without padding.
-    ///
-    /// # Errors
-    /// If width or height is 0 or above [`Texture::MAX_SIZE`], or the number of bytes is not `width * height * 4`.
-    pub fn new(name: impl Into<String>, width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, SceneError> {
-        let name = name.into();
-        let sides = 1..=Self::MAX_SIZE;
-        let fits = |bytes: usize| bytes == width as usize * height as usize * 4;
-        if !sides.contains(&width) || !sides.contains(&height) || !fits(pixels.len()) {
-            return Err(SceneError::InvalidTexture { texture: name, width, height, bytes: pixels.len() });
-        }
-        Ok(Self { name, width, height, pixels: Arc::new(pixels) })
-    }
-
-    /// The name in reports.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// In pixels.
-    pub fn width(&self) -> u32 {
-        self.width
-    }
-
-    /// In pixels.
-    pub fn height(&self) -> u32 {
-        self.height
-    }
-
-    /// RGBA bytes, sRGB encoded, rows from top to bottom.
-    pub fn pixels(&self) -> &[u8] {
-        &self.pixels
-    }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::GpuObject;
+use super::{GpuObject, TextureSets};
 use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::command::{Cull, DrawState, Selection};
 use crate::handle::Handle;
@@ -22,6 +22,7 @@ pub(super) struct DrawStates {
     layouts: Vec<MaterialLayout>,
     /// Counts how often `types` changed.
     types_revision: u64,
+    texture_sets: TextureSets,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +51,8 @@ struct AssetVersion {
     arrivals: u64,
     /// That of the limits.
     limits: u64,
+    /// That of the texture sets.
+    texture_sets: u64,
 }
 
 impl DrawStates {
@@ -57,11 +60,13 @@ impl DrawStates {
     /// before, or was loaded after its handle was made: no object can have been described with another one that is new.
     pub(super) fn update(&mut self, assets: &Assets, limits: &TableLimits<'_>) -> bool {
         let Assets { meshes, materials, .. } = assets;
+        self.texture_sets.update(assets, limits.texture_layers);
         let version = AssetVersion {
             meshes: (meshes.identity(), meshes.revision()),
             materials: (materials.identity(), materials.revision()),
             arrivals: meshes.arrivals() + materials.arrivals(),
             limits: limits.revision,
+            texture_sets: self.texture_sets.revision(),
         };
         if self.version == Some(version) {
             return false;
@@ -83,7 +88,9 @@ impl DrawStates {
             let slot = handle.index() as usize;
             let layout = material.values.as_ref().map(MaterialValues::layout);
             let is_in_arrays = limits.reach_material(slot, layout.map_or(0, |layout| layout.stride));
-            new_materials[slot] = Some(MaterialEntry { material: handle, states: states_of(material), is_in_arrays });
+            let set = self.texture_sets.set_of(handle.index());
+            let states = states_of(material).map(|state| state.with_texture_set(set));
+            new_materials[slot] = Some(MaterialEntry { material: handle, states, is_in_arrays });
             if layout.is_some() {
                 types.resize(materials.slot_count(), None);
                 types[slot] = layout;
@@ -107,6 +114,10 @@ impl DrawStates {
             }
         }
         self.types = types;
+    }
+
+    pub(super) fn texture_sets(&self) -> &TextureSets {
+        &self.texture_sets
     }
 
     /// The type of each material, by slot; empty if none has one.
@@ -188,6 +199,8 @@ pub(crate) struct TableLimits<'a> {
     pub(crate) objects: usize,
     /// The bytes of an array of materials, or of their values, that a shader can read.
     pub(crate) material_bytes: u64,
+    /// The most textures in an array.
+    pub(crate) texture_layers: u32,
     /// Whether a mesh can be drawn.
     pub(crate) can_draw: &'a dyn Fn(&Mesh) -> bool,
     /// Another one after `material_bytes` or `can_draw` changed.
@@ -199,8 +212,13 @@ impl TableLimits<'_> {
     pub(crate) const MAX_OBJECTS: usize = u32::MAX as usize;
 
     /// Without limits but that.
-    pub(crate) const NONE: TableLimits<'static> =
-        TableLimits { objects: Self::MAX_OBJECTS, material_bytes: u64::MAX, can_draw: &|_| true, revision: 0 };
+    pub(crate) const NONE: TableLimits<'static> = TableLimits {
+        objects: Self::MAX_OBJECTS,
+        material_bytes: u64::MAX,
+        texture_layers: 256,
+        can_draw: &|_| true,
+        revision: 0,
+    };
 
     /// Whether arrays reach to the material in a slot, which has `value_bytes` bytes of the engine's own values. In
     /// every backend a material takes at most as much as an object.

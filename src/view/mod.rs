@@ -27,6 +27,7 @@ mod scene_issue;
 mod render_view;
 mod shadow_maps;
 mod subdivision_level;
+mod texture_sets;
 #[cfg(feature = "occlusion")]
 mod triangle_culling;
 mod view_registry;
@@ -67,5 +68,6 @@ pub mod internal {
     pub use super::object_table::ObjectTable;
     #[cfg(feature = "occlusion")]
     pub use super::occlusion::{OccluderMeshes, OcclusionCuller};
+    pub use super::texture_sets::{TextureArray, TextureSet, TextureSets};
     pub use super::visible_set::VisibleSet;
 }

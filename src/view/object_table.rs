@@ -9,7 +9,7 @@ use super::bounds4::BlockBounds;
 use super::draw_states::{DrawStates, UsedMeshes};
 use super::object_block::{ChangedBlock, DescriptionInputs, Findings, ObjectBlock, describe_block};
 use super::object_description::{GatheredColumns, PacketDescription, rejection_reason};
-use super::{BoundingBoxes, GpuObject, IssueReason, SceneIssues, TableLimits};
+use super::{BoundingBoxes, GpuObject, IssueReason, SceneIssues, TableLimits, TextureSets};
 use crate::bit_set::{BITS_PER_WORD, BitWord};
 use crate::command::{BinnedSegment, Bins};
 use crate::leaked_guards::unlock;
@@ -120,6 +120,11 @@ impl ObjectTable {
             self.epoch += 1;
         }
         self.resize_blocks(length_before);
+    }
+
+    /// How textures are bound.
+    pub fn texture_sets(&self) -> &TextureSets {
+        self.draw_states.texture_sets()
     }
 
     /// Begins the frame that it has begun anew, within other limits. What is rejected already stays so.

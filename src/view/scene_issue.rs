@@ -117,7 +117,8 @@ pub enum IssueReason {
     InvalidLight,
     /// A material's texture was removed; the material's plain colour is used.
     StaleTexture,
-    /// A texture exceeds the device's limits; the material's plain colour is used.
+    /// A texture is larger than the device allows, or has a format that it lacks; the material's plain colour is used.
+    /// The software backend lacks the compressed formats.
     TextureLimit,
     /// An object's mesh is not on the device yet, because it is streamed, or its mesh or
     /// material is not [loaded](crate::scene::AssetLoader) yet. The object is not drawn.
@@ -138,9 +139,6 @@ pub enum IssueReason {
     /// A light reaches a view, and is beyond what the backend [can hold](crate::backend::SceneLimits::max_lights) for
     /// that view. Other views may have it.
     LightLimit,
-    /// A texture is wider or higher than [`Texture::MAX_DETAIL`](crate::scene::Texture::MAX_DETAIL), and drawn with
-    /// less detail than it was given with.
-    ReducedTexture,
     /// The [filter](crate::scene::Camera::filter) of a camera lists the index of an object that the scene does not
     /// have. The other objects are drawn as it says.
     UnknownObject,
@@ -153,7 +151,7 @@ pub enum IssueReason {
 }
 
 impl IssueReason {
-    const ALL: [Self; 22] = [
+    const ALL: [Self; 21] = [
         Self::InvalidTransform,
         Self::InvalidBounds,
         Self::OutOfReach,
@@ -172,7 +170,6 @@ impl IssueReason {
         Self::UndrawableMesh,
         Self::MaterialLimit,
         Self::LightLimit,
-        Self::ReducedTexture,
         Self::UnknownObject,
         Self::HalfFloatBlending,
         Self::InvalidItemBounds,
@@ -192,14 +189,13 @@ impl IssueReason {
             Self::ShadowMapLimit => "light without a shadow, as there are too many shadow maps",
             Self::InvalidLight => "invalid light",
             Self::StaleTexture => "material with a removed texture",
-            Self::TextureLimit => "texture beyond the device's limits",
+            Self::TextureLimit => "texture of a size or format that the device lacks",
             Self::NotResident => "object with a mesh or material that is yet to arrive",
             Self::TextureNotResident => "material with a texture that is yet to arrive",
             Self::ObjectLimit => "object beyond the capacity of the device's buffers",
             Self::UndrawableMesh => "object with a mesh that the backend cannot draw",
             Self::MaterialLimit => "object with a material beyond the capacity of the device's buffers",
             Self::LightLimit => "light beyond the capacity of the device's buffers",
-            Self::ReducedTexture => "texture with more pixels than are drawn",
             Self::UnknownObject => "object that a filter lists and the scene does not have",
             Self::HalfFloatBlending => "blended object in half floats, because the device does not blend floats",
             Self::InvalidItemBounds => "item with invalid bounds",
@@ -228,7 +224,7 @@ impl IssueReason {
             Self::StaleTexture | Self::TextureNotResident => {
                 at(&assets.materials, index).map(|material| material.name.as_str())
             }
-            Self::TextureLimit | Self::ReducedTexture => at(&assets.textures, index).map(|texture| texture.name()),
+            Self::TextureLimit => at(&assets.textures, index).map(|texture| texture.name()),
             Self::DarkLight
             | Self::LightOutOfReach
             | Self::InvalidLight

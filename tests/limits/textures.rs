@@ -1,7 +1,7 @@
-//! Textures with more pixels than are drawn.
+//! Textures that are larger than the device allows, or have a format that it lacks.
 
 use drawloom::glam::DVec3;
-use drawloom::scene::{Material, RenderObject, Texture, Topology};
+use drawloom::scene::{Material, RenderObject, Scene, Texture, TextureFormat, Topology};
 use drawloom::view::IssueReason;
 use drawloom_testing::scenes::{field, square};
 use libtest_mimic::Failed;
@@ -10,41 +10,55 @@ use crate::Case;
 use crate::fixture::{Device, Options, expect_scene_issues, renderer, small};
 
 /// The null backend has no textures.
-pub const CASES: &[Case] = &[(
-    "textures_with_more_pixels_than_are_drawn_are_named",
-    &[Device::Adapter, Device::Software, Device::Streamed],
-    reduced,
-)];
+pub const CASES: &[Case] = &[
+    ("textures_that_are_larger_than_the_device_allows_are_named", &[Device::Noop, Device::Streamed], too_large),
+    ("textures_of_a_format_that_the_device_lacks_are_named", &[Device::Software], unknown_format),
+];
 
-fn reduced(device: Device) -> Result<(), Failed> {
-    const MAX: u32 = Texture::MAX_DETAIL;
-    // One direction is enough. Sides that are no powers of two are scaled up, and keep their detail.
-    let sizes = [(300, 7), (MAX + 1, 1), (7, 500), (1, Texture::MAX_SIZE)];
+/// A scene with an object for each texture.
+fn with_textures(textures: impl IntoIterator<Item = Texture>) -> Result<Scene, Failed> {
     let mut scene = small(field(0));
     let mesh = scene.add(square(Topology::TriangleList))?;
-    let mut textures = Vec::new();
-    for (width, height) in sizes {
-        let pixels = vec![200; width as usize * height as usize * 4];
-        let texture = scene.add(Texture::new(format!("{width} by {height}"), width, height, pixels)?)?;
-        textures.push(texture);
+    for texture in textures {
+        let texture = scene.add(texture)?;
         let material = scene.add(Material { texture: Some(texture), ..Material::default() })?;
         scene.add_object(RenderObject::new(mesh, material, DVec3::ZERO))?;
     }
+    Ok(scene)
+}
+
+/// Expects that two frames count this number of textures, and name the first of them.
+fn expect(device: Device, scene: &Scene, (count, first, name): (usize, usize, &str)) -> Result<(), Failed> {
     let mut frames = renderer(device, Options::default())?;
-    let mut expect = |scene: &drawloom::scene::Scene, count, first, name: Option<&str>| {
-        for _ in 0..2 {
-            let found = frames.frame(scene.as_scene_ref())?.scene_issues;
-            let expected = [(IssueReason::ReducedTexture, count, first, name)];
-            expect_scene_issues(&found, &expected[..usize::from(count > 0)])?;
-        }
-        Ok::<_, Failed>(())
+    for _ in 0..8 {
+        frames.frame(scene.as_scene_ref())?;
+    }
+    for _ in 0..2 {
+        let found = frames.frame(scene.as_scene_ref())?.scene_issues;
+        let found: Vec<_> = found.into_iter().filter(|known| known.reason == IssueReason::TextureLimit).collect();
+        let expected = [(IssueReason::TextureLimit, count, first, Some(name))];
+        expect_scene_issues(&found, &expected[..usize::from(count > 0)])?;
+    }
+    Ok(())
+}
+
+/// noop devices allow 8,192 texels to a side.
+fn too_large(device: Device) -> Result<(), Failed> {
+    let plain = |(width, height): (u32, u32)| {
+        Texture::new(format!("{width} by {height}"), width, height, vec![200; (width * height * 4) as usize])
     };
-    expect(&scene, 2, 1, Some("2049 by 1"))?;
-    let small = Texture::new("small", 1, 1, vec![9; 4])?;
-    scene.replace(textures[1], small)?;
-    expect(&scene, 1, 3, Some("1 by 8192"))?;
-    scene.remove(textures[3])?;
-    let stale = frames.frame(scene.as_scene_ref())?.scene_issues;
-    let is_reduced = stale.iter().any(|known| known.reason == IssueReason::ReducedTexture);
-    if is_reduced { Err(format!("{stale:?}").into()) } else { Ok(()) }
+    let sizes = [(300, 7), (8193, 1), (7, 500), (1, 8192), (1, 16_384)];
+    let mut scene = with_textures(sizes.into_iter().map(plain).collect::<Result<Vec<_>, _>>()?)?;
+    expect(device, &scene, (2, 1, "8193 by 1"))?;
+    let handles: Vec<_> = scene.assets().iter::<Texture>().map(|(handle, _)| handle).collect();
+    scene.replace(handles[1], plain((1, 1))?)?;
+    expect(device, &scene, (1, 4, "1 by 16384"))?;
+    scene.remove(handles[4])?;
+    expect(device, &scene, (0, 0, ""))
+}
+
+fn unknown_format(device: Device) -> Result<(), Failed> {
+    let blocks = Texture::with_levels("blocks", TextureFormat::Bc7Srgb, [8, 8], vec![vec![0; 64]])?;
+    let scene = with_textures([Texture::new("plain", 1, 1, vec![255; 4])?, blocks])?;
+    expect(device, &scene, (1, 1, "blocks"))
 }

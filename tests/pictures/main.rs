@@ -76,6 +76,7 @@ mod stencil;
 mod strategies;
 mod streaming;
 mod target_formats;
+mod textures;
 mod transforms;
 mod transient_targets;
 mod transparency;
@@ -164,6 +165,7 @@ fn main() {
         (software::CASES, Needs::Adapter),
         (software::CASES_OF_SHARED_SCENES, Needs::AdapterAndSharedScenes),
         (target_formats::CASES, Needs::Adapter),
+        (textures::CASES, Needs::Adapter),
         (transforms::CASES, Needs::Adapter),
         (transient_targets::CASES, Needs::Adapter),
         (triangles::CASES, Needs::Adapter),

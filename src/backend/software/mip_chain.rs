@@ -1,15 +1,17 @@
 //! Trilinear texture sampling, as on devices.
 
+use std::borrow::Cow;
 use std::sync::LazyLock;
 
-use crate::backend::mip_generation::{ARRAY_SIDES, array_for, mip_chain, srgb_to_linear};
+use half::f16;
+
+use crate::backend::mip_generation::{mip_chain, srgb_to_linear};
 use crate::raster::{Real, Vector, Vector2, Vector4};
-use crate::scene::Texture;
+use crate::scene::{Texture, TextureClass, TextureFormat};
 
 /// All mip levels of a texture.
 pub(super) struct MipChain {
-    /// The width of the first level in pixels: a power of two.
-    side: usize,
+    class: TextureClass,
     levels: Vec<Vec<u8>>,
 }
 
@@ -18,9 +20,11 @@ static LINEAR_OF_BYTES: LazyLock<[f64; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f64 / 255.0)));
 
 impl MipChain {
-    pub(super) fn of(texture: &Texture) -> Self {
-        let side = ARRAY_SIDES[array_for(texture)];
-        Self { side: side as usize, levels: mip_chain(texture, side) }
+    /// `None` of a texture that is compressed: the CPU does not decode it.
+    pub(super) fn of(texture: &Texture) -> Option<Self> {
+        let class = texture.class();
+        let levels = || mip_chain(texture).into_iter().map(Cow::into_owned).collect();
+        (!class.format.is_compressed()).then(|| Self { class, levels: levels() })
     }
 
     /// Samples trilinearly. At the level of detail, the longer of the steps to the next column and to the next row is
@@ -29,43 +33,62 @@ impl MipChain {
         // Numbers that are not finite count as 0, as on devices: they would not lead to a pixel.
         let finite = |value: R| if value.is_finite() { value } else { R::zero() };
         let uv = uv.map(finite);
-        let longest = finite(dpdx.dot(dpdx).max(dpdy.dot(dpdy)).sqrt() * R::of(self.side as f64));
+        let size = Vector([self.class.width, self.class.height].map(|side| R::of(f64::from(side))));
+        let length = |step: Vector2<R>| {
+            let step = step.with(size, |step, side| step * side);
+            step.dot(step)
+        };
+        let longest = finite(length(dpdx).max(length(dpdy)).sqrt());
         let last = self.levels.len() - 1;
         let level = longest.max(R::one()).log2().min(R::of(last as f64));
         let finer = level.floor();
         let fraction = level - finer;
         let finer = finer.as_f64() as usize;
-        let linear = &*LINEAR_OF_BYTES;
-        let one = self.bilinear(linear, finer, uv);
+        let one = self.bilinear(finer, uv);
         if fraction == R::zero() {
             return one;
         }
-        one.with(self.bilinear(linear, finer + 1, uv), |one, other| one + (other - one) * fraction)
+        one.with(self.bilinear(finer + 1, uv), |one, other| one + (other - one) * fraction)
     }
 
     /// Blends the four nearest pixels. The texture repeats beyond its border.
-    fn bilinear<R: Real>(&self, linear: &[f64; 256], level: usize, uv: Vector2<R>) -> Vector4<R> {
-        let side = self.side >> level;
+    fn bilinear<R: Real>(&self, level: usize, uv: Vector2<R>) -> Vector4<R> {
+        let [width, height] = self.class.level_size(level as u32);
+        let size = Vector([width, height].map(|side| R::of(f64::from(side))));
         // The fraction is taken before scaling, so that far coordinates lose no more precision.
-        let point = uv.map(|value| (value - value.floor()) * R::of(side as f64) - R::of(0.5));
+        let point = uv.map(|value| value - value.floor()).with(size, |value, side| value * side - R::of(0.5));
         let [x, y] = point.map(R::floor).0;
         let [right, lower] = (point - Vector([x, y])).0;
-        let wrapped = |first: R, step: i64| (first.as_f64() as i64 + step).rem_euclid(side as i64) as usize;
-        let columns = [(wrapped(x, 0), R::one() - right), (wrapped(x, 1), right)];
-        let rows = [(wrapped(y, 0), R::one() - lower), (wrapped(y, 1), lower)];
+        let wrapped =
+            |first: R, step: i64, side: u32| (first.as_f64() as i64 + step).rem_euclid(i64::from(side)) as usize;
+        let columns = [(wrapped(x, 0, width), R::one() - right), (wrapped(x, 1, width), right)];
+        let rows = [(wrapped(y, 0, height), R::one() - lower), (wrapped(y, 1, height), lower)];
         let mut sum = Vector::zero();
         for (row, row_weight) in rows {
             for (column, weight) in columns {
-                sum = sum + self.pixel(linear, level, row * side + column) * (weight * row_weight);
+                sum = sum + self.texel(level, row * width as usize + column) * (weight * row_weight);
             }
         }
         sum
     }
 
-    fn pixel<R: Real>(&self, linear: &[f64; 256], level: usize, index: usize) -> Vector4<R> {
-        let bytes = &self.levels[level][index * 4..index * 4 + 4];
-        let color = |byte: u8| R::of(linear[usize::from(byte)]);
-        Vector([color(bytes[0]), color(bytes[1]), color(bytes[2]), R::of(f64::from(bytes[3]) / 255.0)])
+    /// A texel, linear. Channels that the format lacks are 0, and alpha is 1.
+    fn texel<R: Real>(&self, level: usize, index: usize) -> Vector4<R> {
+        let (format, length) = (self.class.format, self.class.format.block_bytes() as usize);
+        let bytes = &self.levels[level][index * length..][..length];
+        let mut texel = [0.0, 0.0, 0.0, 1.0];
+        match format {
+            TextureFormat::R16Float | TextureFormat::Rg16Float | TextureFormat::Rgba16Float => {
+                let halves = bytes.as_chunks().0.iter().map(|half| f16::from_le_bytes(*half).to_f64());
+                texel.iter_mut().zip(halves).for_each(|(channel, half)| *channel = half);
+            }
+            _ => texel.iter_mut().zip(bytes).for_each(|(channel, byte)| *channel = f64::from(*byte) / 255.0),
+        }
+        if format == TextureFormat::Rgba8Srgb {
+            let linear = &*LINEAR_OF_BYTES;
+            texel.iter_mut().zip(&bytes[..3]).for_each(|(channel, byte)| *channel = linear[usize::from(*byte)]);
+        }
+        Vector(texel.map(R::of))
     }
 }
 
@@ -91,7 +114,7 @@ pub(super) mod tests {
     }
 
     /// All pixels of a level, weighted by a tent filter two pixels wide around the point, which repeats.
-    fn expected(levels: &[Vec<u8>], level: usize, uv: [f64; 2]) -> [f64; 4] {
+    fn expected(levels: &[Cow<'_, [u8]>], level: usize, uv: [f64; 2]) -> [f64; 4] {
         let side = 256_usize >> level;
         let tent = |index: usize, point: f64| {
             let distance = (index as f64 + 0.5) / side as f64 - point;
@@ -129,8 +152,8 @@ pub(super) mod tests {
             is_down in any::<bool>(),
         ) {
             let texture = noise(256);
-            let levels = mip_chain(&texture, 256);
-            let chain = MipChain::of(&texture);
+            let levels = mip_chain(&texture);
+            let chain = MipChain::of(&texture).unwrap();
             let uv = uv.map(f64::from);
             let length = longest.exp2() / 256.0;
             let long = [around.cos() * length, around.sin() * length].map(|value| f64::from(value as f32));
@@ -154,7 +177,7 @@ pub(super) mod tests {
     #[test]
     fn the_centre_of_a_pixel_samples_that_pixel() {
         let texture = noise(256);
-        let chain = MipChain::of(&texture);
+        let chain = MipChain::of(&texture).unwrap();
         let pixels: Vec<_> = texture.pixels().chunks_exact(4).collect();
         for [x, y] in [[0, 0], [255, 0], [17, 200], [255, 255]] {
             let uv = [x, y].map(|index| (index as f64 + 0.5) / 256.0 - 2.0);
@@ -166,7 +189,7 @@ pub(super) mod tests {
 
     #[test]
     fn coordinates_that_are_not_finite_sample_a_colour() {
-        let chain = MipChain::of(&noise(8));
+        let chain = MipChain::of(&noise(8)).unwrap();
         for strange in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e38, -1e38, -1e-30] {
             for [uv, across] in [[[strange, 0.3], [0.0; 2]], [[0.3, 0.3], [strange, 0.1]]] {
                 let found =

@@ -168,11 +168,10 @@ impl WgpuBackend {
             pass.can_share_encoder =
                 pass.strategy.encoding != EncodingStrategy::OnSubmit && pass.is_small(&request.draws[process]);
             let caches_bundles = pass.has_list() && pass.strategy.recording == RecordingStrategy::CachedBundles;
-            let shared = pass.frame_bind_group.as_ref().zip(resources.materials_bind_group);
-            if let Some((frame_bind_group, materials_bind_group)) = shared.filter(|_| caches_bundles) {
+            if let Some(frame_bind_group) = pass.frame_bind_group.as_ref().filter(|_| caches_bundles) {
                 pass.bundle_cache.begin_frame(BundleKey {
                     frame_bind_group: frame_bind_group.clone(),
-                    materials_bind_group: materials_bind_group.clone(),
+                    materials_bind_groups: Arc::clone(resources.materials_bind_groups),
                     process_bind_group: pass.process_bind_group.as_ref().map(|process| process.group.clone()),
                     engine_bind_group: pass.engine_bind_group.as_ref().map(|columns| columns.group.clone()),
                     meshes: meshes.number(),

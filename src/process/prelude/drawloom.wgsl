@@ -83,7 +83,7 @@ struct Material {
     diffuse: vec3<f32>,
     opacity: f32,
     emission: vec3<f32>,
-    // The array that holds its texture, from 0; 4 for none.
+    // The array that holds its texture, from 0, among those that are bound; 4 for none.
     texture_array: u32,
     texture_layer: u32,
     // 1 if both sides are drawn.
@@ -105,10 +105,11 @@ const ALPHA: u32 = 1u;
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 
 @group(1) @binding(0) var<storage, read> materials: array<Material>;
-@group(1) @binding(1) var textures_256: texture_2d_array<f32>;
-@group(1) @binding(2) var textures_512: texture_2d_array<f32>;
-@group(1) @binding(3) var textures_1024: texture_2d_array<f32>;
-@group(1) @binding(4) var textures_2048: texture_2d_array<f32>;
+// The arrays of a set of textures, which all materials have that are drawn together.
+@group(1) @binding(1) var textures_0: texture_2d_array<f32>;
+@group(1) @binding(2) var textures_1: texture_2d_array<f32>;
+@group(1) @binding(3) var textures_2: texture_2d_array<f32>;
+@group(1) @binding(4) var textures_3: texture_2d_array<f32>;
 @group(1) @binding(5) var texture_sampler: sampler;
 // Linear between pixels, and the nearest pixel outside: for targets.
 @group(1) @binding(6) var target_sampler: sampler;
@@ -253,10 +254,10 @@ fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f
     var texel = vec4<f32>(1.0);
     let layer = material.texture_layer;
     switch material.texture_array {
-        case 0u: { texel = textureSampleGrad(textures_256, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 1u: { texel = textureSampleGrad(textures_512, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 2u: { texel = textureSampleGrad(textures_1024, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 3u: { texel = textureSampleGrad(textures_2048, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 0u: { texel = textureSampleGrad(textures_0, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 1u: { texel = textureSampleGrad(textures_1, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 2u: { texel = textureSampleGrad(textures_2, texture_sampler, uv, layer, uv_dx, uv_dy); }
+        case 3u: { texel = textureSampleGrad(textures_3, texture_sampler, uv, layer, uv_dx, uv_dy); }
         default: {}
     }
     return vec4<f32>(material.diffuse, material.opacity) * texel;
@@ -268,10 +269,10 @@ fn is_cut_out(material: Material, uv: vec2<f32>) -> bool {
     var alpha = material.opacity;
     let layer = material.texture_layer;
     switch material.texture_array {
-        case 0u: { alpha *= textureSampleLevel(textures_256, texture_sampler, uv, layer, 0.0).a; }
-        case 1u: { alpha *= textureSampleLevel(textures_512, texture_sampler, uv, layer, 0.0).a; }
-        case 2u: { alpha *= textureSampleLevel(textures_1024, texture_sampler, uv, layer, 0.0).a; }
-        case 3u: { alpha *= textureSampleLevel(textures_2048, texture_sampler, uv, layer, 0.0).a; }
+        case 0u: { alpha *= textureSampleLevel(textures_0, texture_sampler, uv, layer, 0.0).a; }
+        case 1u: { alpha *= textureSampleLevel(textures_1, texture_sampler, uv, layer, 0.0).a; }
+        case 2u: { alpha *= textureSampleLevel(textures_2, texture_sampler, uv, layer, 0.0).a; }
+        case 3u: { alpha *= textureSampleLevel(textures_3, texture_sampler, uv, layer, 0.0).a; }
         default: {}
     }
     return alpha < material.alpha_cutoff;

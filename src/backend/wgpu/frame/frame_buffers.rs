@@ -242,8 +242,8 @@ impl FrameBuffers {
     /// The passes, and what their bind groups bind.
     pub(crate) fn passes_mut(&mut self) -> (&mut [WgpuPassState], PassResources<'_>) {
         let Buffers { passes, parameters, objects, materials, bytes, .. } = &mut *self.buffers;
-        let materials_bind_group = materials.bind_group();
-        (passes, PassResources { parameters: &parameters.on_device, objects, bytes, materials_bind_group })
+        let materials_bind_groups = materials.bind_groups();
+        (passes, PassResources { parameters: &parameters.on_device, objects, bytes, materials_bind_groups })
     }
 
     /// The meshes that the frame draws subdivided.
@@ -261,9 +261,9 @@ impl FrameBuffers {
         &self.buffers.bytes
     }
 
-    /// `@group(1)`; `None` before the frame begins.
-    pub(crate) fn materials_bind_group(&self) -> Option<&wgpu::BindGroup> {
-        self.buffers.materials.bind_group()
+    /// `@group(1)` for each set of textures; none before the frame begins.
+    pub(crate) fn materials_bind_groups(&self) -> &[wgpu::BindGroup] {
+        self.buffers.materials.bind_groups()
     }
 
     /// Uploads what changed in blocks of objects since [`FrameBuffers::held_epoch`].
@@ -307,7 +307,7 @@ pub(crate) struct PassResources<'a> {
     pub(crate) parameters: &'a GrowingBuffer,
     pub(crate) objects: &'a ObjectBuffers,
     pub(crate) bytes: &'a ResourceBytes,
-    pub(crate) materials_bind_group: Option<&'a wgpu::BindGroup>,
+    pub(crate) materials_bind_groups: &'a Arc<[wgpu::BindGroup]>,
 }
 
 struct Buffers {
@@ -616,7 +616,10 @@ mod tests {
             let mut buffers = Arc::new(BufferPool::new(false)).take(&device).unwrap();
             let mut bound = |asked| {
                 with_request(&mut frames, asked, |request| {
-                    let (limits, assets) = ((SceneLimits::NONE, request.scene_issues), request.scene.assets);
+                    let (limits, assets) = (
+                        (SceneLimits::NONE, request.scene_issues),
+                        (request.scene.assets, request.objects.texture_sets()),
+                    );
                     cache.begin_frame(&device, &uploads, assets, false).unwrap();
                     let materials = cache.snapshot(&device, assets, &[], limits);
                     buffers.begin(&device, &uploads, &layouts, &materials, request).unwrap();

@@ -8,19 +8,21 @@ use crate::backend::wgpu::resources::{
     MirroredBuffer, check_storage_binding_size,
 };
 
-/// The materials of a frame in flight. Of materials that change, only what changed is uploaded, and the bind group
-/// stays the same.
+/// The materials of a frame in flight. Of materials that change, only what changed is uploaded, and the bind groups
+/// stay the same.
 pub(crate) struct MaterialBuffer {
     buffer: MirroredBuffer,
-    /// What the buffer holds and the bind group binds; `None` before the first update, or after one that failed.
+    /// What the buffer holds and the bind groups bind; `None` before the first update, or after one that failed.
     current: Option<(Arc<[u8]>, Arc<MaterialTextures>)>,
-    bind_group: Option<CachedBindGroup>,
+    /// Of each set of textures.
+    cached: Vec<CachedBindGroup>,
+    bind_groups: Arc<[wgpu::BindGroup]>,
 }
 
 impl MaterialBuffer {
     pub(crate) fn new() -> Self {
         let buffer = MirroredBuffer::new("materials", wgpu::BufferUsages::STORAGE);
-        Self { buffer, current: None, bind_group: None }
+        Self { buffer, current: None, cached: Vec::new(), bind_groups: Arc::default() }
     }
 
     /// Uploads materials, and binds them and their textures.
@@ -43,19 +45,26 @@ impl MaterialBuffer {
         self.current = None;
         check_storage_binding_size(device, materials.len())?;
         self.buffer.set(device, uploads, materials)?;
-        let buffer = self.buffer.on_device.binding(0, materials.len()).map(BindingResource::Buffer);
-        let arrays = textures.arrays.iter().map(BindingResource::Texture);
-        let samplers = textures.samplers.iter().map(BindingResource::Sampler);
-        let bound = (0..).zip(buffer.into_iter().chain(arrays).chain(samplers));
-        let before = self.bind_group.take();
-        self.bind_group = CachedBindGroup::update(before, device, "materials", Some(&layouts.assets), bound)?;
+        let mut before = std::mem::take(&mut self.cached).into_iter();
+        for set in &textures.sets {
+            let buffer = self.buffer.on_device.binding(0, materials.len()).map(BindingResource::Buffer);
+            let arrays = set.iter().map(BindingResource::Texture);
+            let samplers = textures.samplers.iter().map(BindingResource::Sampler);
+            let bound = (0..).zip(buffer.into_iter().chain(arrays).chain(samplers));
+            let layout = Some(&layouts.assets);
+            self.cached.extend(CachedBindGroup::update(before.next(), device, "materials", layout, bound)?);
+        }
+        let groups = self.cached.iter().map(|cached| &cached.group);
+        if !groups.clone().eq(self.bind_groups.iter()) {
+            self.bind_groups = groups.cloned().collect();
+        }
         self.current = Some((Arc::clone(materials), Arc::clone(textures)));
         Ok(())
     }
 
-    /// `@group(1)`; `None` before the first update.
-    pub(crate) fn bind_group(&self) -> Option<&wgpu::BindGroup> {
-        self.bind_group.as_ref().map(|cached| &cached.group)
+    /// `@group(1)`, for each set of textures; none before the first update.
+    pub(crate) fn bind_groups(&self) -> &Arc<[wgpu::BindGroup]> {
+        &self.bind_groups
     }
 
     /// Its size in bytes.

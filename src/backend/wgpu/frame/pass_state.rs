@@ -252,7 +252,8 @@ fn new_index_buffer() -> GrowingBuffer {
 #[derive(Clone)]
 pub(crate) struct BundleKey {
     pub(crate) frame_bind_group: wgpu::BindGroup,
-    pub(crate) materials_bind_group: wgpu::BindGroup,
+    /// Of each set of textures.
+    pub(crate) materials_bind_groups: Arc<[wgpu::BindGroup]>,
     pub(crate) process_bind_group: Option<wgpu::BindGroup>,
     pub(crate) engine_bind_group: Option<wgpu::BindGroup>,
     /// The number of the snapshot. The bundles keep the pages that they draw from, but do not keep them from being
@@ -266,7 +267,7 @@ pub(crate) struct BundleKey {
 impl PartialEq for BundleKey {
     fn eq(&self, other: &Self) -> bool {
         self.frame_bind_group == other.frame_bind_group
-            && self.materials_bind_group == other.materials_bind_group
+            && Arc::ptr_eq(&self.materials_bind_groups, &other.materials_bind_groups)
             && self.process_bind_group == other.process_bind_group
             && self.engine_bind_group == other.engine_bind_group
             && (self.meshes, self.clamps_depth) == (other.meshes, other.clamps_depth)
@@ -603,7 +604,7 @@ mod tests {
     fn key(device: &wgpu::Device) -> BundleKey {
         BundleKey {
             frame_bind_group: bind_group(device),
-            materials_bind_group: bind_group(device),
+            materials_bind_groups: [bind_group(device)].into(),
             process_bind_group: None,
             engine_bind_group: None,
             meshes: 1,
@@ -632,7 +633,7 @@ mod tests {
         let key = key(&device);
         let others = [
             BundleKey { frame_bind_group: bind_group(&device), ..key.clone() },
-            BundleKey { materials_bind_group: bind_group(&device), ..key.clone() },
+            BundleKey { materials_bind_groups: [bind_group(&device)].into(), ..key.clone() },
             BundleKey { process_bind_group: Some(bind_group(&device)), ..key.clone() },
             BundleKey { engine_bind_group: Some(bind_group(&device)), ..key.clone() },
             BundleKey { meshes: 2, ..key.clone() },

@@ -58,7 +58,7 @@ impl<'a> BatchRecorder<'a> {
     /// If a resource of a batch is missing. This is a bug in Drawloom.
     pub(super) fn draw(&self, encoder: &mut impl RenderEncoder<'a>, batches: Range<usize>) -> Result<(), BackendError> {
         self.pass.bind_groups().for_each(|(index, group)| encoder.set_bind_group(index, Some(group), &[]));
-        let mut bound = None;
+        let (mut bound, mut texture_set) = (None, 0);
         let mut start = batches.start;
         let meshes = &self.pass.frame.meshes;
         for run in self.pass.list.batches[batches].chunk_by(|one, next| meshes.share_pipeline(one, next)) {
@@ -72,6 +72,12 @@ impl<'a> BatchRecorder<'a> {
                 continue;
             };
             encoder.set_pipeline(pipeline);
+            let set = run[0].state.texture_set();
+            if mem::replace(&mut texture_set, set) != set {
+                let materials = self.pass.frame.buffers.materials_bind_groups().get(set as usize);
+                let materials = materials.ok_or_else(|| broken_rule("a set of textures is bound before it is used"))?;
+                encoder.set_bind_group(1, Some(materials), &[]);
+            }
             if variant.layout.is_some() {
                 self.draw_imported_meshes(encoder, run)?;
                 bound = None;

@@ -93,12 +93,12 @@ impl<'a> PassEncoder<'a> {
         Ok(render_pass)
     }
 
-    /// The bind groups that the pass has, each with its index.
+    /// The bind groups that the pass has, each with its index: of materials, those with the first set of textures.
     pub(super) fn bind_groups(&self) -> impl Iterator<Item = (u32, &'a wgpu::BindGroup)> + use<'a> {
         let state = self.state;
         let [of_process, of_engine] =
             [&state.process_bind_group, &state.engine_bind_group].map(|own| own.as_ref().map(|own| &own.group));
-        let shared = [state.frame_bind_group.as_ref(), self.frame.buffers.materials_bind_group()];
+        let shared = [state.frame_bind_group.as_ref(), self.frame.buffers.materials_bind_groups().first()];
         let groups = shared.into_iter().chain([of_process, of_engine]);
         (0..).zip(groups).filter_map(|(index, group)| Some((index, group?)))
     }
@@ -225,7 +225,7 @@ impl<'a> PassEncoder<'a> {
         let buffers = |buffer| frame.storage_buffers.find(buffer);
         let of_frame = self.state.frame_bind_group.as_ref();
         let of_frame = of_frame.ok_or_else(|| broken_rule("a pass has bind groups before it is recorded"))?;
-        let of_materials = frame.buffers.materials_bind_group();
+        let of_materials = frame.buffers.materials_bind_groups().first();
         let of_materials =
             of_materials.ok_or_else(|| broken_rule("a frame has its materials before it is recorded"))?;
         let view = &self.request.views[pass.view_index];

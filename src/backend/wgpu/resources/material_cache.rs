@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use super::buffers::CountedQueue;
 use super::snapshot_lifetimes::SnapshotToken;
-use super::texture_arrays::{ResidentTextures, TextureLocation};
-use crate::backend::mip_generation::reduced_textures;
+use super::texture_arrays::{ResidentTextures, TextureLocation, empty_array};
 use crate::backend::{BackendError, SceneLimits};
 use crate::scene::{Assets, Material, MaterialLayout};
-use crate::view::{IssueReason, SceneIssues};
+use crate::view::{IssueReason, SceneIssues, TextureSet, TextureSets};
 
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
 #[derive(Clone)]
@@ -31,7 +30,8 @@ impl MaterialSnapshot {
 
 /// The textures of materials, and their samplers: what `@group(1)` binds behind the materials, in that order.
 pub(crate) struct MaterialTextures {
-    pub(crate) arrays: Vec<wgpu::TextureView>,
+    /// Those of each set.
+    pub(crate) sets: Vec<[wgpu::TextureView; TextureSet::MAX_ARRAYS]>,
     pub(crate) samplers: [wgpu::Sampler; 2],
 }
 
@@ -42,26 +42,24 @@ pub(crate) struct MaterialCache {
     /// By material slot, whether its texture is not on the device.
     pub(crate) lacks_texture: Arc<[bool]>,
     current: Option<Current>,
-    /// The views of the texture arrays, with how often arrays had moved.
+    /// The views of the texture arrays, with how often arrays had moved, or been divided into other sets.
     bound_textures: Option<(u64, Arc<MaterialTextures>)>,
     /// Scene issues that making the snapshot found. Every frame that uses the snapshot reports them.
     rejected_textures: Vec<(IssueReason, usize)>,
     rejected_materials: Vec<(IssueReason, usize)>,
-    /// The slots of the textures with more pixels than their arrays have.
-    reduced_textures: Vec<usize>,
 }
 
 struct Current {
     /// Identity and revision of the snapshot's materials.
     materials: (u64, u64),
-    /// How often textures, and their arrays, had changed.
+    /// How often textures, their arrays and their sets had changed.
     textures: u64,
     limits: SceneLimits,
     snapshot: MaterialSnapshot,
 }
 
 impl MaterialCache {
-    /// Begins a frame with the assets' textures. Without streaming, uploads those that are new or changed.
+    /// Begins a frame with the assets' textures, which are divided into these sets. Without streaming, uploads those that are new or changed.
     ///
     /// # Errors
     /// If the device has no room for a texture, or is lost. What is in the cache is undefined then, so drop it.
@@ -69,9 +67,10 @@ impl MaterialCache {
         &mut self,
         device: &wgpu::Device,
         uploads: &CountedQueue,
-        assets: &Assets,
+        (assets, sets): (&Assets, &TextureSets),
         is_streamed: bool,
     ) -> Result<(), BackendError> {
+        self.textures.set_arrays(sets);
         if !self.textures.begin_frame(&assets.textures, (0, |_, _| true), is_streamed) {
             return Ok(());
         }
@@ -89,23 +88,24 @@ impl MaterialCache {
     pub(crate) fn snapshot(
         &mut self,
         device: &wgpu::Device,
-        assets: &Assets,
+        (assets, sets): (&Assets, &TextureSets),
         types: &[MaterialLayout],
         (limits, scene_issues): (SceneLimits, &SceneIssues),
     ) -> MaterialSnapshot {
         let materials = (assets.materials.identity(), assets.materials.revision());
-        // Both only grow, so their sum is new when one of them is.
-        let textures = self.textures.changes() + self.textures.memory.moves;
+        // All of them only grow, so their sum is new when one of them is.
+        let textures = self.textures.changes() + self.textures.memory.moves + sets.revision();
         let before = self.current.take().filter(|current| (current.limits, current.textures) == (limits, textures));
         let mut snapshot = match before {
             Some(current) if current.materials == materials => current.snapshot,
-            Some(current) => {
-                MaterialSnapshot { materials: self.materials(assets, limits), values: Vec::new(), ..current.snapshot }
-            }
+            Some(current) => MaterialSnapshot {
+                materials: self.materials(assets, sets, limits),
+                values: Vec::new(),
+                ..current.snapshot
+            },
             None => {
-                self.reduced_textures = reduced_textures(assets).collect();
                 let token = self.textures.lifetimes.begin_snapshot();
-                let (materials, textures) = (self.materials(assets, limits), self.bound_textures(device));
+                let (materials, textures) = (self.materials(assets, sets, limits), self.bound_textures(device, sets));
                 MaterialSnapshot { token, materials, textures, values: Vec::new() }
             }
         };
@@ -118,12 +118,11 @@ impl MaterialCache {
         for &(reason, index) in self.rejected_textures.iter().chain(&self.rejected_materials) {
             scene_issues.count(reason, index);
         }
-        self.reduced_textures.iter().for_each(|slot| scene_issues.count(IssueReason::ReducedTexture, *slot));
         snapshot
     }
 
-    fn bound_textures(&mut self, device: &wgpu::Device) -> Arc<MaterialTextures> {
-        let moves = self.textures.memory.moves;
+    fn bound_textures(&mut self, device: &wgpu::Device, sets: &TextureSets) -> Arc<MaterialTextures> {
+        let moves = self.textures.memory.moves + sets.revision();
         if let Some((_, textures)) = self.bound_textures.as_ref().filter(|(of, _)| *of == moves) {
             return Arc::clone(textures);
         }
@@ -131,18 +130,24 @@ impl MaterialCache {
             linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
             linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
         ];
-        let textures = Arc::new(MaterialTextures { arrays: self.textures.views(device).into(), samplers });
+        let (views, empty) = (self.textures.views(), empty_array(device));
+        let view = |array: &u32| views.get(*array as usize).and_then(Option::as_ref).unwrap_or(&empty);
+        let views_of =
+            |set: &TextureSet| std::array::from_fn(|position| set.arrays().get(position).map_or(&empty, view).clone());
+        let textures = Arc::new(MaterialTextures { sets: sets.sets().iter().map(views_of).collect(), samplers });
         self.bound_textures = Some((moves, Arc::clone(&textures)));
         textures
     }
 
     /// A [`GpuMaterial`] for each slot within the limits.
-    fn materials(&mut self, assets: &Assets, limits: SceneLimits) -> Arc<[u8]> {
+    fn materials(&mut self, assets: &Assets, sets: &TextureSets, limits: SceneLimits) -> Arc<[u8]> {
         self.rejected_materials.clear();
         let mut materials = vec![GpuMaterial::default(); element_count(assets, size_of::<GpuMaterial>(), limits)];
         let mut lacks_texture = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let texture = self.texture_location(assets, handle.index(), material);
+            let set = sets.sets().get(sets.set_of(handle.index()) as usize);
+            let texture = texture.and_then(|TextureLocation { array, layer }| Some((set?.position(array)?, layer)));
             let is_loaded = material.texture.is_some_and(|texture| assets.get(texture).is_ok());
             lacks_texture[handle.index() as usize] = is_loaded && texture.is_none();
             if let Some(on_device) = materials.get_mut(handle.index() as usize) {
@@ -211,14 +216,15 @@ pub(crate) struct GpuMaterial {
 }
 
 impl GpuMaterial {
-    pub(crate) fn new(material: &Material, texture: Option<TextureLocation>) -> Self {
-        let texture = texture.unwrap_or(TextureLocation::NONE);
+    /// With its texture's position in the material's set, and its layer there.
+    pub(crate) fn new(material: &Material, texture: Option<(usize, u32)>) -> Self {
+        let (array, layer) = texture.unwrap_or((TextureSet::MAX_ARRAYS, 0));
         Self {
             diffuse: material.diffuse.to_array(),
             opacity: material.opacity,
             emission: material.emission.to_array(),
-            texture_array: texture.array,
-            texture_layer: texture.layer,
+            texture_array: array as u32,
+            texture_layer: layer,
             double_sided: u32::from(material.double_sided),
             blend: material.blend as u32,
             alpha_cutoff: material.min_alpha(),

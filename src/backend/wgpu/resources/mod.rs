@@ -49,7 +49,7 @@ pub(crate) use storage_buffers::StorageBuffers;
 pub(crate) use target_cache::{TargetCache, ViewTarget, WgpuTargets};
 pub(crate) use target_texture::sample_count;
 pub(crate) use texture_arrays::{ResidentTextures, TextureLocation};
-pub(crate) use texture_layers::{copy_rows, layer_bytes};
+pub(crate) use texture_layers::copy_rows;
 pub(crate) use texture_streaming::ArrayBudget;
 pub(crate) use vertex_data::{SubdividedMesh, vertex_attributes, vertex_format, vertex_stride};
 pub(crate) use view_array::shape_dimension;

@@ -1,13 +1,12 @@
-//! Textures on the device, in texture arrays by size. All arrays are bound at once, so no batch changes a binding.
+//! Textures on the device: layers of arrays of equal textures, which are bound in [sets](TextureSets).
 
 use super::buffers::CountedQueue;
 use super::residents::{AssetMemory, Residents};
 use super::snapshot_lifetimes::SnapshotLifetimes;
-use super::texture_layers::{TextureLayers, copy_layer, layer_bytes, new_array};
+use super::texture_layers::{TextureLayers, can_hold, copy_layer, new_array};
 use crate::backend::BackendError;
-use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
-use crate::scene::{Assets, Texture};
-use crate::view::IssueReason;
+use crate::scene::{Assets, Texture, TextureClass, TextureFormat};
+use crate::view::{IssueReason, TextureSets};
 
 /// The array and layer of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,17 +15,43 @@ pub(crate) struct TextureLocation {
     pub(crate) layer: u32,
 }
 
-impl TextureLocation {
-    /// The location in a material without a texture.
-    pub(crate) const NONE: Self = Self { array: ARRAY_SIDES.len() as u32, layer: 0 };
-}
-
 /// All texture arrays. An array that is full moves to a larger one, and the device copies its layers.
 #[derive(Default)]
 pub(crate) struct TextureArrays {
-    pub(super) arrays: [TextureLayers; ARRAY_SIDES.len()],
+    pub(super) arrays: Vec<ArrayOnDevice>,
+    /// The array of each texture, by slot; [`NO_ARRAY`] for none.
+    array_of: Vec<u32>,
+    /// That of the sets that the arrays are of.
+    revision: Option<u64>,
     /// Counts how often an array was replaced. While it is the same, so are the views.
     pub(super) moves: u64,
+}
+
+/// An array, as far as it is on the device.
+pub(super) struct ArrayOnDevice {
+    pub(super) class: TextureClass,
+    /// The number of textures that the scene has for it.
+    pub(super) textures: u32,
+    pub(super) layers: TextureLayers,
+}
+
+const NO_ARRAY: u32 = u32::MAX;
+
+impl TextureArrays {
+    /// The array of the texture in a slot.
+    pub(super) fn array_of(&self, texture: u32) -> Option<usize> {
+        self.array_of.get(texture as usize).filter(|array| **array != NO_ARRAY).map(|array| *array as usize)
+    }
+
+    /// The bytes of a layer of an array.
+    pub(super) fn layer_bytes(&self, index: usize) -> u64 {
+        self.arrays[index].class.bytes()
+    }
+
+    /// The bytes that an array takes.
+    fn bytes_of(&self, array: &ArrayOnDevice) -> u64 {
+        array.layers.capacity() as u64 * array.class.bytes()
+    }
 }
 
 /// The textures on the device. Like those of meshes, uploads never overwrite what a frame in flight may still read.
@@ -37,12 +62,11 @@ impl AssetMemory for TextureArrays {
     type Location = TextureLocation;
 
     fn bytes(&self) -> u64 {
-        let arrays = self.arrays.iter().zip(ARRAY_SIDES);
-        arrays.map(|(array, side)| array.capacity() as u64 * layer_bytes(side)).sum()
+        self.arrays.iter().map(|array| self.bytes_of(array)).sum()
     }
 
     fn vacate(&mut self, TextureLocation { array, layer }: TextureLocation) {
-        self.arrays[array as usize].free(layer);
+        self.arrays[array as usize].layers.free(layer);
     }
 
     fn release_empty(
@@ -50,7 +74,7 @@ impl AssetMemory for TextureArrays {
         TextureLocation { array, .. }: TextureLocation,
         _: &SnapshotLifetimes<TextureLocation>,
     ) {
-        let layers = &mut self.arrays[array as usize];
+        let layers = &mut self.arrays[array as usize].layers;
         if layers.capacity() > 0 && layers.free_count() == layers.capacity() {
             layers.release();
             self.moves += 1;
@@ -58,11 +82,37 @@ impl AssetMemory for TextureArrays {
     }
 
     fn clear(&mut self) {
-        *self = Self { moves: self.moves + 1, ..Self::default() };
+        self.arrays.iter_mut().for_each(|array| array.layers.release());
+        self.moves += 1;
     }
 }
 
 impl ResidentTextures {
+    /// The textures are in these arrays from the next frame on.
+    pub(super) fn set_arrays(&mut self, sets: &TextureSets) {
+        let memory = &mut self.memory;
+        if memory.revision == Some(sets.revision()) {
+            return;
+        }
+        let classes = memory.arrays.iter().zip(sets.arrays());
+        if classes.len() < memory.arrays.len() || classes.into_iter().any(|(array, of)| array.class != of.class) {
+            // They are those of other assets.
+            self.clear();
+            self.memory.arrays.clear();
+        }
+        let memory = &mut self.memory;
+        let known = memory.arrays.len();
+        memory.arrays.iter_mut().zip(sets.arrays()).for_each(|(array, of)| array.textures = of.textures);
+        memory.arrays.extend(sets.arrays()[known..].iter().map(|of| ArrayOnDevice {
+            class: of.class,
+            textures: of.textures,
+            layers: TextureLayers::default(),
+        }));
+        memory.array_of.clear();
+        memory.array_of.extend((0..sets.texture_slots()).map(|slot| sets.array_of(slot).unwrap_or(NO_ARRAY)));
+        memory.revision = Some(sets.revision());
+    }
+
     /// Uploads the textures that are missing, and rejects those that exceed the device's layers. Adds the copies to
     /// what is submitted before anything that reads the textures.
     ///
@@ -80,49 +130,58 @@ impl ResidentTextures {
         if missing.is_empty() {
             return Ok(());
         }
-        for index in 0..ARRAY_SIDES.len() {
-            let textures = missing.iter().filter(|(.., texture)| array_for(texture) == index);
-            self.make_room(device, uploads, index, textures.count());
+        let mut wanted = vec![0; self.memory.arrays.len()];
+        for array in missing.iter().filter_map(|(handle, ..)| self.memory.array_of(handle.index())) {
+            wanted[array] += 1;
+        }
+        for (index, textures) in wanted.into_iter().enumerate().filter(|(_, textures)| *textures > 0) {
+            self.make_room(device, uploads, index, textures);
         }
         let label = Some("new and changed textures");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
         for (handle, revision, texture) in missing {
-            let index = array_for(texture);
-            let array = &mut self.memory.arrays[index];
-            match (array.take(), array.texture()) {
-                (Some(layer), Some(on_device)) => {
+            let found = self.memory.array_of(handle.index()).and_then(|index| {
+                let layers = &mut self.memory.arrays[index].layers;
+                Some((index, layers.take()?, layers.texture()?))
+            });
+            match found {
+                Some((index, layer, on_device)) => {
                     copy_layer(device, &mut encoder, on_device, layer, texture)?;
-                    uploads.count(layer_bytes(ARRAY_SIDES[index]));
+                    uploads.count(texture.class().bytes());
                     self.add((handle, revision), TextureLocation { array: index as u32, layer });
                 }
-                _ => rejected.push((IssueReason::TextureLimit, handle.index() as usize)),
+                None => rejected.push((IssueReason::TextureLimit, handle.index() as usize)),
             }
         }
         uploads.add_commands([encoder.finish()]);
         Ok(())
     }
 
-    /// A view of each array; an empty array is a single pixel.
-    pub(crate) fn views(&self, device: &wgpu::Device) -> [wgpu::TextureView; ARRAY_SIDES.len()] {
-        self.memory.arrays.each_ref().map(|array| {
-            let texture = array.texture().cloned().unwrap_or_else(|| new_array(device, 1, 1));
+    /// A view of each array; `None` for one that is empty.
+    pub(super) fn views(&self) -> Vec<Option<wgpu::TextureView>> {
+        let view = |texture: &wgpu::Texture| {
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
                 ..wgpu::TextureViewDescriptor::default()
             })
-        })
+        };
+        self.memory.arrays.iter().map(|array| array.layers.texture().map(view)).collect()
     }
 
     /// Makes room for `textures` further textures in an array, if the device allows that number of layers.
     fn make_room(&mut self, device: &wgpu::Device, uploads: &CountedQueue, index: usize, textures: usize) {
-        let array = &self.memory.arrays[index];
+        let ArrayOnDevice { class, layers: array, .. } = &self.memory.arrays[index];
         let max_layers = device.limits().max_texture_array_layers as usize;
         let has_retired = self.lifetimes.retired().any(|location| location.array == index as u32);
-        if textures <= array.free_count() || (array.capacity() == max_layers && !has_retired) {
+        let is_at_limit = array.capacity() == max_layers && !has_retired;
+        if textures <= array.free_count() || is_at_limit || !can_hold(device, *class) {
             return;
         }
-        // Twice the layers, so that a texture that changes every frame does not move the others every frame.
-        let layers = ((self.live_layers(index).count() + textures) * 2).max(array.capacity()).min(max_layers);
+        // Twice the layers, so that a texture that changes every frame does not move the others every frame. Most
+        // arrays are filled once.
+        let needed = self.live_layers(index).count() + textures;
+        let with_headroom = if array.capacity() > 0 { needed * 2 } else { needed };
+        let layers = with_headroom.max(array.capacity()).min(max_layers);
         self.move_array(device, uploads, index, layers as u32);
     }
 
@@ -136,7 +195,8 @@ impl ResidentTextures {
     /// textures.
     pub(super) fn move_array(&mut self, device: &wgpu::Device, uploads: &CountedQueue, index: usize, layers: u32) {
         let live: Vec<_> = self.live_layers(index).collect();
-        self.memory.arrays[index].move_to(device, uploads, ARRAY_SIDES[index], layers, &live);
+        let ArrayOnDevice { class, layers: array, .. } = &mut self.memory.arrays[index];
+        array.move_to(device, uploads, *class, layers, &live);
         let moved = self.slots.iter_mut().flatten().filter(|texture| texture.location.array == index as u32);
         for (texture, layer) in moved.zip(0..) {
             texture.location.layer = layer;
@@ -145,4 +205,13 @@ impl ResidentTextures {
         self.lifetimes.forget_retired(|location| location.array == index as u32);
         self.memory.moves += 1;
     }
+}
+
+/// A view of an array of a single texel, to be bound where there is none.
+pub(super) fn empty_array(device: &wgpu::Device) -> wgpu::TextureView {
+    let class = TextureClass { width: 1, height: 1, format: TextureFormat::Rgba8Unorm, mip_levels: 1 };
+    new_array(device, class, 1).create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..wgpu::TextureViewDescriptor::default()
+    })
 }

@@ -4,9 +4,9 @@ use super::buffers::CountedQueue;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
 use crate::backend::wgpu::error_scope::{loss_or, refused};
-use crate::scene::Texture;
+use crate::scene::{Texture, TextureClass, TextureFormat};
 
-/// A texture array of square layers with all mip levels.
+/// A texture array of equal layers with all mip levels.
 #[derive(Default)]
 pub(super) struct TextureLayers {
     /// `None` while no layer is in use.
@@ -56,14 +56,14 @@ impl TextureLayers {
         &mut self,
         device: &wgpu::Device,
         uploads: &CountedQueue,
-        side: u32,
+        class: TextureClass,
         layers: u32,
         live: &[u32],
     ) {
         if layers == 0 {
             return self.release();
         }
-        let texture = new_array(device, side, layers);
+        let texture = new_array(device, class, layers);
         if let Some(before) = self.texture.as_ref().filter(|_| !live.is_empty()) {
             let label = Some("textures move to another array");
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
@@ -87,38 +87,60 @@ fn copy_layers(
     count: u32,
 ) {
     for mip_level in 0..source.0.mip_level_count() {
-        let side = source.0.width() >> mip_level;
         let of = |(texture, z)| {
             let origin = wgpu::Origin3d { x: 0, y: 0, z };
             wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect: wgpu::TextureAspect::All }
         };
-        let size = wgpu::Extent3d { width: side, height: side, depth_or_array_layers: count };
+        let level = source.0.size().mip_level_size(mip_level, wgpu::TextureDimension::D2);
+        // Copies of compressed levels are of whole blocks.
+        let level = level.physical_size(source.0.format());
+        let size = wgpu::Extent3d { depth_or_array_layers: count, ..level };
         encoder.copy_texture_to_texture(of(source), of(destination), size);
     }
 }
 
-/// An array of square layers, with all mip levels.
-pub(super) fn new_array(device: &wgpu::Device, side: u32, layers: u32) -> wgpu::Texture {
+/// An array of layers of a class.
+pub(super) fn new_array(device: &wgpu::Device, class: TextureClass, layers: u32) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some("textures"),
-        size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: layers },
-        mip_level_count: side.ilog2() + 1,
+        size: wgpu::Extent3d { width: class.width, height: class.height, depth_or_array_layers: layers },
+        mip_level_count: class.mip_levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        format: format_of(class.format),
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     })
 }
 
-/// The size of a layer with all mip levels, in bytes.
-pub(crate) const fn layer_bytes(side: u32) -> u64 {
-    let (mut bytes, mut level) = (0, side as u64);
-    while level > 0 {
-        bytes += level * level * 4;
-        level /= 2;
+/// Whether a device can have an array of a class.
+pub(super) fn can_hold(device: &wgpu::Device, class: TextureClass) -> bool {
+    let has_size = class.width.max(class.height) <= device.limits().max_texture_dimension_2d;
+    has_size && device.features().contains(format_of(class.format).required_features())
+}
+
+fn format_of(format: TextureFormat) -> wgpu::TextureFormat {
+    let astc = |channel| wgpu::TextureFormat::Astc { block: wgpu::AstcBlock::B4x4, channel };
+    match format {
+        TextureFormat::R8Unorm => wgpu::TextureFormat::R8Unorm,
+        TextureFormat::Rg8Unorm => wgpu::TextureFormat::Rg8Unorm,
+        TextureFormat::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
+        TextureFormat::Rgba8Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        TextureFormat::R16Float => wgpu::TextureFormat::R16Float,
+        TextureFormat::Rg16Float => wgpu::TextureFormat::Rg16Float,
+        TextureFormat::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+        TextureFormat::Bc1Srgb => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+        TextureFormat::Bc3Srgb => wgpu::TextureFormat::Bc3RgbaUnormSrgb,
+        TextureFormat::Bc4Unorm => wgpu::TextureFormat::Bc4RUnorm,
+        TextureFormat::Bc5Unorm => wgpu::TextureFormat::Bc5RgUnorm,
+        TextureFormat::Bc6hUfloat => wgpu::TextureFormat::Bc6hRgbUfloat,
+        TextureFormat::Bc7Unorm => wgpu::TextureFormat::Bc7RgbaUnorm,
+        TextureFormat::Bc7Srgb => wgpu::TextureFormat::Bc7RgbaUnormSrgb,
+        TextureFormat::Etc2Rgba8Unorm => wgpu::TextureFormat::Etc2Rgba8Unorm,
+        TextureFormat::Etc2Rgba8Srgb => wgpu::TextureFormat::Etc2Rgba8UnormSrgb,
+        TextureFormat::Astc4x4Unorm => astc(wgpu::AstcChannel::Unorm),
+        TextureFormat::Astc4x4Srgb => astc(wgpu::AstcChannel::UnormSrgb),
     }
-    bytes
 }
 
 /// Records a copy of a texture, with all mip levels, to a layer.
@@ -132,13 +154,14 @@ pub(super) fn copy_layer(
     layer: u32,
     texture: &Texture,
 ) -> Result<(), BackendError> {
-    for (level, pixels) in (0..).zip(mip_chain(texture, array.width())) {
-        copy_rows(device, encoder, array, (layer, level), 0, &pixels)?;
+    for (level, bytes) in (0..).zip(mip_chain(texture)) {
+        copy_rows(device, encoder, (array, texture.class()), (layer, level), 0, &bytes)?;
     }
     Ok(())
 }
 
-/// Records a copy of whole rows to a mip level of a layer, from row `first` on. The rows wait in a buffer of their own.
+/// Records a copy of whole rows, which are rows of blocks if the format has blocks, to a mip level of a layer of an
+/// array of this class, from row `first` on. The rows wait in a buffer of their own.
 /// `Queue::write_texture` would copy them under a lock that every submission takes. It can also deadlock with a
 /// submission of commands that were recorded before all layers of the texture were initialised (wgpu issue 9460).
 ///
@@ -147,17 +170,18 @@ pub(super) fn copy_layer(
 pub(crate) fn copy_rows(
     device: &wgpu::Device,
     encoder: &mut wgpu::CommandEncoder,
-    array: &wgpu::Texture,
+    (array, class): (&wgpu::Texture, TextureClass),
     (layer, mip_level): (u32, u32),
     first: u32,
     pixels: &[u8],
 ) -> Result<(), BackendError> {
-    let width = array.width() >> mip_level;
-    let row_bytes = width * 4;
-    let extent = wgpu::Extent3d { width, height: pixels.len() as u32 / row_bytes, depth_or_array_layers: 1 };
+    let (_, row_bytes) = class.level_rows(mip_level);
+    let (rows, side) = (pixels.len() as u32 / row_bytes, class.format.block_side());
+    let width = class.level_size(mip_level)[0].next_multiple_of(side);
+    let extent = wgpu::Extent3d { width, height: rows * side, depth_or_array_layers: 1 };
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let label = "rows of a texture";
-    let size = u64::from(stride) * u64::from(extent.height);
+    let size = u64::from(stride) * u64::from(rows);
     // With `MAP_WRITE` the rows are written into this buffer. Without it, wgpu maps another one, which the device
     // copies to this one.
     let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
@@ -176,9 +200,8 @@ pub(crate) fn copy_rows(
         }
     }
     buffer.unmap();
-    let layout =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(stride), rows_per_image: Some(extent.height) };
-    let origin = wgpu::Origin3d { x: 0, y: first, z: layer };
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(stride), rows_per_image: Some(rows) };
+    let origin = wgpu::Origin3d { x: 0, y: first * side, z: layer };
     let destination =
         wgpu::TexelCopyTextureInfo { texture: array, mip_level, origin, aspect: wgpu::TextureAspect::All };
     encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer: &buffer, layout }, destination, extent);
@@ -194,8 +217,8 @@ mod tests {
     #[test]
     fn on_a_lost_device_a_copy_returns_the_loss() {
         let (device, _queue) = noop_device();
-        let array = new_array(&device, 256, 2);
         let texture = Texture::new("plain", 1, 1, vec![255; 4]).unwrap();
+        let array = new_array(&device, texture.class(), 2);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut copy =
             || with_error_scope(&device, "a copy", || copy_layer(&device, &mut encoder, &array, 1, &texture)).flatten();

@@ -3,9 +3,7 @@
 use super::buffers::CountedQueue;
 use super::residents::{Placed, Unplaced};
 use super::texture_arrays::{ResidentTextures, TextureLocation};
-use super::texture_layers::layer_bytes;
-use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
-use crate::scene::Texture;
+use super::texture_layers::can_hold;
 
 /// The device that arrays are on, and what they may take there.
 #[derive(Clone, Copy)]
@@ -51,14 +49,21 @@ impl Copying {
 }
 
 impl ResidentTextures {
-    /// Finds a layer for a texture, or moves an array to a larger one if the budget allows.
+    /// The array of the texture in a slot.
+    pub(crate) fn array_of(&self, texture: u32) -> Option<usize> {
+        self.memory.array_of(texture)
+    }
+
+    /// Finds a layer for a texture in this array, or moves the array to a larger one if the budget allows.
     pub(crate) fn place_beside(
         &mut self,
-        texture: &Texture,
+        index: usize,
         budget: ArrayBudget<'_>,
     ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
-        let index = array_for(texture);
-        let bytes = layer_bytes(ARRAY_SIDES[index]);
+        if !can_hold(budget.device, self.memory.arrays[index].class) {
+            return Err(Unplaced::LayerLimit);
+        }
+        let bytes = self.memory.layer_bytes(index);
         if bytes > budget.bytes {
             return Err(Unplaced::TooLarge { bytes, limit: "texture_bytes", allowed: budget.bytes });
         }
@@ -70,12 +75,11 @@ impl ResidentTextures {
     /// of the others. `evictions` counts them.
     pub(crate) fn place_instead<C: Iterator<Item = u32>>(
         &mut self,
-        texture: &Texture,
+        index: usize,
         budget: ArrayBudget<'_>,
         candidates: impl Fn() -> C,
         evictions: &mut usize,
     ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
-        let index = array_for(texture);
         let evicted = self.evict_for(index, budget, Copying::Seldom, candidates());
         *evictions += evicted;
         let copying = if evicted > 0 { Copying::Seldom } else { Copying::AnyTime };
@@ -84,14 +88,14 @@ impl ResidentTextures {
             *evictions += self.evict_for(index, budget, Copying::AnyTime, candidates());
             found = self.take_layer(index, budget, Copying::AnyTime);
         }
-        if found == Err(Unplaced::Full) && self.memory.arrays[index].capacity() as u64 == budget.max_layers {
+        if found == Err(Unplaced::Full) && self.memory.arrays[index].layers.capacity() as u64 == budget.max_layers {
             found = Err(Unplaced::LayerLimit);
         }
         self.placed(found?)
     }
 
     fn placed(&self, location: TextureLocation) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
-        let on_device = self.memory.arrays[location.array as usize].texture().cloned().ok_or(Unplaced::Full)?;
+        let on_device = self.memory.arrays[location.array as usize].layers.texture().cloned().ok_or(Unplaced::Full)?;
         let last_reader = self.lifetimes.last_reader(|retired| *retired == location);
         Ok(Placed { target: (location, on_device), last_reader })
     }
@@ -103,25 +107,28 @@ impl ResidentTextures {
         budget: ArrayBudget<'_>,
         copying: Copying,
     ) -> Result<TextureLocation, Unplaced> {
-        if self.memory.arrays[index].free_count() == 0 {
+        if self.memory.arrays[index].layers.free_count() == 0 {
             self.grow(index, budget, copying)?;
         }
-        let layer = self.memory.arrays[index].take().ok_or(Unplaced::Full)?;
+        let layer = self.memory.arrays[index].layers.take().ok_or(Unplaced::Full)?;
         Ok(TextureLocation { array: index as u32, layer })
     }
 
     /// Moves an array to a larger one within the budget. If there is not enough of it, the other arrays give up what
     /// they do not use.
     fn grow(&mut self, index: usize, budget: ArrayBudget<'_>, copying: Copying) -> Result<(), Unplaced> {
-        let (bytes, capacity) = (layer_bytes(ARRAY_SIDES[index]), self.memory.arrays[index].capacity() as u64);
-        let wanted = (capacity * 2).max(MIN_LAYERS).min(budget.max_layers);
+        let (bytes, array) = (self.memory.layer_bytes(index), &self.memory.arrays[index]);
+        let capacity = array.layers.capacity() as u64;
+        // A new array has no more layers than there are textures for it.
+        let first = u64::from(array.textures).clamp(1, MAX_FIRST_LAYERS);
+        let wanted = (capacity * 2).max(first).min(budget.max_layers);
         let growth = copying.min_growth(capacity).min(wanted - capacity);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
         if growth == 0 || self.surplus_bytes(index, copying, |_| 0) + rest < growth * bytes {
             return Err(Unplaced::Full);
         }
         let gives_up = rest < growth * bytes;
-        let donors: Vec<_> = (0..ARRAY_SIDES.len())
+        let donors: Vec<_> = (0..self.memory.arrays.len())
             .filter(|other| gives_up && *other != index && self.surplus(*other, copying, 0) > 0)
             .collect();
         // What jobs upload stays where it is.
@@ -139,14 +146,14 @@ impl ResidentTextures {
 
     /// What an array gives up for another one if `evicted` more of its layers are free.
     fn surplus(&self, array: usize, copying: Copying, evicted: u64) -> u64 {
-        let layers = &self.memory.arrays[array];
+        let layers = &self.memory.arrays[array].layers;
         copying.surplus(layers.capacity() as u64, layers.free_count() as u64 + evicted)
     }
 
     /// What all arrays but one give up for it, in bytes.
     fn surplus_bytes(&self, index: usize, copying: Copying, evicted: impl Fn(usize) -> u64) -> u64 {
-        let others = (0..ARRAY_SIDES.len()).filter(|other| *other != index);
-        others.map(|other| self.surplus(other, copying, evicted(other)) * layer_bytes(ARRAY_SIDES[other])).sum()
+        let others = (0..self.memory.arrays.len()).filter(|other| *other != index);
+        others.map(|other| self.surplus(other, copying, evicted(other)) * self.memory.layer_bytes(other)).sum()
     }
 
     /// Evicts candidates until there is a free layer in an array, or the array can grow; none if there are not enough.
@@ -158,11 +165,11 @@ impl ResidentTextures {
         copying: Copying,
         candidates: impl Iterator<Item = u32>,
     ) -> usize {
-        let capacity = self.memory.arrays[index].capacity() as u64;
+        let capacity = self.memory.arrays[index].layers.capacity() as u64;
         let may_grow = capacity < budget.max_layers;
-        let needed = copying.min_growth(capacity).min(budget.max_layers - capacity) * layer_bytes(ARRAY_SIDES[index]);
+        let needed = copying.min_growth(capacity).min(budget.max_layers - capacity) * self.memory.layer_bytes(index);
         let rest = budget.bytes.saturating_sub(self.resident_bytes());
-        let (mut counts, mut chosen) = ([0; ARRAY_SIDES.len()], Vec::new());
+        let (mut counts, mut chosen) = (vec![0; self.memory.arrays.len()], Vec::new());
         for slot in candidates {
             let Some(location) = self.location(slot) else { continue };
             if location.array as usize == index {
@@ -185,26 +192,34 @@ impl ResidentTextures {
     }
 }
 
-/// The layers of a new array, if the budget allows.
-const MIN_LAYERS: u64 = 8;
+/// The most layers of a new array.
+const MAX_FIRST_LAYERS: u64 = 8;
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
     use crate::backend::wgpu::resources::EndOfUpload;
-    use crate::scene::Assets;
+    use crate::scene::{Assets, Texture, TextureClass, TextureFormat};
+    use crate::view::TextureSets;
 
     /// Arrays, and the textures in them, those that were used longest ago first.
     struct Arrays {
         arrays: ResidentTextures,
         assets: Assets,
+        sets: TextureSets,
         device: wgpu::Device,
         uploads: CountedQueue,
         by_use: Vec<u32>,
     }
 
-    const LAYER: u64 = layer_bytes(ARRAY_SIDES[0]);
+    /// A layer of 256.
+    const LAYER: u64 = 4 * (256 * 256 * 4 - 1) / 3;
+
+    fn layer_bytes(side: u32) -> u64 {
+        let mip_levels = side.ilog2() + 1;
+        TextureClass { width: side, height: side, format: TextureFormat::Rgba8Srgb, mip_levels }.bytes()
+    }
     /// A layer of 512 takes four bytes more than four of 256.
     const SLACK: u64 = 64;
 
@@ -212,20 +227,30 @@ mod tests {
         fn new() -> Self {
             let (device, queue) = noop_device();
             let (arrays, uploads) = (ResidentTextures::default(), CountedQueue::new(queue));
-            Self { arrays, assets: Assets::default(), device, uploads, by_use: Vec::new() }
+            Self {
+                arrays,
+                assets: Assets::default(),
+                sets: TextureSets::default(),
+                device,
+                uploads,
+                by_use: Vec::new(),
+            }
         }
 
         /// Places a new texture, which is on the device at once; the first `candidates` by use may make room.
         fn place(&mut self, side: u32, (layers, max_layers): (u64, u64), candidates: usize) -> Result<usize, Unplaced> {
             let texture = Texture::new("plain", side, side, vec![255; (side * side * 4) as usize]).unwrap();
             let handle = self.assets.add(texture.clone()).unwrap();
+            self.sets.update(&self.assets, 256);
+            self.arrays.set_arrays(&self.sets);
+            let array = self.arrays.array_of(handle.index()).unwrap();
             self.arrays.begin_frame(&self.assets.textures, (0, |_, _| true), true);
             let (device, uploads) = (&self.device, &self.uploads);
             let budget = ArrayBudget { device, uploads, bytes: layers * LAYER + SLACK, max_layers };
             let (by_use, mut evictions) = (self.by_use[..candidates].to_vec(), 0);
-            let mut placed = self.arrays.place_beside(&texture, budget);
+            let mut placed = self.arrays.place_beside(array, budget);
             if matches!(placed, Err(Unplaced::Full)) {
-                placed = self.arrays.place_instead(&texture, budget, || by_use.iter().copied(), &mut evictions);
+                placed = self.arrays.place_instead(array, budget, || by_use.iter().copied(), &mut evictions);
             }
             self.by_use.retain(|slot| self.arrays.is_resident(*slot));
             let (location, _) = placed.inspect_err(|_| assert_eq!(evictions, 0, "nothing is evicted in vain"))?.target;
@@ -244,12 +269,12 @@ mod tests {
         let mut arrays = Arrays::new();
         let limits = (1000, 8);
         // The larger ones were used longest ago.
-        for side in [512, 512, 512, 16, 16, 16, 16, 16, 16, 16, 16] {
+        for side in [512, 512, 512, 256, 256, 256, 256, 256, 256, 256, 256] {
             assert_eq!(arrays.place(side, limits, 0), Ok(0));
         }
-        assert_eq!(arrays.place(16, limits, 3), Err(Unplaced::LayerLimit), "larger ones would make room in vain");
+        assert_eq!(arrays.place(256, limits, 3), Err(Unplaced::LayerLimit), "larger ones would make room in vain");
         assert_eq!(arrays.place(512, limits, 0), Ok(0), "the other array is not at its limit");
-        assert_eq!(arrays.place(16, limits, 4), Ok(1));
+        assert_eq!(arrays.place(256, limits, 4), Ok(1));
         assert_eq!(arrays.by_use[..4], [0, 1, 2, 4], "the oldest one of its array");
     }
 
@@ -258,7 +283,7 @@ mod tests {
         let mut arrays = Arrays::new();
         let limits = (8, 256);
         for _ in 0..8 {
-            assert_eq!(arrays.place(16, limits, 0), Ok(0));
+            assert_eq!(arrays.place(256, limits, 0), Ok(0));
         }
         // One of 512 takes the room of four of 256.
         assert_eq!(arrays.place(512, limits, 3), Err(Unplaced::Full));

@@ -3,9 +3,8 @@
 use std::collections::HashMap;
 
 use super::request::Requested;
-use crate::backend::mip_generation::{ARRAY_SIDES, array_for};
 use crate::backend::wgpu::resources::Unplaced;
-use crate::scene::{Assets, Mesh, Texture};
+use crate::scene::{Assets, Mesh};
 use crate::unwind::emit_unlocked;
 
 /// The meshes that had no room in a frame, and how much looking for it has cost.
@@ -54,20 +53,22 @@ fn size_of_mesh(mesh: &Mesh) -> [usize; 2] {
 /// The textures that had no room in a frame, by array. All textures of an array take the same.
 #[derive(Default)]
 pub(super) struct RefusedTextures {
-    by_array: [Option<Unplaced>; ARRAY_SIDES.len()],
+    by_array: HashMap<usize, Unplaced>,
+    /// Whether something is on its way to an array that has to move. An array moves when nothing is. So nothing else
+    /// begins until then.
+    awaits: bool,
 }
 
 impl RefusedTextures {
-    /// Why there is no room for a texture of this size.
-    pub(super) fn of(&self, texture: &Texture) -> Option<Unplaced> {
-        self.by_array[array_for(texture)]
+    /// Why there is no room for a texture of this array.
+    pub(super) fn of(&self, array: usize) -> Option<Unplaced> {
+        if self.awaits { Some(Unplaced::Awaited) } else { self.by_array.get(&array).copied() }
     }
 
-    pub(super) fn add(&mut self, texture: &Texture, unplaced: Unplaced) {
+    pub(super) fn add(&mut self, array: usize, unplaced: Unplaced) {
         match unplaced {
-            // An array moves when nothing is on its way to it. So nothing else begins until then.
-            Unplaced::Awaited => self.by_array.fill(Some(unplaced)),
-            Unplaced::Full | Unplaced::LayerLimit => self.by_array[array_for(texture)] = Some(unplaced),
+            Unplaced::Awaited => self.awaits = true,
+            Unplaced::Full | Unplaced::LayerLimit => _ = self.by_array.insert(array, unplaced),
             Unplaced::TooLarge { .. } => {}
         }
     }

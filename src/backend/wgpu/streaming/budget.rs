@@ -26,9 +26,8 @@ pub struct StreamingBudget {
     /// The device's memory for meshes, in bytes: that of whole pages, of which each takes up to a sixteenth of the
     /// budget, and 4 MiB at most, unless a mesh is larger.
     pub mesh_bytes: u64,
-    /// The device's memory for textures, in bytes: that of whole texture arrays. A texture is scaled to a square of
-    /// 256, 512, 1024 or 2048 pixels, and takes a third more with its mip levels. While an array moves to a larger one,
-    /// both are there.
+    /// The device's memory for textures, in bytes: that of whole texture arrays, of which each has textures of one
+    /// [class](crate::scene::TextureClass). While an array moves to a larger one, both are there.
     pub texture_bytes: u64,
     /// The most bytes that are uploaded from one frame to the next. Larger meshes and textures take several frames. The
     /// same number more may be uploaded by the frame itself, for meshes that replace others on the device and are no

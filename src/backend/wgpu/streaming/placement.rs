@@ -66,15 +66,13 @@ impl<'a, 'b> Placement<'a, 'b> {
                 let upload = Upload::Mesh(MeshUpload::new(in_flight, mesh.clone(), target));
                 HeldUpload { upload, last_reader }
             }),
-            Requested::Texture(handle, revision, texture) => {
-                self.place_texture(handle, texture, importance).map(|placed| {
-                    let Placed { target: (location, array), last_reader } = placed;
-                    let textures = &mut self.residency.materials.textures;
-                    let in_flight = textures.begin_upload((handle, revision), location);
-                    let upload = TextureUpload::new(in_flight, texture.clone(), array, location);
-                    HeldUpload { upload: Upload::Texture(upload), last_reader }
-                })
-            }
+            Requested::Texture(handle, revision, texture) => self.place_texture(handle, importance).map(|placed| {
+                let Placed { target: (location, array), last_reader } = placed;
+                let textures = &mut self.residency.materials.textures;
+                let in_flight = textures.begin_upload((handle, revision), location);
+                let upload = TextureUpload::new(in_flight, texture.clone(), array, location);
+                HeldUpload { upload: Upload::Texture(upload), last_reader }
+            }),
         };
         Ok(placed)
     }
@@ -115,30 +113,29 @@ impl<'a, 'b> Placement<'a, 'b> {
     fn place_texture(
         &mut self,
         handle: Handle<Texture>,
-        texture: &Texture,
         importance: (bool, i32),
     ) -> Result<Placed<(TextureLocation, wgpu::Texture)>, Unplaced> {
         let Self { residency, usage, refused_textures, .. } = self;
         let (budget, slot) = (self.budget.texture_bytes, handle.index());
+        let array = residency.materials.textures.array_of(slot).ok_or(Unplaced::Full)?;
         let replaces = residency.materials.textures.is_resident(slot);
-        if let Some(refused) = refused_textures.of(texture).filter(|refused| !replaces || *refused == Unplaced::Awaited)
-        {
+        if let Some(refused) = refused_textures.of(array).filter(|refused| !replaces || *refused == Unplaced::Awaited) {
             return Err(refused);
         }
         let textures = &mut residency.materials.textures;
         let budget = ArrayBudget::new(residency.device, residency.uploads, budget);
-        let mut placed = textures.place_beside(texture, budget);
+        let mut placed = textures.place_beside(array, budget);
         if matches!(placed, Err(Unplaced::Full)) {
             let eviction_order = self.texture_evictions.get_or_insert_with(|| usage.texture_evictions(textures));
             placed = textures.place_instead(
-                texture,
+                array,
                 budget,
                 || eviction_order.candidates(importance, slot),
                 &mut self.evictions,
             );
         }
         if let Err(unplaced) = &placed {
-            refused_textures.add(texture, *unplaced);
+            refused_textures.add(array, *unplaced);
         }
         placed
     }

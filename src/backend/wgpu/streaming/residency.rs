@@ -46,7 +46,8 @@ impl Residency<'_> {
         let of_meshes =
             budget.map(|budget| MeshBudget { pages: budget.mesh_bytes, at_once: budget.upload_bytes_per_frame });
         self.meshes.begin_frame(self.device, self.uploads, (assets, used), vertices, of_meshes)?;
-        self.materials.begin_frame(self.device, self.uploads, assets, budget.is_some())
+        let sets = request.objects.texture_sets();
+        self.materials.begin_frame(self.device, self.uploads, (assets, sets), budget.is_some())
     }
 
     /// The snapshots of what is on the device. The caches have forgotten the ones before then.
@@ -55,9 +56,9 @@ impl Residency<'_> {
         request: &FrameRequest<'_>,
         is_streamed: bool,
     ) -> (Arc<MeshSnapshot>, MaterialSnapshot) {
-        let FrameRequest { plan, scene, limits, scene_issues, .. } = *request;
-        let types = plan.material_types();
-        let materials = self.materials.snapshot(self.device, scene.assets, types, (limits, scene_issues));
+        let FrameRequest { plan, scene, limits, scene_issues, objects, .. } = *request;
+        let (types, assets) = (plan.material_types(), (scene.assets, objects.texture_sets()));
+        let materials = self.materials.snapshot(self.device, assets, types, (limits, scene_issues));
         (self.meshes.snapshot(is_streamed), materials)
     }
 

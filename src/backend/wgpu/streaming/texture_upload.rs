@@ -1,9 +1,11 @@
 //! The upload of a texture, in portions.
 
+use std::borrow::Cow;
+
 use super::upload_budget::UploadBudget;
 use crate::backend::BackendError;
 use crate::backend::mip_generation::mip_chain;
-use crate::backend::wgpu::resources::{CountedQueue, InFlight, TextureLocation, copy_rows, layer_bytes};
+use crate::backend::wgpu::resources::{CountedQueue, InFlight, TextureLocation, copy_rows};
 use crate::scene::Texture;
 
 /// A texture on its way to the device.
@@ -29,7 +31,7 @@ impl TextureUpload {
 
     /// All that it uploads.
     pub(super) fn bytes(&self) -> u64 {
-        layer_bytes(self.array.width())
+        self.texture.class().bytes()
     }
 
     /// Makes mip levels, and uploads as much as is allowed. Returns whether all of it is uploaded, once the device has
@@ -44,21 +46,21 @@ impl TextureUpload {
         upload_budget: &mut UploadBudget,
     ) -> Result<(bool, wgpu::CommandBuffer), BackendError> {
         if self.levels.is_empty() {
-            self.levels = mip_chain(&self.texture, self.array.width());
-            self.levels.reverse();
+            self.levels = mip_chain(&self.texture).into_iter().map(Cow::into_owned).rev().collect();
         }
         let label = Some("a streamed texture");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
         while let Some(level) = self.levels.last() {
             let number = self.array.mip_level_count() - self.levels.len() as u32;
-            let row_bytes = u64::from(self.array.width() >> number) * 4;
+            let class = self.texture.class();
+            let row_bytes = u64::from(class.level_rows(number).1);
             let first = u64::from(self.rows) * row_bytes;
             let length = upload_budget.take(level.len() as u64 - first, row_bytes);
             if length == 0 {
                 break;
             }
             let bytes = &level[first as usize..(first + length) as usize];
-            copy_rows(device, &mut encoder, &self.array, (self.location.layer, number), self.rows, bytes)?;
+            copy_rows(device, &mut encoder, (&self.array, class), (self.location.layer, number), self.rows, bytes)?;
             uploads.count(length);
             self.rows += (length / row_bytes) as u32;
             if first + length == level.len() as u64 {

@@ -1,0 +1,163 @@
+//! Textures keep their size, their format and their texels, however many there are of how many sizes.
+
+use std::sync::Arc;
+
+use drawloom::backend::{Picture, SoftwareBackend};
+use drawloom::glam::{DVec3, Vec3};
+use drawloom::process::Deferred;
+use drawloom::scene::{Blend, Camera, Material, Projection, RenderObject, Scene, Texture, TextureFormat, Topology};
+use drawloom::task::Scheduler;
+use drawloom_testing::random::Random;
+use drawloom_testing::scenes::{sized, square};
+use half::f16;
+use libtest_mimic::Failed;
+
+use crate::Case;
+use crate::fixture::{Fixture, draw_on_processor, half_floats};
+use crate::strategies::{few_strategies, fixture_with};
+
+pub const CASES: &[Case] = &[
+    ("a_texture_shows_its_texels_whatever_its_size_and_format", texels),
+    ("textures_of_many_sizes_are_each_on_their_object_with_every_strategy", many_sizes),
+    ("textures_that_are_replaced_by_others_of_other_sizes_are_drawn", replaced),
+];
+
+/// Pixels to a side of a tile, which one object covers.
+const TILE: u32 = 4;
+
+/// A wall of square tiles, `columns` in a row, that fills the picture; each has its own texture, and shows it in the
+/// colour of the texture's texels.
+fn wall(columns: u32, textures: &[Texture], blend: Blend) -> Result<Scene, Failed> {
+    let mut scene = Scene::new();
+    let mesh = scene.add(square(Topology::TriangleList))?;
+    let rows = (textures.len() as u32).div_ceil(columns);
+    let projection = Projection::Orthographic { height: f64::from(2 * rows) as f32 };
+    let center = DVec3::new(f64::from(columns) - 1.0, f64::from(rows) - 1.0, 0.0);
+    let camera = Camera::looking_at("main", center + DVec3::Z * 5.0, center);
+    scene.cameras = vec![Camera { projection, far: 100.0, ..sized(camera, [columns * TILE, rows * TILE]) }];
+    scene.ambient = Vec3::ONE;
+    for (index, texture) in (0..).zip(textures) {
+        let texture = scene.add(texture.clone())?;
+        let material = Material { texture: Some(texture), diffuse: Vec3::ONE, blend, ..Material::default() };
+        let material = scene.add(material)?;
+        let place = DVec3::new(f64::from(2 * (index % columns)), f64::from(2 * (index / columns)), 0.0);
+        scene.add_object(RenderObject::new(mesh, material, place))?;
+    }
+    Ok(scene)
+}
+
+/// The colour of what is in the middle of a tile, from the lower left on, in sRGB. `radiance` is a picture of half
+/// floats.
+fn tile(radiance: &Picture, columns: u32, index: u32) -> [u8; 3] {
+    let (column, row) = (index % columns, index / columns);
+    let [x, y] = [column * TILE + TILE / 2, radiance.height - 1 - (row * TILE + TILE / 2)];
+    half_floats(radiance)[(y * radiance.width + x) as usize].map(|linear| {
+        let encoded = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+        (encoded * 255.0).round() as u8
+    })
+}
+
+/// The first view's radiance.
+fn draw(fixture: &mut Fixture, scene: &Scene) -> Result<Picture, Failed> {
+    let recorded = fixture.record(scene)?;
+    Ok(fixture.submit(recorded)?.read(0, "radiance")?)
+}
+
+/// Every format that each device has, each with a size that was once scaled: red, green and blue where the format has
+/// them.
+fn texels() -> Result<(), Failed> {
+    let half = |values: &[f32]| values.iter().flat_map(|value| f16::from_f32(*value).to_le_bytes()).collect::<Vec<_>>();
+    // 0.5 is 188 in sRGB.
+    let formats = [
+        (TextureFormat::Rgba8Srgb, vec![188, 0, 255, 255], [188, 0, 255]),
+        (TextureFormat::Rgba8Unorm, vec![0, 128, 255, 255], [0, 188, 255]),
+        (TextureFormat::R8Unorm, vec![128], [188, 0, 0]),
+        (TextureFormat::Rg8Unorm, vec![255, 128], [255, 188, 0]),
+        (TextureFormat::R16Float, half(&[0.5]), [188, 0, 0]),
+        (TextureFormat::Rg16Float, half(&[0.0, 0.5]), [0, 188, 0]),
+        (TextureFormat::Rgba16Float, half(&[0.5, 0.5, 0.0, 1.0]), [188, 188, 0]),
+    ];
+    for size in [[1, 1], [16, 16], [300, 7], [3, 500], [1, 2100]] {
+        let texture = |(format, texel, _): &(TextureFormat, Vec<u8>, _)| {
+            let texels = texel.repeat(size[0] as usize * size[1] as usize);
+            Texture::with_levels(format!("{format:?}"), *format, size, vec![texels])
+        };
+        let textures = formats.iter().map(texture).collect::<Result<Vec<_>, _>>()?;
+        let picture = draw(&mut Fixture::new()?, &wall(7, &textures, Blend::None)?)?;
+        for (index, (format, _, expected)) in (0..).zip(&formats) {
+            let found = tile(&picture, 7, index);
+            if found.iter().zip(expected).any(|(found, expected)| found.abs_diff(*expected) > 1) {
+                return Err(format!("{format:?} of {size:?}: {found:?}, not {expected:?}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// 60 textures of different sizes, each of one colour. Every fourth one has a size that another one has too.
+fn colored(random: &mut Random, index: u32) -> Result<(Texture, [u8; 3]), Failed> {
+    let color = [random.below(256), random.below(256), random.below(256)].map(|channel| channel as u8);
+    let number = if index.is_multiple_of(4) { index / 8 } else { index };
+    let (width, height) = (1 + number * 3, 1 + (number * 7) % 40);
+    let texels = [color[0], color[1], color[2], 255].repeat((width * height) as usize);
+    Ok((Texture::new(format!("texture {index}"), width, height, texels)?, color))
+}
+
+fn many_sizes() -> Result<(), Failed> {
+    let mut random = Random::stream(5);
+    let colored = (0..60).map(|index| colored(&mut random, index)).collect::<Result<Vec<_>, _>>()?;
+    let textures: Vec<_> = colored.iter().map(|(texture, _)| texture.clone()).collect();
+    for blend in [Blend::None, Blend::Alpha] {
+        let scene = wall(10, &textures, blend)?;
+        let check = |picture: &Picture, what: &str| {
+            let wrong = (0..).zip(&colored).find(|(index, (_, color))| {
+                tile(picture, 10, *index).iter().zip(color).any(|(found, expected)| found.abs_diff(*expected) > 1)
+            });
+            wrong.map_or(Ok(()), |(index, (_, color))| {
+                Err(Failed::from(format!("{what}: tile {index} is {:?}, not {color:?}", tile(picture, 10, index))))
+            })
+        };
+        let mut first = None;
+        for (recording, encoding) in few_strategies() {
+            let mut fixture = fixture_with(recording, encoding)?;
+            for _ in 0..3 {
+                let picture = draw(&mut fixture, &scene)?;
+                check(&picture, &format!("{blend:?} with {recording:?} and {encoding:?}"))?;
+                if *first.get_or_insert_with(|| picture.clone()) != picture {
+                    return Err(format!("{blend:?}: {recording:?} and {encoding:?} draw something else").into());
+                }
+            }
+        }
+        let scheduler = Arc::new(Scheduler::new(1)?);
+        let software = SoftwareBackend::new(Arc::clone(&scheduler));
+        let picture = draw_on_processor((software, scheduler), Deferred::to_picture(), &scene, "radiance")?;
+        check(&picture, "software")?;
+    }
+    Ok(())
+}
+
+/// Textures are replaced by others of other sizes, and materials exchange theirs, from frame to frame.
+fn replaced() -> Result<(), Failed> {
+    let mut random = Random::stream(6);
+    let (textures, mut colors): (Vec<_>, Vec<_>) =
+        (0..24).map(|index| colored(&mut random, index)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let mut scene = wall(6, &textures, Blend::None)?;
+    let handles: Vec<_> = scene.assets().iter::<Texture>().map(|(handle, _)| handle).collect();
+    let mut fixture = Fixture::new()?;
+    for frame in 0..40 {
+        let picture = draw(&mut fixture, &scene)?;
+        for (index, color) in (0..).zip(&colors) {
+            let found = tile(&picture, 6, index);
+            if found.iter().zip(color).any(|(found, expected)| found.abs_diff(*expected) > 1) {
+                return Err(format!("frame {frame}: tile {index} is {found:?}, not {color:?}").into());
+            }
+        }
+        for _ in 0..random.below(4) {
+            let (slot, number) = (random.below(24), random.below(60) as u32);
+            let (texture, color) = colored(&mut random, number)?;
+            scene.replace(handles[slot], texture)?;
+            colors[slot] = color;
+        }
+    }
+    Ok(())
+}
