@@ -210,6 +210,7 @@ impl<'a> TextureCache<'a> {
             name: definition.name.clone(),
             diffuse,
             texture: texture.handle,
+            textures: Vec::new(),
             emission: definition.emission,
             opacity,
             blend: if is_blended { Blend::Alpha } else { Blend::None },

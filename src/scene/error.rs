@@ -92,9 +92,10 @@ pub enum SceneError {
         /// Its name.
         mesh: String,
     },
-    /// Colours that are negative or not finite, or an opacity or alpha cutoff outside 0 to 1.
+    /// Colours that are negative or not finite, an opacity or alpha cutoff outside 0 to 1, or too many textures.
     #[error(
-        "material `{material}` has a colour that is negative or not finite, or an opacity or alpha cutoff outside 0 to 1"
+        "material `{material}` has a colour that is negative or not finite, an opacity or alpha cutoff outside 0 to 1, or \
+         more than 6 textures"
     )]
     InvalidMaterial {
         /// Its name.

@@ -14,6 +14,11 @@ pub struct Material {
     pub diffuse: Vec3,
     /// Multiplied by `diffuse`, if there is one.
     pub texture: Option<Handle<Texture>>,
+    /// Further textures, at most [`MAX_TEXTURES`](Self::MAX_TEXTURES) with the first one. Shaders of the engine's own
+    /// processes read them: `texture_at(material, place, uv, dpdx(uv), dpdy(uv))` in WGSL, where place 0 is that of
+    /// `texture`, 1 the first of these, and so on. It is white where a material has none in that place, or the texture
+    /// is not on the device; `has_texture(material, place)` tells. Shipped processes ignore them.
+    pub textures: Vec<Option<Handle<Texture>>>,
     /// Emitted radiance, linear.
     pub emission: Vec3,
     /// 0 is transparent, 1 is opaque. Only blended and masked materials use it.
@@ -47,6 +52,7 @@ impl Default for Material {
             name: String::from("default"),
             diffuse: Vec3::splat(0.8),
             texture: None,
+            textures: Vec::new(),
             emission: Vec3::ZERO,
             opacity: 1.0,
             blend: Blend::None,
@@ -58,6 +64,15 @@ impl Default for Material {
 }
 
 impl Material {
+    /// The most textures of a material.
+    pub const MAX_TEXTURES: usize = 6;
+
+    /// Its textures, each with its place.
+    pub fn all_textures(&self) -> impl Iterator<Item = (usize, Handle<Texture>)> {
+        let places = (0..).zip([&self.texture].into_iter().chain(&self.textures));
+        places.filter_map(|(place, texture)| Some((place, (*texture)?)))
+    }
+
     /// Whether it is a mask: it does not blend, and has an [`alpha_cutoff`](Self::alpha_cutoff).
     pub fn is_masked(&self) -> bool {
         self.blend == Blend::None && self.alpha_cutoff.is_some()
@@ -71,12 +86,14 @@ impl Material {
         self.alpha_cutoff.filter(|_| self.is_masked()).map_or(0.0, |cutoff| cutoff * (1.0 - ROUNDING))
     }
 
-    /// Whether its colours are finite and not negative, and its opacity and alpha cutoff are from 0 to 1.
+    /// Whether its colours are finite and not negative, its opacity and alpha cutoff are from 0 to 1, and it has no more
+    /// textures than it may.
     pub(super) fn is_valid(&self) -> bool {
         let finite = self.diffuse.is_finite() && self.emission.is_finite();
         let positive = self.diffuse.min_element() >= 0.0 && self.emission.min_element() >= 0.0;
         let is_fraction = |value: f32| (0.0..=1.0).contains(&value);
-        finite && positive && is_fraction(self.opacity) && self.alpha_cutoff.is_none_or(is_fraction)
+        let has_room = self.textures.len() < Self::MAX_TEXTURES;
+        has_room && finite && positive && is_fraction(self.opacity) && self.alpha_cutoff.is_none_or(is_fraction)
     }
 }
 

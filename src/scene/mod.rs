@@ -36,6 +36,7 @@ mod packed_vertex;
 mod static_group;
 mod projection;
 mod redraw;
+mod sampler;
 mod scene_ref;
 #[cfg(feature = "meshopt")]
 mod simplified_levels;
@@ -79,6 +80,7 @@ pub use object_set::ObjectSet;
 pub use owned_scene::{ObjectHandle, RenderObject, Scene};
 pub use projection::Projection;
 pub use redraw::Redraw;
+pub use sampler::{Filter, Outside, Sampler};
 pub use scene_ref::SceneRef;
 pub use static_group::StaticGroup;
 pub use texture::{Texture, TextureClass, TextureFormat};

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::SceneError;
+use super::{Sampler, SceneError};
 
 /// An image for materials, with its mip levels. Clones share their bytes.
 ///
-/// On the device a texture is what it was given as: its size, its format and its texels. Textures of one [size, format
-/// and number of levels](TextureClass) share an array, so a scene is drawn with fewest changes of bindings where many
-/// textures have one of few sizes.
+/// On the device a texture is what it was given as: its size, its format and its texels. Textures of one
+/// [class](TextureClass) share an array, so a scene is drawn with fewest changes of bindings where many textures have
+/// one of few sizes, formats and samplers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Texture {
     name: String,
@@ -28,6 +28,8 @@ pub struct TextureClass {
     pub format: TextureFormat,
     /// The number of mip levels. Each is half as wide and high as the one before, rounded down, and 1 at least.
     pub mip_levels: u32,
+    /// How shaders read it.
+    pub sampler: Sampler,
 }
 
 /// The format of a texture's texels.
@@ -172,7 +174,8 @@ impl Texture {
         [width, height]: [u32; 2],
         levels: Vec<Vec<u8>>,
     ) -> Result<Self, SceneError> {
-        let mut class = TextureClass { width, height, format, mip_levels: levels.len() as u32 };
+        let (mip_levels, sampler) = (levels.len() as u32, Sampler::default());
+        let mut class = TextureClass { width, height, format, mip_levels, sampler };
         let (sides, side) = (1..=Self::MAX_SIZE, format.block_side());
         let has_size = [width, height].iter().all(|size| sides.contains(size) && size % side == 0);
         let fits = |(level, bytes): (u32, &Vec<u8>)| {
@@ -190,12 +193,18 @@ impl Texture {
         Ok(Self { name: name.into(), class, levels: levels.into() })
     }
 
+    /// The same texture with another sampler.
+    pub fn sampled_by(mut self, sampler: Sampler) -> Self {
+        self.class.sampler = sampler;
+        self
+    }
+
     /// The name in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its size, its format and the number of its mip levels.
+    /// Its size, its format, the number of its mip levels, and its sampler.
     pub fn class(&self) -> TextureClass {
         self.class
     }
@@ -261,7 +270,8 @@ mod tests {
 
     #[test]
     fn a_class_has_the_bytes_of_all_its_levels() {
-        let class = |width, height, format, mip_levels| TextureClass { width, height, format, mip_levels };
+        let sampler = Sampler::default();
+        let class = |width, height, format, mip_levels| TextureClass { width, height, format, mip_levels, sampler };
         assert_eq!(class(4, 4, TextureFormat::Rgba8Srgb, 3).bytes(), 64 + 16 + 4);
         assert_eq!(class(4, 1, TextureFormat::Rgba16Float, 3).bytes(), 32 + 16 + 8);
         assert_eq!(class(8, 8, TextureFormat::Bc1Srgb, 4).bytes(), 32 + 8 + 8 + 8);

@@ -60,9 +60,9 @@ struct ArrayOfTexture {
 }
 
 impl TextureSet {
-    /// The most arrays that are bound together: with them, 12 of the 16 textures that every device can bind are left for
-    /// a process's own.
-    pub const MAX_ARRAYS: usize = 4;
+    /// The most arrays that are bound together, so that every material finds those of all its textures. Of the 16
+    /// textures and samplers that every device can bind, 10 and 9 are left for a process's own.
+    pub const MAX_ARRAYS: usize = Material::MAX_TEXTURES;
 
     /// The arrays, by index among [`TextureSets::arrays`].
     pub fn arrays(&self) -> &[u32] {
@@ -239,8 +239,8 @@ impl TextureSets {
     fn needed_arrays(&self, assets: &Assets, material: &Material) -> TextureSet {
         let mut needed = TextureSet { arrays: [u32::MAX; TextureSet::MAX_ARRAYS], count: 0 };
         let known = || {
-            let loaded = material.texture.into_iter().filter(|texture| assets.get(*texture).is_ok());
-            loaded.filter_map(|texture| self.textures[texture.index() as usize])
+            let loaded = material.all_textures().filter(|(_, texture)| assets.get(*texture).is_ok());
+            loaded.filter_map(|(_, texture)| self.textures[texture.index() as usize])
         };
         known().for_each(|texture| _ = needed.add(texture.array));
         known().filter_map(|texture| texture.former).for_each(|former| _ = needed.add(former));
@@ -279,7 +279,7 @@ mod tests {
         for (handle, material) in assets.materials.iter() {
             let set = &sets.sets()[sets.set_of(handle.index()) as usize];
             prop_assert!(set.arrays().len() <= TextureSet::MAX_ARRAYS);
-            if let Some(texture) = material.texture.filter(|texture| assets.get(*texture).is_ok()) {
+            for (_, texture) in material.all_textures().filter(|(_, texture)| assets.get(*texture).is_ok()) {
                 let array = sets.array_of(texture.index()).unwrap_or(u32::MAX);
                 prop_assert!(set.position(array).is_some(), "{set:?} lacks {array}");
             }
@@ -308,8 +308,10 @@ mod tests {
                         assets.remove(materials.swap_remove(index % materials.len())).unwrap();
                     }
                     _ => {
-                        let texture = (!textures.is_empty()).then(|| textures[index % textures.len()]);
-                        materials.push(assets.add(Material { texture, ..Material::default() }).unwrap());
+                        let texture_of = |step| textures.get((index + step) % textures.len().max(1)).copied();
+                        let textures = (0..class as usize % 6).map(|step| texture_of(3 * step)).collect();
+                        let material = Material { texture: texture_of(1), textures, ..Material::default() };
+                        materials.push(assets.add(material).unwrap());
                     }
                 }
                 let revision = sets.revision();
@@ -323,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn materials_of_four_arrays_share_a_set_and_a_fifth_has_another_one() {
+    fn materials_of_six_arrays_share_a_set_and_a_seventh_has_another_one() {
         let (mut assets, mut sets) = (Assets::default(), TextureSets::default());
         let mut add = |class| {
             let texture = assets.add(texture(class)).unwrap();
@@ -331,8 +333,8 @@ mod tests {
             sets.update(&assets, 256);
             sets.set_of(material.index())
         };
-        assert_eq!([0, 1, 2, 3, 0, 3].map(&mut add), [0; 6]);
-        assert_eq!([4, 0, 5, 4].map(&mut add), [1, 0, 1, 1]);
+        assert_eq!([0, 1, 2, 3, 0, 4, 5, 3].map(&mut add), [0; 8]);
+        assert_eq!([6, 0, 7, 6].map(&mut add), [1, 0, 1, 1]);
     }
 
     #[test]

@@ -3,9 +3,13 @@
 use std::sync::Arc;
 
 use drawloom::backend::{Picture, SoftwareBackend};
+use drawloom::command::Selection;
 use drawloom::glam::{DVec3, Vec3};
-use drawloom::process::Deferred;
-use drawloom::scene::{Blend, Camera, Material, Projection, RenderObject, Scene, Texture, TextureFormat, Topology};
+use drawloom::process::{CommandDraws, Declare, Deferred, Draws, InjectionPoint, RenderProcess};
+use drawloom::scene::{
+    Blend, Camera, Filter, Material, MaterialType, Mesh, Outside, Projection, RenderObject, Sampler, Scene, Texture,
+    TextureFormat, Topology, Vertex,
+};
 use drawloom::task::Scheduler;
 use drawloom_testing::random::Random;
 use drawloom_testing::scenes::{sized, square};
@@ -20,6 +24,8 @@ pub const CASES: &[Case] = &[
     ("a_texture_shows_its_texels_whatever_its_size_and_format", texels),
     ("textures_of_many_sizes_are_each_on_their_object_with_every_strategy", many_sizes),
     ("textures_that_are_replaced_by_others_of_other_sizes_are_drawn", replaced),
+    ("a_shader_finds_each_texture_of_a_material_in_its_place", places),
+    ("textures_are_read_as_their_samplers_say", samplers),
 ];
 
 /// Pixels to a side of a tile, which one object covers.
@@ -157,6 +163,149 @@ fn replaced() -> Result<(), Failed> {
             let (texture, color) = colored(&mut random, number)?;
             scene.replace(handles[slot], texture)?;
             colors[slot] = color;
+        }
+    }
+    Ok(())
+}
+
+/// Materials of this type have up to six textures.
+const LAYERED: MaterialType<[f32; 4]> = MaterialType::new("layered");
+
+/// Adds the textures of a material, weighted by powers of two.
+struct Layered;
+
+impl RenderProcess for Layered {
+    fn name(&self) -> &str {
+        "layered"
+    }
+
+    fn declare(&self, declare: &mut Declare) {
+        declare.at(InjectionPoint::AfterLighting);
+        declare.draws_over("radiance");
+        declare.draws_depth("depth");
+    }
+
+    fn draws(&self) -> Draws<'_> {
+        Draws::Commands(CommandDraws {
+            shader: "
+                struct Corner {
+                    @builtin(position) position: vec4<f32>,
+                    @location(0) uv: vec2<f32>,
+                    @location(1) @interpolate(flat) material: u32,
+                }
+
+                @vertex
+                fn vertex(in: VertexInput) -> Corner {
+                    let object = drawn_object(in.instance);
+                    return Corner(clip_position(relative_position(object, in.position)), in.uv, object.material);
+                }
+
+                @fragment
+                fn fragment(in: Corner) -> @location(0) vec4<f32> {
+                    let material = materials[in.material];
+                    let across = dpdx(in.uv);
+                    let down = dpdy(in.uv);
+                    var sum = vec4<f32>(0.0);
+                    for (var place = 0u; place < 6u; place++) {
+                        if has_texture(material, place) {
+                            sum += texture_at(material, place, in.uv, across, down) * f32(1u << place);
+                        }
+                    }
+                    return sum;
+                }
+            ",
+            selection: Selection::OPAQUE.of_material_type(LAYERED),
+            ..CommandDraws::default()
+        })
+    }
+}
+
+/// Materials with textures of many sizes in some of their places: each shows their sum.
+fn places() -> Result<(), Failed> {
+    let mut random = Random::stream(7);
+    let (columns, count) = (8, 40);
+    let plain = Texture::new("plain", 1, 1, vec![255; 4])?;
+    let mut scene = wall(columns, &vec![plain; count as usize], Blend::None)?;
+    let materials: Vec<_> = scene.assets().iter::<Material>().map(|(handle, _)| handle).collect();
+    // Each material shares its textures with the one before, or has new ones.
+    let (mut places, mut sum) = (Vec::new(), 0.0);
+    let mut expected = Vec::new();
+    for (index, material) in materials.iter().enumerate() {
+        if index % 3 != 2 {
+            (places, sum) = (Vec::new(), 0.0);
+            for place in 0..Material::MAX_TEXTURES {
+                if random.below(3) == 0 {
+                    places.push(None);
+                    continue;
+                }
+                let (width, height, value) = (1 + random.below(9), 1 + random.below(4), random.below(256));
+                let texels = vec![value as u8; width * height];
+                let size = [width as u32, height as u32];
+                let texture = Texture::with_levels("value", TextureFormat::R8Unorm, size, vec![texels])?;
+                places.push(Some(scene.add(texture)?));
+                sum += value as f64 / 255.0 * f64::from(1_u32 << place);
+            }
+        }
+        let (texture, textures) = (places[0], places[1..].to_vec());
+        let values = Some(LAYERED.values([0.0; 4]));
+        scene.replace(*material, Material { texture, textures, values, ..Material::default() })?;
+        expected.push(sum);
+    }
+    for (recording, encoding) in few_strategies() {
+        let backend = crate::fixture::backend()?.recording_strategy(recording).encoding_strategy(encoding);
+        let mut fixture =
+            Fixture::on_backend(backend, 2, |builder| builder.pipeline(Deferred::to_picture()).process(Layered))?;
+        let picture = draw(&mut fixture, &scene)?;
+        let found = half_floats(&picture);
+        for (index, expected) in (0..).zip(&expected) {
+            let (column, row) = (index % columns, index / columns);
+            let [x, y] = [column * TILE + TILE / 2, picture.height - 1 - (row * TILE + TILE / 2)];
+            let [red, ..] = found[(y * picture.width + x) as usize];
+            if (red - expected).abs() > expected / 1000.0 + 1e-6 {
+                return Err(format!("{recording:?}: material {index} shows {red}, not {expected}").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A texture of a few texels on a square that shows more than it, magnified, and one of many texels, reduced, with every
+/// kind of sampler: on the device and in software.
+fn samplers() -> Result<(), Failed> {
+    // No pixel's centre is where two texels are equally near.
+    let corner = |x: f32, y: f32| Vertex {
+        position: [x, y, 0.0],
+        normal: [0.0, 0.0, 1.0],
+        uv: [x * 1.713 + 0.459, y * 1.877 + 0.731],
+    };
+    let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
+    let mesh = Mesh::new("square", Topology::TriangleList, corners, vec![0, 1, 2, 2, 1, 3])?;
+    let mut random = Random::stream(8);
+    for (width, height) in [(3, 2), (80, 70)] {
+        let texels: Vec<u8> = (0..width * height * 4).map(|_| random.below(256) as u8).collect();
+        let texture = Texture::new("noise", width, height, texels)?;
+        for outside in [Outside::Repeat, Outside::Mirror, Outside::Clamp] {
+            for filter in [Filter::Linear, Filter::Nearest] {
+                let (magnified, reduced, levels) = (filter, filter, filter);
+                let sampler =
+                    Sampler { outside: [outside, Outside::Repeat], magnified, reduced, levels, anisotropy: 1 };
+                let mut scene = wall(1, &[texture.clone().sampled_by(sampler)], Blend::None)?;
+                scene.cameras[0].size = [60, 60];
+                let handle = scene.assets().iter::<Mesh>().map(|(handle, _)| handle).next();
+                scene.replace(handle.ok_or("the wall has a mesh")?, mesh.clone())?;
+                let device = half_floats(&draw(&mut Fixture::new()?, &scene)?);
+                let scheduler = Arc::new(Scheduler::new(1)?);
+                let software = SoftwareBackend::new(Arc::clone(&scheduler));
+                let deferred = Deferred::to_picture();
+                let software = half_floats(&draw_on_processor((software, scheduler), deferred, &scene, "radiance")?);
+                let differs = |(one, other): &(&[f64; 3], &[f64; 3])| {
+                    one.iter().zip(*other).any(|(one, other)| (one - other).abs() > 0.02)
+                };
+                let different = device.iter().zip(&software).filter(differs).count();
+                if different > 60 {
+                    return Err(format!("{sampler:?}, {width} x {height}: {different} of 3600 pixels differ").into());
+                }
+            }
         }
     }
     Ok(())

@@ -195,7 +195,7 @@ fn invalid_lengths_are_detected() {
         &[0xd0, 0x05],
         &[0xd0, 5 << 3],
         &[0xd0, 0x80],
-        &[0xd0, 0x40, 0xff, 0xff],
+        &[0xd0, 0x40, 0xff, 0xff, 0xff, 0xff],
     ] {
         let mut bytes = DeltaCommands::new().into_bytes();
         bytes[8] = 1;

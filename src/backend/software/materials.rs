@@ -60,16 +60,17 @@ impl MaterialCache {
         let mut slots = vec![None; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
             let slot = handle.index() as usize;
-            let chain = material.texture.and_then(|texture| {
+            let mut chains = [const { None }; Material::MAX_TEXTURES];
+            for (place, texture) in material.all_textures() {
                 if assets.get(texture).is_err() {
                     let is_pending = assets.is_pending(texture);
                     let reason = if is_pending { IssueReason::TextureNotResident } else { IssueReason::StaleTexture };
                     self.rejected.push((reason, slot));
-                    return None;
+                } else {
+                    chains[place] = self.chain(assets, texture.index());
                 }
-                self.chain(assets, texture.index())
-            });
-            slots[slot] = Some(TableEntry::new(material, chain));
+            }
+            slots[slot] = Some(TableEntry::new(material, chains));
         }
         self.table = Arc::new(MaterialTable { slots });
     }
@@ -100,14 +101,15 @@ struct TableEntry {
     double_sided: bool,
     blend: Blend,
     values: Option<MaterialValues>,
-    chain: Option<Arc<MipChain>>,
+    /// By place.
+    chains: [Option<Arc<MipChain>>; Material::MAX_TEXTURES],
 }
 
 impl TableEntry {
-    fn new(material: &Material, chain: Option<Arc<MipChain>>) -> Self {
+    fn new(material: &Material, chains: [Option<Arc<MipChain>>; Material::MAX_TEXTURES]) -> Self {
         let Material { diffuse, opacity, emission, double_sided, blend, .. } = *material;
         let (alpha_cutoff, values) = (material.min_alpha(), material.values.clone());
-        Self { diffuse, opacity, alpha_cutoff, emission, double_sided, blend, values, chain }
+        Self { diffuse, opacity, alpha_cutoff, emission, double_sided, blend, values, chains }
     }
 }
 
@@ -134,10 +136,10 @@ impl<R: Real> Materials<R> for MaterialTable {
         self.slots.get(slot as usize)?.as_ref()?.values.as_ref()
     }
 
-    fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
+    fn texture_at(&self, slot: u32, place: usize, uv: Vector2<R>, [dpdx, dpdy]: [Vector2<R>; 2]) -> Vector4<R> {
         let entry = self.slots.get(slot as usize).and_then(Option::as_ref);
-        match entry.and_then(|entry| entry.chain.as_ref()) {
-            Some(chain) => chain.trilinear(uv, dpdx, dpdy),
+        match entry.and_then(|entry| entry.chains.get(place)?.as_ref()) {
+            Some(chain) => chain.sample(uv, dpdx, dpdy),
             None => Vector::splat(R::one()),
         }
     }
@@ -149,7 +151,7 @@ mod tests {
     use crate::backend::software::mip_chain::tests::noise;
 
     fn texel(table: &MaterialTable, uv: [f32; 2]) -> [f32; 4] {
-        Materials::<f32>::sample(table, 0, Vector(uv), Vector::zero(), Vector::zero()).0
+        Materials::<f32>::texture_at(table, 0, 0, Vector(uv), [Vector::zero(); 2]).0
     }
 
     #[test]
@@ -160,7 +162,9 @@ mod tests {
             textures.map(|texture| assets.add(Material { texture: Some(texture), ..Material::default() }).unwrap());
         let mut cache = MaterialCache::default();
         let chains = |table: &MaterialTable| {
-            [0, 1].map(|slot: usize| table.slots[slot].as_ref().and_then(|entry| entry.chain.as_ref().map(Arc::as_ptr)))
+            [0, 1].map(|slot: usize| {
+                table.slots[slot].as_ref().and_then(|entry| entry.chains[0].as_ref().map(Arc::as_ptr))
+            })
         };
         let first = cache.update(&assets, &SceneIssues::default());
         assert!(Arc::ptr_eq(&first, &cache.update(&assets, &SceneIssues::default())));
@@ -197,7 +201,7 @@ mod tests {
             let table = cache.update(assets, &scene_issues);
             let counts: Vec<_> =
                 scene_issues.list().iter().map(|issue| (issue.reason, issue.count, issue.first)).collect();
-            (counts, Materials::<f32>::sample(&*table, 1, Vector::zero(), Vector::zero(), Vector::zero()))
+            (counts, Materials::<f32>::texture_at(&*table, 1, 0, Vector::zero(), [Vector::zero(); 2]))
         };
         assert!(rejected(&assets).0.is_empty());
         assets.remove(texture).unwrap();

@@ -1,4 +1,4 @@
-//! Trilinear texture sampling, as on devices.
+//! Texture sampling, as on devices.
 
 use std::borrow::Cow;
 use std::sync::LazyLock;
@@ -7,7 +7,7 @@ use half::f16;
 
 use crate::backend::mip_generation::{mip_chain, srgb_to_linear};
 use crate::raster::{Real, Vector, Vector2, Vector4};
-use crate::scene::{Texture, TextureClass, TextureFormat};
+use crate::scene::{Filter, Outside, Texture, TextureClass, TextureFormat};
 
 /// All mip levels of a texture.
 pub(super) struct MipChain {
@@ -27,9 +27,9 @@ impl MipChain {
         (!class.format.is_compressed()).then(|| Self { class, levels: levels() })
     }
 
-    /// Samples trilinearly. At the level of detail, the longer of the steps to the next column and to the next row is
-    /// one pixel long (Vulkan, "Level-of-Detail Operation").
-    pub(super) fn trilinear<R: Real>(&self, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
+    /// Samples as the texture's sampler says. At the level of detail, the longer of the steps to the next column and to
+    /// the next row is one texel long (Vulkan, "Level-of-Detail Operation").
+    pub(super) fn sample<R: Real>(&self, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
         // Numbers that are not finite count as 0, as on devices: they would not lead to a pixel.
         let finite = |value: R| if value.is_finite() { value } else { R::zero() };
         let uv = uv.map(finite);
@@ -39,34 +39,32 @@ impl MipChain {
             step.dot(step)
         };
         let longest = finite(length(dpdx).max(length(dpdy)).sqrt());
-        let last = self.levels.len() - 1;
+        let (sampler, last) = (self.class.sampler, self.levels.len() - 1);
+        let filter = if longest > R::one() { sampler.reduced } else { sampler.magnified };
         let level = longest.max(R::one()).log2().min(R::of(last as f64));
+        if sampler.levels == Filter::Nearest {
+            return self.sample_level(filter, (level + R::of(0.5)).floor().as_f64() as usize, uv);
+        }
         let finer = level.floor();
         let fraction = level - finer;
         let finer = finer.as_f64() as usize;
-        let one = self.bilinear(finer, uv);
+        let one = self.sample_level(filter, finer, uv);
         if fraction == R::zero() {
             return one;
         }
-        one.with(self.bilinear(finer + 1, uv), |one, other| one + (other - one) * fraction)
+        one.with(self.sample_level(filter, finer + 1, uv), |one, other| one + (other - one) * fraction)
     }
 
-    /// Blends the four nearest pixels. The texture repeats beyond its border.
-    fn bilinear<R: Real>(&self, level: usize, uv: Vector2<R>) -> Vector4<R> {
-        let [width, height] = self.class.level_size(level as u32);
-        let size = Vector([width, height].map(|side| R::of(f64::from(side))));
-        // The fraction is taken before scaling, so that far coordinates lose no more precision.
-        let point = uv.map(|value| value - value.floor()).with(size, |value, side| value * side - R::of(0.5));
-        let [x, y] = point.map(R::floor).0;
-        let [right, lower] = (point - Vector([x, y])).0;
-        let wrapped =
-            |first: R, step: i64, side: u32| (first.as_f64() as i64 + step).rem_euclid(i64::from(side)) as usize;
-        let columns = [(wrapped(x, 0, width), R::one() - right), (wrapped(x, 1, width), right)];
-        let rows = [(wrapped(y, 0, height), R::one() - lower), (wrapped(y, 1, height), lower)];
+    /// The nearest texel, or a mixture of the four nearest ones.
+    fn sample_level<R: Real>(&self, filter: Filter, level: usize, uv: Vector2<R>) -> Vector4<R> {
+        let size = self.class.level_size(level as u32);
+        let [columns, rows] = std::array::from_fn(|axis| {
+            nearest_texels(uv[axis], self.class.sampler.outside[axis], size[axis], filter == Filter::Linear)
+        });
         let mut sum = Vector::zero();
         for (row, row_weight) in rows {
             for (column, weight) in columns {
-                sum = sum + self.texel(level, row * width as usize + column) * (weight * row_weight);
+                sum = sum + self.texel(level, row * size[0] as usize + column) * (weight * row_weight);
             }
         }
         sum
@@ -92,12 +90,41 @@ impl MipChain {
     }
 }
 
+/// The two texels of a row of `size` that are nearest to a coordinate, each with its share; if `is_linear` is false, the
+/// nearest one has all.
+fn nearest_texels<R: Real>(coordinate: R, outside: Outside, size: u32, is_linear: bool) -> [(usize, R); 2] {
+    let period = if outside == Outside::Mirror { R::of(2.0) } else { R::one() };
+    // The fraction is taken before scaling, so that far coordinates lose no more precision.
+    let within = match outside {
+        Outside::Clamp => coordinate.max(R::of(-1.0)).min(R::of(2.0)),
+        Outside::Repeat | Outside::Mirror => coordinate - (coordinate / period).floor() * period,
+    };
+    let middle = if is_linear { R::of(0.5) } else { R::zero() };
+    let point = within * R::of(f64::from(size)) - middle;
+    let first = point.floor();
+    let share = if is_linear { point - first } else { R::zero() };
+    let texel = |step: i64| {
+        let (index, size) = (first.as_f64() as i64 + step, i64::from(size));
+        let inside = match outside {
+            Outside::Clamp => index.clamp(0, size - 1),
+            Outside::Repeat => index.rem_euclid(size),
+            Outside::Mirror => {
+                let index = index.rem_euclid(2 * size);
+                index.min(2 * size - 1 - index)
+            }
+        };
+        inside as usize
+    };
+    [(texel(0), R::one() - share), (texel(1), share)]
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use fastrand::Rng;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::scene::Sampler;
 
     /// The unit roundoff of f32.
     const UNIT: f64 = 1.0 / 16_777_216.0;
@@ -110,7 +137,7 @@ pub(super) mod tests {
 
     fn texel<R: Real>(chain: &MipChain, uv: [f64; 2], gradients: [[f64; 2]; 2]) -> [f64; 4] {
         let [uv, across, down] = [uv, gradients[0], gradients[1]].map(|vector| Vector(vector.map(R::of)));
-        chain.trilinear(uv, across, down).0.map(R::as_f64)
+        chain.sample(uv, across, down).0.map(R::as_f64)
     }
 
     /// All pixels of a level, weighted by a tent filter two pixels wide around the point, which repeats.
@@ -172,6 +199,25 @@ pub(super) mod tests {
                 prop_assert!((single[channel] - double[channel]).abs() <= bound, "{single:?} {double:?}");
             }
         }
+    }
+
+    #[test]
+    fn beyond_the_edges_a_texture_is_what_its_sampler_says() {
+        let row = |outside| -> Vec<u8> {
+            let texels = (0..3).flat_map(|red| [red, 0, 0, 255]).collect();
+            let texture = Texture::with_levels("row", TextureFormat::Rgba8Unorm, [3, 1], vec![texels]).unwrap();
+            let sampler = Sampler { outside: [outside; 2], ..Sampler::NEAREST };
+            let chain = MipChain::of(&texture.sampled_by(sampler)).unwrap();
+            (-6..9)
+                .map(|column| {
+                    let uv = [(f64::from(column) + 0.3) / 3.0, -7.6];
+                    (texel::<f64>(&chain, uv, [[0.0; 2]; 2])[0] * 255.0).round() as u8
+                })
+                .collect()
+        };
+        assert_eq!(row(Outside::Repeat), [0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(row(Outside::Mirror), [0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1, 2]);
+        assert_eq!(row(Outside::Clamp), [0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2, 2]);
     }
 
     #[test]

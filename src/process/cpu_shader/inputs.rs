@@ -102,8 +102,9 @@ pub trait Materials<R: Real>: Sync {
     /// The engine's own values of the material in a slot; `None` if it has none.
     fn values(&self, slot: u32) -> Option<&MaterialValues>;
 
-    /// `textureSampleGrad` of a material's texture, linear; white where the material has none.
-    fn sample(&self, slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R>;
+    /// `texture_at` of the material in a slot: its texture in a place at texture coordinates with these derivatives,
+    /// linear; white where the material has none.
+    fn texture_at(&self, slot: u32, place: usize, uv: Vector2<R>, derivatives: [Vector2<R>; 2]) -> Vector4<R>;
 }
 
 /// A target that a process samples.

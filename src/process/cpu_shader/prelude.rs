@@ -82,12 +82,12 @@ impl<R: Real> PassInputs<'_, R> {
         dpdx: Vector2<R>,
         dpdy: Vector2<R>,
     ) -> Vector4<R> {
-        with_alpha(material.diffuse, material.opacity) * self.materials.sample(slot, uv, dpdx, dpdy)
+        with_alpha(material.diffuse, material.opacity) * self.materials.texture_at(slot, 0, uv, [dpdx, dpdy])
     }
 
     /// Whether the material in a slot is a mask that has a hole at texture coordinates: `is_cut_out`.
     pub fn is_cut_out(&self, slot: u32, material: &ShaderMaterial<R>, uv: Vector2<R>) -> bool {
-        let alpha = || material.opacity * self.materials.sample(slot, uv, Vector::zero(), Vector::zero())[3];
+        let alpha = || material.opacity * self.materials.texture_at(slot, 0, uv, [Vector::zero(); 2])[3];
         material.alpha_cutoff > R::zero() && alpha() < material.alpha_cutoff
     }
 }

@@ -119,7 +119,7 @@ impl<R: Real> Materials<R> for OneMaterial<R> {
         None
     }
 
-    fn sample(&self, _slot: u32, uv: Vector2<R>, dpdx: Vector2<R>, dpdy: Vector2<R>) -> Vector4<R> {
+    fn texture_at(&self, _: u32, _: usize, uv: Vector2<R>, [dpdx, dpdy]: [Vector2<R>; 2]) -> Vector4<R> {
         Vector([uv[0], uv[1], dpdx[0] + dpdy[1], R::one()])
     }
 }

@@ -83,17 +83,18 @@ struct Material {
     diffuse: vec3<f32>,
     opacity: f32,
     emission: vec3<f32>,
-    // The array that holds its texture, from 0, among those that are bound; 4 for none.
-    texture_array: u32,
-    texture_layer: u32,
+    // Where a mask's alpha is less, there is no surface; 0 for a material without a mask.
+    alpha_cutoff: f32,
     // 1 if both sides are drawn.
     double_sided: u32,
     // 0 for none, 1 alpha, 2 additive, 3 subtractive.
     blend: u32,
-    // Where a mask's alpha is less, there is no surface; 0 for a material without a mask.
-    alpha_cutoff: f32,
+    // In each place the array of the texture, among those that are bound, in the upper 8 bits, and its layer in the
+    // others; `NO_TEXTURE` for none. Read them by `texture_at`.
+    textures: array<u32, 6>,
 }
 
+const NO_TEXTURE: u32 = 0xffffffffu;
 const ALPHA: u32 = 1u;
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -105,14 +106,21 @@ const ALPHA: u32 = 1u;
 @group(0) @binding(3) var<storage, read> lights: array<Light>;
 
 @group(1) @binding(0) var<storage, read> materials: array<Material>;
-// The arrays of a set of textures, which all materials have that are drawn together.
+// The arrays of a set of textures, which all materials have that are drawn together, and their samplers.
 @group(1) @binding(1) var textures_0: texture_2d_array<f32>;
 @group(1) @binding(2) var textures_1: texture_2d_array<f32>;
 @group(1) @binding(3) var textures_2: texture_2d_array<f32>;
 @group(1) @binding(4) var textures_3: texture_2d_array<f32>;
-@group(1) @binding(5) var texture_sampler: sampler;
+@group(1) @binding(5) var textures_4: texture_2d_array<f32>;
+@group(1) @binding(6) var textures_5: texture_2d_array<f32>;
+@group(1) @binding(7) var sampler_0: sampler;
+@group(1) @binding(8) var sampler_1: sampler;
+@group(1) @binding(9) var sampler_2: sampler;
+@group(1) @binding(10) var sampler_3: sampler;
+@group(1) @binding(11) var sampler_4: sampler;
+@group(1) @binding(12) var sampler_5: sampler;
 // Linear between pixels, and the nearest pixel outside: for targets.
-@group(1) @binding(6) var target_sampler: sampler;
+@group(1) @binding(13) var target_sampler: sampler;
 
 struct FullScreenPixel {
     @builtin(position) position: vec4<f32>,
@@ -248,34 +256,51 @@ fn metres_from_origin(low: vec3<u32>, high: vec3<i32>) -> vec3<f32> {
     return fixed_difference(low, high, vec3<u32>(0u), vec3<i32>(0));
 }
 
-// A material's diffuse colour and opacity at texture coordinates. The caller takes the derivatives of `uv`, because
-// that needs uniform control flow.
-fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
-    var texel = vec4<f32>(1.0);
-    let layer = material.texture_layer;
-    switch material.texture_array {
-        case 0u: { texel = textureSampleGrad(textures_0, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 1u: { texel = textureSampleGrad(textures_1, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 2u: { texel = textureSampleGrad(textures_2, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        case 3u: { texel = textureSampleGrad(textures_3, texture_sampler, uv, layer, uv_dx, uv_dy); }
-        default: {}
+// Whether a material has a texture in a place from 0 to 5, and it is on the device.
+fn has_texture(material: Material, place: u32) -> bool {
+    return material.textures[place] != NO_TEXTURE;
+}
+
+// A texture of a material, in a place from 0 to 5, at texture coordinates; white if it has none. The caller takes the
+// derivatives of `uv`, because that needs uniform control flow.
+fn texture_at(material: Material, place: u32, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
+    let texture = material.textures[place];
+    let layer = texture & 0xffffffu;
+    switch texture >> 24u {
+        case 0u: { return textureSampleGrad(textures_0, sampler_0, uv, layer, uv_dx, uv_dy); }
+        case 1u: { return textureSampleGrad(textures_1, sampler_1, uv, layer, uv_dx, uv_dy); }
+        case 2u: { return textureSampleGrad(textures_2, sampler_2, uv, layer, uv_dx, uv_dy); }
+        case 3u: { return textureSampleGrad(textures_3, sampler_3, uv, layer, uv_dx, uv_dy); }
+        case 4u: { return textureSampleGrad(textures_4, sampler_4, uv, layer, uv_dx, uv_dy); }
+        case 5u: { return textureSampleGrad(textures_5, sampler_5, uv, layer, uv_dx, uv_dy); }
+        default: { return vec4<f32>(1.0); }
     }
-    return vec4<f32>(material.diffuse, material.opacity) * texel;
+}
+
+// The same at full resolution.
+fn texture_in_full(material: Material, place: u32, uv: vec2<f32>) -> vec4<f32> {
+    let texture = material.textures[place];
+    let layer = texture & 0xffffffu;
+    switch texture >> 24u {
+        case 0u: { return textureSampleLevel(textures_0, sampler_0, uv, layer, 0.0); }
+        case 1u: { return textureSampleLevel(textures_1, sampler_1, uv, layer, 0.0); }
+        case 2u: { return textureSampleLevel(textures_2, sampler_2, uv, layer, 0.0); }
+        case 3u: { return textureSampleLevel(textures_3, sampler_3, uv, layer, 0.0); }
+        case 4u: { return textureSampleLevel(textures_4, sampler_4, uv, layer, 0.0); }
+        case 5u: { return textureSampleLevel(textures_5, sampler_5, uv, layer, 0.0); }
+        default: { return vec4<f32>(1.0); }
+    }
+}
+
+// A material's diffuse colour and opacity at texture coordinates, with their derivatives.
+fn diffuse_at(material: Material, uv: vec2<f32>, uv_dx: vec2<f32>, uv_dy: vec2<f32>) -> vec4<f32> {
+    return vec4<f32>(material.diffuse, material.opacity) * texture_at(material, 0u, uv, uv_dx, uv_dy);
 }
 
 // Whether a mask has a hole at texture coordinates. It is read at the texture's full resolution, because an averaged
 // alpha may be below the cutoff everywhere: leaves would vanish in the distance.
 fn is_cut_out(material: Material, uv: vec2<f32>) -> bool {
-    var alpha = material.opacity;
-    let layer = material.texture_layer;
-    switch material.texture_array {
-        case 0u: { alpha *= textureSampleLevel(textures_0, texture_sampler, uv, layer, 0.0).a; }
-        case 1u: { alpha *= textureSampleLevel(textures_1, texture_sampler, uv, layer, 0.0).a; }
-        case 2u: { alpha *= textureSampleLevel(textures_2, texture_sampler, uv, layer, 0.0).a; }
-        case 3u: { alpha *= textureSampleLevel(textures_3, texture_sampler, uv, layer, 0.0).a; }
-        default: {}
-    }
-    return alpha < material.alpha_cutoff;
+    return material.opacity * texture_in_full(material, 0u, uv).a < material.alpha_cutoff;
 }
 
 // Texture coordinates of a vertex that can be interpolated.

@@ -48,8 +48,8 @@ impl MaterialBuffer {
         let mut before = std::mem::take(&mut self.cached).into_iter();
         for set in &textures.sets {
             let buffer = self.buffer.on_device.binding(0, materials.len()).map(BindingResource::Buffer);
-            let arrays = set.iter().map(BindingResource::Texture);
-            let samplers = textures.samplers.iter().map(BindingResource::Sampler);
+            let arrays = set.arrays.iter().map(BindingResource::Texture);
+            let samplers = set.samplers.iter().chain([&textures.target_sampler]).map(BindingResource::Sampler);
             let bound = (0..).zip(buffer.into_iter().chain(arrays).chain(samplers));
             let layout = Some(&layouts.assets);
             self.cached.extend(CachedBindGroup::update(before.next(), device, "materials", layout, bound)?);

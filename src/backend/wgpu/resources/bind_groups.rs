@@ -8,7 +8,7 @@ use wgpu::ShaderStages;
 use crate::backend::BackendError;
 use crate::backend::wgpu::error_scope::{catch_wgpu_panic, with_error_scope};
 use crate::process::{Format, ShaderResource};
-use crate::view::GpuView;
+use crate::view::{GpuView, TextureSet};
 
 /// The bind group layouts that all processes share.
 #[derive(Clone)]
@@ -39,15 +39,12 @@ impl BindGroupLayouts {
             view_dimension: wgpu::TextureViewDimension::D2Array,
             multisampled: false,
         };
-        let assets = [
-            entry(0, ALL_STAGES, storage(false)),
-            entry(1, FRAGMENT_AND_COMPUTE, array),
-            entry(2, FRAGMENT_AND_COMPUTE, array),
-            entry(3, FRAGMENT_AND_COMPUTE, array),
-            entry(4, FRAGMENT_AND_COMPUTE, array),
-            entry(5, FRAGMENT_AND_COMPUTE, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-            entry(6, FRAGMENT_AND_COMPUTE, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-        ];
+        let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+        let arrays = std::iter::repeat_n(array, TextureSet::MAX_ARRAYS);
+        // The last one is that of targets.
+        let samplers = std::iter::repeat_n(sampler, TextureSet::MAX_ARRAYS + 1);
+        let textures = (1..).zip(arrays.chain(samplers)).map(|(binding, ty)| entry(binding, FRAGMENT_AND_COMPUTE, ty));
+        let assets: Vec<_> = [entry(0, ALL_STAGES, storage(false))].into_iter().chain(textures).collect();
         Self { frame: layout("frame", &frame), assets: layout("assets", &assets) }
     }
 }

@@ -1,13 +1,18 @@
 //! The cache of materials and their textures.
 
+use std::array;
+use std::collections::HashMap;
 use std::sync::Arc;
+
+use bytemuck::Zeroable;
 
 use super::buffers::CountedQueue;
 use super::snapshot_lifetimes::SnapshotToken;
 use super::texture_arrays::{ResidentTextures, TextureLocation, empty_array};
 use crate::backend::{BackendError, SceneLimits};
-use crate::scene::{Assets, Material, MaterialLayout};
-use crate::view::{IssueReason, SceneIssues, TextureSet, TextureSets};
+use crate::handle::Handle;
+use crate::scene::{Assets, Filter, Material, MaterialLayout, Outside, Sampler, Texture};
+use crate::view::{GpuObject, IssueReason, SceneIssues, TextureSet, TextureSets};
 
 /// The materials of a frame, and their textures. It stays valid while they change for later frames.
 #[derive(Clone)]
@@ -30,16 +35,22 @@ impl MaterialSnapshot {
 
 /// The textures of materials, and their samplers: what `@group(1)` binds behind the materials, in that order.
 pub(crate) struct MaterialTextures {
-    /// Those of each set.
-    pub(crate) sets: Vec<[wgpu::TextureView; TextureSet::MAX_ARRAYS]>,
-    pub(crate) samplers: [wgpu::Sampler; 2],
+    pub(crate) sets: Vec<BoundSet>,
+    /// That of targets.
+    pub(crate) target_sampler: wgpu::Sampler,
+}
+
+/// The arrays of a set, each with its sampler.
+pub(crate) struct BoundSet {
+    pub(crate) arrays: [wgpu::TextureView; TextureSet::MAX_ARRAYS],
+    pub(crate) samplers: [wgpu::Sampler; TextureSet::MAX_ARRAYS],
 }
 
 /// Keeps materials, and textures on the device. Materials are uploaded by the buffers of a frame.
 #[derive(Default)]
 pub(crate) struct MaterialCache {
     pub(crate) textures: ResidentTextures,
-    /// By material slot, whether its texture is not on the device.
+    /// By material slot, whether one of its textures is not on the device.
     pub(crate) lacks_texture: Arc<[bool]>,
     current: Option<Current>,
     /// The views of the texture arrays, with how often arrays had moved, or been divided into other sets.
@@ -126,15 +137,22 @@ impl MaterialCache {
         if let Some((_, textures)) = self.bound_textures.as_ref().filter(|(of, _)| *of == moves) {
             return Arc::clone(textures);
         }
-        let samplers = [
-            linear_sampler(device, "textures", wgpu::AddressMode::Repeat),
-            linear_sampler(device, "targets", wgpu::AddressMode::ClampToEdge),
-        ];
         let (views, empty) = (self.textures.views(), empty_array(device));
-        let view = |array: &u32| views.get(*array as usize).and_then(Option::as_ref).unwrap_or(&empty);
-        let views_of =
-            |set: &TextureSet| std::array::from_fn(|position| set.arrays().get(position).map_or(&empty, view).clone());
-        let textures = Arc::new(MaterialTextures { sets: sets.sets().iter().map(views_of).collect(), samplers });
+        let mut samplers = HashMap::new();
+        let mut sampler_of = |sampler: Sampler| -> wgpu::Sampler {
+            samplers.entry(sampler).or_insert_with(|| new_sampler(device, "textures", sampler)).clone()
+        };
+        let target_sampler = sampler_of(Sampler::CLAMP);
+        let mut bound = |set: &TextureSet| {
+            let array = |position: usize| set.arrays().get(position).map(|array| *array as usize);
+            let view = |position| array(position).and_then(|array| views[array].as_ref()).unwrap_or(&empty).clone();
+            let mut sampler = |position| {
+                sampler_of(array(position).map_or(Sampler::REPEAT, |array| sets.arrays()[array].class.sampler))
+            };
+            BoundSet { arrays: array::from_fn(view), samplers: array::from_fn(&mut sampler) }
+        };
+        let textures =
+            Arc::new(MaterialTextures { sets: sets.sets().iter().map(&mut bound).collect(), target_sampler });
         self.bound_textures = Some((moves, Arc::clone(&textures)));
         textures
     }
@@ -142,24 +160,29 @@ impl MaterialCache {
     /// A [`GpuMaterial`] for each slot within the limits.
     fn materials(&mut self, assets: &Assets, sets: &TextureSets, limits: SceneLimits) -> Arc<[u8]> {
         self.rejected_materials.clear();
-        let mut materials = vec![GpuMaterial::default(); element_count(assets, size_of::<GpuMaterial>(), limits)];
+        let mut materials = vec![GpuMaterial::zeroed(); element_count(assets, size_of::<GpuMaterial>(), limits)];
         let mut lacks_texture = vec![false; assets.materials.slot_count()];
         for (handle, material) in assets.iter::<Material>() {
-            let texture = self.texture_location(assets, handle.index(), material);
             let set = sets.sets().get(sets.set_of(handle.index()) as usize);
-            let texture = texture.and_then(|TextureLocation { array, layer }| Some((set?.position(array)?, layer)));
-            let is_loaded = material.texture.is_some_and(|texture| assets.get(texture).is_ok());
-            lacks_texture[handle.index() as usize] = is_loaded && texture.is_none();
-            if let Some(on_device) = materials.get_mut(handle.index() as usize) {
-                *on_device = GpuMaterial::new(material, texture);
+            let mut on_device = GpuMaterial::new(material);
+            for (place, texture) in material.all_textures() {
+                let Some(location) = self.texture_location(assets, handle.index(), texture) else {
+                    lacks_texture[handle.index() as usize] |= assets.get(texture).is_ok();
+                    continue;
+                };
+                if let Some(position) = set.and_then(|set| set.position(location.array)) {
+                    on_device.textures[place] = (position as u32) << 24 | location.layer;
+                }
+            }
+            if let Some(slot) = materials.get_mut(handle.index() as usize) {
+                *slot = on_device;
             }
         }
         self.lacks_texture = lacks_texture.into();
         bytemuck::cast_slice(&materials).into()
     }
 
-    fn texture_location(&mut self, assets: &Assets, slot: u32, material: &Material) -> Option<TextureLocation> {
-        let texture = material.texture?;
+    fn texture_location(&mut self, assets: &Assets, slot: u32, texture: Handle<Texture>) -> Option<TextureLocation> {
         if assets.get(texture).is_err() {
             let is_pending = assets.is_pending(texture);
             let reason = if is_pending { IssueReason::TextureNotResident } else { IssueReason::StaleTexture };
@@ -189,45 +212,62 @@ fn element_count(assets: &Assets, stride: usize, limits: SceneLimits) -> usize {
     assets.materials.slot_count().min(allowed).max(1)
 }
 
-fn linear_sampler(device: &wgpu::Device, label: &str, outside: wgpu::AddressMode) -> wgpu::Sampler {
+fn new_sampler(device: &wgpu::Device, label: &str, sampler: Sampler) -> wgpu::Sampler {
+    let [address_mode_u, address_mode_v] = sampler.outside.map(|outside| match outside {
+        Outside::Repeat => wgpu::AddressMode::Repeat,
+        Outside::Mirror => wgpu::AddressMode::MirrorRepeat,
+        Outside::Clamp => wgpu::AddressMode::ClampToEdge,
+    });
+    let filter = |filter| match filter {
+        Filter::Nearest => wgpu::FilterMode::Nearest,
+        Filter::Linear => wgpu::FilterMode::Linear,
+    };
     device.create_sampler(&wgpu::SamplerDescriptor {
         label: Some(label),
-        address_mode_u: outside,
-        address_mode_v: outside,
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        address_mode_u,
+        address_mode_v,
+        mag_filter: filter(sampler.magnified),
+        min_filter: filter(sampler.reduced),
+        mipmap_filter: match sampler.levels {
+            Filter::Nearest => wgpu::MipmapFilterMode::Nearest,
+            Filter::Linear => wgpu::MipmapFilterMode::Linear,
+        },
+        anisotropy_clamp: sampler.effective_anisotropy(),
         ..wgpu::SamplerDescriptor::default()
     })
 }
 
 /// A material as shaders read it: `Material` in `drawloom.wgsl`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct GpuMaterial {
     diffuse: [f32; 3],
     opacity: f32,
     emission: [f32; 3],
-    texture_array: u32,
-    texture_layer: u32,
+    alpha_cutoff: f32,
     double_sided: u32,
     blend: u32,
-    alpha_cutoff: f32,
+    /// By place: the array's position in the set in the upper 8 bits, and the layer in the others; [`NO_TEXTURE`] for
+    /// none.
+    textures: [u32; Material::MAX_TEXTURES],
 }
 
+// Limits of materials count on it.
+const _: () = assert!(size_of::<GpuMaterial>() <= size_of::<GpuObject>());
+
+const NO_TEXTURE: u32 = u32::MAX;
+
 impl GpuMaterial {
-    /// With its texture's position in the material's set, and its layer there.
-    pub(crate) fn new(material: &Material, texture: Option<(usize, u32)>) -> Self {
-        let (array, layer) = texture.unwrap_or((TextureSet::MAX_ARRAYS, 0));
+    /// Without its textures.
+    fn new(material: &Material) -> Self {
         Self {
             diffuse: material.diffuse.to_array(),
             opacity: material.opacity,
             emission: material.emission.to_array(),
-            texture_array: array as u32,
-            texture_layer: layer,
+            alpha_cutoff: material.min_alpha(),
             double_sided: u32::from(material.double_sided),
             blend: material.blend as u32,
-            alpha_cutoff: material.min_alpha(),
+            textures: [NO_TEXTURE; Material::MAX_TEXTURES],
         }
     }
 }

@@ -5,7 +5,7 @@ use super::residents::{AssetMemory, Residents};
 use super::snapshot_lifetimes::SnapshotLifetimes;
 use super::texture_layers::{TextureLayers, can_hold, copy_layer, new_array};
 use crate::backend::BackendError;
-use crate::scene::{Assets, Texture, TextureClass, TextureFormat};
+use crate::scene::{Assets, Sampler, Texture, TextureClass, TextureFormat};
 use crate::view::{IssueReason, TextureSets};
 
 /// The array and layer of a texture.
@@ -209,7 +209,8 @@ impl ResidentTextures {
 
 /// A view of an array of a single texel, to be bound where there is none.
 pub(super) fn empty_array(device: &wgpu::Device) -> wgpu::TextureView {
-    let class = TextureClass { width: 1, height: 1, format: TextureFormat::Rgba8Unorm, mip_levels: 1 };
+    let (format, sampler) = (TextureFormat::Rgba8Unorm, Sampler::REPEAT);
+    let class = TextureClass { width: 1, height: 1, format, mip_levels: 1, sampler };
     new_array(device, class, 1).create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..wgpu::TextureViewDescriptor::default()

@@ -200,7 +200,7 @@ mod tests {
     use super::*;
     use crate::backend::wgpu::noop_device::noop_device;
     use crate::backend::wgpu::resources::EndOfUpload;
-    use crate::scene::{Assets, Texture, TextureClass, TextureFormat};
+    use crate::scene::{Assets, Sampler, Texture, TextureClass, TextureFormat};
     use crate::view::TextureSets;
 
     /// Arrays, and the textures in them, those that were used longest ago first.
@@ -218,7 +218,8 @@ mod tests {
 
     fn layer_bytes(side: u32) -> u64 {
         let mip_levels = side.ilog2() + 1;
-        TextureClass { width: side, height: side, format: TextureFormat::Rgba8Srgb, mip_levels }.bytes()
+        let sampler = Sampler::REPEAT;
+        TextureClass { width: side, height: side, format: TextureFormat::Rgba8Srgb, mip_levels, sampler }.bytes()
     }
     /// A layer of 512 takes four bytes more than four of 256.
     const SLACK: u64 = 64;

@@ -43,7 +43,7 @@ pub(crate) struct FrameUse {
     pub(super) frame: u64,
     pub(super) meshes: UseMarks,
     pub(super) materials: UseMarks,
-    /// By material slot, whether its texture is not on the device.
+    /// By material slot, whether one of its textures is not on the device.
     pub(super) lacks_texture: Arc<[bool]>,
 }
 
@@ -62,7 +62,7 @@ impl FrameUse {
         self.meshes.mark(slot, self.frame);
     }
 
-    /// Marks the material in a slot. Returns whether its texture is not on the device.
+    /// Marks the material in a slot. Returns whether one of its textures is not on the device.
     #[inline]
     pub(crate) fn mark_material(&self, slot: u32) -> bool {
         self.materials.mark(slot, self.frame);

@@ -9,7 +9,7 @@ use crate::backend::wgpu::resources::{ResidentMeshes, ResidentTextures};
 use crate::handle::Handle;
 use crate::scene::{Assets, Material, Mesh, Texture};
 
-/// The materials that have a texture, by texture.
+/// The materials that have textures, by texture.
 #[derive(Default)]
 pub(super) struct TextureUsers {
     /// Identity and revision of the materials.
@@ -28,7 +28,11 @@ impl TextureUsers {
         self.version = version;
         self.users.clear();
         let materials = assets.iter::<Material>();
-        self.users.extend(materials.filter_map(|(handle, material)| Some((material.texture?, handle.index()))));
+        self.users.extend(
+            materials.flat_map(|(handle, material)| {
+                material.all_textures().map(move |(_, texture)| (texture, handle.index()))
+            }),
+        );
         self.users.sort_unstable_by_key(|(texture, _)| texture.index());
     }
 
