@@ -9,8 +9,8 @@ pub struct Sampler {
     pub magnified: Filter,
     /// Where it is reduced.
     pub reduced: Filter,
-    /// Between mip levels.
-    pub levels: Filter,
+    /// Between mip levels; `None` shows the first level alone.
+    pub levels: Option<Filter>,
     /// The most samples along the direction in which a surface is seen at a slant, from 1 for one to 16; other numbers
     /// count as the nearest of these. It has an effect if all filters are linear. The software backend takes one.
     pub anisotropy: u8,
@@ -44,7 +44,7 @@ impl Sampler {
         outside: [Outside::Repeat; 2],
         magnified: Filter::Linear,
         reduced: Filter::Linear,
-        levels: Filter::Linear,
+        levels: Some(Filter::Linear),
         anisotropy: 1,
     };
 
@@ -53,12 +53,13 @@ impl Sampler {
 
     /// Repeats the texture, and shows the nearest texel of the nearest level.
     pub const NEAREST: Self =
-        Self { magnified: Filter::Nearest, reduced: Filter::Nearest, levels: Filter::Nearest, ..Self::REPEAT };
+        Self { magnified: Filter::Nearest, reduced: Filter::Nearest, levels: Some(Filter::Nearest), ..Self::REPEAT };
 
     /// The anisotropy that it has on a device: 1 unless all filters are linear.
     #[cfg(feature = "wgpu")]
     pub(crate) fn effective_anisotropy(self) -> u16 {
-        let is_linear = [self.magnified, self.reduced, self.levels].iter().all(|filter| *filter == Filter::Linear);
+        let filters = [Some(self.magnified), Some(self.reduced), self.levels];
+        let is_linear = filters.iter().all(|filter| *filter == Some(Filter::Linear));
         if is_linear { u16::from(self.anisotropy).clamp(1, 16) } else { 1 }
     }
 }

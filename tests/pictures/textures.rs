@@ -285,8 +285,12 @@ fn samplers() -> Result<(), Failed> {
         let texels: Vec<u8> = (0..width * height * 4).map(|_| random.below(256) as u8).collect();
         let texture = Texture::new("noise", width, height, texels)?;
         for outside in [Outside::Repeat, Outside::Mirror, Outside::Clamp] {
-            for filter in [Filter::Linear, Filter::Nearest] {
-                let (magnified, reduced, levels) = (filter, filter, filter);
+            for (filter, levels) in [
+                (Filter::Linear, Some(Filter::Linear)),
+                (Filter::Nearest, Some(Filter::Nearest)),
+                (Filter::Linear, None),
+            ] {
+                let (magnified, reduced) = (filter, filter);
                 let sampler =
                     Sampler { outside: [outside, Outside::Repeat], magnified, reduced, levels, anisotropy: 1 };
                 let mut scene = wall(1, &[texture.clone().sampled_by(sampler)], Blend::None)?;

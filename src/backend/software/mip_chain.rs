@@ -42,8 +42,12 @@ impl MipChain {
         let (sampler, last) = (self.class.sampler, self.levels.len() - 1);
         let filter = if longest > R::one() { sampler.reduced } else { sampler.magnified };
         let level = longest.max(R::one()).log2().min(R::of(last as f64));
-        if sampler.levels == Filter::Nearest {
-            return self.sample_level(filter, (level + R::of(0.5)).floor().as_f64() as usize, uv);
+        match sampler.levels {
+            Some(Filter::Linear) => {}
+            Some(Filter::Nearest) => {
+                return self.sample_level(filter, (level + R::of(0.5)).floor().as_f64() as usize, uv);
+            }
+            None => return self.sample_level(filter, 0, uv),
         }
         let finer = level.floor();
         let fraction = level - finer;

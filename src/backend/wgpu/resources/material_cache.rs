@@ -229,9 +229,12 @@ fn new_sampler(device: &wgpu::Device, label: &str, sampler: Sampler) -> wgpu::Sa
         mag_filter: filter(sampler.magnified),
         min_filter: filter(sampler.reduced),
         mipmap_filter: match sampler.levels {
-            Filter::Nearest => wgpu::MipmapFilterMode::Nearest,
-            Filter::Linear => wgpu::MipmapFilterMode::Linear,
+            Some(Filter::Linear) => wgpu::MipmapFilterMode::Linear,
+            Some(Filter::Nearest) | None => wgpu::MipmapFilterMode::Nearest,
         },
+        // A quarter of a level, so that a device tells what is reduced from what is magnified (Vulkan,
+        // `VkSamplerCreateInfo`).
+        lod_max_clamp: if sampler.levels.is_some() { wgpu::SamplerDescriptor::default().lod_max_clamp } else { 0.25 },
         anisotropy_clamp: sampler.effective_anisotropy(),
         ..wgpu::SamplerDescriptor::default()
     })
